@@ -1,0 +1,1 @@
+"""Finds the equation behind measured data."""

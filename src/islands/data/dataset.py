@@ -1,0 +1,162 @@
+"""A record: inputs and one output on a common, uniform time grid, in one or several recordings."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dataset:
+    """Several inputs and one output of one system, sampled at ``dt``.
+
+    Attributes
+    ----------
+    u : ndarray, shape (samples, inputs)
+        The inputs, finite.
+    y : ndarray, shape (samples,)
+        The output. NaN marks a missing value: a free run reads the output in its warm-up alone, so the rest
+        may be missing; estimation asks for a complete one.
+    dt : float
+        Sampling time in seconds.
+    input_names, output_name
+        Column names, as measured: ``u_V``.
+    input_units, output_unit
+        Units, ``""`` where unknown.
+    segments : tuple of int
+        Lengths in samples of the recordings that follow one another; they sum to ``samples``. No regressor
+        reaches across a boundary.
+    start : float
+        Time of the first sample in seconds.
+
+    Raises
+    ------
+    RecordError
+        Shapes, segments or ``dt`` do not fit together.
+    """
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    dt: float
+    input_names: tuple[str, ...] = ("u",)
+    output_name: str = "y"
+    input_units: tuple[str, ...] = ("",)
+    output_unit: str = ""
+    segments: tuple[int, ...] = ()
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        u = np.array(self.u, dtype=np.float64, order="C", ndmin=1)
+        y = np.array(self.y, dtype=np.float64)
+        if u.ndim == 1:
+            u = u[:, None]
+        if u.ndim != 2 or y.ndim != 1 or len(u) != len(y):
+            raise RecordError(
+                "inputs are a (samples, inputs) array, the output a (samples,) array of the same length; "
+                f"got {np.shape(self.u)} and {np.shape(self.y)}"
+            )
+        inputs = u.shape[1]
+        names = self.input_names if len(self.input_names) == inputs else _numbered(self.input_names, inputs)
+        units = self.input_units if len(self.input_units) == inputs else ("",) * inputs
+        segments = self.segments or (len(y),)
+        if not (np.isfinite(self.dt) and self.dt > 0):
+            raise RecordError(f"the sampling time must be a positive number of seconds, got {self.dt}")
+        if sum(segments) != len(y) or min(segments) < 0:
+            raise RecordError(f"the segments' lengths {segments} do not sum to the {len(y)} samples")
+        if not np.isfinite(u).all():
+            sample, channel = np.argwhere(~np.isfinite(u))[0]
+            raise RecordError(
+                f"input {names[channel]} is not finite at sample {sample}: repair or cut the record"
+            )
+        for array in (u, y):
+            array.setflags(write=False)
+        for field, value in (
+            ("u", u),
+            ("y", y),
+            ("input_names", tuple(names)),
+            ("input_units", tuple(units)),
+            ("segments", segments),
+        ):
+            object.__setattr__(self, field, value)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.y)
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+        return self.u.shape[1]
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of every sample in seconds, shape (samples,), without a pause between recordings."""
+        return self.start + self.dt * np.arange(self.samples)
+
+    @property
+    def bounds(self) -> tuple[tuple[int, int], ...]:
+        """First sample and one past the last of every segment."""
+        ends = np.cumsum(self.segments)
+        return tuple((int(end) - length, int(end)) for end, length in zip(ends, self.segments, strict=True))
+
+    @property
+    def output_range(self) -> float:
+        """``max(y) - min(y)`` over the samples that are there; the scale of MAPE, equation (7)."""
+        return float(np.nanmax(self.y) - np.nanmin(self.y))
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def __getitem__(self, rows: slice) -> "Dataset":
+        """Return the samples of a slice (step 1) as a record of its own; segments are cut, none is joined."""
+        first, last, step = rows.indices(self.samples)
+        if step != 1 or last <= first:
+            raise RecordError(f"take a non-empty slice of step 1 of the record's {self.samples} samples")
+        segments = tuple(
+            min(last, end) - max(first, begin)
+            for begin, end in self.bounds
+            if min(last, end) > max(first, begin)
+        )
+        return replace(
+            self,
+            u=self.u[first:last],
+            y=self.y[first:last],
+            segments=segments,
+            start=self.start + first * self.dt,
+        )
+
+
+def _numbered(names: tuple[str, ...], inputs: int) -> tuple[str, ...]:
+    if names == ("u",):
+        return tuple(f"u{index + 1}" for index in range(inputs))
+    raise RecordError(f"{inputs} inputs need {inputs} names, got {names}")
+
+
+def join(recordings: tuple[Dataset, ...]) -> Dataset:
+    """Join several recordings of one system; each stays a segment of its own.
+
+    Raises
+    ------
+    RecordError
+        The recordings differ in names, units or sampling time.
+    """
+    first = recordings[0]
+    for other in recordings[1:]:
+        same = (other.input_names, other.output_name, other.input_units, other.output_unit)
+        if same != (first.input_names, first.output_name, first.input_units, first.output_unit):
+            raise RecordError(
+                "recordings of one system have the same columns and units: rename or convert them first"
+            )
+        if abs(other.dt - first.dt) > 1e-6 * first.dt:
+            raise RecordError(
+                f"recordings were sampled at {first.dt} s and {other.dt} s: resample one of them"
+            )
+    return replace(
+        first,
+        u=np.concatenate([recording.u for recording in recordings]),
+        y=np.concatenate([recording.y for recording in recordings]),
+        segments=tuple(length for recording in recordings for length in recording.segments),
+    )
