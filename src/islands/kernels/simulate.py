@@ -6,8 +6,11 @@ row (layout ``[block][time][lane]``). Intervals of one sample are one-step-ahead
 is the free run.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from islands.kernels.machine import execute
 
@@ -15,121 +18,105 @@ from islands.kernels.machine import execute
 CHUNK = 64
 
 
+class Layout(NamedTuple):
+    """A record, cut into intervals and laid out in blocks of lanes.
+
+    Attributes
+    ----------
+    signals : ndarray of float64, shape (channel, flat)
+        Channel 0 is the measured output, then come the inputs.
+    block_offset : ndarray of int64, shape (block,)
+        Where in a channel the first warm-up row of the block stands.
+    block_lanes : ndarray of int64, shape (block,)
+        Lanes of the block.
+    row_stride : int
+        Distance between two rows (two times) of a block.
+    start : ndarray of int64, shape (lane of all blocks,)
+        Sample of the interval's first prediction.
+    length : ndarray of int64, shape (lane of all blocks,)
+        Samples of the interval; not increasing within a block.
+    width : int
+        The most lanes of a block.
+    warm_up : int
+        Rows before the first predicted one.
+    """
+
+    signals: NDArray[np.float64]
+    block_offset: NDArray[np.int64]
+    block_lanes: NDArray[np.int64]
+    row_stride: int
+    start: NDArray[np.int64]
+    length: NDArray[np.int64]
+    width: int
+    warm_up: int
+
+
 @njit(nogil=True, cache=True, error_model="numpy")
 def simulate(
-    signals,  # float64 [channel][flat]: channel 0 is the measured output, then the inputs
-    block_offset,  # int64 [block]: where the block's first warm-up row starts in a channel
-    block_lanes,  # int64 [block]
-    row_stride,  # distance between two rows (two times) of a block in a channel
-    start,  # int64 [lane of all blocks]: sample at which the interval's first prediction stands
-    length,  # int64 [lane of all blocks]: samples of the interval, not increasing within a block
-    width,  # lanes for which the arena has room
-    warm_up,  # rows before the first predicted one
-    code,  # int64 [instruction, 4]: operation, target temporary, first operand, second operand
-    addresses,  # int64 [instruction]: row function of a CALL
-    operands,  # int64 [operand, 2]: channel and lag, or -1 and the index of a temporary
-    constants,  # float64 [constant]: the first temporaries hold these
-    temporaries,  # number of temporary rows
-    factors,  # int64 [term, 4]: operands whose product is the term
-    degree,  # int64 [term]: how many of them there are
+    program,
     theta,  # float64 [term]
+    layout,
     bound,  # a larger absolute prediction is a divergence
     patient,  # False: stop at the end of the first chunk in which an interval diverged
-    squared_error,  # out, float64 [lane of all blocks]: sum over the interval
+    squared_error,  # out, float64 [lane of all blocks]: sum over the interval, in the order of time
     diverged,  # out, int64 [lane of all blocks]: step at which the interval left the bound, or -1
     predicted,  # out, float64 [sample] in the record's order; size 0: not wanted
 ):
-    """Simulate every interval; see the comments at the arguments for shapes.
-
-    Each interval's squared error is summed in the order of time. The caller sums over intervals.
-    """
+    """Simulate every interval from measured values; the caller sums over intervals."""
+    signals, warm_up, width, row_stride = layout.signals, layout.warm_up, layout.width, layout.row_stride
+    start, length = layout.start, layout.length
+    code, addresses = program.code, program.addresses
     channels = signals.shape[0]
     row = np.uint64(width)
     history = warm_up + CHUNK
-    arena = np.empty((channels * history + temporaries) * width)
+    arena = np.empty((channels * history + program.temporaries) * width)
     first_temporary = np.uint64(channels * history * width)
-    for index in range(constants.size):
+    home, stride = _operand_rows(program, first_temporary, history, warm_up, row)
+    place = np.empty_like(home)
+    for index in range(program.constants.size):
         at = first_temporary + np.uint64(index) * row
         for lane in range(row):
-            arena[at + lane] = constants[index]
-
-    n_operands = operands.shape[0]
-    home = np.empty(n_operands, np.uint64)
-    stride = np.empty(n_operands, np.uint64)
-    for index in range(n_operands):
-        channel, lag = operands[index]
-        if channel < 0:
-            home[index] = first_temporary + np.uint64(lag) * row
-            stride[index] = np.uint64(0)
-        else:
-            home[index] = np.uint64(channel * history + warm_up - lag) * row
-            stride[index] = row
-    place = np.empty(n_operands, np.uint64)
+            arena[at + lane] = program.constants[index]
 
     y_home = np.uint64(warm_up) * row
     lane_base = 0
-    for block in range(block_offset.size):
-        lanes = np.uint64(block_lanes[block])
-        offset = block_offset[block]
-        for lane in range(lane_base, lane_base + block_lanes[block]):
+    for block in range(layout.block_offset.size):
+        lanes = np.uint64(layout.block_lanes[block])
+        offset = layout.block_offset[block]
+        for lane in range(lane_base, lane_base + layout.block_lanes[block]):
             squared_error[lane] = 0.0
             diverged[lane] = -1
-        steps = length[lane_base]
         for channel in range(channels):
-            _copy_rows(
-                signals,
-                channel,
-                offset,
-                row_stride,
-                arena,
-                np.uint64(channel * history) * row,
-                row,
-                lanes,
-                warm_up,
-            )
-        done = 0
+            target = np.uint64(channel * history) * row
+            _copy_rows(signals, channel, offset, row_stride, arena, target, row, lanes, warm_up)
+        steps = length[lane_base]
         active = lanes
+        done = 0
         while done < steps:
             chunk = min(CHUNK, steps - done)
-            for channel in range(1, channels):
-                _copy_rows(
-                    signals,
-                    channel,
-                    offset + (warm_up + done) * row_stride,
-                    row_stride,
-                    arena,
-                    np.uint64(channel * history + warm_up) * row,
-                    row,
-                    lanes,
-                    chunk,
-                )
-            for index in range(n_operands):
-                place[index] = home[index]
-            left_bound = 0
-            y_row = y_home
             measured = offset + (warm_up + done) * row_stride
+            for channel in range(1, channels):
+                target = np.uint64(channel * history + warm_up) * row
+                _copy_rows(signals, channel, measured, row_stride, arena, target, row, lanes, chunk)
+            place[:] = home
+            y_row = y_home
+            outside = 0
             for step in range(done, done + chunk):
-                while active > 0 and length[lane_base + np.int64(active) - 1] <= step:
+                while length[lane_base + np.int64(active) - 1] <= step:
                     active -= np.uint64(1)
                 for index in range(code.shape[0]):
-                    execute(
-                        arena,
-                        code[index, 0],
-                        first_temporary + np.uint64(code[index, 1]) * row,
-                        place[code[index, 2]],
-                        place[code[index, 3]],
-                        active,
-                        addresses[index],
-                    )
-                _sum_terms(arena, factors, degree, theta, place, y_row, active)
-                left_bound += _add_squared_error(
+                    target = first_temporary + np.uint64(code[index, 1]) * row
+                    first, second = place[code[index, 2]], place[code[index, 3]]
+                    execute(arena, code[index, 0], target, first, second, active, addresses[index])
+                _sum_terms(arena, program.factors, program.degree, theta, place, y_row, active)
+                outside += _add_squared_error(
                     arena, y_row, signals, measured, squared_error, lane_base, active, bound
                 )
-                for index in range(n_operands):
+                for index in range(place.size):
                     place[index] += stride[index]
                 y_row += row
                 measured += row_stride
-            if left_bound > 0:
+            if outside > 0:
                 _find_divergence(arena, y_home, row, lane_base, lanes, length, done, chunk, bound, diverged)
                 if not patient:
                     return
@@ -140,7 +127,24 @@ def simulate(
                 for index in range(np.uint64(warm_up) * row):
                     arena[base + index] = arena[base + index + np.uint64(chunk) * row]
             done += chunk
-        lane_base += block_lanes[block]
+        lane_base += layout.block_lanes[block]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _operand_rows(program, first_temporary, history, warm_up, row):
+    """Return every operand's offset at the first step, and by how much it moves with a step."""
+    count = program.operands.shape[0]
+    home = np.empty(count, np.uint64)
+    stride = np.empty(count, np.uint64)
+    for index in range(count):
+        channel, lag = program.operands[index]
+        if channel < 0:
+            home[index] = first_temporary + np.uint64(lag) * row
+            stride[index] = np.uint64(0)
+        else:
+            home[index] = np.uint64(channel * history + warm_up - lag) * row
+            stride[index] = row
+    return home, stride
 
 
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")

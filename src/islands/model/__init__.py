@@ -1,0 +1,1 @@
+"""The algebra of models: primitives, expressions, regressors, clusters, models and their text."""

@@ -1,0 +1,163 @@
+"""Expressions over lagged signals: the genes of evolution and the regressors of a model.
+
+An expression is a tree of four kinds of node, each a frozen value. The signals are numbered: channel 0 is the
+output y, channel i >= 1 the input u_i. A leaf on its own stands for one sample back, and a back-shift adds to
+the lags of everything under it, so ``q5(q5(u1))`` is ``u1(k-11)`` (the paper, section 5.1).
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from islands.errors import ModelError
+
+
+@dataclass(frozen=True, slots=True)
+class Primitive:
+    """A function that may stand in an expression.
+
+    A primitive is its plain Python function on floats; all else is what the algebra may assume of it. Two
+    primitives of one name are equal.
+
+    Attributes
+    ----------
+    name : str
+        As it is written in text: ``tanh``.
+    arity : int
+        1 or 2.
+    scalar : callable
+        ``arity`` floats to a finite float, for every finite argument ("protected"); built of arithmetic and
+        the functions of ``math``, so that it also compiles.
+    latex : str
+        Format with ``{0}`` and ``{1}`` for the arguments.
+    parity : -1, 0 or 1
+        1: f(-x) = f(x). -1: f(-x) = -f(x). 0: neither. Unary primitives alone.
+    degree : float or None
+        f(c x) = c^degree f(x) for every c > 0; None: not homogeneous. Unary primitives alone.
+    commutative : bool
+        f(a, b) = f(b, a).
+    simplify : callable or None
+        The canonical arguments to an equal, simpler expression, or to None where there is none.
+    """
+
+    name: str
+    arity: int
+    scalar: Callable[..., float] = field(compare=False)
+    latex: str = field(compare=False)
+    parity: int = 0
+    degree: float | None = None
+    commutative: bool = False
+    simplify: "Callable[..., Expression | None] | None" = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Lagged:
+    """A signal some samples back: ``Lagged(0, 2)`` is y(k-2), ``Lagged(1, 1)`` is u1(k-1)."""
+
+    channel: int
+    lag: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number."""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """The back-shift operator: ``samples`` more on every lag of ``argument``."""
+
+    samples: int
+    argument: "Expression"
+
+
+@dataclass(frozen=True, slots=True)
+class Apply:
+    """A primitive applied to its arguments; sums and products in canonical form take any number of them."""
+
+    primitive: Primitive
+    arguments: "tuple[Expression, ...]"
+
+
+Expression = Lagged | Constant | Shift | Apply
+
+
+def children(expression: Expression) -> tuple[Expression, ...]:
+    """Return the nodes directly under the root."""
+    match expression:
+        case Shift(_, argument):
+            return (argument,)
+        case Apply(_, arguments):
+            return arguments
+        case _:
+            return ()
+
+
+def walk(expression: Expression) -> Iterator[Expression]:
+    """Yield every node, the root first, from left to right."""
+    yield expression
+    for child in children(expression):
+        yield from walk(child)
+
+
+def height(expression: Expression) -> int:
+    """Count the edges from the root to the deepest leaf, back-shifts included (the paper's GP height)."""
+    return max((1 + height(child) for child in children(expression)), default=0)
+
+
+def unshifted(expression: Expression, samples: int = 0) -> Expression:
+    """Push every back-shift down to the leaves, ``samples`` more than written."""
+    match expression:
+        case Lagged(channel, lag):
+            return Lagged(channel, lag + samples)
+        case Shift(more, argument):
+            return unshifted(argument, samples + more)
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(unshifted(argument, samples) for argument in arguments))
+        case Constant():
+            return expression
+
+
+def lags(expression: Expression) -> frozenset[tuple[int, int]]:
+    """Return the pairs (channel, lag) that the expression reads."""
+    return frozenset(
+        (node.channel, node.lag) for node in walk(unshifted(expression)) if isinstance(node, Lagged)
+    )
+
+
+def value(expression: Expression, signal: Callable[[int, int], float]) -> float:
+    """Evaluate an expression: the definition of its meaning, and the oracle of every kernel.
+
+    Parameters
+    ----------
+    signal : callable
+        ``signal(channel, lag)`` returns the number that stands ``lag`` samples back in the channel.
+    """
+    match expression:
+        case Lagged(channel, lag):
+            return signal(channel, lag)
+        case Constant(number):
+            return number
+        case Shift(samples, argument):
+            return value(argument, lambda channel, lag: signal(channel, lag + samples))
+        case Apply(primitive, arguments):
+            values = [value(argument, signal) for argument in arguments]
+            result = values[0] if len(values) > 1 else primitive.scalar(values[0])
+            for other in values[1:]:
+                result = primitive.scalar(result, other)
+            return result
+    raise ModelError(f"{expression!r} is no expression: use Lagged, Constant, Shift or Apply")
+
+
+def content(expression: Expression) -> tuple[object, ...]:
+    """Return a key that orders expressions by what they say, the same on every machine and in every run."""
+    match expression:
+        case Lagged(channel, lag):
+            return (0, channel, lag)
+        case Apply(primitive, arguments):
+            return (1, primitive.name, len(arguments), *(content(argument) for argument in arguments))
+        case Shift(samples, argument):
+            return (2, samples, content(argument))
+        case Constant(number):
+            return (3, number)

@@ -1,0 +1,230 @@
+"""The table of primitives: one entry here, and a function can be evolved, compiled, written and read.
+
+The paper uses multiplication, subtraction and sign (its phi1 and phi2) and the back-shifts q1 .. q5. A user's
+own joins by name with `primitive`, a plain scalar function, in a table of the caller's.
+"""
+
+import inspect
+import math
+import re
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from islands.errors import ModelError
+from islands.model.expression import Apply, Constant, Expression, Primitive
+
+#: Names that stand for signals, time and back-shifts in text.
+SIGNALS = re.compile(r"y|u\d*|k|q\d+")
+
+#: Arguments on which a new primitive has to be finite and keep what it declares.
+_PROBES = (0.0, 1.0, -1.0, 0.3, -0.7, 2.5, -41.0, 1e3, -1e3, 1e-12, 1e6)
+
+#: Below this a divisor or a logarithm's argument counts as zero.
+TINY = 1e-9
+
+#: exp is clipped at this argument, so that a free run diverges by its bound and not by an overflow.
+LARGEST_EXPONENT = 50.0
+
+
+def _multiply(a: float, b: float) -> float:
+    return a * b
+
+
+def _subtract(a: float, b: float) -> float:
+    return a - b
+
+
+def _add(a: float, b: float) -> float:
+    return a + b
+
+
+def _sign(a: float) -> float:
+    return float(a > 0.0) - float(a < 0.0)
+
+
+def _sign_of_difference(a: float, b: float) -> float:
+    return float(a > b) - float(a < b)
+
+
+def _divide(a: float, b: float) -> float:
+    return 1.0 if abs(b) < TINY else a / b
+
+
+def _absolute(a: float) -> float:
+    return abs(a)
+
+
+def _square(a: float) -> float:
+    return a * a
+
+
+def _cube(a: float) -> float:
+    return a * a * a
+
+
+def _root(a: float) -> float:
+    return math.sqrt(abs(a))
+
+
+def _exponential(a: float) -> float:
+    return math.exp(min(a, LARGEST_EXPONENT))
+
+
+def _logarithm(a: float) -> float:
+    return 0.0 if abs(a) < TINY else math.log(abs(a))
+
+
+def _sine(a: float) -> float:
+    return math.sin(a)
+
+
+def _cosine(a: float) -> float:
+    return math.cos(a)
+
+
+def _hyperbolic_tangent(a: float) -> float:
+    return math.tanh(a)
+
+
+def _larger(a: float, b: float) -> float:
+    return a if a > b else b
+
+
+def _smaller(a: float, b: float) -> float:
+    return a if a < b else b
+
+
+MUL = Primitive("mul", 2, _multiply, r"{0} {1}", commutative=True)
+ADD = Primitive("add", 2, _add, r"{0} + {1}", commutative=True)
+SUB = Primitive("sub", 2, _subtract, r"{0} - {1}")
+
+
+def _sign_of_sign(a: Expression) -> Expression | None:
+    return a if isinstance(a, Apply) and a.primitive == SIGN else None
+
+
+SIGN = Primitive(
+    "sign", 1, _sign, r"\operatorname{{sign}}({0})", parity=-1, degree=0.0, simplify=_sign_of_sign
+)
+
+
+def _quotient_of_equals(a: Expression, b: Expression) -> Expression | None:
+    return Constant(1.0) if a == b else None
+
+
+def _one_of_equals(a: Expression, b: Expression) -> Expression | None:
+    return a if a == b else None
+
+
+_BUILT_IN = (
+    MUL,
+    SUB,
+    SIGN,
+    Primitive("phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=lambda a, b: Apply(SUB, (a, b))),
+    Primitive(
+        "phi2",
+        2,
+        _sign_of_difference,
+        r"\operatorname{{sign}}({0} - {1})",
+        simplify=lambda a, b: Apply(SIGN, (Apply(SUB, (a, b)),)),
+    ),
+    ADD,
+    Primitive("div", 2, _divide, r"\frac{{{0}}}{{{1}}}", simplify=_quotient_of_equals),
+    Primitive("abs", 1, _absolute, r"\left|{0}\right|", parity=1, degree=1.0),
+    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=lambda a: Apply(MUL, (a, a))),
+    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=lambda a: Apply(MUL, (a, a, a))),
+    Primitive("sqrt", 1, _root, r"\sqrt{{\left|{0}\right|}}", parity=1, degree=0.5),
+    Primitive("exp", 1, _exponential, r"\exp({0})"),
+    Primitive("log", 1, _logarithm, r"\ln\left|{0}\right|", parity=1),
+    Primitive("sin", 1, _sine, r"\sin({0})", parity=-1),
+    Primitive("cos", 1, _cosine, r"\cos({0})", parity=1),
+    Primitive("tanh", 1, _hyperbolic_tangent, r"\tanh({0})", parity=-1),
+    Primitive("max", 2, _larger, r"\max({0}, {1})", commutative=True, simplify=_one_of_equals),
+    Primitive("min", 2, _smaller, r"\min({0}, {1})", commutative=True, simplify=_one_of_equals),
+)
+
+PRIMITIVES: Mapping[str, Primitive] = MappingProxyType({entry.name: entry for entry in _BUILT_IN})
+
+
+def primitive(
+    name: str, scalar: Callable[..., float], latex: str = "", parity: int = 0, commutative: bool = False
+) -> Primitive:
+    """Make a primitive of the user's own from a plain scalar function, and check what it declares.
+
+    Parameters
+    ----------
+    name : str
+        A Python identifier that no built-in primitive and no signal has.
+    scalar : callable
+        One or two floats to a float, of arithmetic and the functions of ``math``.
+    latex : str
+        Format with ``{0}`` and ``{1}``; made of the name where it is empty.
+    parity : -1, 0 or 1
+        As in `Primitive`.
+    commutative : bool
+        As in `Primitive`.
+
+    Raises
+    ------
+    ModelError
+        The name is taken, the function takes other than one or two arguments, is not finite at zero, at a
+        negative or at a large argument, or is not as it declares.
+    """
+    if not name.isidentifier() or name in PRIMITIVES or name[0] in "yuq":
+        raise ModelError(
+            f"{name!r} can't name a primitive: take an identifier that is not in use and not y, u, q .."
+        )
+    arity = len(inspect.signature(scalar).parameters)
+    if arity not in (1, 2):
+        raise ModelError(f"primitive {name!r} takes {arity} arguments: a primitive takes one or two")
+    made = Primitive(
+        name,
+        arity,
+        scalar,
+        latex or rf"\operatorname{{{{{name}}}}}(" + ", ".join(f"{{{i}}}" for i in range(arity)) + ")",
+        parity=parity,
+        commutative=commutative,
+    )
+    check(made)
+    return made
+
+
+def check(entry: Primitive) -> None:
+    """Verify that a primitive is finite everywhere and keeps the parity, degree and symmetry it declares.
+
+    Raises
+    ------
+    ModelError
+        It does not: the message names the argument.
+    """
+    probes = [(a,) for a in _PROBES] if entry.arity == 1 else [(a, b) for a in _PROBES for b in _PROBES]
+    for arguments in probes:
+        result = _finite(entry, arguments)
+        if entry.parity and not _close(result * entry.parity, _finite(entry, tuple(-a for a in arguments))):
+            raise ModelError(
+                f"primitive {entry.name!r} declares parity {entry.parity}, not so at {arguments}"
+            )
+        if entry.commutative and result != _finite(entry, arguments[::-1]):
+            raise ModelError(f"primitive {entry.name!r} declares that it commutes, not so at {arguments}")
+        if entry.degree is not None:
+            scaled = _finite(entry, tuple(3.0 * a for a in arguments))
+            if not _close(scaled, 3.0**entry.degree * result):
+                raise ModelError(
+                    f"primitive {entry.name!r} declares degree {entry.degree}, not so at {arguments}"
+                )
+
+
+def _finite(entry: Primitive, arguments: tuple[float, ...]) -> float:
+    try:
+        result = float(entry.scalar(*arguments))
+    except (ArithmeticError, ValueError) as error:
+        raise ModelError(
+            f"primitive {entry.name!r} fails at {arguments} ({error}): protect it there"
+        ) from error
+    if not math.isfinite(result):
+        raise ModelError(f"primitive {entry.name!r} is {result} at {arguments}: protect it there")
+    return result
+
+
+def _close(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=1e-12, abs_tol=1e-300)

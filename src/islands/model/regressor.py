@@ -1,0 +1,170 @@
+"""Canonical form: one way to write every regressor, so that equal ones are seen to be equal.
+
+Back-shifts stand at the leaves, products and sums are flat and in the order of their content, factors that
+are numbers are taken out (a regressor's own factor belongs to its parameter), equal terms of a sum are
+merged. ``sign^3`` is ``sign``, but ``sign^2`` is never 1: it is 0 where the input rests.
+"""
+
+from dataclasses import dataclass
+
+from islands.errors import ModelError
+from islands.model.expression import (
+    Apply,
+    Constant,
+    Expression,
+    Lagged,
+    Primitive,
+    Shift,
+    content,
+    lags,
+    unshifted,
+)
+from islands.model.primitives import ADD, MUL, SIGN, SUB
+
+_ONE = Constant(1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Regressor:
+    """An expression in canonical form, that reads the past alone. Make it with `regressor`."""
+
+    expression: Expression
+
+    @property
+    def lags(self) -> frozenset[tuple[int, int]]:
+        """Pairs (channel, lag) that the regressor reads; channel 0 is y."""
+        return lags(self.expression)
+
+    @property
+    def maximum_lag(self) -> int:
+        """The deepest lag; 0 for a constant."""
+        return max((lag for _, lag in self.lags), default=0)
+
+    @property
+    def content(self) -> tuple[object, ...]:
+        """Key that orders regressors: first the plain ones, then products, by what they say."""
+        return content(self.expression)
+
+
+def regressor(expression: Expression) -> tuple[float, Regressor | None]:
+    """Bring an expression into canonical form.
+
+    Returns
+    -------
+    factor : float
+        The expression equals ``factor`` times the regressor.
+    regressor : Regressor or None
+        None where the expression is identically zero; then the factor is 0.
+
+    Raises
+    ------
+    ModelError
+        A lag is under 1: the regressor would look at the present or the future.
+    """
+    factor, core = canonical(expression)
+    for channel, lag in sorted(lags(core)):
+        if lag < 1:
+            raise ModelError(
+                f"a regressor reads the past alone: channel {channel} has lag {lag}, take 1 or more"
+            )
+    return (factor, Regressor(core)) if factor else (0.0, None)
+
+
+def canonical(expression: Expression) -> tuple[float, Expression]:
+    """Return (factor, core) with ``expression = factor * core``; zero is (0, 1) and a number c is (c, 1)."""
+    match expression:
+        case Lagged():
+            return 1.0, expression
+        case Constant(number):
+            return number, _ONE
+        case Shift():
+            return canonical(unshifted(expression))
+        case Apply(primitive, arguments):
+            parts = [canonical(argument) for argument in arguments]
+            if primitive == MUL:
+                return _product(parts)
+            if primitive in (ADD, SUB):
+                negate = -1.0 if primitive == SUB else 1.0
+                return _sum([parts[0], *((negate * factor, core) for factor, core in parts[1:])])
+            return _function(primitive, parts)
+
+
+def _product(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
+    factor = 1.0
+    cores: list[Expression] = []
+    for number, core in parts:
+        factor *= number
+        cores.extend(_arguments_of(core, MUL))
+    if factor == 0.0:
+        return 0.0, _ONE
+    cores = sorted((core for core in _even_signs_apart(cores) if core != _ONE), key=content)
+    if not cores:
+        return factor, _ONE
+    return factor, cores[0] if len(cores) == 1 else Apply(MUL, tuple(cores))
+
+
+def _even_signs_apart(cores: list[Expression]) -> list[Expression]:
+    """Reduce powers of a sign: odd ones to the first, even ones to the second, which is not 1 at rest."""
+    signs = [core for core in cores if isinstance(core, Apply) and core.primitive == SIGN]
+    kept = [core for core in cores if core not in signs]
+    for sign in dict.fromkeys(signs):
+        kept += [sign] if signs.count(sign) % 2 else [sign, sign]
+    return kept
+
+
+def _sum(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
+    weights: dict[Expression, float] = {}
+    for outer, core in parts:
+        for inner, term in _terms_of(core):
+            weights[term] = weights.get(term, 0.0) + outer * inner
+    terms = sorted(
+        ((core, weight) for core, weight in weights.items() if weight), key=lambda t: content(t[0])
+    )
+    if not terms:
+        return 0.0, _ONE
+    leading = terms[0][1]
+    if len(terms) == 1:
+        return leading, terms[0][0]
+    (first, _), (second, weight) = terms[:2]
+    if len(terms) == 2 and weight == -leading:
+        return leading, Apply(SUB, (first, second))
+    return leading, Apply(ADD, tuple(_times(weight / leading, core) for core, weight in terms))
+
+
+def _terms_of(core: Expression) -> list[tuple[float, Expression]]:
+    if isinstance(core, Apply) and core.primitive == SUB:
+        return [(1.0, core.arguments[0]), (-1.0, core.arguments[1])]
+    if isinstance(core, Apply) and core.primitive == ADD:
+        return [canonical(term) for term in core.arguments]
+    return [(1.0, core)]
+
+
+def _function(primitive: Primitive, parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
+    """Fold constants, take signs and scales out of odd, even and homogeneous functions, order arguments."""
+    if all(core == _ONE for _, core in parts):
+        return primitive.scalar(*(factor for factor, _ in parts)), _ONE
+    outer = 1.0
+    if primitive.parity and parts[0][0] < 0.0:
+        outer = float(primitive.parity)
+        parts = [(-parts[0][0], parts[0][1])]
+    if primitive.degree is not None and parts[0][0] > 0.0:
+        outer *= parts[0][0] ** primitive.degree
+        parts = [(1.0, parts[0][1])]
+    arguments = [_times(factor, core) for factor, core in parts]
+    if primitive.commutative:
+        arguments.sort(key=content)
+    simpler = primitive.simplify(*arguments) if primitive.simplify else None
+    if simpler is None:
+        return outer, Apply(primitive, tuple(arguments))
+    factor, core = canonical(simpler)
+    return outer * factor, core
+
+
+def _times(factor: float, core: Expression) -> Expression:
+    if core == _ONE:
+        return Constant(factor)
+    return core if factor == 1.0 else Apply(MUL, (Constant(factor), *_arguments_of(core, MUL)))
+
+
+def _arguments_of(core: Expression, primitive: Primitive) -> tuple[Expression, ...]:
+    return core.arguments if isinstance(core, Apply) and core.primitive == primitive else (core,)

@@ -1,0 +1,1 @@
+"""Predictions of a model: one step ahead, multiple shooting, free run."""

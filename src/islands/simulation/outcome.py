@@ -1,0 +1,46 @@
+"""What becomes of an evaluation: success, or a failure that happens a thousand times in a search.
+
+A failure is a value with a reason and advice, never an exception: exceptions are for a caller's mistake.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Verdict(Enum):
+    """The kinds of outcome; the value is the advice."""
+
+    OK = "nothing to do"
+    DIVERGED = "the prediction left the bound: take fewer terms, other terms, or constrain the parameters"
+    SINGULAR = (
+        "the regressors depend on each other on this data: remove one, or excite the system more richly"
+    )
+    INFEASIBLE = "the structure cannot meet the constraints: add the regressor that the reason names"
+    TOO_FEW_ROWS = (
+        "there are not more rows than parameters: take a longer record, fewer terms or smaller lags"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A verdict and its reason.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        Its name is the kind, its value the advice.
+    reason : str
+        What happened, where; empty for OK.
+    """
+
+    verdict: Verdict = Verdict.OK
+    reason: str = ""
+
+    def __bool__(self) -> bool:
+        return self.verdict is Verdict.OK
+
+    def __str__(self) -> str:
+        return "ok" if self else f"{self.verdict.name.lower()}: {self.reason}; {self.verdict.value}"
+
+
+OK = Outcome()
