@@ -19,7 +19,6 @@ def gram(
     rows,
     warm_up,  # as in `columns`
     out,  # out, float64 [term, term]
-    progress,  # out, int64 [1]: rows done, for who watches from another thread
 ):
     """Compute the inner products of all pairs of terms over all rows, in the written order of `sums`."""
     terms = program.degree.size
@@ -39,10 +38,8 @@ def gram(
             filled += lanes
             if filled == FOLD:
                 _add_products(flat, terms, filled, fold, out)
-                progress[0] += filled
                 filled = 0
     _add_products(flat, terms, filled, fold, out)
-    progress[0] += filled
     for i in range(terms):
         for j in range(i):
             out[i, j] = out[j, i]

@@ -1,0 +1,1 @@
+"""Parameters from data: least squares, constrained least squares, forward orthogonal regression."""

@@ -1,0 +1,69 @@
+"""Constrained least squares, equation (4), in the null space of the constraints.
+
+``S theta = c`` is met by ``theta = theta_p + Z eta`` with ``S Z = 0``; eta is free, so the constraints hold
+whatever the data say, and the result equals equation (4) without its three inverses.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from islands.estimation.least_squares import Estimate, factor, failed, solve
+from islands.simulation.outcome import Outcome, Verdict
+
+#: Rows of S that keep less than this share of their norm are combinations of the others.
+_REDUNDANT = 1e-10
+
+
+def constrained_least_squares(
+    psi: NDArray[np.float64], y: NDArray[np.float64], S: NDArray[np.float64], c: NDArray[np.float64]
+) -> Estimate:
+    """Estimate the parameters that minimise ``|y - Psi theta|`` under ``S theta = c``.
+
+    Parameters
+    ----------
+    psi : ndarray, shape (terms, rows)
+        The regressor matrix, transposed.
+    y : ndarray, shape (rows,)
+        The target.
+    S : ndarray, shape (constraints, terms)
+        No row may be a combination of the others.
+    c : ndarray, shape (constraints,)
+        What the rows sum to.
+
+    Returns
+    -------
+    Estimate
+        INFEASIBLE where a constraint is redundant or contradicts the others, or there are more than terms.
+    """
+    made = factor(psi, y)
+    if isinstance(made, Outcome):
+        return failed(len(psi), made)
+    found = null_space(S / made.scale, c)
+    if isinstance(found, Outcome):
+        return failed(len(psi), found)
+    return solve(made, *found)
+
+
+def null_space(
+    S: NDArray[np.float64], c: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | Outcome:
+    """Return a particular solution of ``S theta = c`` and an orthonormal basis of the null space of S."""
+    constraints, terms = S.shape
+    if not constraints:
+        return np.zeros(terms), np.eye(terms)
+    norms = np.sqrt(np.sum(S**2, axis=1))
+    if not norms.all():
+        row = int(np.flatnonzero(norms == 0.0)[0])
+        return Outcome(Verdict.INFEASIBLE, f"constraint {row + 1} names no regressor")
+    scaled, targets = S / norms[:, None], c / norms
+    q, r, order = qr(scaled.T, pivoting=True)
+    diagonal = np.abs(np.diag(r))
+    rank = int(np.sum(diagonal > _REDUNDANT))
+    particular = q[:, :rank] @ np.linalg.solve(r[:rank, :rank].T, targets[order[:rank]])
+    if rank < constraints:
+        row = order[rank]
+        contradicts = abs(scaled[row] @ particular - targets[row]) > _REDUNDANT * (1.0 + abs(targets[row]))
+        kind = "contradicts the others" if contradicts else "is a combination of the others: leave it out"
+        return Outcome(Verdict.INFEASIBLE, f"constraint {row + 1} {kind}")
+    return particular, q[:, rank:]
