@@ -10,9 +10,11 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.errors import SettingsError
 from islands.model.clusters import OUTPUT_AT_REST, Cluster, clusters
-from islands.model.expression import Expression
-from islands.model.regressor import Regressor
+from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.model.primitives import ADD, MUL
+from islands.model.regressor import Regressor, canonical
 from islands.simulation.outcome import Outcome, Verdict
 
 
@@ -33,12 +35,60 @@ class Constrained:
     c: NDArray[np.float64]
 
 
-Constraint = Callable[[Sequence[Regressor]], Constrained | Outcome]
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """A way in which a constrained model may grow.
+
+    Attributes
+    ----------
+    expression : Expression
+        What is added: a regressor, or a difference of two that keeps their cluster's sum as it is.
+    regressors : tuple of Regressor
+        Those that the model then has.
+    """
+
+    expression: Expression
+    regressors: tuple[Regressor, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Directions:
+    """The null space of a constraint over a library, one direction a candidate.
+
+    Attributes
+    ----------
+    target : Expression
+        What the directions explain: y(k), less what the constraint fixes.
+    fixed : tuple of Regressor
+        Regressors that every model has.
+    free : tuple of Direction
+    """
+
+    target: Expression
+    fixed: tuple[Regressor, ...]
+    free: tuple[Direction, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Constraint:
+    """An entry of the table: on given regressors, and on a library from which regressors are selected."""
+
+    constrain: Callable[[Sequence[Regressor]], Constrained | Outcome]
+    directions: Callable[[Sequence[Regressor]], Directions | Outcome]
+    description: str
+
+
+_PRESENT = Lagged(0, 0)
 
 
 def unconstrained(regressors: Sequence[Regressor]) -> Constrained:
     """Leave every parameter free."""
     return Constrained(tuple(regressors), np.empty((0, len(regressors))), np.empty(0))
+
+
+def every_regressor(library: Sequence[Regressor]) -> Directions:
+    """Let a model grow by any regressor."""
+    return Directions(_PRESENT, (), tuple(Direction(item.expression, (item,)) for item in library))
 
 
 def continuum_of_equilibria(regressors: Sequence[Regressor]) -> Constrained | Outcome:
@@ -59,6 +109,43 @@ def continuum_of_equilibria(regressors: Sequence[Regressor]) -> Constrained | Ou
     return Constrained(kept, S, np.array([target(group.steady_state) for group in groups]))
 
 
+def increments(library: Sequence[Regressor]) -> Directions | Outcome:
+    """Let a model grow by what vanishes at rest: y(k) - y(k-1) is explained by increments alone.
+
+    Within a cluster that is the difference of a regressor and the cluster's first; a regressor with a phi
+    factor vanishes by itself. So the selection sees the constraint, and estimation has none left to repair.
+    """
+    groups = clusters(library)
+    output = next((group for group in groups if is_output(group)), None)
+    if output is None:
+        return Outcome(Verdict.INFEASIBLE, "no candidate is y at rest: add y(k-1) to the library")
+    clustered = {member for group in groups for member in group.members}
+    vanishing = [item for position, item in enumerate(library) if position not in clustered]
+    free = [Direction(item.expression, (item,)) for item in vanishing]
+    known = {direction.expression for direction in free}
+    for group in groups:
+        first, *others = (
+            (library[member], weight) for member, weight in zip(group.members, group.weights, strict=True)
+        )
+        for other in others:
+            expression = _difference(other, first)
+            if expression not in known:
+                free.append(Direction(expression, (other[0], first[0])))
+    base, weight = library[output.members[0]], output.weights[0]
+    return Directions(_difference((_PRESENT, 1.0), (base, weight)), (base,), tuple(free))
+
+
+def _difference(
+    left: tuple[Regressor | Expression, float], right: tuple[Regressor | Expression, float]
+) -> Expression:
+    """Return ``left / its weight - right / its weight``, up to a factor."""
+    terms = [
+        Apply(MUL, (Constant(sign / weight), item.expression if isinstance(item, Regressor) else item))
+        for sign, (item, weight) in ((1.0, left), (-1.0, right))
+    ]
+    return canonical(Apply(ADD, tuple(terms)))[1]
+
+
 def target(steady_state: Expression) -> float:
     """Return what the parameters of a cluster sum to when there is a continuum of equilibria."""
     return 1.0 if steady_state == OUTPUT_AT_REST else 0.0
@@ -70,5 +157,23 @@ def is_output(cluster: Cluster) -> bool:
 
 
 CONSTRAINTS: Mapping[str, Constraint] = MappingProxyType(
-    {"none": unconstrained, "hysteresis": continuum_of_equilibria}
+    {
+        "none": Constraint(unconstrained, every_regressor, "parameters are free"),
+        "hysteresis": Constraint(
+            continuum_of_equilibria, increments, "a continuum of equilibria (Property 1)"
+        ),
+    }
 )
+
+
+def constraint(name: str) -> Constraint:
+    """Return a constraint by name.
+
+    Raises
+    ------
+    SettingsError
+        There is none of that name.
+    """
+    if name not in CONSTRAINTS:
+        raise SettingsError(f"unknown constraints {name!r}: take one of {', '.join(CONSTRAINTS)}")
+    return CONSTRAINTS[name]

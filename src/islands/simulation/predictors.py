@@ -42,13 +42,19 @@ def one_step_ahead(model: Model, record: Dataset, warm_up: int | None = None) ->
     return multiple_shooting(model, record, 1, warm_up)
 
 
-def free_run(model: Model, record: Dataset, warm_up: int | None = None) -> Simulation:
+def free_run(
+    model: Model, record: Dataset, warm_up: int | None = None, bound: float | None = None
+) -> Simulation:
     """Simulate every segment from its first samples on; the output is read in the warm-up alone."""
-    return multiple_shooting(model, record, None, warm_up)
+    return multiple_shooting(model, record, None, warm_up, bound)
 
 
 def multiple_shooting(
-    model: Model, record: Dataset, interval: int | None, warm_up: int | None = None
+    model: Model,
+    record: Dataset,
+    interval: int | None,
+    warm_up: int | None = None,
+    bound: float | None = None,
 ) -> Simulation:
     """Simulate intervals of ``interval`` samples, each from measured values (None: the whole segment).
 
@@ -56,6 +62,8 @@ def multiple_shooting(
     ----------
     warm_up : int or None
         Samples before the first prediction; None takes the model's deepest lag, all that it needs.
+    bound : float or None
+        A larger absolute prediction is a divergence; None takes `bound_of` the record.
 
     Raises
     ------
@@ -75,17 +83,18 @@ def multiple_shooting(
     if warm_up < model.maximum_lag:
         raise SettingsError(f"the model reads {model.maximum_lag} samples back, the warm-up has {warm_up}")
     theta = np.array(model.parameters)
+    bound = bound_of(record) if bound is None else bound
     cut = layout(record, warm_up, interval)
     squared_error = np.empty(len(cut.start))
     diverged = np.empty(len(cut.start), np.int64)
     predicted = np.full(record.samples, np.nan)
-    simulate(link(model.regressors), theta, cut, bound_of(record), True, squared_error, diverged, predicted)
+    simulate(link(model.regressors), theta, cut, bound, True, squared_error, diverged, predicted)
     failed = np.flatnonzero(diverged >= 0)
     for lane in failed:
         predicted[cut.start[lane] + diverged[lane] : cut.start[lane] + cut.length[lane]] = np.nan
     if failed.size:
         sample = int((cut.start + diverged)[failed].min())
-        reason = f"|y| left {bound_of(record):.3g} at sample {sample}"
+        reason = f"|y| left {bound:.3g} at sample {sample}"
         return Simulation(predicted, np.inf, Outcome(Verdict.DIVERGED, reason))
     # Intervals are added in the order of time, whatever the order of the lanes.
     in_time = squared_error[np.argsort(cut.start, kind="stable")]
@@ -93,7 +102,13 @@ def multiple_shooting(
 
 
 def bound_of(record: Dataset) -> float:
-    """Return the absolute output beyond which a simulation of the record has diverged."""
-    known = record.y[np.isfinite(record.y)]
-    largest = float(np.abs(known).max(initial=0.0))
-    return BOUND * max(record.output_range if known.size else 0.0, largest, np.finfo(float).tiny / BOUND)
+    """Return the absolute output beyond which a simulation of the record has diverged.
+
+    It is `BOUND` times the output's range or largest value; where outputs are missing and what is left tells
+    no scale, at least `BOUND` of the output's unit.
+    """
+    known = record.y[~np.isnan(record.y)]
+    scale = float(max(np.ptp(known), np.abs(known).max())) if known.size else 0.0
+    if known.size < record.samples or scale == 0.0:
+        scale = max(scale, 1.0)
+    return BOUND * scale

@@ -1,0 +1,134 @@
+"""The table of candidate libraries for forward selection: what a structure may be made of.
+
+A library turns (degree, lags, inputs) into regressors. Add one here and it can be chosen by name.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from types import MappingProxyType
+
+from islands.errors import SettingsError
+from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.model.model import canonical_order
+from islands.model.primitives import MUL, PRIMITIVES
+from islands.model.regressor import Regressor, regressor
+
+#: A Gram matrix of this many candidates takes 128 MB; more is a job for evolution.
+MOST_CANDIDATES = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class Library:
+    """A family of candidate regressors and the settings that suit it.
+
+    Attributes
+    ----------
+    build : callable
+        ``build(degree, lags, inputs)`` returns the expressions, in any order.
+    degree, lags : int
+        Defaults.
+    constraints : str
+        The parameter constraint that usually goes with it.
+    description : str
+    """
+
+    build: Callable[[int, int, int], list[Expression]]
+    degree: int
+    lags: int
+    constraints: str
+    description: str
+
+
+def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regressor, ...]:
+    """Return a library's regressors in the order of their content.
+
+    Raises
+    ------
+    SettingsError
+        The library is unknown, a setting is out of range, or there would be too many candidates.
+    """
+    if name not in LIBRARIES:
+        raise SettingsError(f"unknown library {name!r}: take one of {', '.join(LIBRARIES)}")
+    if degree < 1 or lags < 1:
+        raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
+    full = full_set(degree, lags, lags, inputs)
+    if full > 100 * MOST_CANDIDATES:
+        raise SettingsError(_too_many(full))
+    made = canonical_order(
+        item
+        for expression in LIBRARIES[name].build(degree, lags, inputs)
+        if (item := regressor(expression)[1])
+    )
+    if len(made) > MOST_CANDIDATES:
+        raise SettingsError(_too_many(len(made)))
+    return tuple(made)
+
+
+def full_set(degree: int, output_lags: int, input_lags: int, inputs: int = 1) -> int:
+    """Return how many candidate terms a full polynomial set has, the constant included: equation (5)."""
+    candidates = term = 1
+    for power in range(1, degree + 1):
+        term = term * (output_lags + inputs * input_lags + power - 1) // power
+        candidates += term
+    return candidates
+
+
+def _too_many(count: int) -> str:
+    return (
+        f"{count} candidates are more than a library may have ({MOST_CANDIDATES}): take a smaller degree or "
+        "fewer lags, or let evolution search"
+    )
+
+
+def polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
+    """Return every monomial up to ``degree`` in all lagged signals, and the constant: equation (1)."""
+    signals = [Lagged(channel, lag) for channel in range(inputs + 1) for lag in range(1, lags + 1)]
+    return [_product(*factors) for factors in _monomials(signals, degree)]
+
+
+def phi_polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
+    """Return the terms of rate-independent hysteresis, a part of equation (9).
+
+    They are y(k-1), and the products of one increment phi1 of an input, at most one direction phi2 of it,
+    and a monomial in y(k-1) and the inputs u(k-1), together of ``degree``, a direction not counted. First
+    differences alone are taken, down to lag ``lags``. Levels have lag 1 only: where the input is slow their
+    lags are interchangeable, and a difference of outputs would be chosen for its one-step-ahead fit and
+    diverge in a free run.
+    """
+    if lags < 2:
+        raise SettingsError("phi-polynomial needs lags of at least 2: a first difference reads two samples")
+    levels = [Lagged(channel, 1) for channel in range(inputs + 1)]
+    made: list[Expression] = [Lagged(0, 1)]
+    for channel in range(1, inputs + 1):
+        steps = [(Lagged(channel, lag), Lagged(channel, lag + 1)) for lag in range(1, lags)]
+        directions: list[tuple[Expression, ...]] = [
+            (),
+            *((Apply(PRIMITIVES["phi2"], step),) for step in steps),
+        ]
+        heads = [(Apply(PRIMITIVES["phi1"], step), *sign) for step in steps for sign in directions]
+        made += [_product(*head, *level) for head in heads for level in _monomials(levels, degree - 1)]
+    return made
+
+
+def _monomials(signals: list[Lagged], degree: int) -> list[tuple[Expression, ...]]:
+    """Return the factors of every monomial, those of 1 (none) first."""
+    return [
+        factors for power in range(degree + 1) for factors in combinations_with_replacement(signals, power)
+    ]
+
+
+def _product(*factors: Expression) -> Expression:
+    if not factors:
+        return Constant(1.0)
+    return factors[0] if len(factors) == 1 else Apply(MUL, factors)
+
+
+LIBRARIES: Mapping[str, Library] = MappingProxyType(
+    {
+        "phi-polynomial": Library(
+            phi_polynomial, 5, 3, "hysteresis", "increments and directions of the input times monomials"
+        ),
+        "polynomial": Library(polynomial, 3, 3, "none", "all monomials of the lagged signals"),
+    }
+)

@@ -1,0 +1,88 @@
+"""Everything that is said about one model: its errors, its residuals, its physics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.model.model import Model
+from islands.simulation.outcome import Outcome
+from islands.simulation.predictors import multiple_shooting
+from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
+from islands.validation.physics import Physics, physics
+from islands.validation.residual_tests import ResidualTests, residual_tests
+
+#: Parts of a split and ways to simulate, as they are named in a result.
+PARTS = ("estimation", "validation")
+MODES = ("one_step_ahead", "multiple_shooting", "free_run")
+
+_NOTHING = Metrics(nan, nan, nan, nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assessment:
+    """What is known of a model.
+
+    Attributes
+    ----------
+    metrics : mapping
+        ``metrics[part][mode]``, NaN where that simulation diverged.
+    outcomes : mapping
+        ``outcomes[part][mode]``.
+    information : InformationCriteria
+        Of the one-step-ahead residual on the estimation data.
+    residual_tests : ResidualTests
+        Of the one-step-ahead residual on the longest recording of the validation data.
+    physics : Physics
+    """
+
+    metrics: Mapping[str, Mapping[str, Metrics]]
+    outcomes: Mapping[str, Mapping[str, Outcome]]
+    information: InformationCriteria
+    residual_tests: ResidualTests
+    physics: Physics
+
+
+def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None) -> Assessment:
+    """Assess a model on the data that estimated it and on the data that validates it.
+
+    Parameters
+    ----------
+    shooting : int
+        Samples of an interval of multiple shooting.
+    warm_up : int or None
+        Samples before the first prediction; None takes the model's deepest lag.
+    """
+    intervals = dict(zip(MODES, (1, shooting, None), strict=True))
+    errors: dict[str, dict[str, Metrics]] = {}
+    outcomes: dict[str, dict[str, Outcome]] = {}
+    for part, record in zip(PARTS, (split.estimation, split.validation), strict=True):
+        runs = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
+        outcomes[part] = {mode: run.outcome for mode, run in runs.items()}
+        errors[part] = {
+            mode: metrics(record.y, run.y) if run.outcome else _NOTHING for mode, run in runs.items()
+        }
+    return Assessment(
+        errors,
+        outcomes,
+        _information(model, split.estimation, warm_up),
+        _residual_tests(model, split.validation, warm_up),
+        physics(model, split.estimation),
+    )
+
+
+def _information(model: Model, record: Dataset, warm_up: int | None) -> InformationCriteria:
+    residual = record.y - multiple_shooting(model, record, 1, warm_up).y
+    known = residual[~np.isnan(residual)]
+    return information_criteria(float(np.add.reduce(known**2)), len(known), model.size)
+
+
+def _residual_tests(model: Model, record: Dataset, warm_up: int | None) -> ResidualTests:
+    begin, end = max(record.bounds, key=lambda bounds: bounds[1] - bounds[0])
+    recording = record[begin:end]
+    residual = recording.y - multiple_shooting(model, recording, 1, warm_up).y
+    lags = min(25, (int(np.sum(~np.isnan(residual))) - 2) // 2)
+    return residual_tests(residual, recording.u, max_lag=max(1, lags))
