@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 
+#: Part by which the sampling times of joined recordings may differ: a printed time column tells no more.
+SAME_DT = 1e-3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dataset:
@@ -17,8 +20,8 @@ class Dataset:
     u : ndarray, shape (samples, inputs)
         The inputs, finite.
     y : ndarray, shape (samples,)
-        The output. NaN marks a missing value: a free run reads the output in its warm-up alone, so the rest
-        may be missing; estimation asks for a complete one.
+        The output, never infinite. NaN marks a missing value: a free run reads the output in its warm-up
+        alone, so the rest may be missing; estimation asks for a complete one.
     dt : float
         Sampling time in seconds.
     input_names, output_name
@@ -30,11 +33,14 @@ class Dataset:
         reaches across a boundary.
     start : float
         Time of the first sample in seconds.
+    sha256 : str
+        Hash of the file that the record came from, in hexadecimal; "" where there is none.
 
     Raises
     ------
     RecordError
-        Shapes, segments or ``dt`` do not fit together.
+        Shapes, names, units, segments or ``dt`` do not fit together, there is no sample, or a value is
+        infinite or a missing input.
     """
 
     u: NDArray[np.float64]
@@ -46,6 +52,7 @@ class Dataset:
     output_unit: str = ""
     segments: tuple[int, ...] = ()
     start: float = 0.0
+    sha256: str = ""
 
     def __post_init__(self) -> None:
         u = np.array(self.u, dtype=np.float64, order="C", ndmin=1)
@@ -59,24 +66,24 @@ class Dataset:
             )
         inputs = u.shape[1]
         names = self.input_names if len(self.input_names) == inputs else _numbered(self.input_names, inputs)
-        units = self.input_units if len(self.input_units) == inputs else ("",) * inputs
-        segments = self.segments or (len(y),)
+        units = ("",) * inputs if tuple(self.input_units) == ("",) else tuple(self.input_units)
+        if len(units) != inputs:
+            raise RecordError(f"{inputs} inputs need {inputs} units, got {units}")
+        segments = tuple(int(length) for length in self.segments) or (len(y),)
         if not (np.isfinite(self.dt) and self.dt > 0):
             raise RecordError(f"the sampling time must be a positive number of seconds, got {self.dt}")
-        if sum(segments) != len(y) or min(segments) < 0:
-            raise RecordError(f"the segments' lengths {segments} do not sum to the {len(y)} samples")
-        if not np.isfinite(u).all():
-            sample, channel = np.argwhere(~np.isfinite(u))[0]
+        if sum(segments) != len(y) or min(segments) < 1:
             raise RecordError(
-                f"input {names[channel]} is not finite at sample {sample}: repair or cut the record"
+                f"the segments' lengths {segments} must be positive and sum to the {len(y)} samples"
             )
+        _refuse_non_finite(u, y, names, self.output_name)
         for array in (u, y):
             array.setflags(write=False)
         for field, value in (
             ("u", u),
             ("y", y),
             ("input_names", tuple(names)),
-            ("input_units", tuple(units)),
+            ("input_units", units),
             ("segments", segments),
         ):
             object.__setattr__(self, field, value)
@@ -89,12 +96,12 @@ class Dataset:
     @property
     def inputs(self) -> int:
         """Number of inputs."""
-        return self.u.shape[1]
+        return int(self.u.shape[1])
 
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of every sample in seconds, shape (samples,), without a pause between recordings."""
-        return self.start + self.dt * np.arange(self.samples)
+        return self.start + self.dt * np.arange(self.samples, dtype=np.float64)
 
     @property
     def bounds(self) -> tuple[tuple[int, int], ...]:
@@ -104,8 +111,9 @@ class Dataset:
 
     @property
     def output_range(self) -> float:
-        """``max(y) - min(y)`` over the samples that are there; the scale of MAPE, equation (7)."""
-        return float(np.nanmax(self.y) - np.nanmin(self.y))
+        """``max(y) - min(y)`` over the samples that are there (NaN: none); scale of MAPE, equation (7)."""
+        present = self.y[~np.isnan(self.y)]
+        return float(np.ptp(present)) if present.size else float("nan")
 
     def __len__(self) -> int:
         return self.samples
@@ -129,6 +137,21 @@ class Dataset:
         )
 
 
+def _refuse_non_finite(
+    u: NDArray[np.float64], y: NDArray[np.float64], names: tuple[str, ...], output: str
+) -> None:
+    if not np.isfinite(u).all():
+        sample, channel = np.argwhere(~np.isfinite(u))[0]
+        raise RecordError(
+            f"input {names[channel]} is not finite at sample {sample}: repair or cut the record"
+        )
+    if np.isinf(y).any():
+        raise RecordError(
+            f"output {output} is infinite at sample {np.argmax(np.isinf(y))}: repair or cut the record; NaN "
+            "marks a missing value"
+        )
+
+
 def _numbered(names: tuple[str, ...], inputs: int) -> tuple[str, ...]:
     if names == ("u",):
         return tuple(f"u{index + 1}" for index in range(inputs))
@@ -141,8 +164,10 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
     Raises
     ------
     RecordError
-        The recordings differ in names, units or sampling time.
+        There is none, or they differ in names, units or sampling time.
     """
+    if not recordings:
+        raise RecordError("no recording is given: join one or more")
     first = recordings[0]
     for other in recordings[1:]:
         same = (other.input_names, other.output_name, other.input_units, other.output_unit)
@@ -150,7 +175,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
             raise RecordError(
                 "recordings of one system have the same columns and units: rename or convert them first"
             )
-        if abs(other.dt - first.dt) > 1e-6 * first.dt:
+        if abs(other.dt - first.dt) > SAME_DT * first.dt:
             raise RecordError(
                 f"recordings were sampled at {first.dt} s and {other.dt} s: resample one of them"
             )
@@ -159,4 +184,5 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
         u=np.concatenate([recording.u for recording in recordings]),
         y=np.concatenate([recording.y for recording in recordings]),
         segments=tuple(length for recording in recordings for length in recording.segments),
+        sha256="",
     )

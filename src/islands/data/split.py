@@ -2,16 +2,42 @@
 
 from dataclasses import dataclass
 
-from islands.data.dataset import Dataset
-from islands.errors import SettingsError
+from islands.data.dataset import SAME_DT, Dataset
+from islands.errors import RecordError, SettingsError
 
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Data that estimates parameters and data that selects among the models estimated."""
+    """Data that estimates parameters and data that selects among the models estimated.
+
+    The columns' names may differ (``u_est_V``, ``u_val_V``): inputs correspond by their order.
+
+    Attributes
+    ----------
+    estimation, validation : Dataset
+        Records of one system.
+
+    Raises
+    ------
+    RecordError
+        The records differ in the number of inputs or in sampling time.
+    """
 
     estimation: Dataset
     validation: Dataset
+
+    def __post_init__(self) -> None:
+        estimation, validation = self.estimation, self.validation
+        if estimation.inputs != validation.inputs:
+            raise RecordError(
+                f"the estimation data has {estimation.inputs} inputs, the validation data "
+                f"{validation.inputs}: give both the same inputs in the same order"
+            )
+        if abs(estimation.dt - validation.dt) > SAME_DT * estimation.dt:
+            raise RecordError(
+                f"the estimation data was sampled at {estimation.dt} s, the validation data at "
+                f"{validation.dt} s: resample one of them"
+            )
 
 
 def split(record: Dataset, fraction: float = 0.25) -> Split:

@@ -63,7 +63,8 @@ def null_space(
     particular = q[:, :rank] @ np.linalg.solve(r[:rank, :rank].T, targets[order[:rank]])
     if rank < constraints:
         row = order[rank]
-        contradicts = abs(scaled[row] @ particular - targets[row]) > _REDUNDANT * (1.0 + abs(targets[row]))
+        missed = abs(scaled[row] @ particular - targets[row])
+        contradicts = missed > _REDUNDANT * (np.linalg.norm(particular) + abs(targets[row]))
         kind = "contradicts the others" if contradicts else "is a combination of the others: leave it out"
         return Outcome(Verdict.INFEASIBLE, f"constraint {row + 1} {kind}")
     return particular, q[:, rank:]

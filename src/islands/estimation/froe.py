@@ -49,12 +49,15 @@ def froe(gram: NDArray[np.float64], tolerance: float = 0.0, max_terms: int | Non
         With n terms it begins the selection with n + 1. Ties go to the first candidate.
     """
     candidates = len(gram) - 1
-    norms = np.diag(gram)[:-1]
+    norms = np.diag(gram)
+    # What is zero, or too large for its square to be a number, explains nothing and spoils nothing.
+    usable = (norms > 0.0) & np.isfinite(norms)
+    gram = np.where(usable[:, None] & usable, gram, 0.0)
     energy = gram[-1, -1]
-    scale = np.where(norms > 0.0, 1.0 / np.sqrt(np.where(norms > 0.0, norms, 1.0)), 0.0)
+    scale = 1.0 / np.sqrt(np.where(usable, norms, 1.0))[:-1]
     scaled = gram[:-1, :-1] * scale[:, None] * scale
     correlation = gram[:-1, -1] * scale
-    left = (norms > 0.0).astype(float)
+    left = usable[:-1].astype(float)
     rows = np.empty((0, candidates))
     order: list[int] = []
     err: list[float] = []
@@ -83,4 +86,7 @@ def prune(gram: NDArray[np.float64], tolerance: float) -> tuple[int, ...]:
     gram : ndarray, shape (terms + 1, terms + 1)
         Inner products of an individual's regressors and, last, the target (the paper, section 5.2).
     """
-    return tuple(sorted(froe(gram, tolerance).order))
+    # All are orthogonalised before any leaves (the paper, section 2): one that explains little by itself may
+    # let the next explain much.
+    found = froe(gram)
+    return tuple(sorted(item for item, err in zip(found.order, found.err, strict=True) if err > tolerance))

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
+from islands.errors import RecordError
 from islands.kernels.orthogonal import orthogonalise
+from islands.kernels.sums import total
 from islands.simulation.outcome import OK, Outcome, Verdict
 
 #: A regressor that keeps less than this share of its norm depends on those before it.
@@ -74,16 +76,25 @@ def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Factor | Outcome
     -------
     Factor or Outcome
         TOO_FEW_ROWS, or SINGULAR with the position of the first regressor that depends on those before it.
+
+    Raises
+    ------
+    RecordError
+        The target has another number of rows: the kernel would read beyond its end.
     """
     terms, rows = psi.shape
+    if y.shape != (rows,):
+        raise RecordError(f"the regressor matrix has {rows} rows, the target has shape {y.shape}")
     if rows <= terms:
         return Outcome(Verdict.TOO_FEW_ROWS, f"{rows} rows for {terms} parameters")
-    triangle, projection, residual = np.empty((terms, terms)), np.empty(terms), np.array(y)
-    dependent = orthogonalise(np.array(psi), residual, triangle, projection, DEPENDENT)
+    triangle, projection = np.empty((terms, terms)), np.empty(terms)
+    # The kernel works in place on contiguous rows of float64; the caller's may be a transposed view.
+    q, residual = np.array(psi, dtype=np.float64, order="C"), np.array(y, dtype=np.float64)
+    dependent = orthogonalise(q, residual, triangle, projection, DEPENDENT)
     if dependent >= 0:
         return Outcome(Verdict.SINGULAR, f"regressor {dependent + 1} depends on those before it")
     scale = np.sqrt(np.sum(triangle**2, axis=0))
-    return Factor(triangle / scale, scale, projection, float(np.sum(residual**2)), rows)
+    return Factor(triangle / scale, scale, projection, float(total(residual**2)), rows)
 
 
 def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:

@@ -13,13 +13,16 @@ from islands.kernels.sums import FOLD, dot
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def orthogonalise(
-    matrix,  # in and out, float64 [column, row]: becomes Q, its columns of norm 1, or 0 where dependent
+    matrix,  # in and out, float64 [column, row]: becomes Q, its columns of norm 1
     target,  # in and out, float64 [row]: becomes the residual, orthogonal to Q
     triangle,  # out, float64 [column, column]: R, upper
     projection,  # out, float64 [column]: Q'y
     tolerance,  # a column that keeps less than this share of its norm depends on those before it
 ):
-    """Factor ``matrix = Q R`` and return the number of the first dependent column, or -1."""
+    """Factor ``matrix = Q R`` and return the number of the first dependent column, or -1.
+
+    A dependent column ends the factorisation: the outputs are then of no use.
+    """
     columns, rows = matrix.shape
     flat = matrix.reshape(-1)
     fold = np.empty(FOLD)

@@ -40,12 +40,12 @@ class Primitive:
     """
 
     name: str
-    arity: int
+    arity: int = field(compare=False)
     scalar: Callable[..., float] = field(compare=False)
     latex: str = field(compare=False)
-    parity: int = 0
-    degree: float | None = None
-    commutative: bool = False
+    parity: int = field(default=0, compare=False)
+    degree: float | None = field(default=None, compare=False)
+    commutative: bool = field(default=False, compare=False)
     simplify: "Callable[..., Expression | None] | None" = field(default=None, compare=False)
 
 
@@ -59,7 +59,7 @@ class Lagged:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number."""
+    """A finite number."""
 
     value: float
 

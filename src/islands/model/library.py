@@ -48,8 +48,6 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
     SettingsError
         The library is unknown, a setting is out of range, or there would be too many candidates.
     """
-    if name not in LIBRARIES:
-        raise SettingsError(f"unknown library {name!r}: take one of {', '.join(LIBRARIES)}")
     if degree < 1 or lags < 1:
         raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
     full = full_set(degree, lags, lags, inputs)
@@ -57,12 +55,25 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
         raise SettingsError(_too_many(full))
     made = canonical_order(
         item
-        for expression in LIBRARIES[name].build(degree, lags, inputs)
+        for expression in library_named(name).build(degree, lags, inputs)
         if (item := regressor(expression)[1])
     )
     if len(made) > MOST_CANDIDATES:
         raise SettingsError(_too_many(len(made)))
     return tuple(made)
+
+
+def library_named(name: str) -> Library:
+    """Return a library by name.
+
+    Raises
+    ------
+    SettingsError
+        There is none of that name.
+    """
+    if name not in LIBRARIES:
+        raise SettingsError(f"unknown library {name!r}: take one of {', '.join(LIBRARIES)}")
+    return LIBRARIES[name]
 
 
 def full_set(degree: int, output_lags: int, input_lags: int, inputs: int = 1) -> int:

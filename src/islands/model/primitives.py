@@ -5,6 +5,7 @@ own joins by name with `primitive`, a plain scalar function, in a table of the c
 """
 
 import inspect
+import keyword
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -108,8 +109,28 @@ SIGN = Primitive(
 )
 
 
-def _quotient_of_equals(a: Expression, b: Expression) -> Expression | None:
-    return Constant(1.0) if a == b else None
+def _difference(a: Expression, b: Expression) -> Expression:
+    return Apply(SUB, (a, b))
+
+
+def _sign_of_a_difference(a: Expression, b: Expression) -> Expression:
+    return Apply(SIGN, (Apply(SUB, (a, b)),))
+
+
+def _second_power(a: Expression) -> Expression:
+    return Apply(MUL, (a, a))
+
+
+def _third_power(a: Expression) -> Expression:
+    return Apply(MUL, (a, a, a))
+
+
+def _simpler_quotient(a: Expression, b: Expression) -> Expression | None:
+    if a == b:
+        return Constant(1.0)
+    if isinstance(b, Constant):
+        return Constant(1.0) if abs(b.value) < TINY else Apply(MUL, (Constant(1.0 / b.value), a))
+    return None
 
 
 def _one_of_equals(a: Expression, b: Expression) -> Expression | None:
@@ -120,19 +141,19 @@ _BUILT_IN = (
     MUL,
     SUB,
     SIGN,
-    Primitive("phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=lambda a, b: Apply(SUB, (a, b))),
+    Primitive("phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=_difference),
     Primitive(
         "phi2",
         2,
         _sign_of_difference,
         r"\operatorname{{sign}}({0} - {1})",
-        simplify=lambda a, b: Apply(SIGN, (Apply(SUB, (a, b)),)),
+        simplify=_sign_of_a_difference,
     ),
     ADD,
-    Primitive("div", 2, _divide, r"\frac{{{0}}}{{{1}}}", simplify=_quotient_of_equals),
+    Primitive("div", 2, _divide, r"\frac{{{0}}}{{{1}}}", simplify=_simpler_quotient),
     Primitive("abs", 1, _absolute, r"\left|{0}\right|", parity=1, degree=1.0),
-    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=lambda a: Apply(MUL, (a, a))),
-    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=lambda a: Apply(MUL, (a, a, a))),
+    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=_second_power),
+    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=_third_power),
     Primitive("sqrt", 1, _root, r"\sqrt{{\left|{0}\right|}}", parity=1, degree=0.5),
     Primitive("exp", 1, _exponential, r"\exp({0})"),
     Primitive("log", 1, _logarithm, r"\ln\left|{0}\right|", parity=1),
@@ -168,25 +189,36 @@ def primitive(
     ------
     ModelError
         The name is taken, the function takes other than one or two arguments, is not finite at zero, at a
-        negative or at a large argument, or is not as it declares.
+        negative or at a large argument, or is not as it declares, or the LaTeX is no format.
     """
-    if not name.isidentifier() or name in PRIMITIVES or name[0] in "yuq":
+    free = name not in PRIMITIVES and not keyword.iskeyword(name) and not SIGNALS.fullmatch(name)
+    if not (free and name.isidentifier()):
         raise ModelError(
-            f"{name!r} can't name a primitive: take an identifier that is not in use and not y, u, q .."
+            f"{name!r} can't name a primitive: take an identifier that is not in use and not y, u, k, q1 .."
         )
-    arity = len(inspect.signature(scalar).parameters)
+    arity = _arity(name, scalar)
     if arity not in (1, 2):
         raise ModelError(f"primitive {name!r} takes {arity} arguments: a primitive takes one or two")
+    upright = name.replace("_", r"\_")
     made = Primitive(
         name,
         arity,
         scalar,
-        latex or rf"\operatorname{{{{{name}}}}}(" + ", ".join(f"{{{i}}}" for i in range(arity)) + ")",
+        latex or rf"\operatorname{{{{{upright}}}}}(" + ", ".join(f"{{{i}}}" for i in range(arity)) + ")",
         parity=parity,
         commutative=commutative,
     )
     check(made)
     return made
+
+
+def _arity(name: str, scalar: Callable[..., float]) -> int:
+    try:
+        return len(inspect.signature(scalar).parameters)
+    except ValueError as error:
+        raise ModelError(
+            f"primitive {name!r} does not tell its arguments: wrap it in a function of one or two"
+        ) from error
 
 
 def check(entry: Primitive) -> None:
@@ -195,8 +227,16 @@ def check(entry: Primitive) -> None:
     Raises
     ------
     ModelError
-        It does not: the message names the argument.
+        It does not: the message names the argument. Or its LaTeX is no format of its arguments.
     """
+    if entry.arity == 2 and (entry.parity or entry.degree is not None):
+        raise ModelError(f"primitive {entry.name!r} has two arguments: parity and degree are for one")
+    try:
+        entry.latex.format(*"ab"[: entry.arity])
+    except (LookupError, ValueError) as error:
+        raise ModelError(
+            f"the LaTeX of primitive {entry.name!r} is no format of {{0}}: double every other brace"
+        ) from error
     probes = [(a,) for a in _PROBES] if entry.arity == 1 else [(a, b) for a in _PROBES for b in _PROBES]
     for arguments in probes:
         result = _finite(entry, arguments)
@@ -217,7 +257,7 @@ def check(entry: Primitive) -> None:
 def _finite(entry: Primitive, arguments: tuple[float, ...]) -> float:
     try:
         result = float(entry.scalar(*arguments))
-    except (ArithmeticError, ValueError) as error:
+    except (ArithmeticError, ValueError, TypeError) as error:
         raise ModelError(
             f"primitive {entry.name!r} fails at {arguments} ({error}): protect it there"
         ) from error

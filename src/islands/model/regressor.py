@@ -5,6 +5,7 @@ are numbers are taken out (a regressor's own factor belongs to its parameter), e
 merged. ``sign^3`` is ``sign``, but ``sign^2`` is never 1: it is 0 where the input rests.
 """
 
+import math
 from dataclasses import dataclass
 
 from islands.errors import ModelError
@@ -59,7 +60,7 @@ def regressor(expression: Expression) -> tuple[float, Regressor | None]:
     Raises
     ------
     ModelError
-        A lag is under 1: the regressor would look at the present or the future.
+        A lag is under 1: the regressor would look at the present or the future. Or a number overflows.
     """
     factor, core = canonical(expression)
     for channel, lag in sorted(lags(core)):
@@ -71,7 +72,18 @@ def regressor(expression: Expression) -> tuple[float, Regressor | None]:
 
 
 def canonical(expression: Expression) -> tuple[float, Expression]:
-    """Return (factor, core) with ``expression = factor * core``; zero is (0, 1) and a number c is (c, 1)."""
+    """Return (factor, core) with ``expression = factor * core``; zero is (0, 1) and a number c is (c, 1).
+
+    Raises
+    ------
+    ModelError
+        The numbers in the expression overflow.
+    """
+    factor, core = _canonical(expression)
+    return _finite(factor), core
+
+
+def _canonical(expression: Expression) -> tuple[float, Expression]:
     match expression:
         case Lagged():
             return 1.0, expression
@@ -123,12 +135,13 @@ def _sum(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
     if not terms:
         return 0.0, _ONE
     leading = terms[0][1]
-    if len(terms) == 1:
-        return leading, terms[0][0]
-    (first, _), (second, weight) = terms[:2]
-    if len(terms) == 2 and weight == -leading:
+    scaled = [(core, weight / leading) for core, weight in terms if weight / leading]
+    if len(scaled) == 1:
+        return leading, scaled[0][0]
+    (first, _), (second, ratio) = scaled[:2]
+    if len(scaled) == 2 and ratio == -1.0:
         return leading, Apply(SUB, (first, second))
-    return leading, Apply(ADD, tuple(_times(weight / leading, core) for core, weight in terms))
+    return leading, Apply(ADD, tuple(_times(ratio, core) for core, ratio in scaled))
 
 
 def _terms_of(core: Expression) -> list[tuple[float, Expression]]:
@@ -142,7 +155,7 @@ def _terms_of(core: Expression) -> list[tuple[float, Expression]]:
 def _function(primitive: Primitive, parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
     """Fold constants, take signs and scales out of odd, even and homogeneous functions, order arguments."""
     if all(core == _ONE for _, core in parts):
-        return primitive.scalar(*(factor for factor, _ in parts)), _ONE
+        return _folded(primitive, [factor for factor, _ in parts]), _ONE
     outer = 1.0
     if primitive.parity and parts[0][0] < 0.0:
         outer = float(primitive.parity)
@@ -160,10 +173,25 @@ def _function(primitive: Primitive, parts: list[tuple[float, Expression]]) -> tu
     return outer * factor, core
 
 
+def _folded(primitive: Primitive, numbers: list[float]) -> float:
+    try:
+        return float(primitive.scalar(*numbers))
+    except (ArithmeticError, ValueError) as error:
+        raise ModelError(
+            f"primitive {primitive.name!r} fails at {numbers} ({error}): protect it there"
+        ) from error
+
+
+def _finite(number: float) -> float:
+    if not math.isfinite(number):
+        raise ModelError("the numbers in an expression overflow: write smaller ones")
+    return number
+
+
 def _times(factor: float, core: Expression) -> Expression:
     if core == _ONE:
-        return Constant(factor)
-    return core if factor == 1.0 else Apply(MUL, (Constant(factor), *_arguments_of(core, MUL)))
+        return Constant(_finite(factor))
+    return core if factor == 1.0 else Apply(MUL, (Constant(_finite(factor)), *_arguments_of(core, MUL)))
 
 
 def _arguments_of(core: Expression, primitive: Primitive) -> tuple[Expression, ...]:

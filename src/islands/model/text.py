@@ -7,7 +7,8 @@ leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. where there are sever
 
 import ast
 import re
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
 from islands.errors import ModelError
@@ -15,14 +16,17 @@ from islands.model.expression import Apply, Constant, Expression, Lagged, Primit
 from islands.model.model import Model
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
 
-_SIGNAL = re.compile(r"(y|u)(\d*)")
-_BACK_SHIFT = re.compile(r"q(\d+)")
+_SIGNAL = re.compile(r"y|u([1-9][0-9]*)?")
+_BACK_SHIFT = re.compile(r"q([0-9]+)")
 _OPERATORS: Mapping[type[ast.operator], str] = {
     ast.Add: "add",
     ast.Sub: "sub",
     ast.Mult: "mul",
     ast.Div: "div",
 }
+
+#: A larger power is written as a product of powers: text from outside must not ask for millions of factors.
+LARGEST_POWER = 99
 
 #: How tightly text holds together: a sum is put in brackets inside a product, a product inside a power.
 _SUM, _PRODUCT, _ATOM = 0, 1, 2
@@ -38,7 +42,7 @@ def _plain(expression: Expression, inputs: int) -> tuple[str, int]:
         case Lagged(channel, lag):
             return f"{_name(channel, inputs)}(k-{lag})" if lag else f"{_name(channel, inputs)}(k)", _ATOM
         case Constant(number):
-            return repr(float(number)).removesuffix(".0"), _ATOM if number >= 0 else _SUM
+            return _digits(number), _binding(number)
         case Shift(samples, argument):
             return f"q{samples}({plain(argument, inputs)})", _ATOM
         case Apply(primitive, (_, _, *_) as arguments) if primitive in (ADD, SUB):
@@ -55,13 +59,29 @@ def _plain(expression: Expression, inputs: int) -> tuple[str, int]:
 
 def _plain_product(factors: Sequence[Expression], inputs: int) -> str:
     parts = []
-    for factor, run in groupby(factors):
-        power = len(list(run))
+    for factor, power in _powers(factors):
         text = _operand(factor, inputs, _PRODUCT if power == 1 else _ATOM, (MUL,))
         # A quotient binds like a product, and a*b/c is read as (a*b)/c.
         text = f"({text})" if _is(factor, "div") and power == 1 else text
         parts.append(text if power == 1 else f"{text}^{power}")
     return "*".join(parts)
+
+
+def _powers(factors: Sequence[Expression]) -> Iterator[tuple[Expression, int]]:
+    for factor, run in groupby(factors):
+        left = len(list(run))
+        while left:
+            yield factor, min(left, LARGEST_POWER)
+            left -= min(left, LARGEST_POWER)
+
+
+def _digits(number: float) -> str:
+    return repr(float(number)).removesuffix(".0")
+
+
+def _binding(number: float) -> int:
+    # Minus zero has a sign, too: -0^2 would be read as -(0^2).
+    return _SUM if _digits(number).startswith("-") else _ATOM
 
 
 def _operand(expression: Expression, inputs: int, binding: int, as_call: tuple[Primitive, ...] = ()) -> str:
@@ -102,7 +122,7 @@ def _latex(expression: Expression, inputs: int) -> tuple[str, int]:
             index = f"{name[1:]}," if len(name) > 1 else ""
             return f"{name[0]}_{{{index}k{f'-{lag}' if lag else ''}}}", _ATOM
         case Constant(number):
-            return _latex_number(number), _ATOM if number >= 0 else _SUM
+            return _latex_number(_digits(number)), _binding(number)
         case Shift(samples, argument):
             return f"q^{{-{samples}}} {_bracketed(argument, inputs, _ATOM)}", _PRODUCT
         case Apply(primitive, arguments) if primitive in (ADD, SUB):
@@ -115,11 +135,15 @@ def _latex(expression: Expression, inputs: int) -> tuple[str, int]:
 
 
 def _latex_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
-    parts = []
+    parts: list[str] = []
     for factor, run in groupby(factors):
         power = len(list(run))
         text = _bracketed(factor, inputs, _ATOM)
-        if power > 1 and isinstance(factor, Apply) and text[0] != "\\":
+        # No exponent stands on an exponent or a fraction, and no number directly behind another one.
+        bare = text[0] != "\\" or text[-1] == "}"
+        if (power > 1 and bare and not isinstance(factor, Lagged)) or (
+            parts and isinstance(factor, Constant)
+        ):
             text = rf"\left({text}\right)"
         parts.append(text if power == 1 else f"{text}^{{{power}}}")
     return parts
@@ -130,8 +154,8 @@ def _bracketed(expression: Expression, inputs: int, binding: int) -> str:
     return text if own >= binding else rf"\left({text}\right)"
 
 
-def _latex_number(number: float, digits: int = 17) -> str:
-    mantissa, _, exponent = f"{number:.{digits}g}".partition("e")
+def _latex_number(number: str) -> str:
+    mantissa, _, exponent = number.partition("e")
     return mantissa if not exponent else rf"{mantissa} \times 10^{{{int(exponent)}}}"
 
 
@@ -155,7 +179,7 @@ def latex_equation(model: Model, digits: int = 6) -> str:
         weight = (
             rf"\theta_{{{position + 1}}}"
             if model.theta is None
-            else _latex_number(model.theta[position], digits)
+            else _latex_number(f"{model.theta[position]:.{digits}g}")
         )
         constant = item.expression == Constant(1.0)
         parts.append(
@@ -181,25 +205,28 @@ def parse(text: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Expres
     Raises
     ------
     ModelError
-        It is no expression: the message shows the part that could not be read.
+        It is no expression, or nested too deeply: the message shows the part that could not be read.
     """
     try:
         tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
-    except (SyntaxError, ValueError) as error:
-        raise ModelError(f"cannot read {text!r}: write it like u(k-1)*sign(u(k-1) - u(k-2))") from error
-    return _read(tree.body, primitives)
+        return _read(tree.body, primitives)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ModelError(f"cannot read {text[:80]!r}: write it like u(k-1)*sign(u(k-1) - u(k-2))") from error
 
 
 def _read(node: ast.expr, primitives: Mapping[str, Primitive]) -> Expression:
     match node:
-        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-            return Constant(float(number))
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
-            return Constant(-float(number))
+        case ast.Constant() if (number := _number(node)) is not None:
+            return Constant(number)
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as operand) if (
+            number := _number(operand)
+        ) is not None:
+            return Constant(-number)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return Apply(MUL, (Constant(-1.0), _read(operand, primitives)))
         case ast.BinOp(op=ast.Pow()):
-            return Apply(MUL, _factors(node, primitives))
+            factors = _factors(node, primitives)
+            return Apply(MUL, factors) if len(factors) > 1 else factors[0]
         case ast.BinOp(op=ast.Mult()):
             return Apply(MUL, tuple(f for part in _chain(node, ast.Mult) for f in _factors(part, primitives)))
         case ast.BinOp(op=ast.Add()):
@@ -215,6 +242,16 @@ def _read(node: ast.expr, primitives: Mapping[str, Primitive]) -> Expression:
     )
 
 
+def _number(node: ast.Constant) -> float | None:
+    """Return a finite number, or None: True is no number, and 1e999 is none either."""
+    match node.value:
+        case bool():
+            return None
+        case int() | float() as number if abs(number) <= sys.float_info.max:
+            return float(number)
+    return None
+
+
 def _chain(node: ast.expr, operator: type[ast.operator]) -> list[ast.expr]:
     """Return the operands of a * b * c, which Python reads as (a * b) * c."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, operator):
@@ -224,16 +261,20 @@ def _chain(node: ast.expr, operator: type[ast.operator]) -> list[ast.expr]:
 
 def _factors(node: ast.expr, primitives: Mapping[str, Primitive]) -> tuple[Expression, ...]:
     match node:
-        case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant(value=int() as power)) if 1 <= power <= 99:
+        case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant(value=int() as power)) if (
+            1 <= power <= LARGEST_POWER and power is not True
+        ):
             return (_read(base, primitives),) * power
         case ast.BinOp(op=ast.Pow()):
-            raise ModelError(f"cannot read {ast.unparse(node)!r}: a power is a whole number from 1 to 99")
+            raise ModelError(
+                f"cannot read {ast.unparse(node)!r}: a power is a whole number from 1 to {LARGEST_POWER}"
+            )
     return (_read(node, primitives),)
 
 
 def _read_call(name: str, arguments: Sequence[ast.expr], primitives: Mapping[str, Primitive]) -> Expression:
     if (signal := _SIGNAL.fullmatch(name)) and len(arguments) == 1:
-        channel = 0 if name == "y" else int(signal[2] or 1)
+        channel = 0 if name == "y" else int(signal[1] or 1)
         return Lagged(channel, _lag(arguments[0]))
     if (shift := _BACK_SHIFT.fullmatch(name)) and len(arguments) == 1:
         return Shift(int(shift[1]), _read(arguments[0], primitives))
@@ -250,6 +291,8 @@ def _lag(node: ast.expr) -> int:
     match node:
         case ast.Name(id="k"):
             return 0
-        case ast.BinOp(left=ast.Name(id="k"), op=ast.Sub(), right=ast.Constant(value=int() as lag)):
+        case ast.BinOp(left=ast.Name(id="k"), op=ast.Sub(), right=ast.Constant(value=int() as lag)) if (
+            lag is not True
+        ):
             return lag
     raise ModelError(f"cannot read the lag {ast.unparse(node)!r}: write k-1, k-2, ...")

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 from islands.kernels import columns as column_kernel
 from islands.kernels import gram as gram_kernel
+from islands.kernels.machine import Program
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor
 from islands.program.linker import link
@@ -24,11 +25,16 @@ def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> ND
     Raises
     ------
     RecordError
-        An output is missing, or no segment is longer than the warm-up.
+        An output is missing, no segment is longer than the warm-up, or a term reads an input that the
+        record does not have.
+    SettingsError
+        The warm-up is shorter than the deepest lag of the terms.
     """
+    program = link(terms)
+    _refuse_unreadable(program, record, warm_up)
     signals, first, rows = _rows(record, warm_up)
     out = np.empty((len(terms), int(rows.sum())))
-    column_kernel.columns(link(terms), signals, first, rows, warm_up, out)
+    column_kernel.columns(program, signals, first, rows, warm_up, out)
     return out
 
 
@@ -37,13 +43,24 @@ def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray
 
     Raises
     ------
-    RecordError
+    RecordError, SettingsError
         As in `regressor_matrix`.
     """
+    program = link(terms)
+    _refuse_unreadable(program, record, warm_up)
     signals, first, rows = _rows(record, warm_up)
     out = np.empty((len(terms), len(terms)))
-    gram_kernel.gram(link(terms), signals, first, rows, warm_up, out)
+    gram_kernel.gram(program, signals, first, rows, warm_up, out)
     return out
+
+
+def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
+    # The kernel does not check: it would read another signal's samples, or none of the record's.
+    deepest_channel, deepest_lag = program.operands.max(axis=0, where=program.operands[:, :1] >= 0, initial=0)
+    if deepest_channel > record.inputs:
+        raise RecordError(f"the terms read input {deepest_channel}, the record has {record.inputs}")
+    if deepest_lag > warm_up:
+        raise SettingsError(f"the terms read {deepest_lag} samples back, the warm-up has {warm_up}")
 
 
 def _rows(record: Dataset, warm_up: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:

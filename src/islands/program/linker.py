@@ -63,11 +63,15 @@ class _Assembly:
     addresses: list[int] = field(default_factory=list)
     constants: dict[float, int] = field(default_factory=dict)
     known: dict[Expression, _Operand] = field(default_factory=dict)
+    emitted: dict[tuple[int, _Operand, _Operand, int], _Operand] = field(default_factory=dict)
 
     def emit(self, operation: int, first: _Operand, second: _Operand, address: int = 0) -> _Operand:
-        self.code.append((operation, len(self.code), first, second))
-        self.addresses.append(address)
-        return (TEMPORARY, len(self.code) - 1)
+        key = (operation, first, second, address)
+        if key not in self.emitted:
+            self.emitted[key] = (TEMPORARY, len(self.code))
+            self.code.append((operation, len(self.code), first, second))
+            self.addresses.append(address)
+        return self.emitted[key]
 
     def constant(self, value: float) -> _Operand:
         # Constants come before all other temporaries: a place below zero until rows are numbered.

@@ -67,8 +67,8 @@ def _intervals(
     if not pairs:
         longest = max(record.segments)
         raise RecordError(
-            f"the longest recording has {longest} samples and the deepest lag is {warm_up}: "
-            "take a longer recording or smaller lags"
+            f"the longest recording has {longest} samples and the warm-up takes {warm_up}: "
+            "take a longer recording, smaller lags or a shorter warm-up"
         )
     start, length = np.array(pairs, np.int64).T
     return np.ascontiguousarray(start), np.ascontiguousarray(length)

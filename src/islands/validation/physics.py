@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset, join
 from islands.estimation.constraints import target
+from islands.model import text
 from islands.model.clusters import clusters
 from islands.model.model import Model
-from islands.model import text
 from islands.simulation.predictors import bound_of, free_run
 from islands.systems.signals import hold, minor_loops, sine
 

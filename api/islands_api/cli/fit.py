@@ -1,0 +1,88 @@
+"""``islands fit``: forward selection over a library, and (constrained) least squares."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
+
+import typer
+
+import islands
+from islands.errors import SettingsError
+from islands.estimation.constraints import CONSTRAINTS
+from islands.io.records import read_record
+from islands.model.library import LIBRARIES
+from islands.result import Result
+from islands_api.cli import options
+from islands_api.cli.console import output, progress
+
+
+def fit(
+    record: options.Record,
+    inputs: options.Inputs,
+    output_column: options.Output,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    validation: Annotated[
+        str | None,
+        typer.Option(
+            "--validation", help="FILE, FRACTION of the record's end (default 0.25), or START:STOP."
+        ),
+    ] = None,
+    library: Annotated[str, typer.Option("--library", help=" or ".join(LIBRARIES))] = "phi-polynomial",
+    degree: Annotated[int | None, typer.Option("--degree", help="By default what suits the library.")] = None,
+    lags: Annotated[int | None, typer.Option("--lags", help="By default what suits the library.")] = None,
+    max_terms: Annotated[int, typer.Option("--max-terms", help="Size of the largest model.")] = 10,
+    constraints: Annotated[
+        str | None,
+        typer.Option("--constraints", help=f"{' or '.join(CONSTRAINTS)}; by default what suits the library."),
+    ] = None,
+    shooting: Annotated[
+        int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
+) -> None:
+    """Fit small models to a record by forward selection and least squares, and assess them."""
+    check_folder(out, force)
+    names = options.columns(inputs)
+    with progress("fit") as tell:
+        tell("reading", 0.0)
+        data = read_record(record, names, output_column, dt, options.rows(rows))
+        held_out = options.validation(validation, record, names, output_column, dt)
+        began = perf_counter()
+        result = islands.fit(
+            data,
+            held_out,
+            library=library,
+            degree=degree,
+            lags=lags,
+            max_terms=max_terms,
+            constraints=constraints,
+            shooting=shooting,
+            seed=seed,
+            progress=tell,
+        ).with_wall_time(perf_counter() - began)
+        tell("figures", 1.0)
+        result.save(out)
+    show_result(result, out)
+
+
+def check_folder(folder: Path, force: bool) -> None:
+    """Refuse to write over a result that somebody may still want.
+
+    Raises
+    ------
+    SettingsError
+        There is one, or the path is a file.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise SettingsError(f"--out {folder} is a file: give a folder")
+    if (folder / "result.json").exists() and not force:
+        raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
+
+
+def show_result(result: Result, folder: Path) -> None:
+    """Print the summary and where everything is."""
+    output.print(str(result), markup=False)
+    output.print(f"{folder}/: result.json, models/, figures/, summary.txt", markup=False)

@@ -1,0 +1,77 @@
+"""Options that several commands share, and how their texts are understood."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.io.models import read_model
+from islands.io.records import read_record
+from islands.model.model import Model
+from islands.systems.published_models import published
+
+Record = Annotated[
+    Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point) or NPZ.")
+]
+Inputs = Annotated[
+    list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")
+]
+Output = Annotated[str, typer.Option("--output", help="Output column.")]
+SamplingTime = Annotated[
+    float | None, typer.Option("--dt", help="Sampling time in seconds, where the record has no time column.")
+]
+Rows = Annotated[
+    str | None, typer.Option("--rows", help="START:STOP, the samples of the record to use; all by default.")
+]
+
+#: Where a model may come from, besides a file: ``published:13``.
+PUBLISHED = "published:"
+
+
+def columns(texts: list[str]) -> list[str]:
+    """Split ``--input a,b`` and join what was repeated."""
+    return [name for text in texts for name in text.split(",") if name]
+
+
+def rows(text: str | None) -> slice | None:
+    """Read START:STOP."""
+    if text is None:
+        return None
+    try:
+        start, stop = (int(part) if part else None for part in text.split(":"))
+    except ValueError:
+        raise SettingsError(f"cannot read the rows {text!r}: write START:STOP, for example 0:5000") from None
+    return slice(start, stop)
+
+
+def validation(
+    text: str | None, record: Path, inputs: list[str], output: str, dt: float | None
+) -> Dataset | float:
+    """Read ``--validation``: a fraction of the record's end, rows of the record's file, or a file of its own.
+
+    Raises
+    ------
+    SettingsError
+        It is none of the three.
+    """
+    if text is None:
+        return 0.25
+    if Path(text).exists():
+        return read_record(text, inputs, output, dt)
+    if ":" in text:
+        return read_record(record, inputs, output, dt, rows(text))
+    try:
+        return float(text)
+    except ValueError:
+        raise SettingsError(
+            f"--validation {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
+        ) from None
+
+
+def model(text: str) -> Model:
+    """Read a model file, or take a published model: ``published:12``."""
+    if text.startswith(PUBLISHED):
+        return published(text.removeprefix(PUBLISHED)).model
+    return read_model(text)

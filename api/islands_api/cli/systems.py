@@ -1,0 +1,37 @@
+"""``islands systems``: list the simulated systems, and make records of them."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from islands.io.records import write_record
+from islands.systems.catalogue import SYSTEMS, make_record
+from islands_api.cli.console import output
+
+systems = typer.Typer(help="Simulated systems: list them, make records of them.", no_args_is_help=True)
+
+
+@systems.command("list")
+def list_systems() -> None:
+    """List the systems with their variants and the parts that can be made."""
+    table = Table("system", "what it is", "variants", "parts")
+    for name, entry in SYSTEMS.items():
+        table.add_row(name, entry.description, ", ".join(entry.variants), ", ".join(entry.parts))
+    output.print(table)
+
+
+@systems.command()
+def make(
+    system: Annotated[str, typer.Argument(help="A name from the list.")],
+    out: Annotated[Path, typer.Option("--out", help="CSV file to write.")],
+    variant: Annotated[str | None, typer.Option("--variant", help="By default the first.")] = None,
+    part: Annotated[str, typer.Option("--part")] = "estimation",
+    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+) -> None:
+    """Make a record and write it as CSV, every number exactly."""
+    chosen = variant or (SYSTEMS[system].variants[0] if system in SYSTEMS else "")
+    record = make_record(system, chosen, part, seed)
+    write_record(record, out)
+    output.print(f"{out}: {record.samples} samples, {', '.join(record.input_names)} to {record.output_name}")

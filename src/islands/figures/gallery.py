@@ -1,0 +1,37 @@
+"""The table of figures that a result shows: each draws an assessed model on the data that it belongs to."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from matplotlib.figure import Figure
+
+from islands.data.split import Split
+from islands.figures.free_run import draw_free_run
+from islands.figures.hold import draw_holds
+from islands.figures.loop import draw_loop
+from islands.figures.residuals import draw_residual_correlations
+from islands.simulation.predictors import free_run
+from islands.validation.findings import Assessed
+
+FigureOf = Callable[[Assessed, Split], Figure]
+
+
+def _free_run(entry: Assessed, split: Split) -> Figure:
+    return draw_free_run(split.validation, free_run(entry.model, split.validation).y)
+
+
+def _loop(entry: Assessed, split: Split) -> Figure:
+    return draw_loop(split.validation, free_run(entry.model, split.validation).y)
+
+
+def _hold(entry: Assessed, split: Split) -> Figure:
+    return draw_holds(entry.model, split.estimation)
+
+
+def _residuals(entry: Assessed, _split: Split) -> Figure:
+    return draw_residual_correlations(entry.assessment.residual_tests)
+
+
+FIGURES: Mapping[str, FigureOf] = MappingProxyType(
+    {"free-run": _free_run, "loop": _loop, "hold": _hold, "residuals": _residuals}
+)

@@ -1,0 +1,1 @@
+"""Files in, files out: the only room of the core that opens one."""

@@ -1,0 +1,6 @@
+"""Records to and from files: each format is a reader, listed in `READERS`."""
+
+from islands.io.records.reader import READERS, columns_of, fingerprint, read_record
+from islands.io.records.writer import write_record, write_simulation
+
+__all__ = ["READERS", "columns_of", "fingerprint", "read_record", "write_record", "write_simulation"]

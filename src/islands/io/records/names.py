@@ -1,0 +1,54 @@
+"""What a column's name says: its unit, and whether the column is time."""
+
+import re
+from collections.abc import Iterable
+
+from islands.errors import RecordError
+
+#: Seconds of the units in which a time column may be given; a name without a unit is in seconds.
+TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+
+#: With one of these a capital T is a temperature.
+TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
+
+_TIME = re.compile(r"t(_.*|\s*[\[(].*)?|time.*", re.IGNORECASE)
+_BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]*?)\s*[\])]")
+
+
+def unit_of(name: str) -> str:
+    """Return the unit in a column's name: ``V`` of ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
+
+    It is what follows the last underscore, unless that is a bare number (``u_1``); ``""`` without one.
+    """
+    if bracketed := _BRACKETED.fullmatch(name):
+        return bracketed[1]
+    suffix = name.rpartition("_")[2] if "_" in name else ""
+    return "" if suffix.isdigit() else suffix
+
+
+def looks_like_time(name: str) -> bool:
+    """Tell whether a column is called ``t``, ``t_*`` or ``time*``; ``T_K`` is a temperature."""
+    return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and unit_of(name) in TEMPERATURE_UNITS)
+
+
+def seconds_per_unit(name: str) -> float | None:
+    """Return the seconds of a time column's unit, None where the unit is unknown."""
+    return TIME_UNITS.get(unit_of(name).lower())
+
+
+def time_column(names: Iterable[str], file: str) -> str | None:
+    """Choose the time column among columns that are neither input nor output; None where there is none.
+
+    ``t``, ``time`` and names with a unit of time go before other words that begin with ``time``, so that a
+    ``timestamp`` beside ``t_s`` does no harm.
+
+    Raises
+    ------
+    RecordError
+        Several columns may be the time.
+    """
+    candidates = [name for name in names if looks_like_time(name) and seconds_per_unit(name) is not None]
+    plain = [name for name in candidates if name.lower() in {"t", "time"} or unit_of(name)] or candidates
+    if len(plain) > 1:
+        raise RecordError(f"{file}: columns {' and '.join(plain)} may all be the time: rename all but one")
+    return plain[0] if plain else None

@@ -1,0 +1,142 @@
+"""Reads a record from a file and refuses, with advice, what would spoil an identification later."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.errors import RecordError
+from islands.io.records.archive import read_archive
+from islands.io.records.checks import check_choice, check_length, check_values, check_varies
+from islands.io.records.delimited import read_delimited
+from islands.io.records.names import time_column, unit_of
+from islands.io.records.sampling import sampling_of
+from islands.io.records.table import Table
+
+#: How a file is read, by its suffix. A new format is a reader and an entry here.
+READERS: dict[str, Callable[[Path], Table]] = {
+    ".csv": read_delimited,
+    ".txt": read_delimited,
+    ".tsv": read_delimited,
+    ".dat": read_delimited,
+    ".npz": read_archive,
+}
+
+
+def read_record(
+    path: str | Path,
+    inputs: Sequence[str],
+    output: str,
+    dt: float | None = None,
+    rows: slice | None = None,
+    missing_output: bool = False,
+) -> Dataset:
+    """Read inputs and an output from a CSV or NPZ file and check them.
+
+    A column called ``t``, ``t_*`` or ``time*`` that is neither input nor output is time, in the unit at the
+    end of its name (s, ms, us, ns, min, h; without one: s). What follows the last underscore of a name is the
+    unit: ``u_V``. The separator and a decimal comma of a text file are inferred.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; its suffix chooses the reader from `READERS`.
+    inputs : sequence of str
+        Columns that are inputs, in the order in which the model will number them.
+    output : str
+        Column that is the output.
+    dt : float, optional
+        Sampling time in seconds, for files that do not tell it; where the file does, both agree within 1 %.
+        An NPZ file may hold it as a single number ``dt`` or ``Ts`` (seconds) or ``fs`` (hertz).
+    rows : slice, optional
+        Samples to read, from 0, not counting a header; what lies outside is not checked.
+    missing_output : bool
+        Accept an output with missing values, which a free run reads in its warm-up alone, and constant
+        channels: a hold is worth simulating, though nothing can be estimated from it.
+
+    Returns
+    -------
+    Dataset
+        One segment of float64, with the columns' names and units; ``start`` is the first sample's time.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as it is. The message names row and column and says what to do.
+    """
+    inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    table = _opened(path)
+    file = Path(path).name
+    check_choice(table.names, inputs, output, file)
+    time = time_column((name for name in table.names if name not in (*inputs, output)), file)
+    columns = table.read((*inputs, output, *([time] if time else [])), rows)
+    check_length(columns)
+    for name in columns.numbers:
+        check_values(columns, name, missing=missing_output and name == output)
+    step, start = sampling_of(table, columns, time, dt)
+    for name in () if missing_output else (*inputs, output):
+        check_varies(columns, name)
+    return Dataset(
+        u=np.column_stack([columns.numbers[name] for name in inputs]),
+        y=columns.numbers[output],
+        dt=step,
+        input_names=inputs,
+        output_name=output,
+        input_units=tuple(unit_of(name) for name in inputs),
+        output_unit=unit_of(output),
+        start=step * columns.first if start is None else start,
+        sha256=fingerprint(path),
+    )
+
+
+def columns_of(path: str | Path) -> tuple[str, ...]:
+    """Return the names of a file's columns (of an NPZ file: of its arrays), in the file's order.
+
+    Raises
+    ------
+    RecordError
+        The file is not there or cannot be read.
+    """
+    return _opened(path).names
+
+
+def fingerprint(path: str | Path) -> str:
+    """Return the SHA-256 of the file's bytes in hexadecimal: two equal fingerprints are the same data.
+
+    Raises
+    ------
+    RecordError
+        The file is not there or cannot be read.
+    """
+    with _existing(path).open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _opened(path: str | Path) -> Table:
+    file = _existing(path)
+    reader = READERS.get(file.suffix.lower())
+    if reader is None:
+        raise RecordError(
+            f"{file.name}: files ending in '{file.suffix}' are not known, only {', '.join(READERS)}: export "
+            "the record to one of these"
+        )
+    return reader(file)
+
+
+def _existing(path: str | Path) -> Path:
+    file = Path(path)
+    try:
+        file.open("rb").close()
+    except FileNotFoundError as error:
+        raise RecordError(
+            f"there is no file {file}: check the path and the folder that it is relative to"
+        ) from error
+    except OSError as error:
+        if file.is_dir():
+            raise RecordError(f"{file} is a folder: give the path of the file in it") from error
+        raise RecordError(
+            f"{file} cannot be opened ({error.strerror}): check path and permissions"
+        ) from error
+    return file

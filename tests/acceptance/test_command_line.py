@@ -1,0 +1,201 @@
+"""The whole house through its front door: processes, files, messages."""
+
+import csv
+import importlib.util
+import json
+import subprocess
+import sysconfig
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def islands(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=240
+    )
+
+
+def succeed(*arguments: object) -> str:
+    done = islands(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def fail(*arguments: object) -> str:
+    done = islands(*arguments)
+    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record of the consistent piezo, cut to 20 s, and what ``islands fit`` makes of it."""
+    base = tmp_path_factory.mktemp("house")
+    succeed(
+        "systems",
+        "make",
+        "bouc-wen-piezo",
+        "--variant",
+        "consistent",
+        "--part",
+        "estimation",
+        "--out",
+        base / "long.csv",
+    )
+    succeed(
+        "systems",
+        "make",
+        "bouc-wen-piezo",
+        "--variant",
+        "consistent",
+        "--part",
+        "validation",
+        "--out",
+        base / "sine.csv",
+    )
+    fit = ["fit", base / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:20000"]
+    succeed(*fit, "--validation", base / "sine.csv", "--max-terms", 6, "--out", base / "fit")
+    return base
+
+
+@pytest.fixture(scope="module")
+def result(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "fit" / "result.json").read_text())
+
+
+def test_systems_are_listed_and_made(folder: Path) -> None:
+    assert "bouc-wen-piezo" in succeed("systems", "list")
+    with (folder / "sine.csv").open() as stream:
+        rows = list(csv.reader(stream))
+    assert rows[0] == ["t_s", "u_V", "y_um"]
+    assert len(rows) == 20_001
+
+
+def test_a_result_says_what_was_read_searched_and_found(result: dict[str, Any]) -> None:
+    assert result["record"]["samples"] == 20_000
+    assert result["record"]["dt"] == pytest.approx(1e-3, rel=1e-9)
+    assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
+    assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
+    assert result["settings"]["constraints"] == "hysteresis"
+    assert result["search"]["outcomes"]["ok"] == result["search"]["evaluations"] == len(result["models"])
+    # Equation (5) for degree 5 and three lags of y and u: C(11, 5).
+    assert result["search"]["full_set"]["candidates"] == 462
+    assert result["search"]["wall_s"] > 0
+
+
+def test_models_come_best_first_with_metrics_and_physics(result: dict[str, Any]) -> None:
+    errors = [model["metrics"]["validation"]["free_run"]["rmse"] for model in result["models"]]
+    assert errors == sorted(errors)
+    best = result["models"][0]
+    assert best["rank"] == 1
+    assert best["metrics"]["validation"]["free_run"]["mape"] < 0.5
+    assert best["physics"]["property_1"] is True
+    assert best["physics"]["hold_drift_percent"] < 1e-6
+    assert best["physics"]["clusters"] == [
+        {"cluster": "y", "sum": pytest.approx(1.0, abs=1e-9), "target": 1.0}
+    ]
+    assert best["terms"][0]["regressor"] == "y(k-1)"
+    assert all(term["standard_error"] >= 0 for term in best["terms"])
+
+
+def test_the_folder_holds_models_figures_and_a_summary(folder: Path, result: dict[str, Any]) -> None:
+    for model in result["models"]:
+        document = json.loads((folder / "fit" / "models" / f"{model['rank']:02d}.json").read_text())
+        assert document["terms"] == model["terms"]
+    figures = {path.stem for path in (folder / "fit" / "figures").glob("*.svg")}
+    assert figures == {"free-run", "loop", "hold", "residuals"}
+    assert result["models"][0]["equation"] in (folder / "fit" / "summary.txt").read_text()
+
+
+def test_the_same_fit_gives_the_same_models_bit_for_bit(folder: Path) -> None:
+    fit = ["fit", folder / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:20000"]
+    succeed(*fit, "--validation", folder / "sine.csv", "--max-terms", 6, "--out", folder / "again")
+    for path in sorted((folder / "fit").rglob("*")):
+        if path.is_file() and path.name != "result.json":
+            twin = folder / "again" / path.relative_to(folder / "fit")
+            assert path.read_bytes() == twin.read_bytes(), path.name
+
+
+@pytest.mark.parametrize(("mode", "missing"), [("one-step", 3), ("shooting", 3), ("free-run", 3)])
+def test_simulate_writes_a_row_for_every_sample(folder: Path, mode: str, missing: int) -> None:
+    out = folder / f"{mode}.csv"
+    text = succeed(
+        "simulate", folder / "fit/models/01.json", folder / "sine.csv", "--mode", mode, "--out", out
+    )
+    assert "ok" in text
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    assert table.dtype.names == ("time", "y_sim")
+    assert len(table) == 20_000
+    assert np.isnan(table["y_sim"][:missing]).all()
+    assert np.isfinite(table["y_sim"][missing:]).all()
+    measured = np.genfromtxt(folder / "sine.csv", delimiter=",", names=True)
+    assert np.array_equal(table["time"], measured["t_s"])
+    assert np.abs(table["y_sim"] - measured["y_um"])[missing:].max() < 1.0
+
+
+def test_a_free_run_needs_no_output_after_its_warm_up(folder: Path) -> None:
+    with (folder / "sine.csv").open() as stream:
+        rows = list(csv.reader(stream))
+    for row in rows[11:]:
+        row[2] = ""
+    with (folder / "blind.csv").open("w", newline="") as stream:
+        csv.writer(stream).writerows(rows)
+    model = folder / "fit/models/01.json"
+    succeed("simulate", model, folder / "blind.csv", "--mode", "free-run", "--out", folder / "blind-run.csv")
+    succeed("simulate", model, folder / "sine.csv", "--mode", "free-run", "--out", folder / "seen-run.csv")
+    assert (folder / "blind-run.csv").read_text() == (folder / "seen-run.csv").read_text()
+    assert "missing at sample 10" in fail("simulate", model, folder / "blind.csv", "--mode", "one-step")
+
+
+def test_the_exported_python_function_computes_the_same_numbers(folder: Path) -> None:
+    source = succeed("show", folder / "fit/models/01.json", "--format", "python")
+    (folder / "exported.py").write_text(source)
+    spec = importlib.util.spec_from_file_location("exported", folder / "exported.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    record = np.genfromtxt(folder / "sine.csv", delimiter=",", names=True)
+    succeed("simulate", folder / "fit/models/01.json", folder / "sine.csv", "--out", folder / "run.csv")
+    ours = np.genfromtxt(folder / "run.csv", delimiter=",", names=True)["y_sim"]
+    theirs = module.simulate(record["u_V"].tolist(), record["y_um"].tolist())
+    assert np.array_equal(np.array(theirs)[module.MAXIMUM_LAG :], ours[module.MAXIMUM_LAG :])
+
+
+@pytest.mark.parametrize("number", ["12", "13", "14"])
+def test_published_models_are_shown_in_every_format(number: str) -> None:
+    assert succeed("show", f"published:{number}").startswith("y(k) = 1*y(k-1)")
+    assert succeed("show", f"published:{number}", "--format", "latex").startswith("y_{k} = ")
+    assert "def simulate(" in succeed("show", f"published:{number}", "--format", "python")
+    assert (
+        json.loads(succeed("show", f"published:{number}", "--format", "json"))["schema"] == "islands.model/1"
+    )
+
+
+def test_errors_say_what_to_do_and_nothing_is_lost(folder: Path) -> None:
+    record, out = folder / "sine.csv", folder / "never"
+    base = ["fit", record, "--output", "y_um", "--out", out]
+    assert "u_mV" in fail(*base, "--input", "u_mV")
+    assert "unknown library" in fail(*base, "--input", "u_V", "--library", "fourier")
+    assert "unknown constraints" in fail(*base, "--input", "u_V", "--constraints", "physics")
+    assert "too" in fail(*base, "--input", "u_V", "--library", "polynomial", "--degree", 5, "--lags", 11)
+    assert "--validation" in fail(*base, "--input", "u_V", "--validation", "nowhere.csv")
+    assert "START:STOP" in fail(*base, "--input", "u_V", "--rows", "all")
+    assert not out.exists()
+    before = (folder / "fit/result.json").read_bytes()
+    message = fail("fit", record, "--input", "u_V", "--output", "y_um", "--out", folder / "fit")
+    assert "--force" in message
+    assert (folder / "fit/result.json").read_bytes() == before
+    assert "no published model" in fail("show", "published:15")
+    assert "cannot read the model file" in fail("show", folder / "nothing.json")
+    assert "is no model file" in fail("show", folder / "fit/result.json")
+    assert "there are" in fail("systems", "make", "pendulum", "--out", folder / "p.csv")

@@ -1,0 +1,71 @@
+"""The shape of the repository: imports, packages, sizes, and documentation of what can be added to."""
+
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from islands.estimation.constraints import CONSTRAINTS
+from islands.figures.gallery import FIGURES
+from islands.io.export import EXPORTS
+from islands.io.records import READERS
+from islands.model.library import LIBRARIES
+from islands.model.primitives import PRIMITIVES
+from islands.systems.catalogue import SYSTEMS
+from islands.systems.published_models import PUBLISHED
+
+ROOT = Path(__file__).parents[2]
+SOURCES = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "api").rglob("*.py")])
+
+
+def test_imports_keep_the_contracts() -> None:
+    """Layers point down, siblings do not see each other, the core knows no clock and no environment."""
+    command = Path(sysconfig.get_path("scripts")) / "lint-imports"
+    done = subprocess.run([command], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_source_folder_is_a_package_with_a_purpose() -> None:
+    folders = {path.parent for path in SOURCES}
+    for folder in folders:
+        assert (folder / "__init__.py").read_text().startswith('"""'), folder
+
+
+def test_every_module_says_why_it_exists() -> None:
+    for path in SOURCES:
+        assert path.read_text().lstrip("r").startswith('"""'), path
+
+
+def test_files_stay_small_enough_to_read() -> None:
+    long = {str(path): count for path in SOURCES if (count := len(path.read_text().splitlines())) > 300}
+    assert not long
+
+
+def test_no_room_is_an_attic() -> None:
+    for path in SOURCES:
+        assert not {"utils", "helpers", "common", "misc"} & {path.stem, *path.parts}, path
+
+
+def test_the_folder_api_is_not_importable_as_a_package() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "import api.islands_api"], cwd=ROOT / "src", capture_output=True, check=False
+    )
+    assert done.returncode != 0
+
+
+@pytest.mark.parametrize(
+    "table", [PRIMITIVES, LIBRARIES, CONSTRAINTS, SYSTEMS, PUBLISHED, FIGURES, EXPORTS, READERS]
+)
+def test_every_table_entry_is_documented(table: dict[str, object]) -> None:
+    text = (ROOT / "docs" / "reference.md").read_text()
+    missing = [name for name in table if f"`{name}`" not in text]
+    assert not missing
+
+
+def test_the_lock_file_names_hashes_and_no_index() -> None:
+    text = (ROOT / "requirements.lock").read_text()
+    assert "--hash=sha256:" in text
+    assert "://" not in text
+    assert "--index-url" not in text

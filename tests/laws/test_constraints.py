@@ -1,0 +1,179 @@
+"""Laws of the constraints on parameters: Property 1 of the paper, section 3, and its null space."""
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.estimation.constrained import constrained_least_squares
+from islands.estimation.constraints import CONSTRAINTS, constraint
+from islands.estimation.least_squares import least_squares
+from islands.model.clusters import steady_state
+from islands.model.expression import Lagged
+from islands.model.model import model_of
+from islands.model.regressor import regressor
+from islands.model.text import parse, plain
+from islands.program.columns import regressor_matrix
+from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.predictors import free_run
+
+
+def made(*texts):
+    """Return regressors of texts, in the order given."""
+    return [regressor(parse(text))[1] for text in texts]
+
+
+MODEL_14 = made(
+    "phi2(u(k-5), u(k-10))",
+    "phi2(u(k-1), u(k-3))",
+    "y(k-6)*u(k-10)",
+    "y(k-1)*u(k-4)",
+    "u(k-9)",
+    "u(k-7)",
+    "phi2(u(k-9), u(k-2))",
+    "phi1(u(k-5), u(k-6))",
+    "y(k-1)",
+)
+
+
+def rows(constrained):
+    """Return every constraint as ({regressor's text: weight}, target)."""
+    names = [plain(item.expression) for item in constrained.regressors]
+    return [
+        ({name: weight for name, weight in zip(names, row, strict=True) if weight}, total)
+        for row, total in zip(constrained.S.tolist(), constrained.c.tolist(), strict=True)
+    ]
+
+
+def hysteresis(*texts):
+    return CONSTRAINTS["hysteresis"].constrain(made(*texts))
+
+
+def test_model_14_has_the_papers_three_clusters():
+    found = CONSTRAINTS["hysteresis"].constrain(MODEL_14)
+    assert found.regressors == tuple(MODEL_14)
+    expected = [
+        ({"y(k-1)": 1.0}, 1.0),
+        ({"u(k-9)": 1.0, "u(k-7)": 1.0}, 0.0),
+        ({"y(k-6)*u(k-10)": 1.0, "y(k-1)*u(k-4)": 1.0}, 0.0),
+    ]
+    assert sorted(rows(found), key=str) == sorted(expected, key=str)
+
+
+def test_several_lags_of_y_share_the_sum_of_one():
+    found = hysteresis("y(k-1)", "y(k-2)", "phi1(u(k-1), u(k-2))")
+    assert rows(found) == [({"y(k-1)": 1.0, "y(k-2)": 1.0}, 1.0)]
+    assert len(found.regressors) == 3
+
+
+@pytest.mark.parametrize("lone", ["u(k-1)", "u(k-1)*y(k-3)", "y(k-2)^2", "1", "exp(u(k-1) - u(k-2))"])
+def test_a_lone_regressor_of_another_cluster_is_dropped_and_not_counted(lone):
+    found = hysteresis(lone, "y(k-1)", "y(k-1)*y(k-3)*u(k-2)", "phi1(u(k-1), u(k-2))")
+    assert [plain(item.expression) for item in found.regressors] == ["y(k-1)", "u(k-1) - u(k-2)"]
+    assert rows(found) == [({"y(k-1)": 1.0}, 1.0)]
+
+
+def test_a_lone_y_keeps_its_parameter_of_one():
+    found = hysteresis("y(k-3)")
+    assert rows(found) == [({"y(k-3)": 1.0}, 1.0)]
+
+
+@pytest.mark.parametrize("texts", [["u(k-1)", "u(k-2)"], ["y(k-1)^2", "y(k-2)^2"], ["phi1(u(k-1), u(k-2))"]])
+def test_a_structure_without_y_is_infeasible(texts):
+    found = hysteresis(*texts)
+    assert found == Outcome(Verdict.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
+    assert "add the regressor that the reason names" in str(found)
+
+
+def test_members_enter_their_cluster_with_their_weight_at_rest():
+    # 2 y(k-1) + y(k-2) is 3 y at rest; its canonical form takes the 2 out.
+    found = hysteresis("2*y(k-1) + y(k-2)", "y(k-3)")
+    (row, total), names = rows(found)[0], [plain(item.expression) for item in found.regressors]
+    assert total == 1.0
+    assert [row[name] for name in names] == [1.5, 1.0]
+
+
+def test_a_constrained_estimate_rests_where_it_is_put():
+    generator = np.random.default_rng(10)
+    u = np.cumsum(generator.normal(size=400)) / 5
+    y = 0.8 * np.roll(u, 2) + 0.1 * generator.normal(size=400)
+    record = Dataset(u, y, 0.1)
+    found = CONSTRAINTS["hysteresis"].constrain(MODEL_14)
+    psi = regressor_matrix([*found.regressors, Lagged(0, 0)], record, 10)
+    theta = constrained_least_squares(psi[:-1], psi[-1], found.S, found.c).theta
+    chosen = model_of((item.expression, float(weight)) for item, weight in zip(MODEL_14, theta, strict=True))
+    for level in (-2.0, 0.0, 3.0):
+        held = free_run(chosen, Dataset(np.full(200, 1.5), np.full(200, level), 0.1)).y[10:]
+        np.testing.assert_allclose(held, level, rtol=0, atol=1e-9)
+
+
+def test_no_constraint_leaves_all_free():
+    found = CONSTRAINTS["none"].constrain(MODEL_14)
+    assert found.regressors == tuple(MODEL_14)
+    assert found.S.shape == (0, 9)
+    assert found.c.shape == (0,)
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+def test_every_constraint_is_found_by_its_name(name):
+    assert constraint(name) is CONSTRAINTS[name]
+    assert constraint(name).description
+
+
+def test_an_unknown_constraint_is_refused():
+    with pytest.raises(SettingsError) as caught:
+        constraint("backlash")
+    assert str(caught.value) == "unknown constraints 'backlash': take one of none, hysteresis"
+
+
+# Its null space, for selection.
+
+LIBRARY = made(
+    "y(k-1)",
+    "y(k-2)",
+    "y(k-4)",
+    "y(k-2) + 0.5*y(k-3)",
+    "u(k-1) + 0.5*u(k-3)",
+    "u(k-1)",
+    "u(k-2)",
+    "y(k-1)*u(k-1)",
+    "y(k-2)*u(k-1)",
+    "phi2(u(k-1), u(k-2))",
+    "u(k-1)*phi1(u(k-1), u(k-2))",
+)
+
+
+def test_every_direction_of_hysteresis_vanishes_at_rest():
+    found = CONSTRAINTS["hysteresis"].directions(LIBRARY)
+    assert [plain(item.expression) for item in found.fixed] == ["y(k-1)"]
+    # One for each regressor but the first of the three clusters.
+    assert len(found.free) == len(LIBRARY) - 3
+    for direction in found.free:
+        assert abs(steady_state(regressor(direction.expression)[1])[0]) < 1e-15
+
+
+def test_estimating_in_the_null_space_is_constrained_least_squares():
+    generator = np.random.default_rng(12)
+    record = Dataset(generator.normal(size=300), generator.normal(size=300), 0.1)
+    found = CONSTRAINTS["hysteresis"].directions(LIBRARY)
+    moves = regressor_matrix([*(item.expression for item in found.free), found.target], record, 4)
+    free = least_squares(moves[:-1], moves[-1])
+    bound = CONSTRAINTS["hysteresis"].constrain(LIBRARY)
+    psi = regressor_matrix([*bound.regressors, Lagged(0, 0)], record, 4)
+    constrained = constrained_least_squares(psi[:-1], psi[-1], bound.S, bound.c)
+    np.testing.assert_allclose(
+        moves[-1] - free.theta @ moves[:-1], psi[-1] - constrained.theta @ psi[:-1], rtol=0, atol=1e-10
+    )
+    assert free.residual_variance == pytest.approx(constrained.residual_variance, rel=1e-10)
+
+
+def test_a_library_without_y_cannot_meet_the_constraint():
+    found = CONSTRAINTS["hysteresis"].directions(made("u(k-1)", "u(k-2)"))
+    assert found.verdict is Verdict.INFEASIBLE
+    assert "add y(k-1) to the library" in found.reason
+
+
+def test_without_a_constraint_every_regressor_is_a_direction():
+    found = CONSTRAINTS["none"].directions(LIBRARY)
+    assert (found.target, found.fixed) == (Lagged(0, 0), ())
+    assert [direction.regressors for direction in found.free] == [(item,) for item in LIBRARY]

@@ -1,0 +1,227 @@
+"""The laws of expressions: text, canonical form and what they mean."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from strategies import any_number, expressions, grid, leaves, nearly, phi_factors, settled_value, signals
+
+from islands.errors import ModelError
+from islands.model.expression import Apply, Constant, Lagged, Shift, content, lags, unshifted, value, walk
+from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
+from islands.model.regressor import canonical, regressor
+from islands.model.text import latex, parse, plain
+
+
+def product(*factors):
+    return Apply(MUL, factors)
+
+
+@settings(max_examples=300)
+@given(expressions(constants=any_number))
+def test_text_is_read_back_as_the_expression_that_was_written(expression):
+    assert parse(plain(expression)) == expression
+
+
+@given(expressions(inputs=1))
+def test_a_single_input_is_read_back_without_a_number(expression):
+    assert "u1" not in plain(expression)
+    assert parse(plain(expression)) == expression
+
+
+@given(expressions(inputs=2))
+def test_two_inputs_are_read_back_with_their_numbers(expression):
+    text = plain(expression, inputs=2)
+    assert "u(" not in text
+    assert parse(text) == expression
+
+
+@settings(max_examples=200)
+@given(expressions())
+def test_canonical_form_is_idempotent(expression):
+    factor, core = canonical(expression)
+    if factor:
+        assert canonical(core) == (1.0, core)
+
+
+@settings(max_examples=200)
+@given(expressions())
+def test_canonical_text_is_read_back_as_the_same_regressor(expression):
+    _, item = regressor(expression)
+    if item is not None:
+        assert regressor(parse(plain(item.expression))) == (1.0, item)
+
+
+@settings(max_examples=300)
+@given(expressions(), signals())
+def test_canonical_form_keeps_the_value(expression, signal):
+    expected = settled_value(expression, signal)
+    assume(expected is not None)
+    factor, item = regressor(expression)
+    found = 0.0 if item is None else settled_value(item.expression, signal)
+    assume(found is not None)
+    assert nearly(factor * found, expected)
+
+
+@given(expressions())
+def test_canonical_form_reads_no_lag_that_the_expression_does_not_read(expression):
+    _, core = canonical(expression)
+    assert lags(core) <= lags(expression)
+
+
+@given(expressions())
+def test_canonical_form_has_its_back_shifts_at_the_leaves_and_no_other_name_for_a_primitive(expression):
+    rewritten = {"phi1", "phi2", "square", "cube"}
+    for node in walk(canonical(expression)[1]):
+        assert not isinstance(node, Shift)
+        assert not (isinstance(node, Apply) and node.primitive.name in rewritten)
+
+
+@given(st.lists(expressions(height=2), min_size=2, max_size=5), st.randoms(use_true_random=False))
+def test_commuted_products_are_one_regressor(factors, rng):
+    shuffled = rng.sample(factors, len(factors))
+    (one, core), (other, same) = canonical(product(*factors)), canonical(product(*shuffled))
+    assert core == same
+    assert nearly(one, other)
+
+
+@given(st.lists(leaves(), min_size=2, max_size=5), st.lists(grid, min_size=5, max_size=5), st.randoms())
+def test_commuted_sums_are_one_regressor(signals_read, weights, rng):
+    terms = [product(Constant(w), leaf) for w, leaf in zip(weights, signals_read, strict=False)]
+    shuffled = rng.sample(terms, len(terms))
+    assert canonical(Apply(ADD, tuple(terms))) == canonical(Apply(ADD, tuple(shuffled)))
+
+
+@given(expressions(height=2), expressions(height=2), expressions(height=2))
+def test_brackets_of_a_product_do_not_matter(a, b, c):
+    assert canonical(product(a, product(b, c)))[1] == canonical(product(product(a, b), c))[1]
+
+
+@given(expressions(height=2), st.sampled_from(["phi1", "phi2", "sub"]))
+def test_phi_of_equal_arguments_is_zero(argument, name):
+    assert regressor(Apply(PRIMITIVES[name], (argument, argument))) == (0.0, None)
+
+
+@given(phi_factors())
+def test_phi_with_its_arguments_exchanged_changes_its_sign_alone(phi):
+    exchanged = Apply(phi.primitive, phi.arguments[::-1])
+    factor, core = canonical(phi)
+    assert canonical(exchanged) == (-factor, core)
+
+
+@given(expressions(), st.integers(1, 5), st.integers(1, 5))
+def test_back_shifts_add(expression, first, second):
+    assert unshifted(Shift(first, Shift(second, expression))) == unshifted(expression, first + second)
+
+
+@given(expressions(height=2), st.integers(1, 5), signals())
+def test_a_back_shift_moves_every_signal_under_it(expression, samples, signal):
+    now = settled_value(expression, lambda channel, lag: signal(channel, lag + samples))
+    assume(now is not None)
+    assert value(Shift(samples, expression), signal) == now
+    assert value(unshifted(Shift(samples, expression)), signal) == now
+
+
+def test_two_back_shifts_of_five_are_eleven_samples_back():
+    assert regressor(parse("q5(q5(u(k-1)))"))[1].expression == Lagged(1, 11)
+
+
+@given(phi_factors(), st.integers(1, 9))
+def test_an_odd_power_of_a_sign_is_the_sign_and_an_even_one_never_one(phi, power):
+    sign = canonical(Apply(SIGN, (Apply(SUB, phi.arguments),)))[1]
+    _, core = canonical(product(*[sign] * power)) if power > 1 else (1.0, sign)
+    assert core == (sign if power % 2 else product(sign, sign))
+    assert value(core, lambda *_: 1.0) == 0.0
+
+
+@given(expressions(height=2), grid, grid)
+def test_equal_terms_of_a_sum_merge(expression, first, second):
+    terms = tuple(product(Constant(weight), expression) for weight in (first, second))
+    factor, core = canonical(expression)
+    expected = (first + second) * factor
+    found, merged = canonical(Apply(ADD, terms))
+    assert nearly(found, expected)
+    assert merged == (core if expected else Constant(1.0))
+
+
+@given(expressions(height=2), grid.filter(bool))
+def test_a_number_in_front_belongs_to_the_parameter(expression, number):
+    assume(canonical(expression)[0] != 0.0)
+    factor, item = regressor(expression)
+    found, same = regressor(product(Constant(number), expression))
+    assert same == item
+    assert nearly(found, number * factor)
+
+
+@given(expressions(height=2), leaves().map(lambda leaf: Lagged(leaf.channel, 0)))
+def test_a_regressor_never_looks_at_the_present(expression, present):
+    assume(canonical(expression)[0] != 0.0)
+    with pytest.raises(ModelError, match=rf"reads the past alone: channel {present.channel} has lag 0"):
+        regressor(product(expression, present))
+
+
+@given(st.lists(expressions(height=2), min_size=3, max_size=3))
+def test_the_order_of_content_is_total(three):
+    a, b, c = map(content, three)
+    assert [a < b, a == b, a > b].count(True) == 1
+    assert (a == b) == (three[0] == three[1])
+    if a <= b <= c:
+        assert a <= c
+
+
+@given(st.lists(expressions(height=2), min_size=2, max_size=8), st.randoms())
+def test_sorting_by_content_forgets_the_order_of_arrival(found, rng):
+    shuffled = rng.sample(found, len(found))
+    assert sorted(found, key=content) == sorted(shuffled, key=content)
+
+
+@settings(max_examples=200)
+@given(expressions(constants=any_number))
+def test_latex_has_balanced_braces_and_brackets(expression):
+    depth = 0
+    written = latex(expression, inputs=2)
+    for mark in written:
+        depth += {"{": 1, "}": -1}.get(mark, 0)
+        assert depth >= 0
+    assert depth == 0
+    assert written.count(r"\left") == written.count(r"\right")
+
+
+@given(expressions())
+def test_latex_never_puts_an_exponent_on_an_exponent_or_a_fraction(expression):
+    written = latex(expression)
+    assert not re.search(r"\^\{[^{}]*\}\^", written)
+    assert not re.search(r"\\frac\{[^{}]*(\{[^{}]*\}[^{}]*)*\}\{[^{}]*(\{[^{}]*\}[^{}]*)*\}\^", written)
+
+
+DETERMINED = """
+from islands.model.clusters import clusters
+from islands.model.expression import Lagged, content, lags
+from islands.model.model import model_of
+from islands.model.text import at_rest, equation, latex_equation, parse
+terms = ["max(y(k-3), u2(k-1))*tanh(u1(k-2))", "u1(k-1)*sign(u1(k-1) - u1(k-4))^3", "y(k-1)", "3", "u2(k-7)",
+         "exp(phi1(u1(k-1), u1(k-2)))*y(k-2)", "sin(y(k-1) + 2*u2(k-3) - u1(k-1)*u2(k-1))", "2*y(k-9)"]
+model = model_of([(parse(text), 0.5) for text in terms], ("u1", "u2"))
+print(equation(model)); print(latex_equation(model))
+for found in clusters(model.regressors):
+    print(at_rest(found.steady_state, 2), found.members, found.weights)
+"""
+
+
+def test_text_and_clusters_do_not_depend_on_the_seed_of_the_hash():
+    printed = {
+        subprocess.run(
+            [sys.executable, "-c", DETERMINED],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(printed) == 1
+    assert printed.pop().count("\n") == 7

@@ -1,0 +1,213 @@
+"""Laws of forward orthogonal regression by error reduction ratio, equation (6).
+
+Oracle: a textbook forward selection by modified Gram-Schmidt on columns, in extended precision.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.data.dataset import Dataset
+from islands.estimation.froe import froe, prune
+from islands.estimation.least_squares import least_squares
+from islands.model.expression import Lagged
+from islands.model.regressor import regressor
+from islands.model.text import parse
+from islands.program.columns import gram_matrix
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def problem(seed, terms=5, rows=120, noise=0.3):
+    """Draw a regressor matrix of correlated terms (terms, rows) and a target."""
+    generator = np.random.default_rng(seed)
+    psi = generator.normal(size=(terms, terms)) @ generator.normal(size=(terms, rows))
+    psi += 0.5 * generator.normal(size=(terms, rows))
+    return psi, generator.normal(size=terms) @ psi + noise * generator.normal(size=rows)
+
+
+def squares(psi, y, theta):
+    return float(np.sum((y - theta @ psi) ** 2))
+
+
+def inner_products(psi, y):
+    stacked = np.vstack([psi, y])
+    return stacked @ stacked.T
+
+
+def textbook(psi, y):
+    """Select forward by modified Gram-Schmidt on the columns, in extended precision."""
+    left = dict(enumerate(psi.astype(np.longdouble)))
+    norms = {position: column @ column for position, column in left.items()}
+    target = y.astype(np.longdouble)
+    order, ratios = [], []
+    while left:
+        err = {
+            position: (column @ target) ** 2 / (column @ column) / (target @ target)
+            for position, column in left.items()
+            if column @ column > 1e-20 * norms[position]
+        }
+        if not err:
+            break
+        best = max(err, key=err.get)
+        order.append(best)
+        ratios.append(float(err[best]))
+        chosen = left.pop(best)
+        left = {
+            position: column - (chosen @ column) / (chosen @ chosen) * chosen
+            for position, column in left.items()
+        }
+    return order, ratios
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_froe_is_the_textbooks_forward_selection_on_columns(seed):
+    psi, y = problem(seed, 8, 200, noise=3.0)
+    found = froe(inner_products(psi, y))
+    order, ratios = textbook(psi, y)
+    assert list(found.order) == order
+    np.testing.assert_allclose(found.err, ratios, rtol=1e-6, atol=1e-12)
+
+
+@given(seeds, st.integers(1, 10))
+def test_error_reduction_ratios_sum_to_what_least_squares_explains_and_to_one_at_most(seed, terms):
+    psi, y = problem(seed, terms, noise=1.0)
+    found = froe(inner_products(psi, y))
+    assert len(found.order) == terms
+    assert min(found.err) > 0.0
+    assert sum(found.err) <= 1.0 + 1e-12
+    explained = 1.0 - squares(psi, y, least_squares(psi, y).theta) / (y @ y)
+    assert sum(found.err) == pytest.approx(explained, abs=1e-9)
+
+
+@given(seeds)
+def test_ratios_of_a_target_that_is_explained_fully_sum_to_one(seed):
+    psi, _ = problem(seed, 6)
+    found = froe(inner_products(psi, np.random.default_rng(seed).normal(size=6) @ psi))
+    assert sum(found.err) == pytest.approx(1.0, abs=1e-9)
+
+
+@given(seeds)
+def test_froe_with_n_terms_begins_froe_with_one_more(seed):
+    gram = inner_products(*problem(seed, 7, noise=1.0))
+    selections = [froe(gram, max_terms=terms) for terms in range(9)]
+    assert [len(selection.order) for selection in selections] == [0, 1, 2, 3, 4, 5, 6, 7, 7]
+    for shorter, longer in pairwise(selections):
+        assert longer.order[: len(shorter.order)] == shorter.order
+        assert longer.err[: len(shorter.err)] == shorter.err
+
+
+@given(seeds)
+def test_the_first_selected_has_the_largest_correlation(seed):
+    psi, y = problem(seed, 7, noise=1.0)
+    correlation = np.abs(psi @ y) / np.sqrt(np.sum(psi**2, axis=1))
+    assert froe(inner_products(psi, y), max_terms=1).order == (int(np.argmax(correlation)),)
+
+
+@given(seeds, st.floats(1e-6, 0.3))
+def test_a_tolerance_stops_the_selection_and_changes_nothing_before(seed, tolerance):
+    gram = inner_products(*problem(seed, 7, noise=1.0))
+    full, stopped = froe(gram), froe(gram, tolerance)
+    count = len(stopped.order)
+    assert stopped.order == full.order[:count]
+    assert all(err > tolerance for err in stopped.err)
+    assert count == 7 or full.err[count] <= tolerance
+
+
+def test_zeros_and_duplicates_are_never_selected():
+    psi, y = problem(13, 4)
+    zero = np.zeros(120)
+    doubled = np.vstack([zero, psi[0], psi, zero, -3.0 * psi[1], psi[2] + 2.0 * psi[3]])
+    found = froe(inner_products(doubled, y))
+    assert len(found.order) == 4
+    assert not {0, 6} & set(found.order)
+    assert sum(found.err) == pytest.approx(sum(froe(inner_products(psi, y)).err), abs=1e-12)
+
+
+def test_ties_go_to_the_first_candidate():
+    psi, y = problem(14, 3)
+    order = froe(inner_products(np.vstack([psi, psi]), y)).order
+    assert sorted(order) == [0, 1, 2]
+
+
+def test_nothing_is_selected_for_a_target_of_zeros():
+    psi, _ = problem(15, 3)
+    assert froe(inner_products(psi, np.zeros(120))).order == ()
+    assert froe(np.array([[4.0]])).order == ()
+
+
+@pytest.mark.parametrize("value", [math.inf, math.nan])
+def test_a_candidate_that_overflowed_is_never_selected_and_spoils_no_other(value):
+    psi, y = problem(16, 4)
+    usual = froe(inner_products(np.delete(psi, 2, axis=0), y))
+    gram = inner_products(psi, y)
+    gram[2] = gram[:, 2] = value
+    found = froe(gram)
+    assert found.order == tuple(item + (item > 1) for item in usual.order)
+    assert found.err == usual.err
+
+
+@pytest.mark.parametrize("value", [math.inf, math.nan])
+def test_a_target_that_is_no_number_selects_nothing(value):
+    gram = inner_products(*problem(16, 4))
+    gram[4] = gram[:, 4] = value
+    assert froe(gram).order == ()
+
+
+@given(seeds, st.floats(1e-6, 0.3))
+def test_pruning_leaves_exactly_those_whose_ratio_exceeds_the_tolerance(seed, tolerance):
+    psi, y = problem(seed, 7, noise=1.0)
+    order, ratios = textbook(psi, y)
+    expected = [item for item, err in zip(order, ratios, strict=True) if err > tolerance]
+    assert prune(inner_products(psi, y), tolerance) == tuple(sorted(expected))
+
+
+def test_pruning_orthogonalises_all_before_any_leaves():
+    # The second term explains 1 % alone and is selected first; with it the other explains all that is left.
+    a, b, c = np.linalg.qr(np.random.default_rng(17).normal(size=(50, 3)))[0].T
+    y = a
+    psi = np.array([c + 0.05 * a, 0.1 * a + c + 0.01 * b])
+    gram = inner_products(psi, y)
+    found = froe(gram)
+    assert found.order == (1, 0)
+    assert found.err[0] == pytest.approx(0.0099, abs=1e-3)
+    assert found.err[1] > 0.9
+    assert prune(gram, 0.05) == (0,)
+    assert prune(gram, 1e-3) == (0, 1)
+    assert prune(gram, 0.9999) == ()
+
+
+# Units.
+
+TEXTS = [
+    "y(k-1)",
+    "y(k-3)",
+    "u(k-1)",
+    "u(k-2)^2*y(k-1)",
+    "sign(u(k-1) - u(k-2))",
+    "(u(k-1) - u(k-2))*y(k-1)^2",
+    "abs(u(k-3))*sign(y(k-1))",
+]
+
+
+def measured(volts=1.0, metres=1.0):
+    generator = np.random.default_rng(18)
+    u = generator.normal(size=400)
+    y = np.zeros(400)
+    for k in range(3, 400):
+        y[k] = 0.6 * y[k - 1] - 0.1 * y[k - 3] + u[k - 1] + 0.1 * u[k - 2] ** 2 * np.tanh(y[k - 1])
+        y[k] += 0.3 * np.sign(u[k - 1] - u[k - 2]) + 0.2 * generator.normal()
+    return Dataset(volts * u, metres * y, 0.1)
+
+
+@pytest.mark.parametrize(("volts", "metres"), [(1e3, 1.0), (1.0, 1e-6), (58.8, 4.7e-5), (1e-4, 1e5)])
+def test_the_units_of_the_record_leave_froes_order_as_it_was(volts, metres):
+    terms = [*(regressor(parse(text))[1] for text in TEXTS), Lagged(0, 0)]
+    before, after = (froe(gram_matrix(terms, item, 3)) for item in (measured(), measured(volts, metres)))
+    assert len(before.order) == len(TEXTS)
+    assert after.order == before.order
+    np.testing.assert_allclose(after.err, before.err, rtol=1e-6)

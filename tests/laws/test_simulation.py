@@ -1,0 +1,333 @@
+"""Laws of simulation: what one-step-ahead, multiple shooting and free run mean, whatever the model.
+
+The oracle is the definition: a recursion over samples in plain floats, on `islands.model.expression.value`.
+The kernel has to agree with it to the last bit.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from islands.data.dataset import Dataset, join
+from islands.kernels.sums import total
+from islands.model.expression import value
+from islands.model.model import model_of
+from islands.model.text import parse
+from islands.simulation.layout import WIDTH, layout
+from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
+
+
+def model(inputs=1, **terms):
+    """Make a model of ``name="parameter * text"`` terms; the names only tell them apart."""
+    split = (term.split(" * ", 1) for term in terms.values())
+    names = ("u",) if inputs == 1 else tuple(f"u{index + 1}" for index in range(inputs))
+    return model_of([(parse(text), float(parameter)) for parameter, text in split], names)
+
+
+#: Stable models of every kind that the kernel treats in its own way.
+MODELS = {
+    "linear": model(a="1.2 * y(k-1)", b="-0.5 * y(k-2)", c="0.3 * u(k-1)"),
+    "deepest lag on y": model(a="0.4 * y(k-9)", b="0.3 * y(k-1)", c="1 * u(k-2)"),
+    "deepest lag on u": model(a="0.6 * y(k-1)", b="1 * u(k-11)", c="-0.4 * u(k-1)"),
+    "input alone": model(a="0.6 * u(k-1)", b="1 * u(k-3)*u(k-1)", c="0.2 * 1"),
+    "output alone": model(a="0.9 * y(k-1)", b="-0.1 * y(k-3)"),
+    "a single term": model(a="0.7 * y(k-1)"),
+    "hysteresis": model(
+        a="1 * y(k-1)",
+        b="0.77 * phi1(u(k-1), u(k-2))",
+        c="0.0144 * u(k-2)*phi2(u(k-2), u(k-3))*phi1(u(k-2), u(k-3))",
+        d="-0.096 * y(k-1)*phi2(u(k-2), u(k-3))*phi1(u(k-2), u(k-3))",
+        e="0.00315 * u(k-2)^2*phi1(u(k-2), u(k-3))",
+        f="-0.0246 * u(k-2)*y(k-1)*phi1(u(k-2), u(k-3))",
+    ),
+    "one to seven factors": model(
+        a="0.1 * y(k-1)",
+        b="0.02 * u(k-1)*u(k-2)",
+        c="0.02 * u(k-1)^2*u(k-2)",
+        d="0.01 * u(k-1)^2*u(k-2)*u(k-4)",
+        e="0.01 * u(k-1)^2*u(k-2)^2*u(k-4)",
+        f="0.001 * u(k-1)^3*u(k-2)^3*sign(y(k-1))",
+    ),
+    "shared subexpressions": model(
+        a="0.3 * abs(y(k-1) - u(k-2))",
+        b="0.2 * abs(y(k-1) - u(k-2))*sign(u(k-1) - y(k-1))",
+        c="0.1 * sqrt(abs(y(k-1) - u(k-2)) + u(k-1)^2)",
+        d="0.1 * max(sqrt(y(k-2)), u(k-1)) + min(y(k-1), 0.5)",
+    ),
+    "rational": model(
+        a="1 * y(k-1)*(2.5 + y(k-1))/(4 + y(k-1)^2 + y(k-2)^2)", b="0.5 * u(k-1)/(1 + abs(u(k-2)))"
+    ),
+    "two inputs": model(2, a="0.5 * y(k-1)", b="1 * u1(k-2)*u2(k-5)", c="-0.3 * u2(k-1)", d="0.1 * u1(k-1)"),
+}
+
+#: Two and more chunks of the kernel's 64 steps, as long as a warm-up, shorter, and of a single sample.
+SEGMENTS = (150, 3, 70, 12, 1, 64, 30)
+
+every_model = pytest.mark.parametrize("name", MODELS)
+
+
+def record(model, segments=SEGMENTS, seed=0):
+    """Draw a record of noise: nothing that the model could have made."""
+    generator = np.random.default_rng(seed)
+    samples = sum(segments)
+    u, y = generator.normal(size=(samples, model.inputs)), generator.normal(size=samples)
+    return Dataset(u, y, 0.1, segments=segments)
+
+
+def recursion(model, record, interval=None, warm_up=None):
+    """Simulate sample by sample, as the definition says; ``interval=None`` is the free run."""
+    warm_up = model.maximum_lag if warm_up is None else warm_up
+    u, measured, found = record.u.tolist(), record.y.tolist(), [float("nan")] * record.samples
+    terms = [(weight, item.expression) for weight, item in zip(model.theta, model.regressors, strict=True)]
+    for begin, end in record.bounds:
+        for start in range(begin + warm_up, end, interval or record.samples):
+            for k in range(start, min(start + (interval or record.samples), end)):
+
+                def signal(channel, lag, k=k, start=start):
+                    if channel:
+                        return u[k - lag][channel - 1]
+                    return found[k - lag] if k - lag >= start else measured[k - lag]
+
+                prediction = 0.0
+                for weight, expression in terms:
+                    prediction += weight * value(expression, signal)
+                found[k] = prediction
+    return np.array(found)
+
+
+def same(left, right):
+    """Tell whether two predictions agree in every bit, and are missing in the same places."""
+    return left.tobytes() == right.tobytes()
+
+
+def drawn_records(data):
+    """Draw a model, segments of which one at least is long enough, and a warm-up."""
+    name = data.draw(st.sampled_from(list(MODELS)))
+    warm_up = MODELS[name].maximum_lag + data.draw(st.integers(0, 8))
+    lengths = data.draw(st.lists(st.integers(1, 90), min_size=1, max_size=5))
+    lengths[data.draw(st.integers(0, len(lengths) - 1))] += warm_up
+    seed = data.draw(st.integers(0, 2**32 - 1))
+    return MODELS[name], record(MODELS[name], tuple(lengths), seed), warm_up
+
+
+# The kernel is the definition.
+
+
+@every_model
+@pytest.mark.parametrize("interval", [1, 2, 3, 7, 63, 64, 65, 140, None])
+def test_the_kernel_is_the_recursion_bit_for_bit(name, interval):
+    data = record(MODELS[name])
+    found = multiple_shooting(MODELS[name], data, interval)
+    assert found.outcome
+    assert same(found.y, recursion(MODELS[name], data, interval))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.data())
+def test_the_kernel_is_the_recursion_for_any_segments_intervals_and_warm_up(data):
+    chosen, drawn, warm_up = drawn_records(data)
+    interval = data.draw(st.none() | st.integers(1, 100))
+    found = multiple_shooting(chosen, drawn, interval, warm_up)
+    assert found.outcome
+    assert same(found.y, recursion(chosen, drawn, interval, warm_up))
+
+
+@pytest.mark.parametrize("name", ["linear", "deepest lag on u", "hysteresis"])
+@pytest.mark.parametrize("interval", [1, 2])
+def test_more_intervals_than_a_block_has_lanes_are_all_simulated(name, interval):
+    data = record(MODELS[name], (3 * WIDTH + 17, 5, 2 * WIDTH + 1), seed=1)
+    cut = layout(data, MODELS[name].maximum_lag, interval)
+    assert len(cut.block_lanes) > 2
+    assert same(multiple_shooting(MODELS[name], data, interval).y, recursion(MODELS[name], data, interval))
+
+
+def test_functions_of_the_mathematical_library_agree_to_rounding():
+    chosen = model(
+        a="0.5 * tanh(y(k-1) + u(k-1))",
+        b="0.3 * sin(y(k-2))*cos(u(k-2))",
+        c="0.1 * exp(0 - abs(y(k-1)))",
+        d="0.05 * log(u(k-3))",
+    )
+    data = record(chosen)
+    for interval in (1, 20, None):
+        found, expected = multiple_shooting(chosen, data, interval).y, recursion(chosen, data, interval)
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
+
+
+@every_model
+@pytest.mark.parametrize("interval", [1, 7, None])
+@pytest.mark.parametrize("width", [1, 3, 1000])
+def test_the_result_does_not_depend_on_how_lanes_are_blocked(monkeypatch, name, interval, width):
+    data = record(MODELS[name])
+    usual = multiple_shooting(MODELS[name], data, interval)
+    monkeypatch.setattr("islands.simulation.layout.WIDTH", width)
+    assert layout(data, MODELS[name].maximum_lag, interval).width <= width
+    other = multiple_shooting(MODELS[name], data, interval)
+    assert same(usual.y, other.y)
+    assert usual.mean_squared_error == other.mean_squared_error
+
+
+# One kernel, three names.
+
+
+@every_model
+def test_intervals_of_one_sample_are_one_step_ahead_prediction(name):
+    chosen, data = MODELS[name], record(MODELS[name])
+    found, other = one_step_ahead(chosen, data), multiple_shooting(chosen, data, 1)
+    assert same(found.y, other.y)
+    assert found.mean_squared_error == other.mean_squared_error
+    # Its definition needs no recursion at all.
+    channels = [data.y.tolist(), *data.u.T.tolist()]
+    for begin, end in data.bounds:
+        for k in range(begin + chosen.maximum_lag, end):
+            terms = [
+                weight * value(item.expression, lambda channel, lag, k=k: channels[channel][k - lag])
+                for weight, item in zip(chosen.theta, chosen.regressors, strict=True)
+            ]
+            assert found.y[k] == sum(terms, 0.0)
+
+
+@every_model
+@pytest.mark.parametrize("more", [0, 1, 10**9])
+def test_an_interval_as_long_as_the_record_is_the_free_run(name, more):
+    data = record(MODELS[name])
+    found = multiple_shooting(MODELS[name], data, data.samples + more)
+    expected = free_run(MODELS[name], data)
+    assert same(found.y, expected.y)
+    assert found.mean_squared_error == expected.mean_squared_error
+
+
+@every_model
+@pytest.mark.parametrize("interval", [2, 10, 64])
+def test_an_interval_begins_with_the_one_step_ahead_prediction(name, interval):
+    data = record(MODELS[name], (200, 90))
+    found, ahead = multiple_shooting(MODELS[name], data, interval).y, one_step_ahead(MODELS[name], data).y
+    for begin, end in data.bounds:
+        first = slice(begin + MODELS[name].maximum_lag, end, interval)
+        assert same(found[first], ahead[first])
+
+
+# Which samples are predicted.
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.data())
+def test_every_sample_after_a_warm_up_is_predicted_and_no_other(data):
+    chosen, drawn, warm_up = drawn_records(data)
+    found = multiple_shooting(chosen, drawn, data.draw(st.none() | st.integers(1, 50)), warm_up).y
+    expected = np.concatenate([np.arange(length) >= warm_up for length in drawn.segments])
+    assert np.array_equal(np.isfinite(found), expected)
+
+
+@every_model
+@pytest.mark.parametrize("interval", [1, 7, None])
+@pytest.mark.parametrize("more", [0, 5])
+def test_the_mean_squared_error_is_the_mean_over_the_predicted_samples(name, interval, more):
+    data = record(MODELS[name])
+    found = multiple_shooting(MODELS[name], data, interval, MODELS[name].maximum_lag + more)
+    predicted = ~np.isnan(found.y)
+    assert 0 < predicted.sum() < data.samples
+    expected = np.mean((found.y - data.y)[predicted] ** 2)
+    assert found.mean_squared_error == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("interval", [20, None])
+def test_squared_errors_are_added_in_the_order_of_time(seed, interval):
+    chosen, data = MODELS["linear"], record(MODELS["linear"], seed=seed)
+    found = multiple_shooting(chosen, data, interval)
+    sums = []
+    for begin, end in data.bounds:
+        for start in range(begin + 2, end, interval or data.samples):
+            stretch = slice(start, min(start + (interval or data.samples), end))
+            sums.append(sum((error * error for error in (found.y - data.y)[stretch].tolist()), 0.0))
+    assert found.mean_squared_error == total(np.array(sums)) / np.isfinite(found.y).sum()
+
+
+@every_model
+def test_a_longer_warm_up_only_leaves_one_step_ahead_predictions_out(name):
+    data = record(MODELS[name])
+    short, long = one_step_ahead(MODELS[name], data).y, one_step_ahead(MODELS[name], data, 20).y
+    assert np.isnan(short).sum() < np.isnan(long).sum()
+    assert same(long[~np.isnan(long)], short[~np.isnan(long)])
+
+
+# Nothing looks ahead, nothing looks across a boundary.
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.data())
+def test_the_present_and_the_future_leave_predictions_as_they_were(data):
+    chosen, drawn, warm_up = drawn_records(data)
+    interval = data.draw(st.none() | st.integers(1, 40))
+    k = data.draw(st.integers(0, drawn.samples - 1))
+    other = record(chosen, drawn.segments, seed=99)
+    u, y = drawn.u.copy(), drawn.y.copy()
+    u[k:], y[k:] = other.u[k:], other.y[k:]
+    before = multiple_shooting(chosen, drawn, interval, warm_up).y
+    after = multiple_shooting(chosen, replace(drawn, u=u, y=y), interval, warm_up).y
+    assert same(before[: k + 1], after[: k + 1])
+
+
+def test_the_past_does_not_leave_predictions_as_they_were():
+    # So the law above can fail: the sample before k is read at k.
+    chosen = MODELS["linear"]
+    data, k = record(chosen, (100,)), 60
+    for field in ("u", "y"):
+        changed = getattr(data, field).copy()
+        changed[k - 1] += 1.0
+        before, after = (one_step_ahead(chosen, item).y for item in (data, replace(data, **{field: changed})))
+        assert same(before[:k], after[:k])
+        assert before[k] != after[k]
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.data())
+def test_a_free_run_never_reads_the_output_after_its_warm_up(data):
+    chosen, drawn, warm_up = drawn_records(data)
+    y = drawn.y.copy()
+    for begin, end in drawn.bounds:
+        y[begin + warm_up : end] = np.nan
+    found = free_run(chosen, replace(drawn, y=y), warm_up)
+    assert found.outcome
+    assert np.isnan(found.mean_squared_error)
+    assert same(found.y, free_run(chosen, drawn, warm_up).y)
+
+
+@every_model
+@pytest.mark.parametrize("interval", [1, 7, None])
+def test_joined_recordings_are_predicted_as_each_alone(name, interval):
+    chosen = MODELS[name]
+    recordings = [record(chosen, (length,), seed) for seed, length in enumerate((40, 90, 13, 200))]
+    alone = [multiple_shooting(chosen, recording, interval).y for recording in recordings]
+    together = multiple_shooting(chosen, join(tuple(recordings)), interval).y
+    assert same(together, np.concatenate(alone))
+
+
+def test_without_the_boundary_the_recordings_would_have_met():
+    # So the law above can fail: the same samples as one recording are predicted otherwise.
+    chosen, data = MODELS["linear"], record(MODELS["linear"], (40, 60))
+    apart, joined = (free_run(chosen, item).y for item in (data, replace(data, segments=(100,))))
+    assert same(apart[:40], joined[:40])
+    assert np.isnan(apart[40])
+    assert np.isfinite(joined[40])
+    assert apart[45] != joined[45]
+
+
+# The true model.
+
+
+@every_model
+@pytest.mark.parametrize("interval", [1, 7, 64, None])
+def test_the_true_noise_free_model_returns_the_data(name, interval):
+    chosen, noise = MODELS[name], record(MODELS[name], seed=3)
+    made = recursion(chosen, noise)
+    data = replace(noise, y=np.where(np.isnan(made), noise.y, made))
+    found = multiple_shooting(chosen, data, interval)
+    predicted = ~np.isnan(found.y)
+    assert predicted.sum() > 100
+    assert np.array_equal(found.y[predicted], data.y[predicted])
+    assert found.mean_squared_error == 0.0

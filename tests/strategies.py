@@ -1,0 +1,144 @@
+"""Every generator of random values: expressions, signals, models and small records.
+
+Numbers of a *law of values* lie on a coarse grid of binary fractions, so that sums and products of a few of
+them are exact and a jump of sign, max or a protected division is met exactly or not at all.
+"""
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import strategies as st
+
+from islands.data.dataset import Dataset
+from islands.model.expression import Apply, Constant, Lagged, Shift, value
+from islands.model.model import model_of
+from islands.model.primitives import ADD, MUL, PRIMITIVES
+from islands.model.regressor import regressor
+
+INPUTS = 2
+DEEPEST = 12
+
+#: Multiples of 1/8 up to 4 in size.
+grid = st.integers(-32, 32).map(lambda eighths: eighths / 8)
+numbers = st.one_of(st.sampled_from([0.0, 1.0, -1.0, 2.0, -0.5]), grid)
+any_number = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def leaves(inputs=INPUTS):
+    return st.builds(Lagged, st.integers(0, inputs), st.integers(1, DEEPEST))
+
+
+#: Products, sums and equal factors are what canonical form is about: they come more often.
+_KINDS = (
+    "leaf",
+    "leaf",
+    "constant",
+    "function",
+    "function",
+    "function",
+    "several",
+    "several",
+    "power",
+    "shift",
+)
+
+
+@st.composite
+def expressions(draw, inputs=INPUTS, constants=numbers, height=4):
+    """Trees over y, u1 .. and every primitive of the table; sums and products of up to five arguments."""
+    kind = draw(st.sampled_from(_KINDS)) if height else draw(st.sampled_from(["leaf", "leaf", "constant"]))
+    below = expressions(inputs, constants, height - 1)
+    match kind:
+        case "leaf":
+            return draw(leaves(inputs))
+        case "constant":
+            return Constant(draw(constants))
+        case "function":
+            primitive = draw(st.sampled_from(list(PRIMITIVES.values())))
+            return Apply(primitive, tuple(draw(below) for _ in range(primitive.arity)))
+        case "several":
+            primitive = draw(st.sampled_from([MUL, ADD]))
+            return Apply(primitive, tuple(draw(st.lists(below, min_size=2, max_size=5))))
+        case "power":
+            return Apply(MUL, (draw(below),) * draw(st.integers(2, 5)))
+        case _:
+            return Shift(draw(st.integers(1, 5)), draw(below))
+
+
+def regressors(inputs=INPUTS, height=3):
+    """Canonical regressors; expressions that are identically zero are left out."""
+    return (
+        expressions(inputs, height=height)
+        .map(lambda expression: regressor(expression)[1])
+        .filter(lambda item: item is not None)
+    )
+
+
+@st.composite
+def phi_factors(draw):
+    """phi1 or phi2 of two lags of one input, as a factor of a product (the paper, section 3)."""
+    channel = draw(st.integers(1, INPUTS))
+    first, second = draw(st.lists(st.integers(1, DEEPEST), min_size=2, max_size=2, unique=True))
+    name = draw(st.sampled_from(["phi1", "phi2"]))
+    return Apply(PRIMITIVES[name], (Lagged(channel, first), Lagged(channel, second)))
+
+
+@st.composite
+def signals(draw):
+    """A function (channel, lag) -> number on the grid, for every lag that an expression can reach."""
+    seed = draw(st.integers(0, 2**32 - 1))
+    return lambda channel, lag: random.Random(seed + 1000 * channel + lag).randint(-32, 32) / 8
+
+
+@st.composite
+def models(draw, inputs=INPUTS, most=5):
+    """Models with parameters."""
+    terms = draw(st.lists(st.tuples(regressors(inputs, 2), grid), min_size=1, max_size=most))
+    names = ("u",) if inputs == 1 else tuple(f"u{index + 1}" for index in range(inputs))
+    return model_of([(item.expression, theta) for item, theta in terms], names)
+
+
+@st.composite
+def records(draw, inputs=INPUTS, shortest=1, longest=40):
+    """Small records of one to three segments, values of order one."""
+    segments = tuple(draw(st.lists(st.integers(shortest, longest), min_size=1, max_size=3)))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    samples = sum(segments)
+    return Dataset(rng.normal(size=(samples, inputs)), rng.normal(size=samples), 0.1, segments=segments)
+
+
+def settled_value(expression, signal, shakes=4):
+    """Return the value, or None where it hangs on its last digits: no tolerance fits it.
+
+    Every node's result is shaken by 1e-10 of itself. A value that moves by much more stands at a jump of sign
+    or of a protected function, or is what a cancellation left over.
+    """
+    try:
+        plain = value(expression, signal)
+        shaken = [value(_shaken(expression, random.Random(seed)), signal) for seed in range(shakes)]
+    except (OverflowError, ValueError):
+        return None
+    tolerance = 1e-7 * abs(plain)
+    calm = abs(plain) < 1e100 and all(abs(other - plain) <= tolerance for other in shaken)
+    return plain if calm else None
+
+
+def _shaken(expression, rng):
+    match expression:
+        case Shift(samples, argument):
+            return Shift(samples, _shaken(argument, rng))
+        case Apply(primitive, arguments):
+            scalar = primitive.scalar
+            noisy = replace(
+                primitive, scalar=lambda *values: scalar(*values) * (1 + 1e-10 * rng.uniform(-1, 1))
+            )
+            return Apply(noisy, tuple(_shaken(argument, rng) for argument in arguments))
+        case _:
+            return expression
+
+
+def nearly(a, b):
+    """Equal but for rounding, in the sense of `settled_value`."""
+    return math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-280)

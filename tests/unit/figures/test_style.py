@@ -1,0 +1,125 @@
+"""The house style: labels carry units, a user's settings neither leak in nor change, files are the same."""
+
+import hashlib
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from islands.data.dataset import Dataset
+from islands.figures.free_run import draw_free_run
+from islands.figures.style import WIDTH, blank, house_style, label, save
+
+
+def example() -> Figure:
+    u = np.sin(np.arange(300) / 10)
+    return draw_free_run(
+        Dataset(u, 2 * u, 0.1, ("u_V",), "y_um", ("V",), "um"), 1.9 * u, "the same $ content_"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "expected"),
+    [
+        ("y_um", "um", "y (um)"),
+        ("u_est_V", "V", "u_est (V)"),
+        ("force [N]", "N", "force (N)"),
+        ("force (N)", "N", "force (N)"),
+        ("y", "um", "y (um)"),
+        ("y_um", "m", "y_um (m)"),
+        ("y_um", "", "y_um"),
+        ("_V", "V", "(V)"),
+    ],
+)
+def test_a_label_is_the_name_with_its_unit_in_brackets(name, unit, expected):
+    assert label(name, unit) == expected
+
+
+def test_settings_hold_again_after_drawing():
+    before = dict(matplotlib.rcParams.copy())
+    example()
+    with house_style():
+        assert matplotlib.rcParams["svg.hashsalt"] == "islands"
+    assert dict(matplotlib.rcParams.copy()) == before
+
+
+def test_settings_hold_again_after_a_failure():
+    with pytest.raises(ZeroDivisionError), house_style():
+        raise ZeroDivisionError
+    assert matplotlib.rcParams["svg.hashsalt"] is None
+
+
+def test_a_figure_fits_an_articles_column():
+    assert blank(3.0).get_size_inches().tolist() == [WIDTH, 3.0]
+
+
+def test_a_long_title_is_broken_and_a_given_break_is_kept():
+    assert blank(3.0, "word " * 40 + "\nend").get_suptitle().count("\n") == 3
+
+
+def test_the_same_content_gives_the_same_bytes(tmp_path):
+    figure = example()
+    save(figure, tmp_path / "first.svg")
+    figure.savefig(tmp_path / "between.png")
+    save(figure, tmp_path / "again.svg")
+    save(example(), tmp_path / "anew.svg")
+    first = (tmp_path / "first.svg").read_bytes()
+    assert (tmp_path / "again.svg").read_bytes() == first
+    assert (tmp_path / "anew.svg").read_bytes() == first
+
+
+def test_another_curve_gives_other_bytes(tmp_path):
+    save(example(), tmp_path / "one.svg")
+    other = example()
+    other.axes[0].lines[0].set_ydata(np.zeros(300))
+    save(other, tmp_path / "other.svg")
+    assert (tmp_path / "one.svg").read_bytes() != (tmp_path / "other.svg").read_bytes()
+
+
+def test_a_users_settings_do_not_show(tmp_path):
+    save(example(), tmp_path / "plain.svg")
+    with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "none"}):
+        save(example(), tmp_path / "theirs.svg")
+    assert (tmp_path / "theirs.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
+
+
+def test_a_file_holds_no_date_no_image_and_no_font_of_this_machine(tmp_path):
+    save(example(), str(tmp_path / "figure.svg"))
+    text = (tmp_path / "figure.svg").read_text(encoding="utf-8")
+    assert text.count("<svg ") == 1
+    for unwanted in ("dc:date", "<image", "<text", "font-family", matplotlib.__version__):
+        assert unwanted not in text
+
+
+def test_another_process_writes_the_same_bytes_and_never_loads_pyplot(tmp_path):
+    code = """
+import hashlib, importlib.util, pkgutil, sys
+import islands.figures
+for module in pkgutil.iter_modules(islands.figures.__path__):
+    importlib.import_module("islands.figures." + module.name)
+assert "islands.figures.hold" in sys.modules
+spec = importlib.util.spec_from_file_location("tests_of_style", sys.argv[1])
+tests = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(tests)
+tests.save(tests.example(), sys.argv[2])
+print("matplotlib.pyplot" in sys.modules)
+"""
+    theirs, ours = tmp_path / "theirs.svg", tmp_path / "ours.svg"
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, __file__, str(theirs)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    assert done.stdout == "False\n"
+    save(example(), ours)
+    assert digest(theirs) == digest(ours)
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,116 @@
+"""A layout holds every sample after a warm-up in one lane, and its past where the kernel looks for it."""
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.errors import RecordError, SettingsError
+from islands.simulation.layout import WIDTH, layout
+
+SEGMENTS = (230, 4, 5, 120, 6)
+WARM_UP = 5
+
+
+@pytest.fixture
+def record():
+    # Every sample tells where it stands: y is its number, the inputs are that plus a thousand and two.
+    y = np.arange(float(sum(SEGMENTS)))
+    return Dataset(np.column_stack([y + 1000, y + 2000]), y, 0.1, segments=SEGMENTS)
+
+
+def blocks(cut):
+    """Yield offset of the block, its lanes, and the starts and lengths of its intervals."""
+    base = 0
+    for offset, lanes in zip(cut.block_offset, cut.block_lanes, strict=True):
+        yield offset, lanes, cut.start[base : base + lanes], cut.length[base : base + lanes]
+        base += lanes
+    assert base == len(cut.start)
+
+
+@pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
+def test_every_sample_after_a_warm_up_belongs_to_one_interval(record, interval):
+    cut = layout(record, WARM_UP, interval)
+    covered = [
+        k for start, length in zip(cut.start, cut.length, strict=True) for k in range(start, start + length)
+    ]
+    expected = [k for begin, end in record.bounds for k in range(begin + WARM_UP, end)]
+    assert sorted(covered) == expected
+    assert cut.length.max() <= (interval or record.samples)
+
+
+@pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
+def test_the_kernel_finds_every_sample_of_a_lane_with_its_warm_up(record, interval):
+    cut = layout(record, WARM_UP, interval)
+    for offset, lanes, starts, lengths in blocks(cut):
+        for lane in range(lanes):
+            samples = np.arange(starts[lane] - WARM_UP, starts[lane] + lengths[lane])
+            rows = offset + np.arange(len(samples)) * cut.row_stride + lane
+            for channel, base in enumerate((0, 1000, 2000)):
+                assert np.array_equal(cut.signals[channel, rows], samples + base)
+
+
+@pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
+def test_blocks_are_no_wider_than_the_width_and_their_intervals_do_not_lengthen(record, interval):
+    cut = layout(record, WARM_UP, interval)
+    assert cut.block_lanes.max() == cut.width <= WIDTH
+    for _, _, _, lengths in blocks(cut):
+        assert (np.diff(lengths) <= 0).all()
+
+
+def test_the_last_shorter_interval_of_a_segment_counts(record):
+    cut = layout(record, WARM_UP, 100)
+    assert sorted(zip(cut.start.tolist(), cut.length.tolist(), strict=True)) == [
+        (5, 100),
+        (105, 100),
+        (205, 25),
+        (244, 100),
+        (344, 15),
+        (364, 1),
+    ]
+
+
+def test_one_step_ahead_gathers_nothing(record):
+    cut = layout(record, WARM_UP, 1)
+    assert cut.row_stride == 1
+    assert np.array_equal(cut.signals, np.vstack([record.y, record.u.T]))
+    # A block never reaches across a boundary: its lanes are neighbouring samples.
+    for _, _, starts, _ in blocks(cut):
+        assert (np.diff(starts) == 1).all()
+
+
+def test_no_warm_up_is_needed_where_nothing_is_read_back(record):
+    assert layout(record, 0, None).length.sum() == record.samples
+
+
+@pytest.mark.parametrize("interval", [0, -3])
+def test_an_interval_without_a_sample_is_refused(record, interval):
+    with pytest.raises(SettingsError, match=f"^a shooting interval has at least 1 sample, got {interval}$"):
+        layout(record, WARM_UP, interval)
+
+
+def test_recordings_that_are_all_too_short_are_refused(record):
+    with pytest.raises(RecordError) as caught:
+        layout(record, 230)
+    assert "longest recording has 230 samples" in str(caught.value)
+    assert "take a longer recording" in str(caught.value)
+    assert layout(record, 229).length.tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    ("sample", "interval"), [(239, None), (241, None), (243, None), (239, 1), (300, 1), (357, 1), (343, 100)]
+)
+def test_a_missing_output_is_refused_where_an_interval_starts_from_it(record, sample, interval):
+    y = record.y.copy()
+    y[sample] = np.nan
+    gap = Dataset(record.u, y, 0.1, segments=SEGMENTS)
+    with pytest.raises(RecordError, match=f"^the output is missing at sample {sample}, where a simulation"):
+        layout(gap, WARM_UP, interval)
+
+
+def test_a_missing_output_outside_the_warm_ups_is_none_of_the_layouts_business(record):
+    y = record.y.copy()
+    y[WARM_UP:230] = np.nan
+    gap = Dataset(record.u, y, 0.1, segments=SEGMENTS)
+    assert layout(gap, WARM_UP, None).length.sum() == layout(record, WARM_UP, None).length.sum()
+    with pytest.raises(RecordError, match=r"^the output is missing at sample 100, where"):
+        layout(gap, WARM_UP, 100)

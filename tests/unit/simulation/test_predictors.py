@@ -1,0 +1,245 @@
+"""A simulation that leaves its bound is an outcome with a place; a caller's mistake is a message."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.errors import ModelError, RecordError, SettingsError
+from islands.model.expression import value
+from islands.model.model import model_of
+from islands.model.text import parse
+from islands.simulation.outcome import OK, Verdict
+from islands.simulation.predictors import BOUND, bound_of, free_run, multiple_shooting, one_step_ahead
+
+SAMPLES = 300
+
+
+def model(*terms):
+    return model_of([(parse(text), parameter) for parameter, text in terms])
+
+
+def record(u=None, segments=()):
+    generator = np.random.default_rng(11)
+    drawn = generator.normal(size=(2, SAMPLES))
+    return Dataset(drawn[0] if u is None else u, drawn[1], 0.1, segments=segments)
+
+
+def spikes(**at):
+    """Return an input of small numbers with some large ones: ``s100=1e9`` stands at sample 100."""
+    u = np.random.default_rng(12).normal(size=SAMPLES)
+    for name, size in at.items():
+        u[int(name[1:])] = size
+    return u
+
+
+def judged(chosen, data, interval=None, bound=None):
+    """Simulate in plain floats; return predictions up to each divergence and the first sample of any."""
+    bound = bound_of(data) if bound is None else bound
+    u, y, found = data.u[:, 0].tolist(), data.y.tolist(), np.full(data.samples, np.nan)
+    first = None
+    for begin, end in data.bounds:
+        for start in range(begin + chosen.maximum_lag, end, interval or data.samples):
+            past = y[:start]
+            for k in range(start, min(start + (interval or data.samples), end)):
+                channels = (past, u)
+                total = 0.0
+                for weight, item in zip(chosen.theta, chosen.regressors, strict=True):
+                    total += weight * value(item.expression, lambda c, lag, k=k, s=channels: s[c][k - lag])
+                if not abs(total) <= bound:
+                    first = k if first is None else first
+                    break
+                past.append(total)
+                found[k] = total
+    return found, first
+
+
+#: Models and inputs that leave the bound in every way there is, and the first sample where a free run does
+#: (None: the oracle alone knows).
+DIVERGENCES = {
+    "growing slowly": (model((1.2, "y(k-1)"), (1.0, "u(k-1)")), {}, None),
+    "growing at once": (model((0.5, "y(k-1)^4*y(k-2)^2"), (9.0, "u(k-1)")), {}, None),
+    "swinging": (model((-1.5, "y(k-1)"), (1.0, "u(k-1)")), {}, None),
+    "back within the chunk": (model((1.0, "u(k-1)")), {"s100": 1e9}, 101),
+    "the first prediction": (model((1.0, "u(k-1)")), {"s0": -1e9}, 1),
+    "the last prediction": (model((1.0, "u(k-1)")), {"s298": 1e9}, 299),
+    "the last step of a chunk": (model((1.0, "u(k-1)")), {"s64": 1e9}, 65),
+    "the first step of a chunk": (model((1.0, "u(k-1)")), {"s65": 1e9}, 66),
+    "twice": (model((1.0, "u(k-1)")), {"s210": 1e9, "s90": 1e9}, 91),
+    "to infinity and back": (model((1.0, "u(k-1)^2")), {"s50": 1e200}, 51),
+    "to NaN and back": (model((1.0, "u(k-1)^2"), (1.0, "u(k-1)^3")), {"s77": -1e200}, 78),
+    "to NaN for good": (model((math.nan, "y(k-1)"), (1.0, "u(k-1)")), {}, 1),
+}
+
+every_divergence = pytest.mark.parametrize("name", DIVERGENCES)
+
+
+@every_divergence
+@pytest.mark.parametrize("interval", [1, 10, 70, None])
+def test_divergence_is_an_outcome_with_its_first_sample(name, interval):
+    chosen, at, _ = DIVERGENCES[name]
+    data = record(spikes(**at))
+    expected, first = judged(chosen, data, interval)
+    found = multiple_shooting(chosen, data, interval)
+    # Predictions are kept up to the sample where they left the bound, NaN to the end of the interval.
+    assert np.array_equal(found.y, expected, equal_nan=True)
+    if first is None:
+        assert found.outcome == OK
+        assert math.isfinite(found.mean_squared_error)
+    else:
+        assert found.outcome.verdict is Verdict.DIVERGED
+        assert found.outcome.reason == f"|y| left {bound_of(data):.3g} at sample {first}"
+        assert found.mean_squared_error == math.inf
+
+
+@every_divergence
+def test_a_diverging_free_run_has_its_place(name):
+    chosen, at, place = DIVERGENCES[name]
+    data = record(spikes(**at))
+    found = free_run(chosen, data)
+    sample = int(re.fullmatch(r"\|y\| left \S+ at sample (\d+)", found.outcome.reason)[1])
+    assert place in (None, sample)
+    assert np.isfinite(found.y[chosen.maximum_lag : sample]).all()
+    assert np.isnan(found.y[sample:]).all()
+
+
+def test_a_divergence_ends_its_own_interval_alone():
+    data = record(spikes(s100=1e9), segments=(90, 60, 150))
+    found = multiple_shooting(model((1.0, "u(k-1)")), data, 20).y
+    # Intervals of the second segment begin at 91 and 111.
+    assert np.isnan(found[101:111]).all()
+    predicted = np.r_[1:90, 91:101, 111:150, 151:300]
+    assert np.array_equal(found[predicted], data.u[predicted - 1, 0])
+
+
+def test_the_earliest_of_several_diverging_intervals_is_named():
+    # Lanes are ordered by length: the short last interval of the first segment stands behind longer ones.
+    data = record(spikes(s87=1e9, s200=1e9), segments=(90, 210))
+    found = multiple_shooting(model((1.0, "u(k-1)")), data, 40)
+    assert found.outcome.reason.endswith("at sample 88")
+
+
+def test_what_a_lane_left_behind_is_not_read_as_the_next_ones(monkeypatch):
+    # Blocks of two lanes: the second segment leaves the bound at its 41st step, and the arena still holds
+    # that when the fourth, in the same lane, ends after 30 while its neighbour leaves the bound.
+    monkeypatch.setattr("islands.simulation.layout.WIDTH", 2)
+    chosen, data = model((1.0, "u(k-1)")), record(spikes(s141=1e9, s212=1e9), segments=(101, 101, 61, 31, 6))
+    expected, first = judged(chosen, data)
+    found = free_run(chosen, data)
+    assert first == 142
+    assert found.outcome.reason.endswith("at sample 142")
+    assert np.array_equal(found.y, expected, equal_nan=True)
+    assert np.isfinite(found.y[264:294]).all()
+
+
+def test_an_unstable_model_that_is_shot_often_enough_does_not_diverge():
+    chosen = model((1.2, "y(k-1)"), (1.0, "u(k-1)"))
+    assert free_run(chosen, record()).outcome.verdict is Verdict.DIVERGED
+    assert multiple_shooting(chosen, record(), 20).outcome
+    assert one_step_ahead(chosen, record()).outcome
+
+
+def test_a_bound_of_ones_own_replaces_that_of_the_record():
+    chosen, data = model((1.2, "y(k-1)"), (1.0, "u(k-1)")), record()
+    expected, first = judged(chosen, data, bound=50.0)
+    found = free_run(chosen, data, bound=50.0)
+    assert found.outcome.reason == f"|y| left 50 at sample {first}"
+    assert np.array_equal(found.y, expected, equal_nan=True)
+    assert np.nanmax(np.abs(found.y)) <= 50.0
+    assert free_run(model((1.0, "u(k-1)")), record(spikes(s100=1e9)), bound=1e10).outcome
+
+
+@pytest.mark.parametrize(
+    ("y", "scale"),
+    [
+        ([-3.0, 5.0, 1.0], 8.0),
+        ([100.0, 101.0, 100.5], 101.0),
+        ([-1e-6, 1e-6, 0.0], 2e-6),
+        ([-7.0, -7.0, -7.0], 7.0),
+        ([0.0, 0.0, 0.0], 1.0),
+        ([0.0, math.nan, math.nan], 1.0),
+        ([1e-6, math.nan, 2e-6], 1.0),
+        ([40.0, math.nan, -20.0], 60.0),
+        ([math.nan, math.nan, math.nan], 1.0),
+    ],
+)
+def test_the_bound_is_a_million_times_what_is_known_of_the_outputs_scale(y, scale):
+    assert bound_of(Dataset(np.zeros(3), np.array(y), 1.0)) == pytest.approx(BOUND * scale)
+    assert BOUND == 1e6
+
+
+def test_a_model_at_rest_may_start_to_move():
+    # Nothing but the initial zero is known of the output: its scale must not be taken for zero.
+    y = np.full(SAMPLES, np.nan)
+    y[0] = 0.0
+    found = free_run(model((0.5, "y(k-1)"), (1.0, "u(k-1)")), Dataset(np.ones(SAMPLES), y, 0.1))
+    assert found.outcome
+    assert found.y[-1] == pytest.approx(2.0)
+
+
+def test_an_error_where_the_output_is_missing_is_nan_and_no_divergence():
+    data = record()
+    y = data.y.copy()
+    y[150] = math.nan
+    found = free_run(model((1.0, "u(k-1)")), replace(data, y=y))
+    assert found.outcome == OK
+    assert math.isnan(found.mean_squared_error)
+    assert np.array_equal(found.y[1:], data.u[:-1, 0])
+
+
+# A caller's mistakes.
+
+
+def test_too_short_a_record_is_refused():
+    with pytest.raises(RecordError) as caught:
+        free_run(model((1.0, "u(k-300)")), record())
+    assert "the longest recording has 300 samples" in str(caught.value)
+    assert "the warm-up takes 300: take a longer recording" in str(caught.value)
+
+
+def test_too_long_a_warm_up_is_not_called_a_deep_lag():
+    with pytest.raises(RecordError) as caught:
+        free_run(model((1.0, "u(k-1)")), record(), warm_up=400)
+    assert "the warm-up takes 400" in str(caught.value)
+    assert "lag is" not in str(caught.value)
+
+
+@pytest.mark.parametrize("simulate", [one_step_ahead, free_run])
+def test_a_missing_output_in_a_warm_up_is_refused(simulate):
+    data = record()
+    y = data.y.copy()
+    y[1] = math.nan
+    with pytest.raises(RecordError) as caught:
+        simulate(model((0.5, "y(k-2)")), replace(data, y=y))
+    assert "the output is missing at sample 1, where a simulation starts from it" in str(caught.value)
+    assert "fill the gap" in str(caught.value)
+
+
+def test_another_number_of_inputs_is_refused():
+    data = Dataset(np.zeros((9, 2)), np.zeros(9), 0.1)
+    with pytest.raises(RecordError, match=re.escape("the model has 1 inputs ('u',), the record 2")):
+        free_run(model((1.0, "u(k-1)")), data)
+
+
+def test_a_model_without_parameters_is_refused():
+    structure = replace(model((1.0, "u(k-1)")), theta=None)
+    with pytest.raises(ModelError, match=r"^the model has no parameters yet: estimate them first$"):
+        free_run(structure, record())
+
+
+@pytest.mark.parametrize("interval", [0, -1])
+def test_an_empty_interval_is_refused(interval):
+    with pytest.raises(SettingsError, match=f"at least 1 sample, got {interval}$"):
+        multiple_shooting(model((1.0, "u(k-1)")), record(), interval)
+
+
+@pytest.mark.parametrize("warm_up", [0, 3, -1])
+def test_a_warm_up_shorter_than_the_deepest_lag_is_refused(warm_up):
+    chosen = model((1.0, "u(k-1)"), (0.1, "y(k-4)"))
+    with pytest.raises(SettingsError) as caught:
+        one_step_ahead(chosen, record(), warm_up)
+    assert str(caught.value) == f"the model reads 4 samples back, the warm-up has {warm_up}"
+    assert one_step_ahead(chosen, record(), 4).outcome
