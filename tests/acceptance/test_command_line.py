@@ -139,7 +139,7 @@ def test_simulate_writes_a_row_for_every_sample(folder: Path, mode: str, missing
     assert np.isfinite(table["y_sim"][missing:]).all()
     measured = np.genfromtxt(folder / "sine.csv", delimiter=",", names=True)
     assert np.array_equal(table["time"], measured["t_s"])
-    assert np.abs(table["y_sim"] - measured["y_um"])[missing:].max() < 1.0
+    assert np.abs(table["y_sim"] - measured["y_um"])[missing:].max() < 2.0
 
 
 def test_a_free_run_needs_no_output_after_its_warm_up(folder: Path) -> None:
@@ -187,7 +187,9 @@ def test_errors_say_what_to_do_and_nothing_is_lost(folder: Path) -> None:
     assert "u_mV" in fail(*base, "--input", "u_mV")
     assert "unknown library" in fail(*base, "--input", "u_V", "--library", "fourier")
     assert "unknown constraints" in fail(*base, "--input", "u_V", "--constraints", "physics")
-    assert "too" in fail(*base, "--input", "u_V", "--library", "polynomial", "--degree", 5, "--lags", 11)
+    assert "fewer lags" in fail(
+        *base, "--input", "u_V", "--library", "polynomial", "--degree", 5, "--lags", 11
+    )
     assert "--validation" in fail(*base, "--input", "u_V", "--validation", "nowhere.csv")
     assert "START:STOP" in fail(*base, "--input", "u_V", "--rows", "all")
     assert not out.exists()

@@ -128,6 +128,12 @@ def test_zeros_and_duplicates_are_never_selected():
     assert sum(found.err) == pytest.approx(sum(froe(inner_products(psi, y)).err), abs=1e-12)
 
 
+def test_what_explains_nothing_at_all_is_not_selected():
+    gram = np.array([[4.0, 0.0, 1.0, 2.0], [0.0, 9.0, 0.0, 0.0], [1.0, 0.0, 1.0, 3.0], [2.0, 0.0, 3.0, 25.0]])
+    assert froe(gram).order == (2, 0)
+    assert prune(gram, 0.0) == (0, 2)
+
+
 def test_ties_go_to_the_first_candidate():
     psi, y = problem(14, 3)
     order = froe(inner_products(np.vstack([psi, psi]), y)).order

@@ -85,6 +85,7 @@ def _draw(axes: Axes, test: CorrelationTest) -> None:
         color=MEASURED if test.passed else SIMULATED,
     )
     if test.note:
-        axes.text(
-            0.5, 0.5, fill(test.note, 22), transform=axes.transAxes, ha="center", va="center", fontsize=REMARK
-        )
+        # On white, since there is no correlation that it could hide.
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 2.0}
+        note = axes.text(0.5, 0.5, fill(test.note, 22), ha="center", va="center", fontsize=REMARK, bbox=box)
+        note.set_transform(axes.transAxes)

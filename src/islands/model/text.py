@@ -60,11 +60,17 @@ def _plain(expression: Expression, inputs: int) -> tuple[str, int]:
 def _plain_product(factors: Sequence[Expression], inputs: int) -> str:
     parts = []
     for factor, power in _powers(factors):
-        text = _operand(factor, inputs, _PRODUCT if power == 1 else _ATOM, (MUL,))
-        # A quotient binds like a product, and a*b/c is read as (a*b)/c.
-        text = f"({text})" if _is(factor, "div") and power == 1 else text
-        parts.append(text if power == 1 else f"{text}^{power}")
+        if power == 1:
+            parts.append(_plain_factor(factor, inputs, (MUL,)))
+        else:
+            parts.append(f"{_operand(factor, inputs, _ATOM, (MUL,))}^{power}")
     return "*".join(parts)
+
+
+def _plain_factor(expression: Expression, inputs: int, as_call: tuple[Primitive, ...] = ()) -> str:
+    # A quotient binds like a product, and a*b/c is read as (a*b)/c.
+    text = _operand(expression, inputs, _PRODUCT, as_call)
+    return f"({text})" if isinstance(expression, Apply) and expression.primitive.name == "div" else text
 
 
 def _powers(factors: Sequence[Expression]) -> Iterator[tuple[Expression, int]]:
@@ -93,10 +99,6 @@ def _operand(expression: Expression, inputs: int, binding: int, as_call: tuple[P
 
 def _call(primitive: Primitive, arguments: Sequence[Expression], inputs: int) -> str:
     return f"{primitive.name}({', '.join(plain(argument, inputs) for argument in arguments)})"
-
-
-def _is(expression: Expression, name: str) -> bool:
-    return isinstance(expression, Apply) and expression.primitive.name == name
 
 
 def _name(channel: int, inputs: int) -> str:
@@ -168,7 +170,7 @@ def equation(model: Model, digits: int = 6) -> str:
     for position, item in enumerate(model.regressors):
         weight = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
         constant = item.expression == Constant(1.0)
-        parts.append(weight if constant else f"{weight}*{_operand(item.expression, model.inputs, _PRODUCT)}")
+        parts.append(weight if constant else f"{weight}*{_plain_factor(item.expression, model.inputs)}")
     return f"y(k) = {_joined(parts)}"
 
 

@@ -56,11 +56,12 @@ def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray
 
 def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
     # The kernel does not check: it would read another signal's samples, or none of the record's.
-    deepest_channel, deepest_lag = program.operands.max(axis=0, where=program.operands[:, :1] >= 0, initial=0)
-    if deepest_channel > record.inputs:
-        raise RecordError(f"the terms read input {deepest_channel}, the record has {record.inputs}")
-    if deepest_lag > warm_up:
-        raise SettingsError(f"the terms read {deepest_lag} samples back, the warm-up has {warm_up}")
+    read = program.operands[program.operands[:, 0] >= 0]
+    channel, lag = read.max(axis=0, initial=0)
+    if channel > record.inputs:
+        raise RecordError(f"the terms read input {channel}, the record has {record.inputs}")
+    if lag > warm_up:
+        raise SettingsError(f"the terms read {lag} samples back, the warm-up has {warm_up}")
 
 
 def _rows(record: Dataset, warm_up: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:

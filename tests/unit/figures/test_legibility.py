@@ -55,28 +55,29 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-@pytest.fixture(params=FIGURES)
+@pytest.fixture(params=FIGURES, scope="module")
 def figure(request: pytest.FixtureRequest) -> Figure:
     return FIGURES[request.param]()
 
 
-def written(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[Text]:
-    """Return every text that is drawn: no tick outside its axis is among them."""
+@pytest.fixture(scope="module")
+def texts(figure: Figure) -> list[Text]:
+    """Every text that is drawn: no tick outside its axis is among them."""
     drawn: dict[int, Text] = {}
     original = Text.draw
 
-    def draw(self, renderer, *args, **kwargs):
+    def draw(self, renderer):
         if self.get_visible() and self.get_text().strip():
             drawn[id(self)] = self
-        return original(self, renderer, *args, **kwargs)
+        return original(self, renderer)
 
-    monkeypatch.setattr(Text, "draw", draw)
-    figure.draw_without_rendering()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Text, "draw", draw)
+        figure.draw_without_rendering()
     return list(drawn.values())
 
 
-def test_no_text_is_cut_off_at_the_edge(figure, monkeypatch):
-    texts = written(figure, monkeypatch)
+def test_no_text_is_cut_off_at_the_edge(figure, texts):
     assert len(texts) > 10
     for text in texts:
         box = text.get_window_extent()
@@ -86,19 +87,19 @@ def test_no_text_is_cut_off_at_the_edge(figure, monkeypatch):
         assert box.y1 <= figure.bbox.y1, text.get_text()
 
 
-def test_no_text_is_written_over_another(figure, monkeypatch):
-    for one, other in itertools.combinations(written(figure, monkeypatch), 2):
+def test_no_text_is_written_over_another(texts):
+    for one, other in itertools.combinations(texts, 2):
         assert not one.get_window_extent().padded(-1).overlaps(other.get_window_extent().padded(-1)), (
             one.get_text(),
             other.get_text(),
         )
 
 
+def test_no_text_is_smaller_than_a_journal_prints(texts):
+    assert min(text.get_fontsize() for text in texts) >= 7.0
+
+
 def test_saving_twice_gives_the_same_bytes(figure, tmp_path):
     for name in ("first", "second"):
         save(figure, tmp_path / f"{name}.svg")
     assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()
-
-
-def test_no_text_is_smaller_than_a_journal_prints(figure, monkeypatch):
-    assert min(text.get_fontsize() for text in written(figure, monkeypatch)) >= 7.0

@@ -11,6 +11,9 @@ TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0
 #: With one of these a capital T is a temperature.
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
+#: Behind an input's name: the column one sample early, for a system that answers within the sample.
+AT_ONCE = "+1"
+
 _TIME = re.compile(r"t(_.*|\s*[\[(].*)?|time.*", re.IGNORECASE)
 _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]*?)\s*[\])]")
 
@@ -24,6 +27,11 @@ def unit_of(name: str) -> str:
         return bracketed[1]
     suffix = name.rpartition("_")[2] if "_" in name else ""
     return "" if suffix.isdigit() else suffix
+
+
+def column_of(name: str, columns: Iterable[str]) -> str:
+    """Return the column that an input names: ``u_V`` of ``u_V+1``, unless a column has the very name."""
+    return name if name in tuple(columns) else name.removesuffix(AT_ONCE)
 
 
 def looks_like_time(name: str) -> bool:

@@ -5,13 +5,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.io.records.archive import read_archive
 from islands.io.records.checks import check_choice, check_length, check_values, check_varies
 from islands.io.records.delimited import read_delimited
-from islands.io.records.names import time_column, unit_of
+from islands.io.records.names import column_of, time_column, unit_of
 from islands.io.records.sampling import sampling_of
 from islands.io.records.table import Table
 
@@ -39,12 +40,17 @@ def read_record(
     end of its name (s, ms, us, ns, min, h; without one: s). What follows the last underscore of a name is the
     unit: ``u_V``. The separator and a decimal comma of a text file are inferred.
 
+    A model reads inputs of the past alone. Where the output answers within the sample (a band-limited input
+    sampled at the same instants), name the input ``u_V+1``: it is read one sample early, so that its u(k-1)
+    is the input at k. The name stays with the model, which so reads other records in the same way.
+
     Parameters
     ----------
     path : str or Path
         The file; its suffix chooses the reader from `READERS`.
     inputs : sequence of str
-        Columns that are inputs, in the order in which the model will number them.
+        Columns that are inputs, in the order in which the model will number them; ``u_V+1`` for the column
+        u_V one sample early.
     output : str
         Column that is the output.
     dt : float, optional
@@ -69,26 +75,37 @@ def read_record(
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
     table = _opened(path)
     file = Path(path).name
-    check_choice(table.names, inputs, output, file)
-    time = time_column((name for name in table.names if name not in (*inputs, output)), file)
-    columns = table.read((*inputs, output, *([time] if time else [])), rows)
+    sources = [column_of(name, table.names) for name in inputs]
+    check_choice(table.names, sources, output, file)
+    time = time_column((name for name in table.names if name not in (*sources, output)), file)
+    columns = table.read((*sources, output, *([time] if time else [])), rows)
     check_length(columns)
     for name in columns.numbers:
         check_values(columns, name, missing=missing_output and name == output)
     step, start = sampling_of(table, columns, time, dt)
-    for name in () if missing_output else (*inputs, output):
+    for name in () if missing_output else (*sources, output):
         check_varies(columns, name)
     return Dataset(
-        u=np.column_stack([columns.numbers[name] for name in inputs]),
+        u=np.column_stack(
+            [
+                columns.numbers[source] if source == name else _early(columns.numbers[source])
+                for name, source in zip(inputs, sources, strict=True)
+            ]
+        ),
         y=columns.numbers[output],
         dt=step,
         input_names=inputs,
         output_name=output,
-        input_units=tuple(unit_of(name) for name in inputs),
+        input_units=tuple(unit_of(source) for source in sources),
         output_unit=unit_of(output),
         start=step * columns.first if start is None else start,
         sha256=fingerprint(path),
     )
+
+
+def _early(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Read a channel one sample early; no prediction reads what then stands at the last sample."""
+    return np.append(values[1:], values[-1])
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:

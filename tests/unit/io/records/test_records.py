@@ -435,3 +435,19 @@ def test_the_tests_of_the_damper_are_told_apart_by_their_time():
 def test_the_mirrors_arrays_of_many_realisations_are_refused_with_their_shape():
     with pytest.raises(RecordError, match=r"u_100mV_train has the shape \(8192, 3, 6, 2\)"):
         read_record(measured("fsm_piezo.npz"), ["u_100mV_train"], "y_um_100mV_train")
+
+
+def test_an_input_named_plus_one_is_read_one_sample_early(tmp_path):
+    file = tmp_path / "record.csv"
+    file.write_text("t_s,u_V,y_um\n" + "\n".join(f"{k / 10:g},{k * k},{k}" for k in range(40)))
+    early, plain = (read_record(file, [name], "y_um") for name in ("u_V+1", "u_V"))
+    assert early.input_names == ("u_V+1",)
+    assert early.input_units == ("V",)
+    assert np.array_equal(early.u[:-1], plain.u[1:])
+    assert np.array_equal(early.y, plain.y)
+
+
+def test_a_column_that_is_called_plus_one_is_itself(tmp_path):
+    file = tmp_path / "record.csv"
+    file.write_text("t_s,u,u+1,y\n" + "\n".join(f"{k / 10:g},{k},{-k},{k % 7}" for k in range(40)))
+    assert read_record(file, ["u+1"], "y").u[3, 0] == -3.0

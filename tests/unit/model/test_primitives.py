@@ -1,0 +1,191 @@
+"""The table of primitives keeps what it declares, and a user's own joins only if it does."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import pytest
+
+from islands.errors import ModelError
+from islands.model.expression import Lagged, Primitive
+from islands.model.primitives import LARGEST_EXPONENT, PRIMITIVES, TINY, check, primitive
+from islands.model.regressor import canonical
+from islands.model.text import latex, parse, plain
+
+
+@pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
+def test_every_entry_of_the_table_is_finite_and_as_it_declares(entry):
+    check(entry)
+    assert PRIMITIVES[entry.name] is entry
+
+
+@pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
+def test_every_entry_survives_a_journey_to_another_process(entry):
+    assert pickle.loads(pickle.dumps(entry)).scalar is entry.scalar
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "result"),
+    [
+        ("mul", (3.0, -2.0), -6.0),
+        ("sub", (3.0, -2.0), 5.0),
+        ("add", (3.0, -2.0), 1.0),
+        ("sign", (-0.3,), -1.0),
+        ("sign", (0.0,), 0.0),
+        ("phi1", (7.0, 4.0), 3.0),
+        ("phi2", (7.0, 4.0), 1.0),
+        ("phi2", (4.0, 7.0), -1.0),
+        ("phi2", (4.0, 4.0), 0.0),
+        ("div", (1.0, 8.0), 0.125),
+        ("div", (5.0, 0.9 * TINY), 1.0),
+        ("abs", (-2.5,), 2.5),
+        ("square", (-3.0,), 9.0),
+        ("cube", (-3.0,), -27.0),
+        ("sqrt", (-9.0,), 3.0),
+        ("exp", (1.0,), math.e),
+        ("exp", (1e6,), math.exp(LARGEST_EXPONENT)),
+        ("log", (-math.e,), 1.0),
+        ("log", (0.0,), 0.0),
+        ("sin", (math.pi / 2,), 1.0),
+        ("cos", (math.pi,), -1.0),
+        ("tanh", (1e3,), 1.0),
+        ("max", (2.0, -7.0), 2.0),
+        ("min", (2.0, -7.0), -7.0),
+    ],
+)
+def test_what_a_primitive_computes(name, arguments, result):
+    assert PRIMITIVES[name].scalar(*arguments) == pytest.approx(result, rel=1e-15)
+
+
+def test_the_table_cannot_be_changed():
+    with pytest.raises(TypeError):
+        PRIMITIVES["mine"] = PRIMITIVES["mul"]
+
+
+def test_two_primitives_of_one_name_are_equal():
+    assert PRIMITIVES["tanh"] == replace(PRIMITIVES["tanh"], parity=0, scalar=math.sinh)
+    assert PRIMITIVES["tanh"] != replace(PRIMITIVES["tanh"], name="sinh")
+
+
+def saturation(a):
+    return a / (1.0 + abs(a))
+
+
+def hypotenuse(a, b):
+    return (a * a + b * b) ** 0.5
+
+
+def test_a_users_primitive_is_written_read_and_brought_into_canonical_form():
+    table = {**PRIMITIVES, "soft_clip": primitive("soft_clip", saturation, parity=-1)}
+    expression = parse("soft_clip(-2*u(k-1))*y(k-1)", table)
+    assert plain(expression) == "soft_clip((-2)*u(k-1))*y(k-1)"
+    assert parse(plain(expression), table) == expression
+    assert latex(expression) == r"\operatorname{soft\_clip}(\left(-2\right) u_{k-1}) y_{k-1}"
+    factor, core = canonical(expression)
+    assert (factor, plain(core)) == (-1.0, "y(k-1)*soft_clip(2*u(k-1))")
+
+
+def test_a_users_commutative_primitive_forgets_the_order_of_its_arguments():
+    entry = primitive("hyp", hypotenuse, commutative=True)
+    assert (entry.arity, entry.latex.format("a", "b")) == (2, r"\operatorname{hyp}(a, b)")
+    table = {**PRIMITIVES, "hyp": entry}
+    assert canonical(parse("hyp(u(k-1), y(k-2))", table)) == canonical(parse("hyp(y(k-2), u(k-1))", table))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "mul",
+        "tanh",
+        "phi1",
+        "y",
+        "u",
+        "u2",
+        "k",
+        "q1",
+        "q12",
+        "soft clip",
+        "2nd",
+        "",
+        "lambda",
+        "not",
+        "None",
+    ],
+)
+def test_a_name_that_is_taken_or_cannot_be_read_is_refused(name):
+    with pytest.raises(ModelError, match="can't name a primitive: take an identifier that is not in use"):
+        primitive(name, saturation)
+
+
+@pytest.mark.parametrize("name", ["quad", "ramp", "unit_step", "yield_point", "y1"])
+def test_a_name_may_begin_like_a_signal(name):
+    made = primitive(name, saturation)
+    assert plain(parse(f"{name}(y(k-1))", {name: made})) == f"{name}(y(k-1))"
+
+
+@pytest.mark.parametrize(
+    ("scalar", "message"),
+    [
+        (lambda: 1.0, "takes 0 arguments: a primitive takes one or two"),
+        (lambda a, b, c: a + b + c, "takes 3 arguments: a primitive takes one or two"),
+        (max, "does not tell its arguments: wrap it in a function of one or two"),
+    ],
+)
+def test_a_function_of_other_than_one_or_two_arguments_is_refused(scalar, message):
+    with pytest.raises(ModelError, match=message):
+        primitive("mine", scalar)
+
+
+@pytest.mark.parametrize(
+    ("scalar", "message"),
+    [
+        (lambda a: 1.0 / a, r"'mine' fails at \(0\.0,\) \(float division by zero\): protect it there"),
+        (math.sqrt, r"'mine' fails at \(-1\.0,\) \(math domain error\): protect it there"),
+        (lambda a: a**0.5, r"'mine' fails at \(-1\.0,\) \(.*complex.*\): protect it there"),
+        (lambda a: math.exp(abs(a)), r"'mine' fails at \(1000\.0,\) \(math range error\): protect it there"),
+        (lambda a: math.inf if a > 10.0 else a, r"'mine' is inf at \(1000\.0,\): protect it there"),
+        (lambda a: math.nan if a < -40.0 else a, r"'mine' is nan at \(-41\.0,\): protect it there"),
+        (lambda a: a or None, r"'mine' fails at \(0\.0,\) \(.*NoneType.*\)"),
+        (lambda a, b: a / b, r"'mine' fails at \(0\.0, 0\.0\) \(float division by zero\): protect it there"),
+    ],
+)
+def test_a_function_that_is_not_finite_everywhere_is_refused_and_the_argument_named(scalar, message):
+    with pytest.raises(ModelError, match=message):
+        primitive("mine", scalar)
+
+
+@pytest.mark.parametrize(
+    ("scalar", "parity"), [(math.cos, -1), (math.tanh, 1), (lambda a: a + 1.0, -1), (lambda a: a * a + a, 1)]
+)
+def test_a_false_parity_is_refused(scalar, parity):
+    with pytest.raises(ModelError, match=rf"declares parity {parity}, not so at"):
+        primitive("mine", scalar, parity=parity)
+
+
+@pytest.mark.parametrize("scalar", [lambda a, b: a - b, lambda a, b: a + 2.0 * b])
+def test_a_false_commutativity_is_refused(scalar):
+    with pytest.raises(ModelError, match="declares that it commutes, not so at"):
+        primitive("mine", scalar, commutative=True)
+
+
+def test_a_false_degree_is_refused():
+    with pytest.raises(ModelError, match=r"declares degree 2\.0, not so at"):
+        check(Primitive("mine", 1, abs, "{0}", degree=2.0))
+
+
+def test_parity_and_degree_are_for_one_argument():
+    # Canonical form takes the sign of the first argument out and would forget the second.
+    for wrong in ({"parity": -1}, {"degree": 1.0}):
+        with pytest.raises(ModelError, match="has two arguments: parity and degree are for one"):
+            check(Primitive("mine", 2, lambda a, b: a + b, "{0} + {1}", **wrong))
+
+
+@pytest.mark.parametrize("wrong", [r"\frac{1}{2}{0}", r"\foo{x}{0}", "{", r"{0}^{"])
+def test_latex_that_is_no_format_is_refused_when_the_primitive_is_made(wrong):
+    with pytest.raises(ModelError, match=r"the LaTeX of primitive 'mine' is no format of \{0\}"):
+        primitive("mine", saturation, latex=wrong)
+
+
+def test_latex_of_the_users_own_is_kept():
+    made = primitive("mine", saturation, latex=r"\sigma({0})")
+    assert made.latex.format(latex(Lagged(1))) == r"\sigma(u_{k-1})"

@@ -1,0 +1,130 @@
+"""Canonical form, case by case."""
+
+import pytest
+
+from islands.errors import ModelError
+from islands.model.expression import Apply, Constant, Lagged
+from islands.model.primitives import MUL, PRIMITIVES, primitive
+from islands.model.regressor import canonical, regressor
+from islands.model.text import parse, plain
+
+
+def written(text):
+    factor, item = regressor(parse(text))
+    return factor, item and plain(item.expression)
+
+
+@pytest.mark.parametrize(
+    ("text", "factor", "core"),
+    [
+        ("u(k-1)*y(k-1)*3", 3.0, "y(k-1)*u(k-1)"),
+        ("-(u(k-1)*-2)", 2.0, "u(k-1)"),
+        ("q2(u(k-1)*q1(y(k-3)))", 1.0, "y(k-6)*u(k-3)"),
+        ("7", 7.0, "1"),
+        ("2*u(k-1) + 4*y(k-1)", 4.0, "y(k-1) + 0.5*u(k-1)"),
+        ("u(k-2) - u(k-1)", -1.0, "u(k-1) - u(k-2)"),
+        ("3*u(k-1) - 3*u(k-2)", 3.0, "u(k-1) - u(k-2)"),
+        ("u(k-1) + 1 - u(k-1)", 1.0, "1"),
+        ("u(k-1) - (y(k-1) - u(k-1))", -1.0, "y(k-1) + (-2)*u(k-1)"),
+        ("phi2(u(k-4), u(k-1))", -1.0, "sign(u(k-1) - u(k-4))"),
+        ("square(u(k-1)*2)", 4.0, "u(k-1)^2"),
+        ("cube(-u(k-1))*u(k-1)", -1.0, "u(k-1)^4"),
+        ("sqrt(-9*u(k-1))", 3.0, "sqrt(u(k-1))"),
+        ("abs(u(k-2) - u(k-1))", 1.0, "abs(u(k-1) - u(k-2))"),
+        ("tanh(-2*u(k-1))", -1.0, "tanh(2*u(k-1))"),
+        ("cos(y(k-1) - 2*u(k-1))", 1.0, "cos(y(k-1) + (-2)*u(k-1))"),
+        ("exp(2 - 2)", 1.0, "1"),
+        ("sign(5*sign(-u(k-1)))", -1.0, "sign(u(k-1))"),
+        ("sign(u(k-1))^5*y(k-1)", 1.0, "y(k-1)*sign(u(k-1))"),
+        ("sign(u(k-1))^4", 1.0, "sign(u(k-1))^2"),
+        ("sign(u(k-1))*sign(y(k-1))*sign(u(k-1))", 1.0, "sign(y(k-1))*sign(u(k-1))^2"),
+        ("u(k-1)/u(k-1)", 1.0, "1"),
+        ("u(k-1)/(-4)", -0.25, "u(k-1)"),
+        ("u(k-1)/1e-12", 1.0, "1"),
+        ("max(u(k-1), y(k-1))", 1.0, "max(y(k-1), u(k-1))"),
+        ("min(2*u(k-1), u(k-1) + u(k-1))", 2.0, "u(k-1)"),
+        ("log(-u(k-1))", 1.0, "log(u(k-1))"),
+    ],
+)
+def test_the_canonical_form_of(text, factor, core):
+    assert written(text) == (pytest.approx(factor, rel=1e-15), core)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0",
+        "0*u(k-1)",
+        "u(k-1) - u(k-1)",
+        "phi1(u(k-3), u(k-3))",
+        "phi2(u(k-3), u(k-3))*y(k-1)",
+        "phi1(q2(u(k-1)), u(k-3))",
+        "tanh(u(k-2) - q1(u(k-1)))",
+        "q1(0)",
+        "log(1)",
+        "2*u(k-1)*y(k-1) - y(k-1)*u(k-1)*2",
+    ],
+)
+def test_what_is_identically_zero_is_no_regressor(text):
+    assert regressor(parse(text)) == (0.0, None)
+
+
+def test_the_square_of_a_sign_is_not_one_because_it_rests_at_zero():
+    _, square = regressor(parse("sign(u(k-1) - u(k-2))^2"))
+    assert square.expression != Constant(1.0)
+    assert square.lags == {(1, 1), (1, 2)}
+
+
+def test_a_quotient_keeps_a_factor_of_its_numerator_because_it_is_protected():
+    # 2*u/y is 1, not 2, where y is zero.
+    assert written("(2*u(k-1))/y(k-1)") == (1.0, "(2*u(k-1))/y(k-1)")
+
+
+@pytest.mark.parametrize(
+    ("text", "channel", "lag"), [("u(k)", 1, 0), ("y(k-1)*u2(k)", 2, 0), ("exp(y(k))", 0, 0)]
+)
+def test_a_regressor_that_looks_ahead_is_refused(text, channel, lag):
+    message = f"reads the past alone: channel {channel} has lag {lag}, take 1 or more"
+    with pytest.raises(ModelError, match=message):
+        regressor(parse(text))
+
+
+def test_a_look_ahead_is_refused_by_its_lag_after_all_back_shifts():
+    with pytest.raises(ModelError, match="channel 1 has lag -1"):
+        regressor(Lagged(1, -1))
+    assert regressor(parse("q2(u(k))"))[1].expression == Lagged(1, 2)
+
+
+def test_lags_of_a_regressor():
+    _, item = regressor(parse("y(k-2)*exp(u2(k-7) - y(k-2))"))
+    assert item.lags == {(0, 2), (2, 7)}
+    assert item.maximum_lag == 7
+    assert regressor(parse("3"))[1].maximum_lag == 0
+
+
+def test_the_regressors_content_is_its_expressions():
+    _, item = regressor(parse("y(k-2)*u(k-1)"))
+    assert item.content == (1, "mul", 2, (0, 0, 2), (0, 1, 1))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1e200*1e200", "exp(1e200*1e200*u(k-1))", "1e-310*y(k-1) + u(k-1)", "1e308*u(k-1) + 1e308*u(k-1)"],
+)
+def test_numbers_that_overflow_are_refused(text):
+    with pytest.raises(ModelError, match="the numbers in an expression overflow: write smaller ones"):
+        regressor(parse(text))
+
+
+def test_a_users_function_that_fails_on_a_number_in_the_expression_is_named():
+    pole = primitive("pole", lambda a: 1.0 / (a - 0.125))
+    with pytest.raises(ModelError, match=r"'pole' fails at \[0\.125\] \(float division by zero\)"):
+        regressor(parse("u(k-1) + pole(0.125)", {**PRIMITIVES, "pole": pole}))
+
+
+def test_a_weight_that_vanishes_against_the_leading_one_leaves_the_sum():
+    assert canonical(parse("1e300*y(k-1) + 1e-300*u(k-1)")) == (1e300, Lagged(0, 1))
+
+
+def test_a_product_of_one_factor_is_the_factor():
+    assert canonical(Apply(MUL, (Lagged(1, 1),))) == (1.0, Lagged(1, 1))
