@@ -30,18 +30,11 @@ def leaves(inputs=INPUTS):
     return st.builds(Lagged, st.integers(0, inputs), st.integers(1, DEEPEST))
 
 
-#: Products, sums and equal factors are what canonical form is about: they come more often.
+#: Products, sums, equal factors and numbers in front are what canonical form is about: they come more often.
 _KINDS = (
-    "leaf",
-    "leaf",
-    "constant",
-    "function",
-    "function",
-    "function",
-    "several",
-    "several",
-    "power",
-    "shift",
+    *("leaf", "leaf", "constant"),
+    *("function", "function", "function"),
+    *("several", "several", "power", "scaled", "shift"),
 )
 
 
@@ -63,6 +56,8 @@ def expressions(draw, inputs=INPUTS, constants=numbers, height=4):
             return Apply(primitive, tuple(draw(st.lists(below, min_size=2, max_size=5))))
         case "power":
             return Apply(MUL, (draw(below),) * draw(st.integers(2, 5)))
+        case "scaled":
+            return Apply(MUL, (Constant(draw(constants)), draw(below)))
         case _:
             return Shift(draw(st.integers(1, 5)), draw(below))
 

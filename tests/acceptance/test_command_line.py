@@ -200,4 +200,4 @@ def test_errors_say_what_to_do_and_nothing_is_lost(folder: Path) -> None:
     assert "no published model" in fail("show", "published:15")
     assert "cannot read the model file" in fail("show", folder / "nothing.json")
     assert "is no model file" in fail("show", folder / "fit/result.json")
-    assert "there are" in fail("systems", "make", "pendulum", "--out", folder / "p.csv")
+    assert "there is bouc-wen-piezo" in fail("systems", "make", "pendulum", "--out", folder / "p.csv")

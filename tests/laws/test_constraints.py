@@ -82,7 +82,7 @@ def test_a_lone_y_keeps_its_parameter_of_one():
 def test_a_structure_without_y_is_infeasible(texts):
     found = hysteresis(*texts)
     assert found == Outcome(Verdict.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
-    assert "add the regressor that the reason names" in str(found)
+    assert "change either as the reason says" in str(found)
 
 
 def test_members_enter_their_cluster_with_their_weight_at_rest():

@@ -40,11 +40,11 @@ def _add(a: float, b: float) -> float:
 
 
 def _sign(a: float) -> float:
-    return float(a > 0.0) - float(a < 0.0)
+    return 1.0 if a > 0.0 else -1.0 if a < 0.0 else 0.0
 
 
 def _sign_of_difference(a: float, b: float) -> float:
-    return float(a > b) - float(a < b)
+    return 1.0 if a > b else -1.0 if a < b else 0.0
 
 
 def _divide(a: float, b: float) -> float:

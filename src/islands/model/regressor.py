@@ -24,6 +24,9 @@ from islands.model.primitives import ADD, MUL, SIGN, SUB
 
 _ONE = Constant(1.0)
 
+#: A sum of weights that is a smaller share of their sizes is the rounding of zero.
+_ROUNDING = 1e-14
+
 
 @dataclass(frozen=True, slots=True)
 class Regressor:
@@ -125,12 +128,16 @@ def _even_signs_apart(cores: list[Expression]) -> list[Expression]:
 
 
 def _sum(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
-    weights: dict[Expression, float] = {}
+    weights: dict[Expression, list[float]] = {}
     for outer, core in parts:
         for inner, term in _terms_of(core):
-            weights[term] = weights.get(term, 0.0) + outer * inner
+            weights.setdefault(term, []).append(outer * inner)
+    merged = ((core, sum(parts), sum(map(abs, parts))) for core, parts in weights.items())
+    # 0.1 + 0.2 - 0.3 is zero but for its rounding, and must vanish at rest as it does on paper. What has
+    # overflowed is kept (its share is NaN) and refused by whoever reads the number.
     terms = sorted(
-        ((core, weight) for core, weight in weights.items() if weight), key=lambda t: content(t[0])
+        ((core, weight) for core, weight, size in merged if size and not abs(weight) / size <= _ROUNDING),
+        key=lambda term: content(term[0]),
     )
     if not terms:
         return 0.0, _ONE

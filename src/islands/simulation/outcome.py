@@ -15,7 +15,7 @@ class Verdict(Enum):
     SINGULAR = (
         "the regressors depend on each other on this data: remove one, or excite the system more richly"
     )
-    INFEASIBLE = "the structure cannot meet the constraints: add the regressor that the reason names"
+    INFEASIBLE = "the structure cannot meet the constraints: change either as the reason says"
     TOO_FEW_ROWS = (
         "there are not more rows than parameters: take a longer record, fewer terms or smaller lags"
     )

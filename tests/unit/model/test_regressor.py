@@ -3,6 +3,7 @@
 import pytest
 
 from islands.errors import ModelError
+from islands.model.clusters import steady_state
 from islands.model.expression import Apply, Constant, Lagged
 from islands.model.primitives import MUL, PRIMITIVES, primitive
 from islands.model.regressor import canonical, regressor
@@ -128,3 +129,10 @@ def test_a_weight_that_vanishes_against_the_leading_one_leaves_the_sum():
 
 def test_a_product_of_one_factor_is_the_factor():
     assert canonical(Apply(MUL, (Lagged(1, 1),))) == (1.0, Lagged(1, 1))
+
+
+def test_weights_that_cancel_but_for_rounding_are_zero():
+    """0.1 + 0.2 - 0.3 is 5.6e-17 in floats; at rest this regressor is zero."""
+    made = regressor(parse("0.1*y(k-1) + 0.2*y(k-2) + (-0.3)*y(k-3)"))[1]
+    assert made is not None
+    assert steady_state(made)[0] == 0.0

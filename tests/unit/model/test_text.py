@@ -44,6 +44,7 @@ def div(first, second):
         (mul(Constant(-2.0), U), "(-2)*u(k-1)"),
         (mul(Constant(-0.0), Constant(-0.0)), "(-0)^2"),
         (mul(div(U, Y), U), "(u(k-1)/y(k-1))*u(k-1)"),
+        (mul(div(U, Y), div(U, Y)), "(u(k-1)/y(k-1))^2"),
         (div(mul(U, Y), div(U, Y)), "(u(k-1)*y(k-1))/(u(k-1)/y(k-1))"),
         (add(U, Y, Constant(-1.0)), "u(k-1) + y(k-1) + (-1)"),
         (add(U, sub(U, Y)), "u(k-1) + sub(u(k-1), y(k-1))"),

@@ -141,7 +141,7 @@ def test_more_than_four_factors_are_multiplied_beforehand(power):
 
 
 def test_constants_stand_in_the_first_rows_each_once():
-    program = linked("exp(2*u(k-1))", "tanh(2*y(k-1) + 5)", "1")
+    program = linked("exp(2*u(k-1))", "tanh(2*y(k-1) + 10)", "1")
     assert program.constants.tolist() == [2.0, 5.0, 1.0]
     assert program.temporaries > 3
     assert program.operands[program.factors[2, 0]].tolist() == [TEMPORARY, 2]
