@@ -1,0 +1,67 @@
+"""Table 1 of the paper: models (12) and (13) on the authors' record, free run over all 100 s.
+
+The paper prints MAPE 0.32874 / 0.33374 and 0.31189 / 0.25250, R2 0.99940 / 0.99984 and 0.99940 / 0.99990.
+Its parameters are rounded to three digits; with those the record gives 0.3310 / 0.3388 and 0.2914 / 0.3377.
+"""
+
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.estimation.estimation import Estimated, estimate
+from islands.simulation.predictors import free_run
+from islands.systems.catalogue import make_record
+from islands.systems.published_models import PUBLISHED, published
+from islands.validation.metrics import Metrics, metrics
+from islands.validation.physics import cluster_sums, physics
+
+
+@pytest.fixture(scope="module")
+def records() -> tuple[Dataset, Dataset]:
+    return tuple(make_record("bouc-wen-piezo", "authors", part, 0) for part in ("estimation", "validation"))
+
+
+def errors(model, records) -> tuple[Metrics, Metrics]:
+    return tuple(metrics(record.y, free_run(model, record).y) for record in records)
+
+
+@pytest.mark.parametrize(
+    ("number", "mape", "r2"),
+    [
+        ("12", (0.3310, 0.3388), (0.99938, 0.99984)),
+        ("13", (0.2914, 0.3377), (0.99946, 0.99988)),
+    ],
+)
+def test_the_printed_parameters_reproduce_table_1(records, number, mape, r2):
+    found = errors(published(number).model, records)
+    assert [part.mape for part in found] == pytest.approx(mape, rel=0.02)
+    assert [part.r2 for part in found] == pytest.approx(r2, abs=6e-6)
+
+
+def test_estimated_again_under_the_constraints_model_13_is_the_paper_s(records):
+    """With all digits the estimation error is Table 1's 0.31189: structure and record are the paper's."""
+    estimated = estimate(published("13").model.regressors, records[0], "hysteresis")
+    assert isinstance(estimated, Estimated)
+    estimation, validation = errors(estimated.model, records)
+    assert estimation.mape == pytest.approx(0.31189, rel=0.002)
+    assert validation.mape < 0.2525
+    assert estimated.model.parameters[0] == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("number", ["12", "13", "14"])
+def test_every_published_cluster_sum_meets_its_target(number):
+    sums = {entry.cluster: (entry.sum, entry.target) for entry in cluster_sums(published(number).model)}
+    expected = {"12": {"y"}, "13": {"y"}, "14": {"y", "u", "y*u"}}[number]
+    assert set(sums) == expected
+    assert all(value == pytest.approx(target, abs=1e-12) for value, target in sums.values())
+
+
+@pytest.mark.parametrize("number", ["12", "13"])
+def test_property_1_holds_for_the_published_models(records, number):
+    checked = physics(published(number).model, records[0])
+    assert checked.property_1
+    assert len(checked.holds) == 10
+    assert checked.hold_drift_percent < 1e-9
+
+
+def test_the_catalogue_holds_what_the_paper_prints():
+    assert {number: entry.model.size for number, entry in PUBLISHED.items()} == {"12": 6, "13": 9, "14": 9}
