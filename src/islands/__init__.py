@@ -13,8 +13,8 @@ from islands.fit import fit
 from islands.io.models import read_model, write_model
 from islands.io.records import read_record, write_record
 from islands.model.model import Model, model_of
+from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
-from islands.model.text import parse
 from islands.result import FittedModel, Result, simulate
 
 __all__ = [

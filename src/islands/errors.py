@@ -1,5 +1,10 @@
 """Every deliberate error of the house. The message says what is wrong, where, and what to do."""
 
+from collections.abc import Mapping
+from typing import TypeVar
+
+T = TypeVar("T")
+
 
 class IslandsError(Exception):
     """Base of all deliberate errors: catch this to catch them all."""
@@ -15,3 +20,16 @@ class ModelError(IslandsError):
 
 class SettingsError(IslandsError):
     """A setting is out of its range, unknown, or contradicts another one."""
+
+
+def chosen(table: Mapping[str, T], name: str, kind: str) -> T:
+    """Return an entry of a table by name.
+
+    Raises
+    ------
+    SettingsError
+        There is none of that name: the message lists what there is.
+    """
+    if name not in table:
+        raise SettingsError(f"unknown {kind} {name!r}: take one of {', '.join(table)}")
+    return table[name]

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from islands.data.dataset import Dataset
-from islands.errors import SettingsError
+from islands.errors import chosen
 from islands.figures.gallery import FIGURES
 from islands.figures.style import save
 from islands.io.export import export
 from islands.io.results import summary, write_result
+from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
-from islands.model.text import equation, latex_equation
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.findings import Assessed, Findings
 from islands.validation.metrics import Metrics
@@ -80,9 +80,7 @@ class FittedModel:
 
     def plot(self, kind: str = "free-run") -> "Figure":
         """Draw a figure of the model on the validation data: one of ``islands.figures.gallery.FIGURES``."""
-        if kind not in FIGURES:
-            raise SettingsError(f"unknown figure {kind!r}: take one of {', '.join(FIGURES)}")
-        return FIGURES[kind](self.assessed, self.findings.split)
+        return chosen(FIGURES, kind, "figure")(self.assessed, self.findings.split)
 
     def export(self, kind: str = "python") -> str:
         """Return the model as text: plain, latex, python or json."""
@@ -142,7 +140,5 @@ def simulate(model: Model, record: Dataset, mode: str = "free-run", shooting: in
     SettingsError
         The mode is unknown.
     """
-    if mode not in SIMULATIONS:
-        raise SettingsError(f"unknown mode {mode!r}: take one of {', '.join(SIMULATIONS)}")
-    interval = dict(zip(SIMULATIONS, (1, shooting, None), strict=True))[mode]
-    return multiple_shooting(model, record, interval)
+    intervals = dict(zip(SIMULATIONS, (1, shooting, None), strict=True))
+    return multiple_shooting(model, record, chosen(intervals, mode, "mode"))

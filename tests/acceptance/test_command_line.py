@@ -197,7 +197,7 @@ def test_errors_say_what_to_do_and_nothing_is_lost(folder: Path) -> None:
     message = fail("fit", record, "--input", "u_V", "--output", "y_um", "--out", folder / "fit")
     assert "--force" in message
     assert (folder / "fit/result.json").read_bytes() == before
-    assert "no published model" in fail("show", "published:15")
+    assert "unknown published model" in fail("show", "published:15")
     assert "cannot read the model file" in fail("show", folder / "nothing.json")
     assert "is no model file" in fail("show", folder / "fit/result.json")
     assert "there is bouc-wen-piezo" in fail("systems", "make", "pendulum", "--out", folder / "p.csv")

@@ -7,9 +7,9 @@ from strategies import grid, leaves, nearly, phi_factors, regressors, settled_va
 
 from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
 from islands.model.expression import Apply, Constant, Lagged, Shift, content, lags
+from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES
 from islands.model.regressor import canonical, regressor
-from islands.model.text import parse
 
 
 def of(expression):

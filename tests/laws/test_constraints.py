@@ -11,8 +11,9 @@ from islands.estimation.least_squares import least_squares
 from islands.model.clusters import steady_state
 from islands.model.expression import Lagged
 from islands.model.model import model_of
+from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import parse, plain
+from islands.model.text import plain
 from islands.program.columns import regressor_matrix
 from islands.simulation.outcome import Outcome, Verdict
 from islands.simulation.predictors import free_run

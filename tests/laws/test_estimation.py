@@ -18,8 +18,8 @@ from islands.errors import RecordError
 from islands.estimation.constrained import constrained_least_squares
 from islands.estimation.least_squares import least_squares
 from islands.model.expression import Lagged
+from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import parse
 from islands.program.columns import regressor_matrix
 from islands.simulation.outcome import OK, Outcome, Verdict
 
@@ -325,7 +325,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.least_squares import factor
 from islands.model.expression import Lagged
 from islands.model.regressor import regressor
-from islands.model.text import parse
+from islands.model.parsing import parse
 from islands.program.columns import gram_matrix, regressor_matrix
 
 texts = ["y(k-1)", "y(k-2)", "u(k-1)", "u(k-1)*y(k-1)", "u(k-2)^3", "sign(u(k-1) - u(k-2))"]

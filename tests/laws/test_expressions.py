@@ -13,9 +13,10 @@ from strategies import any_number, expressions, grid, leaves, nearly, phi_factor
 
 from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Lagged, Shift, content, lags, unshifted, value, walk
+from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.model.regressor import canonical, regressor
-from islands.model.text import latex, parse, plain
+from islands.model.text import latex, plain
 
 
 def product(*factors):
@@ -238,7 +239,9 @@ DETERMINED = """
 from islands.model.clusters import clusters
 from islands.model.expression import Lagged, content, lags
 from islands.model.model import model_of
-from islands.model.text import at_rest, equation, latex_equation, parse
+from islands.model.equations import equation, latex_equation
+from islands.model.parsing import parse
+from islands.model.text import at_rest
 terms = ["max(y(k-3), u2(k-1))*tanh(u1(k-2))", "u1(k-1)*sign(u1(k-1) - u1(k-4))^3", "y(k-1)", "3", "u2(k-7)",
          "exp(phi1(u1(k-1), u1(k-2)))*y(k-2)", "sin(y(k-1) + 2*u2(k-3) - u1(k-1)*u2(k-1))", "2*y(k-9)"]
 model = model_of([(parse(text), 0.5) for text in terms], ("u1", "u2"))

@@ -15,8 +15,8 @@ from islands.data.dataset import Dataset
 from islands.estimation.froe import froe, prune
 from islands.estimation.least_squares import least_squares
 from islands.model.expression import Lagged
+from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import parse
 from islands.program.columns import gram_matrix
 
 seeds = st.integers(0, 2**32 - 1)

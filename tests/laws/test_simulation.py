@@ -15,7 +15,7 @@ from islands.data.dataset import Dataset, join
 from islands.kernels.sums import total
 from islands.model.expression import value
 from islands.model.model import model_of
-from islands.model.text import parse
+from islands.model.parsing import parse
 from islands.simulation.layout import WIDTH, layout
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 

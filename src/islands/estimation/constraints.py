@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import SettingsError
+from islands.errors import chosen
 from islands.model.clusters import OUTPUT_AT_REST, Cluster, clusters
 from islands.model.expression import Apply, Constant, Expression, Lagged
 from islands.model.primitives import ADD, MUL
@@ -174,6 +174,4 @@ def constraint(name: str) -> Constraint:
     SettingsError
         There is none of that name.
     """
-    if name not in CONSTRAINTS:
-        raise SettingsError(f"unknown constraints {name!r}: take one of {', '.join(CONSTRAINTS)}")
-    return CONSTRAINTS[name]
+    return chosen(CONSTRAINTS, name, "constraints")

@@ -6,11 +6,11 @@ import textwrap
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError, chosen
 from islands.io.models import model_json
+from islands.model.equations import equation, latex_equation
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, walk
 from islands.model.model import Model
-from islands.model.text import equation, latex_equation
 
 _INFIX = {"add": " + ", "sub": " - ", "mul": "*"}
 
@@ -142,6 +142,4 @@ def export(model: Model, kind: str) -> str:
     SettingsError
         There is no such kind.
     """
-    if kind not in EXPORTS:
-        raise SettingsError(f"unknown format {kind!r}: take one of {', '.join(EXPORTS)}")
-    return EXPORTS[kind](model)
+    return chosen(EXPORTS, kind, "format")(model)

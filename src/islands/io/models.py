@@ -7,11 +7,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from islands.errors import ModelError
+from islands.model.equations import equation, latex_equation
 from islands.model.expression import Primitive
 from islands.model.model import Model, canonical_order
+from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor, regressor
-from islands.model.text import equation, latex_equation, parse, plain
+from islands.model.text import plain
 
 SCHEMA: Literal["islands.model/1"] = "islands.model/1"
 

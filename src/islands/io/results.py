@@ -12,7 +12,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.io.models import terms_document, write_model
-from islands.model.text import equation, latex_equation
+from islands.model.equations import equation, latex_equation
 from islands.validation.assessment import PARTS
 from islands.validation.findings import Assessed, Findings
 from islands.validation.physics import Physics

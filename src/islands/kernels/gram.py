@@ -1,7 +1,7 @@
-"""Inner products of all pairs of columns, without ever holding the columns of the whole record.
+"""Inner products of pairs of columns, without ever holding the columns of the whole record.
 
 The regressor matrix of a large library does not fit into memory (80 730 candidates of the paper's appendix on
-100 000 rows: 65 GB). Its Gram matrix does, and forward selection needs nothing else.
+100 000 rows: 65 GB). Inner products are numbers, and selection and least squares need nothing else.
 """
 
 import numpy as np
@@ -12,18 +12,21 @@ from islands.kernels.sums import FOLD, dot_chunk
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def gram(
+def inner_products(
     program,
     signals,
     first,
     rows,
     warm_up,  # as in `columns`
-    out,  # out, float64 [term, term]
+    pairs,  # int64 [pair, 2]: the terms of each pair
+    out,  # out, float64 [pair]
 ):
-    """Compute the inner products of all pairs of terms over all rows, in the written order of `sums`."""
-    terms = program.degree.size
+    """Compute inner products over all rows in the written order of `sums`.
+
+    A pair's number does not depend on which other terms and pairs are computed with it.
+    """
     arena, place = arena_for(program, signals.shape[0], warm_up)
-    chunk = np.empty((terms, FOLD))
+    chunk = np.empty((program.degree.size, FOLD))
     flat = chunk.reshape(-1)
     fold = np.empty(FOLD)
     out[:] = 0.0
@@ -37,17 +40,14 @@ def gram(
             done += lanes
             filled += lanes
             if filled == FOLD:
-                _add_products(flat, terms, filled, fold, out)
+                _add_products(flat, pairs, filled, fold, out)
                 filled = 0
-    _add_products(flat, terms, filled, fold, out)
-    for i in range(terms):
-        for j in range(i):
-            out[i, j] = out[j, i]
+    _add_products(flat, pairs, filled, fold, out)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _add_products(flat, terms, filled, fold, out):
+def _add_products(flat, pairs, filled, fold, out):
     rows = np.uint64(filled)
-    for i in range(terms):
-        for j in range(i, terms):
-            out[i, j] += dot_chunk(flat, np.uint64(i * FOLD), flat, np.uint64(j * FOLD), rows, fold)
+    for pair in range(pairs.shape[0]):
+        one, other = np.uint64(pairs[pair, 0] * FOLD), np.uint64(pairs[pair, 1] * FOLD)
+        out[pair] += dot_chunk(flat, one, flat, other, rows, fold)

@@ -7,6 +7,7 @@ and y(k-6) u(k-10) both are ybar ubar. The sums of the parameters over each clus
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from islands.model.expression import Apply, Expression, Lagged, Shift, content
 from islands.model.regressor import Regressor, canonical
@@ -40,6 +41,7 @@ class Cluster:
         )
 
 
+@lru_cache(maxsize=1 << 16)
 def steady_state(regressor: Regressor) -> tuple[float, Expression]:
     """Return (weight, expression) of a regressor at rest; the weight is 0 where a phi factor vanishes."""
     return canonical(_at_rest(regressor.expression))

@@ -6,7 +6,7 @@ merged. ``sign^3`` is ``sign``, but ``sign^2`` is never 1: it is 0 where the inp
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from islands.errors import ModelError
 from islands.model.expression import (
@@ -21,6 +21,7 @@ from islands.model.expression import (
     unshifted,
 )
 from islands.model.primitives import ADD, MUL, SIGN, SUB
+from islands.model.text import plain
 
 _ONE = Constant(1.0)
 
@@ -32,7 +33,15 @@ _ROUNDING = 1e-14
 class Regressor:
     """An expression in canonical form, that reads the past alone. Make it with `regressor`."""
 
-    expression: Expression
+    expression: Expression = field(compare=False)
+    #: The canonical text, inputs always numbered: it says all, and a string knows its hash.
+    text: str = field(init=False, repr=False)
+    #: Key that orders regressors: first the plain ones, then products, by what they say.
+    content: tuple[object, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", plain(self.expression, inputs=2))
+        object.__setattr__(self, "content", content(self.expression))
 
     @property
     def lags(self) -> frozenset[tuple[int, int]]:
@@ -43,11 +52,6 @@ class Regressor:
     def maximum_lag(self) -> int:
         """The deepest lag; 0 for a constant."""
         return max((lag for _, lag in self.lags), default=0)
-
-    @property
-    def content(self) -> tuple[object, ...]:
-        """Key that orders regressors: first the plain ones, then products, by what they say."""
-        return content(self.expression)
 
 
 def regressor(expression: Expression) -> tuple[float, Regressor | None]:

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from islands.errors import SettingsError
+from islands.errors import chosen
 from islands.model.model import Model, model_of
-from islands.model.text import parse
+from islands.model.parsing import parse
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +101,4 @@ def published(number: str) -> Published:
     SettingsError
         There is none of that number.
     """
-    if number not in PUBLISHED:
-        raise SettingsError(f"no published model {number!r}: there are {', '.join(PUBLISHED)}")
-    return PUBLISHED[number]
+    return chosen(PUBLISHED, number, "published model")

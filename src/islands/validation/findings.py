@@ -8,8 +8,8 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
+from islands.model.equations import equation
 from islands.model.model import Model
-from islands.model.text import equation
 from islands.validation.assessment import Assessment
 
 

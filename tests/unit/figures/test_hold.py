@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset
 from islands.figures.hold import draw_holds
 from islands.figures.style import save
 from islands.model.model import Model, model_of
-from islands.model.text import parse
+from islands.model.parsing import parse
 from islands.validation.physics import LEVELS, physics
 
 PERIOD = 100

@@ -15,7 +15,7 @@ from islands.figures.loop import draw_loop
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
 from islands.model.model import Model, model_of
-from islands.model.text import parse
+from islands.model.parsing import parse
 from islands.validation.residual_tests import residual_tests
 
 LONG_TITLE = "What a report may want to say over a figure, with the name of a record and of a model, is long"

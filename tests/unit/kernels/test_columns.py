@@ -6,9 +6,9 @@ import pytest
 from islands.kernels.columns import columns
 from islands.kernels.sums import FOLD
 from islands.model.expression import Constant, Lagged, value
+from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.model.text import parse
 from islands.program.linker import link
 
 TERMS = [

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from islands.kernels.columns import columns
-from islands.kernels.gram import gram
+from islands.kernels.gram import inner_products
 from islands.kernels.sums import FOLD, dot
 from islands.model.expression import Lagged
+from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import parse
 from islands.program.linker import link
 
 TEXTS = ["y(k-1)", "u(k-3)", "y(k-1)*u(k-1)^2*y(k-2)*u(k-2)", "sign(u(k-1) - u(k-2))", "1/(2 + abs(y(k-1)))"]
@@ -26,6 +26,14 @@ def spans(rows):
     begin = np.cumsum((0, *(count + WARM_UP for count in rows)))
     signals = np.random.default_rng(7).normal(size=(2, int(begin[-1])))
     return signals, begin[:-1] + WARM_UP, np.array(rows)
+
+
+def gram(program, signals, first, rows, warm_up, out):
+    """Fill a square of inner products, every pair computed on its own."""
+    pairs = np.array([(i, j) for i in range(len(out)) for j in range(len(out))])
+    flat = np.full(len(pairs), np.nan)
+    inner_products(program, signals, first, rows, warm_up, pairs, flat)
+    out[:] = flat.reshape(out.shape)
 
 
 def gram_of(terms, rows):

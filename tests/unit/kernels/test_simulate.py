@@ -6,7 +6,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.kernels.simulate import CHUNK, simulate
 from islands.model.model import model_of
-from islands.model.text import parse
+from islands.model.parsing import parse
 from islands.program.linker import link
 from islands.simulation.layout import layout
 

@@ -16,9 +16,9 @@ from islands.model.expression import (
     value,
     walk,
 )
+from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
 from islands.model.regressor import regressor
-from islands.model.text import parse
 
 # Model (13) of the paper, section 7, as genes: q1 .. q5, products of two, phi1 and phi2.
 MODEL_13 = (

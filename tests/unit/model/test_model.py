@@ -7,8 +7,9 @@ from strategies import models
 from islands.errors import ModelError
 from islands.model.expression import Constant
 from islands.model.model import Model, canonical_order, model_of
+from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import parse, plain
+from islands.model.text import plain
 
 
 def items(*texts):

@@ -8,9 +8,10 @@ import pytest
 
 from islands.errors import ModelError
 from islands.model.expression import Lagged, Primitive
+from islands.model.parsing import parse
 from islands.model.primitives import LARGEST_EXPONENT, PRIMITIVES, TINY, check, primitive
 from islands.model.regressor import canonical
-from islands.model.text import latex, parse, plain
+from islands.model.text import latex, plain
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))

@@ -5,9 +5,10 @@ import pytest
 from islands.errors import ModelError
 from islands.model.clusters import steady_state
 from islands.model.expression import Apply, Constant, Lagged
+from islands.model.parsing import parse
 from islands.model.primitives import MUL, PRIMITIVES, primitive
 from islands.model.regressor import canonical, regressor
-from islands.model.text import parse, plain
+from islands.model.text import plain
 
 
 def written(text):

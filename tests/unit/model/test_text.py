@@ -5,10 +5,12 @@ from hypothesis import given
 from strategies import models
 
 from islands.errors import ModelError
+from islands.model.equations import equation, latex_equation
 from islands.model.expression import Apply, Constant, Lagged, Shift
 from islands.model.model import model_of
+from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
-from islands.model.text import LARGEST_POWER, at_rest, equation, latex, latex_equation, parse, plain
+from islands.model.text import LARGEST_POWER, at_rest, latex, plain
 
 U, Y = Lagged(1, 1), Lagged(0, 1)
 

@@ -12,9 +12,9 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.sums import FOLD, dot
 from islands.model.expression import Constant, Lagged
+from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.model.regressor import regressor
-from islands.model.text import parse
 from islands.program.columns import gram_matrix, regressor_matrix
 
 

@@ -10,9 +10,9 @@ from strategies import regressors, signals
 
 from islands.kernels.machine import ADD, CALL, MAX_FACTORS, MULTIPLY, SIGN, SUBTRACT
 from islands.model.expression import Lagged, value
+from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.model.text import parse
 from islands.program.linker import TEMPORARY, link
 from islands.program.row_functions import row_address
 

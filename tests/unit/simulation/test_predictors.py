@@ -11,7 +11,7 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.model.expression import value
 from islands.model.model import model_of
-from islands.model.text import parse
+from islands.model.parsing import parse
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Verdict
 from islands.simulation.predictors import BOUND, bound_of, free_run, multiple_shooting, one_step_ahead

@@ -1,0 +1,24 @@
+"""The table of fitnesses: what evolution minimises. NaN never wins."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+#: Samples of a shooting interval for a fitness, from those of the settings; None is the free run.
+Interval = Callable[[int], int | None]
+
+
+def _one_step_ahead(_shooting: int) -> int | None:
+    return 1
+
+
+def _shooting(shooting: int) -> int | None:
+    return shooting
+
+
+def _free_run(_shooting: int) -> int | None:
+    return None
+
+
+FITNESSES: Mapping[str, Interval] = MappingProxyType(
+    {"one-step": _one_step_ahead, "shooting": _shooting, "free-run": _free_run}
+)

@@ -1,0 +1,63 @@
+"""An individual: a vector of trees (genes), each the basis function of one term (equation (10))."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf
+
+from islands.errors import ModelError
+from islands.model.expression import Expression
+from islands.model.regressor import Regressor, regressor
+from islands.simulation.outcome import OK, Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Individual:
+    """Genes, and what became of them.
+
+    Attributes
+    ----------
+    genes : tuple of Expression
+        As evolution wrote them, back-shifts and all; after evaluation those that are left.
+    regressors : tuple of Regressor
+        The terms of the model, in the order of their content; empty before evaluation.
+    theta : tuple of float
+        Their parameters; empty where the outcome is a failure.
+    fitness : float
+        Lower is better; infinite before evaluation and after a failure.
+    outcome : Outcome
+    """
+
+    genes: tuple[Expression, ...]
+    regressors: tuple[Regressor, ...] = ()
+    theta: tuple[float, ...] = ()
+    fitness: float = inf
+    outcome: Outcome = OK
+
+    @property
+    def size(self) -> int:
+        """Number of terms of the model."""
+        return len(self.regressors)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The model's structure as text: two individuals with one key are one model."""
+        return tuple(item.text for item in self.regressors)
+
+
+@lru_cache(maxsize=1 << 16)
+def regressor_of(gene: Expression) -> Regressor | None:
+    """Return a gene's regressor, None where it is identically zero or its numbers overflow."""
+    try:
+        return regressor(gene)[1]
+    except ModelError:
+        return None
+
+
+def distinct_genes(genes: tuple[Expression, ...]) -> dict[Regressor, Expression]:
+    """Return the first gene of every regressor; genes that are zero are left out."""
+    found: dict[Regressor, Expression] = {}
+    for gene in genes:
+        item = regressor_of(gene)
+        if item is not None:
+            found.setdefault(item, gene)
+    return found

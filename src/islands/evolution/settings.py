@@ -1,0 +1,143 @@
+"""Everything that determines a run of evolution, besides the record and the seed."""
+
+from dataclasses import dataclass
+
+from islands.errors import SettingsError, chosen
+from islands.estimation.constraints import CONSTRAINTS
+from islands.evolution.constraints import STRUCTURES
+from islands.evolution.fitness import FITNESSES
+from islands.model.primitives import PRIMITIVES
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The parameters of the paper's section 5, and what it leaves open.
+
+    Attributes
+    ----------
+    population, generations : int
+        Offspring of every generation, and how many generations.
+    elite : float
+        Share of the population that is kept as elite.
+    crossover : float
+        CXPB, probability that a pair recombines.
+    mutation : float
+        MTPB, probability that an individual mutates if it did not recombine.
+    prune : float
+        PRPB, probability that an evaluated individual is pruned by FROE.
+    tolerance : float
+        Smallest error reduction ratio that survives pruning.
+    max_terms, max_height : int
+        Genes of an individual; edges from a gene's root to its deepest leaf, back-shifts included.
+    shifts : tuple of int
+        The back-shift operators q1, q2, ... that may stand in a gene.
+    primitives : tuple of str
+        Functions that may stand in a gene.
+    structure : str
+        An entry of ``STRUCTURES``: what a gene must look like.
+    constraints : str
+        An entry of the parameter constraints, ``hysteresis`` or ``none``.
+    fitness : str
+        An entry of ``FITNESSES``.
+    shooting : int
+        Samples of an interval of multiple shooting.
+    tournament : int
+        Contestants of a tournament. The paper is silent; 3 is the usual choice of its toolbox.
+    high_level : float
+        Probability that a crossover exchanges whole genes rather than subtrees; the paper is silent.
+    outer : float
+        Probability that a mutation replaces a whole gene rather than a subtree; the paper is silent.
+    initial_terms : tuple of int
+        Fewest and most genes of a first individual; the paper is silent.
+    initial_height : int
+        Greatest height of a first gene, and of a subtree that mutation grows; the paper is silent.
+    library : str
+        A library whose constrained forward selection seeds the first population, and whose regressors an
+        outer mutation may take; "" for none.
+    library_degree, library_lags : int
+        Of that library.
+    from_library : float
+        Probability that an outer mutation takes a regressor of the library; 0 without one.
+    distinct : bool
+        Keep one copy of a model in the elite.
+    refine : bool
+        Polish the hall of fame's parameters on the shooting error.
+    """
+
+    population: int = 500
+    generations: int = 500
+    elite: float = 0.1
+    crossover: float = 0.8
+    mutation: float = 0.2
+    prune: float = 0.5
+    tolerance: float = 1e-5
+    max_terms: int = 10
+    max_height: int = 5
+    shifts: tuple[int, ...] = (1, 2, 3, 4, 5)
+    primitives: tuple[str, ...] = ("mul", "phi1", "phi2")
+    structure: str = "phi"
+    constraints: str = "hysteresis"
+    fitness: str = "shooting"
+    shooting: int = 500
+    tournament: int = 3
+    high_level: float = 0.5
+    outer: float = 0.5
+    initial_terms: tuple[int, int] = (1, 10)
+    initial_height: int = 3
+    library: str = ""
+    library_degree: int = 5
+    library_lags: int = 3
+    from_library: float = 0.0
+    distinct: bool = False
+    refine: bool = False
+
+    def __post_init__(self) -> None:
+        _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
+        _at_least(0, generations=self.generations, max_height=self.max_height)
+        _at_least(1, tournament=self.tournament)
+        _probability(
+            elite=self.elite,
+            crossover=self.crossover,
+            mutation=self.mutation,
+            prune=self.prune,
+            high_level=self.high_level,
+            outer=self.outer,
+            from_library=self.from_library,
+        )
+        if not self.tolerance >= 0.0:
+            raise SettingsError(f"the tolerance of pruning is not negative, got {self.tolerance}")
+        fewest, most = self.initial_terms
+        if not 1 <= fewest <= most <= self.max_terms:
+            raise SettingsError(
+                f"initial_terms {self.initial_terms} lie between 1 and max_terms {self.max_terms}"
+            )
+        chosen(STRUCTURES, self.structure, "structure")
+        chosen(CONSTRAINTS, self.constraints, "constraints")
+        chosen(FITNESSES, self.fitness, "fitness")
+        for name in self.primitives:
+            chosen(PRIMITIVES, name, "primitive")
+        if any(shift < 1 for shift in self.shifts):
+            raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")
+
+    @property
+    def maximum_lag(self) -> int:
+        """The deepest lag that a gene can reach: a leaf's own, and a back-shift on every edge above it."""
+        deepest = 1 + self.max_height * max(self.shifts, default=0)
+        return max(deepest, self.library_lags) if self.library else deepest
+
+    @property
+    def elites(self) -> int:
+        """Number of individuals in the elite, at least one."""
+        return max(1, round(self.elite * self.population))
+
+
+def _at_least(least: int, **values: int) -> None:
+    for name, value in values.items():
+        if value < least:
+            raise SettingsError(f"{name} is at least {least}, got {value}")
+
+
+def _probability(**values: float) -> None:
+    for name, value in values.items():
+        if not 0.0 <= value <= 1.0:
+            raise SettingsError(f"{name} lies between 0 and 1, got {value}")

@@ -1,0 +1,129 @@
+"""Plain text to expressions.
+
+The text is a subset of Python's own syntax but for the caret, so Python's parser reads it.
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Mapping, Sequence
+
+from islands.errors import ModelError
+from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
+from islands.model.primitives import ADD, MUL, PRIMITIVES
+from islands.model.text import LARGEST_POWER
+
+_SIGNAL = re.compile(r"y|u([1-9][0-9]*)?")
+_BACK_SHIFT = re.compile(r"q([0-9]+)")
+_OPERATORS: Mapping[type[ast.operator], str] = {
+    ast.Add: "add",
+    ast.Sub: "sub",
+    ast.Mult: "mul",
+    ast.Div: "div",
+}
+
+
+def parse(text: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Expression:
+    """Read an expression.
+
+    Parameters
+    ----------
+    text : str
+        As `plain` writes it.
+    primitives : mapping
+        The functions that may stand in it, by name.
+
+    Raises
+    ------
+    ModelError
+        It is no expression, or nested too deeply: the message shows the part that could not be read.
+    """
+    try:
+        tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
+        return _read(tree.body, primitives)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ModelError(f"cannot read {text[:80]!r}: write it like u(k-1)*sign(u(k-1) - u(k-2))") from error
+
+
+def _read(node: ast.expr, primitives: Mapping[str, Primitive]) -> Expression:
+    match node:
+        case ast.Constant() if (number := _number(node)) is not None:
+            return Constant(number)
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as operand) if (
+            number := _number(operand)
+        ) is not None:
+            return Constant(-number)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return Apply(MUL, (Constant(-1.0), _read(operand, primitives)))
+        case ast.BinOp(op=ast.Pow()):
+            factors = _factors(node, primitives)
+            return Apply(MUL, factors) if len(factors) > 1 else factors[0]
+        case ast.BinOp(op=ast.Mult()):
+            return Apply(MUL, tuple(f for part in _chain(node, ast.Mult) for f in _factors(part, primitives)))
+        case ast.BinOp(op=ast.Add()):
+            return Apply(ADD, tuple(_read(part, primitives) for part in _chain(node, ast.Add)))
+        case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
+            return Apply(
+                PRIMITIVES[_OPERATORS[type(operator)]], (_read(left, primitives), _read(right, primitives))
+            )
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+            return _read_call(name, arguments, primitives)
+    raise ModelError(
+        f"cannot read {ast.unparse(node)!r}: a leaf is y(k-1) or u(k-1), the rest + - * / ^ and functions"
+    )
+
+
+def _number(node: ast.Constant) -> float | None:
+    """Return a finite number, or None: True is no number, and 1e999 is none either."""
+    match node.value:
+        case bool():
+            return None
+        case int() | float() as number if abs(number) <= sys.float_info.max:
+            return float(number)
+    return None
+
+
+def _chain(node: ast.expr, operator: type[ast.operator]) -> list[ast.expr]:
+    """Return the operands of a * b * c, which Python reads as (a * b) * c."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, operator):
+        return [*_chain(node.left, operator), node.right]
+    return [node]
+
+
+def _factors(node: ast.expr, primitives: Mapping[str, Primitive]) -> tuple[Expression, ...]:
+    match node:
+        case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant(value=int() as power)) if (
+            1 <= power <= LARGEST_POWER and power is not True
+        ):
+            return (_read(base, primitives),) * power
+        case ast.BinOp(op=ast.Pow()):
+            raise ModelError(
+                f"cannot read {ast.unparse(node)!r}: a power is a whole number from 1 to {LARGEST_POWER}"
+            )
+    return (_read(node, primitives),)
+
+
+def _read_call(name: str, arguments: Sequence[ast.expr], primitives: Mapping[str, Primitive]) -> Expression:
+    if (signal := _SIGNAL.fullmatch(name)) and len(arguments) == 1:
+        channel = 0 if name == "y" else int(signal[1] or 1)
+        return Lagged(channel, _lag(arguments[0]))
+    if (shift := _BACK_SHIFT.fullmatch(name)) and len(arguments) == 1:
+        return Shift(int(shift[1]), _read(arguments[0], primitives))
+    if name not in primitives:
+        raise ModelError(f"unknown function {name!r}: known are {', '.join(primitives)}")
+    primitive = primitives[name]
+    variadic = primitive in (ADD, MUL) and len(arguments) > 1
+    if len(arguments) != primitive.arity and not variadic:
+        raise ModelError(f"{name} takes {primitive.arity} arguments, got {len(arguments)}")
+    return Apply(primitive, tuple(_read(argument, primitives) for argument in arguments))
+
+
+def _lag(node: ast.expr) -> int:
+    match node:
+        case ast.Name(id="k"):
+            return 0
+        case ast.BinOp(left=ast.Name(id="k"), op=ast.Sub(), right=ast.Constant(value=int() as lag)) if (
+            lag is not True
+        ):
+            return lag
+    raise ModelError(f"cannot read the lag {ast.unparse(node)!r}: write k-1, k-2, ...")
