@@ -10,6 +10,7 @@ from islands.data.dataset import Dataset, join
 from islands.data.split import Split, split
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
 from islands.fit import fit
+from islands.identify import identify
 from islands.io.models import read_model, write_model
 from islands.io.records import read_record, write_record
 from islands.model.model import Model, model_of
@@ -29,6 +30,7 @@ __all__ = [
     "SettingsError",
     "Split",
     "fit",
+    "identify",
     "join",
     "model_of",
     "parse",

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split, split
-from islands.errors import RecordError, SettingsError
+from islands.errors import SettingsError
 from islands.estimation.constraints import constraint
 from islands.estimation.estimation import estimate
 from islands.estimation.forward_selection import forward_selection
@@ -76,7 +76,7 @@ def fit(
     constraint(constraints)
     if max_terms < 1:
         raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
-    parts = _parts(record, validation)
+    parts = parts_of(record, validation)
     shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
@@ -118,11 +118,14 @@ def fit(
     return Result(Findings(record, parts, seed, settings, search, ranked(models)))
 
 
-def _parts(record: Dataset, validation: Dataset | float) -> Split:
-    if not isinstance(validation, Dataset):
-        return split(record, validation)
-    if validation.inputs != record.inputs:
-        raise RecordError(f"the validation data has {validation.inputs} inputs, the record {record.inputs}")
-    if abs(validation.dt - record.dt) > 0.01 * record.dt:
-        raise RecordError(f"the validation data is sampled at {validation.dt} s, the record at {record.dt} s")
-    return Split(record, validation)
+def parts_of(record: Dataset, validation: Dataset | float) -> Split:
+    """Return estimation and validation data: two records, or the two parts of one.
+
+    Raises
+    ------
+    RecordError
+        The validation data has another number of inputs or sampling time.
+    SettingsError
+        The fraction leaves a part empty.
+    """
+    return Split(record, validation) if isinstance(validation, Dataset) else split(record, validation)

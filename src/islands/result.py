@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from islands.data.dataset import Dataset
 from islands.errors import chosen
-from islands.figures.gallery import FIGURES
+from islands.figures.gallery import FIGURES, SEARCH_FIGURES, search_figures
 from islands.figures.style import save
 from islands.io.export import export
 from islands.io.results import summary, write_result
@@ -120,6 +120,8 @@ class Result:
         figures.mkdir(parents=True, exist_ok=True)
         for kind in FIGURES:
             save(self.best.plot(kind), figures / f"{kind}.svg")
+        for name in search_figures(self.findings):
+            save(SEARCH_FIGURES[name](self.findings), figures / f"{name}.svg")
         write_result(self.findings, folder)
         return folder
 

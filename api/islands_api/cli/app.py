@@ -3,11 +3,13 @@
 import sys
 
 import typer
+from rich.markup import escape
 
 from islands.errors import IslandsError
 from islands_api.cli.console import errors
 from islands_api.cli.demo import demo
 from islands_api.cli.fit import fit
+from islands_api.cli.identify import identify
 from islands_api.cli.show import show
 from islands_api.cli.simulate import simulate
 from islands_api.cli.systems import systems
@@ -15,7 +17,7 @@ from islands_api.cli.systems import systems
 app = typer.Typer(
     help="Find the equation behind measured data.", no_args_is_help=True, pretty_exceptions_enable=False
 )
-for command in (fit, simulate, show, demo):
+for command in (identify, fit, simulate, show, demo):
     app.command()(command)
 app.add_typer(systems, name="systems")
 
@@ -24,8 +26,8 @@ def main() -> None:
     """Run the command line."""
     try:
         app()
-    except IslandsError as error:
-        errors.print(f"[bold red]error:[/] {error}", highlight=False)
+    except (IslandsError, OSError) as error:
+        errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
         sys.exit(2)
     except KeyboardInterrupt:
         errors.print("stopped")

@@ -1,5 +1,6 @@
 """``islands fit``: forward selection over a library, and (constrained) least squares."""
 
+import os
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
@@ -74,10 +75,13 @@ def check_folder(folder: Path, force: bool) -> None:
     Raises
     ------
     SettingsError
-        There is one, or the path is a file.
+        There is one, the path or a part of it is a file, or nothing may be written there.
     """
-    if folder.exists() and not folder.is_dir():
-        raise SettingsError(f"--out {folder} is a file: give a folder")
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise SettingsError(f"--out {folder}: {there} is a file, give a folder")
+    if not os.access(there, os.W_OK):
+        raise SettingsError(f"--out {folder}: nothing may be written in {there}, give another folder")
     if (folder / "result.json").exists() and not force:
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 

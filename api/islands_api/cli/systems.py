@@ -34,4 +34,5 @@ def make(
     chosen = variant or (SYSTEMS[system].variants[0] if system in SYSTEMS else "")
     record = make_record(system, chosen, part, seed)
     write_record(record, out)
-    output.print(f"{out}: {record.samples} samples, {', '.join(record.input_names)} to {record.output_name}")
+    names = f"{', '.join(record.input_names)} to {record.output_name}"
+    output.print(f"{out}: {record.samples} samples, {names}", markup=False)

@@ -10,7 +10,7 @@ from math import isfinite
 from islands.evolution.individual import Individual
 
 #: Models that are kept of every size: validation chooses among them.
-DEPTH = 3
+DEPTH = 8
 
 
 @dataclass(frozen=True, slots=True)

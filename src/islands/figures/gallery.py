@@ -10,8 +10,9 @@ from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.loop import draw_loop
 from islands.figures.residuals import draw_residual_correlations
+from islands.figures.search import draw_convergence, draw_front
 from islands.simulation.predictors import free_run
-from islands.validation.findings import Assessed
+from islands.validation.findings import Assessed, Findings
 
 FigureOf = Callable[[Assessed, Split], Figure]
 
@@ -35,3 +36,13 @@ def _residuals(entry: Assessed, _split: Split) -> Figure:
 FIGURES: Mapping[str, FigureOf] = MappingProxyType(
     {"free-run": _free_run, "loop": _loop, "hold": _hold, "residuals": _residuals}
 )
+
+#: Figures of a whole search; those of its course need a history.
+SEARCH_FIGURES: Mapping[str, Callable[[Findings], Figure]] = MappingProxyType(
+    {"front": draw_front, "convergence": draw_convergence}
+)
+
+
+def search_figures(findings: Findings) -> tuple[str, ...]:
+    """Return the names of the search figures that these findings have."""
+    return tuple(name for name in SEARCH_FIGURES if name != "convergence" or findings.search.history)

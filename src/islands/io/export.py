@@ -2,8 +2,10 @@
 
 import inspect
 import math
+import re
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral, Real
 from types import MappingProxyType
 
 from islands.errors import ModelError, chosen
@@ -24,7 +26,8 @@ def python(model: Model) -> str:
     Raises
     ------
     ModelError
-        The model has no parameters, or a primitive of the user's has no source at hand.
+        The model has no parameters, or a primitive of the user's can't stand alone: its source is not at
+        hand, or it needs more than ``math`` and numbers.
     """
     signals = ["y", *_input_arguments(model)]
     terms = [
@@ -38,15 +41,19 @@ def python(model: Model) -> str:
         if isinstance(node, Apply) and node.primitive.name not in _INFIX
     }
     inputs = ", ".join(signals[1:])
+    functions = [_function(used[name]) for name in sorted(used)]
+    constants = _constants([used[name] for name in sorted(used)])
     return _MODULE.format(
         equation=equation(model),
         names=", ".join(
-            f"{argument} = {name}" for argument, name in zip(signals[1:], model.input_names, strict=True)
+            f"{argument} = {_quoted(name)}"
+            for argument, name in zip(signals[1:], model.input_names, strict=True)
         ),
-        output=model.output_name,
+        output=_quoted(model.output_name),
         dt="any" if model.dt is None else f"{model.dt!r} s",
         lag=model.maximum_lag,
-        functions="".join(_function(used[name]) for name in sorted(used)),
+        constants="".join(f"{name} = {value}\n" for name, value in constants.items()),
+        functions="\n\n".join(functions) + ("\n\n" if functions else ""),
         inputs=inputs,
         first_input=signals[1],
         terms="\n        + ".join(terms),
@@ -61,9 +68,9 @@ Inputs {names}; output y = {output}; sampling time {dt}.
 import math
 
 MAXIMUM_LAG = {lag}
+{constants}
 
-{functions}
-def predict(k, y, {inputs}):
+{functions}def predict(k, y, {inputs}):
     """Return y(k) from the samples before it."""
     return (
         {terms}
@@ -100,33 +107,64 @@ def _python(expression: Expression, signals: list[str]) -> str:
             return f"({_INFIX[primitive.name].join(_python(argument, signals) for argument in arguments)})"
         case Apply(primitive, arguments):
             inner = ", ".join(_python(argument, signals) for argument in arguments)
-            return f"{primitive.scalar.__name__}({inner})"
+            return f"_{primitive.name}({inner})"
     raise ModelError(f"{expression!r} is not in canonical form")
 
 
+def _quoted(name: str) -> str:
+    """Return a column's name as it may stand in a docstring."""
+    return name.replace("\\", r"\\").replace('"', r"\"")
+
+
 def _function(primitive: Primitive) -> str:
-    """Return the source of a primitive's scalar function, with the numbers it takes from its module."""
-    scalar = primitive.scalar
+    """Return the source of a primitive's scalar function, under a name of its own."""
     try:
-        source = textwrap.dedent(inspect.getsource(scalar))
-    except OSError as error:
+        source = textwrap.dedent(inspect.getsource(primitive.scalar))
+    except (OSError, TypeError) as error:
         raise ModelError(
-            f"the source of primitive {primitive.name!r} is not at hand: define it in a file"
+            f"the source of primitive {primitive.name!r} is not at hand: define it with def in a file"
         ) from error
     if not source.startswith("def "):
         raise ModelError(
-            f"primitive {primitive.name!r} can't be exported: write it with def, not as a lambda"
+            f"primitive {primitive.name!r} can't be exported: write it with def, not as a lambda and without "
+            "a decorator"
         )
-    lines = []
-    for name in scalar.__code__.co_names:
-        held = scalar.__globals__.get(name)
-        if isinstance(held, int | float):
-            lines.append(f"{name} = {held!r}\n")
-        elif held is not None and held is not math:
-            raise ModelError(
-                f"primitive {primitive.name!r} uses {name}: an export knows math and numbers alone"
-            )
-    return "".join(lines) + ("\n\n" if lines else "\n") + source + "\n"
+    return re.sub(r"def \w+", f"def _{primitive.name}", source, count=1)
+
+
+def _constants(primitives: Sequence[Primitive]) -> dict[str, str]:
+    """Return what the functions take from their modules: numbers, and ``math`` by other names."""
+    taken = {"math": "math", "MAXIMUM_LAG": "", "predict": "", "simulate": ""}
+    taken |= {f"_{primitive.name}": "" for primitive in primitives}
+    found: dict[str, str] = {}
+    for primitive in primitives:
+        held = inspect.getclosurevars(primitive.scalar)
+        for name, value in {**held.globals, **held.nonlocals}.items():
+            written = _written(value)
+            if written is None:
+                raise ModelError(
+                    f"primitive {primitive.name!r} uses {name}: an export knows math and numbers alone"
+                )
+            if (taken | found).get(name, written) != written:
+                raise ModelError(
+                    f"primitive {primitive.name!r} uses {name}, a name that stands for something else in the "
+                    "export: rename it"
+                )
+            if name not in taken:
+                found[name] = written
+    return found
+
+
+def _written(value: object) -> str | None:
+    """Return Python source of a number, of ``math`` or of one of its functions; None of anything else."""
+    if value is math:
+        return "math"
+    if isinstance(value, Integral):
+        return repr(int(value))
+    if isinstance(value, Real):
+        return repr(float(value)) if math.isfinite(value) else f"float('{float(value)}')"
+    name = getattr(value, "__name__", "")
+    return f"math.{name}" if value is not None and getattr(math, name, None) is value else None
 
 
 EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(

@@ -1,6 +1,7 @@
 """Model files: JSON with a schema version, every float kept exactly."""
 
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -25,7 +26,7 @@ class TermDocument(BaseModel):
 
     regressor: str
     parameter: FiniteFloat | None
-    standard_error: FiniteFloat | None = None
+    standard_error: Annotated[FiniteFloat, Field(ge=0)] | None = None
 
 
 class ModelDocument(BaseModel):
@@ -53,21 +54,41 @@ def terms_document(model: Model) -> list[dict[str, Any]]:
 
 
 def model_json(model: Model) -> str:
-    """Write a model as JSON; the same model gives the same text."""
-    document = ModelDocument(
-        inputs=model.input_names,
-        output=model.output_name,
-        dt=model.dt,
-        equation=equation(model),
-        latex=latex_equation(model),
-        terms=tuple(TermDocument(**term) for term in terms_document(model)),
-    )
+    """Write a model as JSON; the same model gives the same text.
+
+    Raises
+    ------
+    ModelError
+        A number of the model is not finite: JSON has no word for it.
+    """
+    fields = {
+        "inputs": model.input_names,
+        "output": model.output_name,
+        "dt": model.dt,
+        "equation": equation(model),
+        "latex": latex_equation(model),
+        "terms": terms_document(model),
+    }
+    try:
+        document = ModelDocument.model_validate(fields)
+    except ValidationError as error:
+        raise ModelError(f"the model cannot be written: {_problem(error)}") from error
     return document.model_dump_json(by_alias=True, indent=2) + "\n"
 
 
 def write_model(model: Model, path: str | Path) -> None:
-    """Write a model file."""
-    Path(path).write_text(model_json(model), encoding="utf-8")
+    """Write a model file.
+
+    Raises
+    ------
+    ModelError
+        A number of the model is not finite, or the file cannot be written.
+    """
+    text = model_json(model)
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"cannot write the model file {path}: {error.strerror}") from error
 
 
 def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Model:
@@ -103,30 +124,50 @@ def model_from_json(
     try:
         document = ModelDocument.model_validate_json(text)
     except ValidationError as error:
-        problem = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in problem["loc"]) or "the file"
-        raise ModelError(f"{name} is no model file of schema {SCHEMA}: {where}: {problem['msg']}") from error
+        raise ModelError(f"{name} is no model file of schema {SCHEMA}: {_problem(error)}") from error
     terms: dict[Regressor, tuple[float | None, float | None]] = {}
-    for term in document.terms:
-        factor, item = regressor(parse(term.regressor, primitives))
-        if item is None or item in terms:
-            reason = "is identically zero" if item is None else "stands there twice"
-            raise ModelError(f"{name}: the regressor {term.regressor!r} {reason}")
+    for position, term in enumerate(document.terms):
+        where = f"{name}: terms.{position}"
+        factor, item = _canonical(term.regressor, primitives, f"{where}.regressor")
+        if item in terms:
+            raise ModelError(f"{where}.regressor: {term.regressor!r} stands there twice")
         # A term may be written in any way: what canonical form takes out belongs to the parameter.
-        terms[item] = (_times(factor, term.parameter), _times(abs(factor), term.standard_error))
+        terms[item] = (
+            _times(factor, term.parameter, f"{where}.parameter"),
+            _times(abs(factor), term.standard_error, f"{where}.standard_error"),
+        )
     ordered = canonical_order(terms)
-    return Model(
-        tuple(ordered),
-        _complete([terms[item][0] for item in ordered], f"{name}: parameter"),
-        document.inputs,
-        document.output,
-        document.dt,
-        _complete([terms[item][1] for item in ordered], f"{name}: standard_error"),
-    )
+    theta = _complete([terms[item][0] for item in ordered], f"{name}: parameter")
+    errors = _complete([terms[item][1] for item in ordered], f"{name}: standard_error")
+    try:
+        return Model(tuple(ordered), theta, document.inputs, document.output, document.dt, errors)
+    except ModelError as error:
+        raise ModelError(f"{name}: inputs: {error}") from error
 
 
-def _times(factor: float, number: float | None) -> float | None:
-    return None if number is None else factor * number
+def _problem(error: ValidationError) -> str:
+    """Name the first field that is wrong, and say what it should be."""
+    problem = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in problem["loc"]) or "the file"
+    return f"{where}: {problem['msg']}"
+
+
+def _canonical(text: str, primitives: Mapping[str, Primitive], where: str) -> tuple[float, Regressor]:
+    try:
+        factor, item = regressor(parse(text, primitives))
+    except ModelError as error:
+        raise ModelError(f"{where}: {error}") from error
+    if item is None:
+        raise ModelError(f"{where}: {text!r} is identically zero")
+    return factor, item
+
+
+def _times(factor: float, number: float | None, where: str) -> float | None:
+    if number is None:
+        return None
+    if not isfinite(factor * number):
+        raise ModelError(f"{where}: {number!r} overflows with the regressor's factor {factor!r}")
+    return factor * number
 
 
 def _complete(values: list[float | None], what: str) -> tuple[float, ...] | None:

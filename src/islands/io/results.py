@@ -35,6 +35,9 @@ def result_json(findings: Findings) -> str:
             "wall_s": search.wall_s,
             "outcomes": dict(search.outcomes),
             "full_set": dict(search.full_set),
+            "generations": search.generations,
+            "duplicates": search.duplicates,
+            "feasible_share": search.feasible_share,
         },
         "models": [_model_document(rank, entry) for rank, entry in enumerate(findings.models, start=1)],
     }
@@ -116,9 +119,14 @@ def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
 
 
 def write_result(findings: Findings, folder: Path) -> None:
-    """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``."""
+    """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``.
+
+    Models of a result that was in the folder are removed.
+    """
     models = folder / "models"
     models.mkdir(parents=True, exist_ok=True)
+    for path in models.glob("[0-9][0-9]*.json"):
+        path.unlink()
     for rank, entry in enumerate(findings.models, start=1):
         write_model(entry.model, models / f"{rank:02d}.json")
     (folder / "summary.txt").write_text(summary(findings), encoding="utf-8")
@@ -167,24 +175,30 @@ def row(rank: int, entry: Assessed) -> tuple[str, ...]:
     """Return one model's row of the table."""
     metrics, physics = entry.assessment.metrics, entry.assessment.physics
     estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
+    estimated, validated = (bool(entry.assessment.outcomes[part]["free_run"]) for part in PARTS)
+    rests = all(hold.bounded for hold in physics.holds)
     return (
         str(rank),
         str(entry.model.size),
-        number(estimation.mape, "{:.4f}"),
-        number(validation.mape, "{:.4f}"),
-        number(validation.r2, "{:.5f}"),
-        number(physics.hold_drift_percent, "{:.3f}"),
+        number(estimation.mape, "{:.4f}", estimated),
+        number(validation.mape, "{:.4f}", validated),
+        number(validation.r2, "{:.5f}", validated),
+        number(physics.hold_drift_percent, "{:.3f}", rests),
         "yes" if physics.property_1 else "no",
         "pass" if entry.assessment.residual_tests.passed else "fail",
     )
 
 
-def number(value: float, form: str) -> str:
-    """Format a number, or say that the simulation behind it diverged."""
-    return form.format(value) if isfinite(value) else "diverged"
+def number(value: float, form: str, bounded: bool) -> str:
+    """Format a number, or say that the simulation behind it diverged; "-" where the output has no range."""
+    if not bounded:
+        return "diverged"
+    return form.format(value) if isfinite(value) else "-"
 
 
 def _finite(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return _finite(value.item())
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -26,6 +26,8 @@ class Library:
     ----------
     build : callable
         ``build(degree, lags, inputs)`` returns the expressions, in any order.
+    count : callable
+        ``count(degree, lags, inputs)`` returns how many they are, before any is made.
     degree, lags : int
         Defaults.
     constraints : str
@@ -34,6 +36,7 @@ class Library:
     """
 
     build: Callable[[int, int, int], list[Expression]]
+    count: Callable[[int, int, int], int]
     degree: int
     lags: int
     constraints: str
@@ -50,17 +53,15 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
     """
     if degree < 1 or lags < 1:
         raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
-    full = full_set(degree, lags, lags, inputs)
-    if full > 100 * MOST_CANDIDATES:
-        raise SettingsError(_too_many(full))
-    made = canonical_order(
-        item
-        for expression in library_named(name).build(degree, lags, inputs)
-        if (item := regressor(expression)[1])
-    )
-    if len(made) > MOST_CANDIDATES:
-        raise SettingsError(_too_many(len(made)))
-    return tuple(made)
+    library = library_named(name)
+    count = library.count(degree, lags, inputs)
+    if count > MOST_CANDIDATES:
+        raise SettingsError(
+            f"{count} candidates are more than a library may have ({MOST_CANDIDATES}): take a smaller degree "
+            "or fewer lags, or let evolution search"
+        )
+    made = (regressor(expression)[1] for expression in library.build(degree, lags, inputs))
+    return tuple(canonical_order(item for item in made if item))
 
 
 def library_named(name: str) -> Library:
@@ -81,13 +82,6 @@ def full_set(degree: int, output_lags: int, input_lags: int, inputs: int = 1) ->
         term = term * (output_lags + inputs * input_lags + power - 1) // power
         candidates += term
     return candidates
-
-
-def _too_many(count: int) -> str:
-    return (
-        f"{count} candidates are more than a library may have ({MOST_CANDIDATES}): take a smaller degree or "
-        "fewer lags, or let evolution search"
-    )
 
 
 def polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
@@ -120,6 +114,15 @@ def phi_polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
     return made
 
 
+def _count_phi_polynomial(degree: int, lags: int, inputs: int) -> int:
+    # Any of lags - 1 steps, with no direction or any of theirs, before every monomial of the levels.
+    return 1 + inputs * (lags - 1) * lags * full_set(degree - 1, 1, 1, inputs)
+
+
+def _count_polynomial(degree: int, lags: int, inputs: int) -> int:
+    return full_set(degree, lags, lags, inputs)
+
+
 def _monomials(signals: list[Lagged], degree: int) -> list[tuple[Expression, ...]]:
     """Return the factors of every monomial, those of 1 (none) first."""
     return [
@@ -136,8 +139,20 @@ def _product(*factors: Expression) -> Expression:
 LIBRARIES: Mapping[str, Library] = MappingProxyType(
     {
         "phi-polynomial": Library(
-            phi_polynomial, 5, 3, "hysteresis", "increments and directions of the input times monomials"
+            phi_polynomial,
+            _count_phi_polynomial,
+            degree=5,
+            lags=3,
+            constraints="hysteresis",
+            description="increments and directions of the input times monomials",
         ),
-        "polynomial": Library(polynomial, 3, 3, "none", "all monomials of the lagged signals"),
+        "polynomial": Library(
+            polynomial,
+            _count_polynomial,
+            degree=3,
+            lags=3,
+            constraints="none",
+            description="all monomials of the lagged signals",
+        ),
     }
 )

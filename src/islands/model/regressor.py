@@ -49,6 +49,11 @@ class Regressor:
         return lags(self.expression)
 
     @property
+    def degree(self) -> int:
+        """How many factors stand in the product, those of a constant not counted."""
+        return len(_arguments_of(self.expression, MUL))
+
+    @property
     def maximum_lag(self) -> int:
         """The deepest lag; 0 for a constant."""
         return max((lag for _, lag in self.lags), default=0)

@@ -1,13 +1,14 @@
 """Everything that is said about one model: its errors, its residuals, its physics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
+from islands.errors import RecordError
 from islands.model.model import Model
 from islands.simulation.outcome import Outcome
 from islands.simulation.predictors import multiple_shooting
@@ -21,6 +22,9 @@ MODES = ("one_step_ahead", "multiple_shooting", "free_run")
 
 _NOTHING = Metrics(nan, nan, nan, nan)
 
+#: Residuals that a test of one lag takes.
+_FEWEST = 3
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
@@ -33,9 +37,10 @@ class Assessment:
     outcomes : mapping
         ``outcomes[part][mode]``.
     information : InformationCriteria
-        Of the one-step-ahead residual on the estimation data.
+        Of the one-step-ahead residual on the estimation data; NaN where it diverged.
     residual_tests : ResidualTests
-        Of the one-step-ahead residual on the longest recording of the validation data.
+        Of the one-step-ahead residual on the longest recording of the validation data; where it diverged
+        there, no test passed and each one's note says so.
     physics : Physics
     """
 
@@ -55,6 +60,11 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
         Samples of an interval of multiple shooting.
     warm_up : int or None
         Samples before the first prediction; None takes the model's deepest lag.
+
+    Raises
+    ------
+    RecordError
+        A part is too short for a prediction, or the validation data for a test of the residual.
     """
     intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}
@@ -75,14 +85,30 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
 
 
 def _information(model: Model, record: Dataset, warm_up: int | None) -> InformationCriteria:
-    residual = record.y - multiple_shooting(model, record, 1, warm_up).y
-    known = residual[~np.isnan(residual)]
-    return information_criteria(float(np.add.reduce(known**2)), len(known), model.size)
+    run = multiple_shooting(model, record, 1, warm_up)
+    if not run.outcome:
+        return InformationCriteria(nan, nan, nan)
+    residual = (record.y - run.y)[~np.isnan(run.y)]
+    return information_criteria(float(np.add.reduce(residual**2)), len(residual), model.size)
 
 
 def _residual_tests(model: Model, record: Dataset, warm_up: int | None) -> ResidualTests:
     begin, end = max(record.bounds, key=lambda bounds: bounds[1] - bounds[0])
     recording = record[begin:end]
-    residual = recording.y - multiple_shooting(model, recording, 1, warm_up).y
-    lags = min(25, (int(np.sum(~np.isnan(residual))) - 2) // 2)
-    return residual_tests(residual, recording.u, max_lag=max(1, lags))
+    first = model.maximum_lag if warm_up is None else warm_up
+    samples = recording.samples - first
+    if samples < _FEWEST:
+        raise RecordError(
+            f"the longest recording of the validation data has {recording.samples} samples, of which the "
+            f"warm-up takes {first}: testing the residual takes {_FEWEST} more; give a longer recording"
+        )
+    run = multiple_shooting(model, recording, 1, warm_up)
+    # What is known of a diverged prediction is that it is wrong: zeros stand in, and the verdict is given.
+    residual = recording.y - run.y if run.outcome else np.zeros(recording.samples)
+    tests = residual_tests(residual, recording.u, max_lag=min(25, (samples - 2) // 2) or 1)
+    return tests if run.outcome else _failed(tests, f"diverged: {run.outcome.reason}")
+
+
+def _failed(tests: ResidualTests, why: str) -> ResidualTests:
+    entries = tuple(replace(test, passed=False, note=why) for test in tests.tests)
+    return ResidualTests(entries, whiteness_p=nan, ljung_box=nan, passed=False)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,24 @@ class Assessed:
 
 
 @dataclass(frozen=True, slots=True)
+class Progress:
+    """One point of a search's course.
+
+    Attributes
+    ----------
+    generation : int
+    evaluations : int
+        Until then.
+    best : mapping
+        The least fitness (mean squared shooting error) of every size.
+    """
+
+    generation: int
+    evaluations: int
+    best: Mapping[int, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Search:
     """What a search did.
 
@@ -36,12 +55,21 @@ class Search:
         ``bytes`` of its regressor matrix, which was never made.
     wall_s : float or None
         Seconds it took, from whoever has a clock.
+    generations, duplicates, feasible_share
+        Of an evolution: generations done, individuals whose structure had been evaluated before, and the
+        share of individuals that got a finite fitness; None for other searches.
+    history : tuple of Progress
+        The course of an evolution, oldest first.
     """
 
     evaluations: int
     outcomes: Mapping[str, int]
     full_set: Mapping[str, int]
     wall_s: float | None = None
+    generations: int | None = None
+    duplicates: int | None = None
+    feasible_share: float | None = None
+    history: tuple[Progress, ...] = ()
 
     @property
     def evaluations_per_second(self) -> float | None:
@@ -78,8 +106,9 @@ class Findings:
 def ranked(models: Sequence[Assessed]) -> tuple[Assessed, ...]:
     """Order models by their free-run error on the validation data, the least first.
 
-    Those that diverged there come last, by their one-step-ahead error; ties go to the smaller model, then to
-    the text. Validation selects the model, so its error is no test of it.
+    Those that diverged there come last, by their one-step-ahead error, and behind them those that diverged
+    even one step ahead; ties go to the smaller model, then to the text. Validation selects the model, so its
+    error is no test of it.
     """
     return tuple(sorted(models, key=_key))
 
@@ -87,5 +116,5 @@ def ranked(models: Sequence[Assessed]) -> tuple[Assessed, ...]:
 def _key(entry: Assessed) -> tuple[bool, float, int, str]:
     errors = entry.assessment.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))
-    rmse = errors["one_step_ahead"].rmse if diverged else errors["free_run"].rmse
-    return diverged, rmse, entry.model.size, equation(entry.model, digits=17)
+    rmse = errors["one_step_ahead" if diverged else "free_run"].rmse
+    return diverged, inf if np.isnan(rmse) else rmse, entry.model.size, equation(entry.model, digits=17)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset, join
 from islands.estimation.constraints import target
 from islands.model import text
-from islands.model.clusters import clusters
+from islands.model.clusters import OUTPUT_AT_REST, clusters
 from islands.model.model import Model
 from islands.simulation.predictors import bound_of, free_run
 from islands.systems.signals import hold, minor_loops, sine
@@ -33,7 +33,7 @@ HOLD_PERIODS, PERIODS = 20, 4
 #: Other amplitudes and rates, as multiples of the record's own.
 EXCURSIONS = (("amplitude", 0.5), ("rate", 0.25), ("rate", 5.0))
 
-#: No scenario is longer than this many samples: a very slow record is checked at a faster rate.
+#: No input rests longer than this many samples: a very slow record is checked at a faster rate.
 _LONGEST = 100_000
 
 
@@ -65,7 +65,7 @@ class Hold:
         The output stayed within the bound; it was constant over the second half.
     drift_percent : float
         How far the output moved from the first sample at rest to the last, in per cent of the record's
-        output range; infinite after a divergence.
+        output range; infinite after a divergence, or where the record's output is constant and it moved.
     """
 
     level: float
@@ -157,14 +157,15 @@ def physics(model: Model, record: Dataset) -> Physics:
 
 
 def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
-    """Return the sums of the parameters over the clusters, beside their targets."""
+    """Return the sums of the parameters over the clusters, beside their targets.
+
+    The cluster of y comes first. Where no regressor is y at rest its sum is 0: an output that is not fed back
+    has one equilibrium, not a continuum.
+    """
+    sums = {group.steady_state: group.total(model.parameters) for group in clusters(model.regressors)}
     return tuple(
-        ClusterSum(
-            text.at_rest(group.steady_state, model.inputs),
-            group.total(model.parameters),
-            target(group.steady_state),
-        )
-        for group in clusters(model.regressors)
+        ClusterSum(text.at_rest(state, model.inputs), total, target(state))
+        for state, total in ({OUTPUT_AT_REST: 0.0} | sums).items()
     )
 
 
@@ -177,8 +178,8 @@ def hold_response(
 
 
 def _period(record: Dataset, maximum_lag: int) -> int:
-    """Return the period in samples of a sine with the record's range and rms slope (first input)."""
-    u = record.u[:, 0]
+    """Return the period in samples of a sine with range and rms slope of the first input that varies."""
+    u = record.u[:, int(np.argmax(np.ptp(record.u, axis=0) > 0))]
     slope = np.concatenate([np.diff(u[begin:end]) for begin, end in record.bounds])
     amplitude = np.ptp(u) / 2
     period = 2 * np.pi * amplitude / np.sqrt(2 * np.mean(slope**2)) if slope.any() else 0
@@ -243,9 +244,9 @@ def _hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float)
     level, loading = kind
     # A divergence on the way to the level leaves NaN at rest as well.
     bounded = not np.isnan(y).any()
-    drift = 100 * abs(y[-1] - y[0]) / output_range if bounded else np.inf
+    drift = _percent(y[-1] - y[0], output_range) if bounded else np.inf
     moves = np.ptp(y[len(y) // 2 :]) if bounded else np.inf
-    return Hold(level, loading, bounded, bool(moves <= CONSTANT * output_range), float(drift))
+    return Hold(level, loading, bounded, bool(moves <= CONSTANT * output_range), drift)
 
 
 def _excursion(
@@ -254,7 +255,16 @@ def _excursion(
     bounded = not np.isnan(y).any()
     if not bounded:
         return Excursion(name, False, np.inf, np.inf)
-    # The last return of the input to its largest value, and the one before it.
-    returns = np.flatnonzero(signal >= signal.max() * (1 - 1e-9))
-    closure = abs(y[returns[-1]] - y[returns[-2]]) if len(returns) > 1 else np.nan
-    return Excursion(name, True, float(100 * closure / output_range), float(100 * np.ptp(y) / output_range))
+    # The last return of the input to its largest value, and the one before it: two samples side by side, as
+    # near to a crest from before as from behind, are one return.
+    largest = np.flatnonzero(signal >= signal.max() * (1 - 1e-9))
+    before, last = largest[np.diff(largest, prepend=-2) > 1][-2:]
+    return Excursion(
+        name, True, _percent(y[last] - y[before], output_range), _percent(np.ptp(y), output_range)
+    )
+
+
+def _percent(distance: float, output_range: float) -> float:
+    """Return a distance in per cent of a range; of a range of 0 it is nothing, or infinitely much."""
+    share = abs(float(distance)) / output_range if output_range > 0 else np.inf
+    return 100 * share if distance else 0.0

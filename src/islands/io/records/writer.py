@@ -1,6 +1,7 @@
 """Records and simulations as CSV, every number so that it is read back exactly."""
 
 import csv
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -38,8 +39,12 @@ def write_simulation(record: Dataset, simulated: NDArray[np.float64], path: str 
 
 
 def _times(record: Dataset) -> list[float]:
-    # Twelve digits: what lies behind them is the rounding of start + k dt.
-    return [float(f"{time:.12g}") for time in record.time]
+    # Twelve digits, or more where a millionth of a sample takes them: what lies behind is the rounding of
+    # start + k dt.
+    time = record.time
+    steps = float(np.abs(time).max()) / record.dt
+    digits = min(17, max(12, 7 + math.ceil(math.log10(max(1.0, steps)))))
+    return [float(f"{moment:.{digits}g}") for moment in time]
 
 
 def _write(path: str | Path, names: Sequence[str], rows: Iterable[Sequence[float]]) -> None:

@@ -1,0 +1,220 @@
+"""Identify: evolution by MGGP/FROE, refinement, validation. Nobody has to guess the terms."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.errors import SettingsError, chosen
+from islands.estimation.estimation import estimate
+from islands.estimation.refinement import refine
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import Engine, Epoch, SerialEngine
+from islands.evolution.fitness import FITNESSES
+from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import regressor_of
+from islands.evolution.presets import PRESETS
+from islands.evolution.problem import Problem, problem
+from islands.evolution.settings import Settings
+from islands.fit import parts_of
+from islands.model.library import full_set
+from islands.model.model import Model, canonical_order
+from islands.model.regressor import Regressor
+from islands.result import Result
+from islands.simulation.outcome import Outcome
+from islands.simulation.predictors import free_run
+from islands.validation.assessment import assess
+from islands.validation.findings import Assessed, Findings, Progress, Search, ranked
+from islands.validation.metrics import metrics
+from islands.validation.physics import physics
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Where a search stands: what a watcher sees, and all that a checkpoint needs.
+
+    Attributes
+    ----------
+    archipelago : Archipelago
+    evaluations, duplicates : int
+        Since the beginning.
+    outcomes : mapping
+        Number of individuals by outcome.
+    history : tuple of Progress
+    """
+
+    archipelago: Archipelago = field(default_factory=Archipelago)
+    evaluations: int = 0
+    duplicates: int = 0
+    outcomes: Mapping[str, int] = field(default_factory=dict)
+    history: tuple[Progress, ...] = ()
+
+
+#: Called after every epoch; a true answer ends the search there, and the best so far is the result.
+Watch = Callable[[State, Settings], bool | None]
+
+
+def identify(
+    record: Dataset,
+    validation: Dataset | float = 0.25,
+    *,
+    preset: str = "hysteresis",
+    seed: int = 0,
+    islands: int = 1,
+    progress: Watch | None = None,
+    start: State | None = None,
+    engine: Engine | None = None,
+    **changes: Any,
+) -> Result:
+    """Identify a record by evolution.
+
+    Parameters
+    ----------
+    record : Dataset
+        Complete.
+    validation : Dataset or float
+        A record of its own, or the share of the record's end, that selects among the hall of fame.
+    preset : str
+        An entry of ``PRESETS``.
+    seed : int
+        The same seed gives the same result, bit for bit.
+    islands : int
+        Islands that evolve beside each other.
+    progress : callable, optional
+        Called with the `State` after every epoch; return True to stop there.
+    start : State, optional
+        Go on from here, as if never stopped.
+    engine : Engine, optional
+        Carries out the epochs; the serial one by default.
+    **changes
+        Settings that differ from the preset's: ``generations=100``.
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown or out of range, or no model was found.
+    RecordError
+        The record is too short or incomplete, or the validation data does not fit it.
+    """
+    settings = settings_of(
+        preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
+    )
+    if islands < 1:
+        raise SettingsError(f"there is at least one island, got {islands}")
+    split = parts_of(record, validation)
+    posed = problem(split.estimation, settings)
+    state = start or State()
+    runner = engine or SerialEngine()
+    for epoch in runner.run(posed, seed, islands, state.archipelago):
+        state = after(state, epoch)
+        if progress is not None and progress(state, settings):
+            break
+    models = final_models(state.archipelago.hall, posed, split)
+    if not models:
+        raise SettingsError(
+            f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
+            "record"
+        )
+    described = {"method": "identify", "preset": preset, "islands": islands, **asdict(settings)}
+    described["validation"] = "record" if isinstance(validation, Dataset) else validation
+    return Result(Findings(record, split, seed, described, _search(state, posed), models))
+
+
+def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
+    """Return a preset's settings with changes.
+
+    Raises
+    ------
+    SettingsError
+        The preset or a setting is unknown, or out of range.
+    """
+    base = chosen(PRESETS, preset, "preset")
+    for name in changes:
+        chosen(asdict(base), name, "setting")
+    if "max_terms" in changes and "initial_terms" not in changes:
+        fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
+        changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}
+    return replace(base, **changes)
+
+
+def after(state: State, epoch: Epoch) -> State:
+    """Return the state after one more epoch."""
+    evaluations = state.evaluations + epoch.info.evaluations
+    best = {size: entry.fitness for size, entry in epoch.archipelago.hall.best().items()}
+    return State(
+        epoch.archipelago,
+        evaluations,
+        state.duplicates + epoch.info.duplicates,
+        dict(Counter(state.outcomes) + Counter(epoch.info.outcomes)),
+        (*state.history, Progress(epoch.archipelago.epoch, evaluations, best)),
+    )
+
+
+def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Assessed, ...]:
+    """Validate the hall of fame and return the best model of every size, best first.
+
+    Candidates are the hall's models as they were estimated, the same refined, and the structures that seeded
+    the search: an evolution never returns worse than its seed. Under a constraint a model has to have
+    Property 1; where none of a size has, the size is left out.
+    """
+    settings = posed.settings
+    found: dict[int, list[tuple[float, Model]]] = {}
+    for model in _candidates(hall, posed):
+        simulated = free_run(model, split.validation, settings.maximum_lag)
+        if simulated.outcome:
+            rmse = metrics(split.validation.y, simulated.y).rmse
+            found.setdefault(model.size, []).append((rmse, model))
+    kept = []
+    for entries in found.values():
+        entries.sort(key=lambda entry: (entry[0], tuple(item.text for item in entry[1].regressors)))
+        for _, model in entries:
+            if settings.constraints == "none" or physics(model, split.estimation).property_1:
+                kept.append(Assessed(model, assess(model, split, settings.shooting, settings.maximum_lag)))
+                break
+    return ranked(kept)
+
+
+def _candidates(hall: HallOfFame, posed: Problem) -> list[Model]:
+    record, settings = posed.record, posed.settings
+    interval = FITNESSES[settings.fitness](settings.shooting)
+    structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall.entries}
+    for genes in posed.seeds:
+        found = (item for gene in genes if (item := regressor_of(gene)))
+        structures.setdefault(tuple(canonical_order(found)))
+    models = []
+    for structure in structures:
+        estimated = estimate(structure, record, settings.constraints, settings.maximum_lag)
+        if isinstance(estimated, Outcome):
+            continue
+        models.append(estimated.model)
+        if settings.refine:
+            refined = refine(estimated.model, record, interval, settings.constraints, settings.maximum_lag)
+            if not isinstance(refined, Outcome):
+                models.append(refined.model)
+    return models
+
+
+def _search(state: State, posed: Problem) -> Search:
+    deepest, degree = _reach(state.archipelago.hall)
+    inputs = posed.record.inputs
+    count = full_set(degree, deepest, deepest, inputs)
+    rows = sum(max(0, length - posed.settings.maximum_lag) for length in posed.record.segments)
+    return Search(
+        state.evaluations,
+        dict(state.outcomes),
+        {"candidates": count, "bytes": 8 * count * rows, "degree": degree, "lags": deepest},
+        None,
+        state.archipelago.epoch,
+        state.duplicates,
+        state.outcomes.get("ok", 0) / max(1, state.evaluations),
+        state.history,
+    )
+
+
+def _reach(hall: HallOfFame) -> tuple[int, int]:
+    """Return the deepest lag and the highest number of factors that the hall's models use."""
+    regressors = [item for entry in hall.entries for item in entry.regressors]
+    deepest = max((item.maximum_lag for item in regressors), default=1)
+    return max(1, deepest), max((item.degree for item in regressors), default=1)

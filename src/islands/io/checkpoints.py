@@ -1,0 +1,106 @@
+"""Checkpoints: an archipelago as a versioned file, written so that a crash leaves the old one or the new one.
+
+Expressions are text that is read back as written; floats are exact.
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from islands.errors import ModelError
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.individual import Individual
+from islands.evolution.island import Island
+from islands.model.expression import Primitive
+from islands.model.parsing import parse
+from islands.model.primitives import PRIMITIVES
+from islands.model.regressor import Regressor
+from islands.model.text import plain
+from islands.simulation.outcome import Outcome, Verdict
+
+SCHEMA = "islands.checkpoint/1"
+
+
+def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, Any]) -> None:
+    """Write an archipelago, and what it belongs to, in place of the file that is there."""
+    document = {
+        "schema": SCHEMA,
+        "about": dict(about),
+        "epoch": archipelago.epoch,
+        "islands": [_island(island) for island in archipelago.islands],
+    }
+    beside = path.with_suffix(".part")
+    with beside.open("w", encoding="utf-8") as stream:
+        json.dump(document, stream)
+        stream.flush()
+        os.fsync(stream.fileno())
+    beside.replace(path)
+
+
+def read_checkpoint(
+    path: Path, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> tuple[Archipelago, dict[str, Any]]:
+    """Read an archipelago and what it belongs to.
+
+    Raises
+    ------
+    ModelError
+        There is no checkpoint, or it is damaged or of another version.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ModelError(f"cannot read the checkpoint {path}: {error}") from error
+    if not isinstance(document, dict) or document.get("schema") != SCHEMA:
+        raise ModelError(f"{path} is no checkpoint of schema {SCHEMA}")
+    try:
+        islands = tuple(_read_island(island, primitives) for island in document["islands"])
+        return Archipelago(islands, int(document["epoch"])), dict(document["about"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(f"the checkpoint {path} is damaged: {error!r}") from error
+
+
+def _island(island: Island) -> dict[str, Any]:
+    return {
+        "index": island.index,
+        "seed": island.seed,
+        "generation": island.generation,
+        "population": [_individual(each) for each in island.population],
+        "elite": [_individual(each) for each in island.elite],
+        "hall": [_individual(each) for each in island.hall.entries],
+    }
+
+
+def _individual(individual: Individual) -> dict[str, Any]:
+    return {
+        "genes": [plain(gene, inputs=2) for gene in individual.genes],
+        "regressors": [item.text for item in individual.regressors],
+        "theta": list(individual.theta),
+        "fitness": None if individual.fitness == inf else individual.fitness,
+        "outcome": [individual.outcome.verdict.name, individual.outcome.reason],
+    }
+
+
+def _read_island(document: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Island:
+    population, elite, hall = (
+        tuple(_read_individual(each, primitives) for each in document[name])
+        for name in ("population", "elite", "hall")
+    )
+    return Island(
+        document["index"], document["seed"], document["generation"], population, elite, HallOfFame(hall)
+    )
+
+
+def _read_individual(document: Mapping[str, Any], primitives: Mapping[str, Primitive]) -> Individual:
+    verdict, reason = document["outcome"]
+    return Individual(
+        tuple(parse(text, primitives) for text in document["genes"]),
+        tuple(Regressor(parse(text, primitives)) for text in document["regressors"]),
+        tuple(document["theta"]),
+        inf if document["fitness"] is None else document["fitness"],
+        Outcome(Verdict[verdict], reason),
+    )

@@ -1,0 +1,272 @@
+"""Laws of forward selection over a library: nested, constrained, and right where it can be.
+
+It is greedy: on slow or rich excitation it may pass a true term by. Here it is held to what it can do: small
+systems out of the library, under an excitation that tells their terms apart.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset, join
+from islands.estimation.constraints import CONSTRAINTS
+from islands.estimation.estimation import Estimated, estimate
+from islands.estimation.forward_selection import forward_selection
+from islands.model.library import candidates
+from islands.model.text import plain
+from islands.simulation.outcome import Outcome, Verdict
+from islands.validation.physics import cluster_sums
+
+LAGS = 3
+SETTINGS = [
+    ("polynomial", 2, "none"),
+    ("polynomial", 2, "hysteresis"),
+    ("phi-polynomial", 3, "none"),
+    ("phi-polynomial", 3, "hysteresis"),
+]
+
+
+def library(name, degree, inputs=1):
+    return candidates(name, degree, LAGS, inputs)
+
+
+def texts(structure, inputs=1):
+    return [plain(item.expression, inputs) for item in structure]
+
+
+def walk(samples, seed, inputs=1):
+    """A slow input that is everywhere and goes both ways at all levels."""
+    return 0.1 * np.cumsum(np.random.default_rng(seed).normal(size=(samples, inputs)), axis=0)
+
+
+def white(samples, seed, inputs=1):
+    return np.random.default_rng(seed).uniform(-1, 1, size=(samples, inputs))
+
+
+def narx(u, noise, seed):
+    """y(k) = 0.5 y(k-2) + u(k-1) + 0.4 u(k-1)^2 - 0.3 y(k-1) u(k-2) + e(k)."""
+    e, u, y = noise * np.random.default_rng(seed + 1000).normal(size=len(u)), u[:, 0], np.zeros(len(u))
+    for k in range(LAGS, len(u)):
+        y[k] = 0.5 * y[k - 2] + u[k - 1] + 0.4 * u[k - 1] ** 2 - 0.3 * y[k - 1] * u[k - 2] + e[k]
+    return y
+
+
+NARX = {"y(k-2)": 0.5, "u(k-1)": 1.0, "u(k-1)^2": 0.4, "y(k-1)*u(k-2)": -0.3}
+
+
+def hysteresis(u, noise, seed, start=0.0):
+    """y(k) = y(k-1) + 0.8 du(k-1) - 0.3 y(k-1) |du(k-1)| + 0.2 u(k-1)^2 du(k-2) + e(k)."""
+    e, u, y = noise * np.random.default_rng(seed + 1000).normal(size=len(u)), u[:, 0], np.full(len(u), start)
+    for k in range(LAGS, len(u)):
+        new, old = u[k - 1] - u[k - 2], u[k - 2] - u[k - 3]
+        y[k] = y[k - 1] + 0.8 * new - 0.3 * y[k - 1] * abs(new) + 0.2 * u[k - 1] ** 2 * old + e[k]
+    return y
+
+
+HYSTERESIS = {
+    "y(k-1)": 1.0,
+    "u(k-1) - u(k-2)": 0.8,
+    "y(k-1)*sign(u(k-1) - u(k-2))*(u(k-1) - u(k-2))": -0.3,
+    "u(k-1)^2*(u(k-2) - u(k-3))": 0.2,
+}
+
+
+def measured(seed=0, samples=400):
+    """A record that no structure of any library explains."""
+    u = walk(samples, seed)
+    y = np.tanh(hysteresis(u, 0.02, seed)) + 0.3 * np.sin(3 * u[:, 0])
+    return Dataset(u, y, 0.1)
+
+
+# Nested.
+
+
+@pytest.mark.parametrize(("name", "degree", "constraints"), SETTINGS)
+def test_the_first_structures_do_not_depend_on_how_many_are_asked_for(name, degree, constraints):
+    longest = forward_selection(library(name, degree), measured(), constraints, 12)
+    assert len(longest[-1]) == 12 or constraints == "hysteresis"
+    for most in range(1, 13):
+        found = forward_selection(library(name, degree), measured(), constraints, most)
+        assert found == tuple(structure for structure in longest if len(structure) <= most)
+
+
+@pytest.mark.parametrize(("name", "degree", "constraints"), SETTINGS)
+def test_every_structure_is_the_one_before_it_and_what_was_added(name, degree, constraints):
+    found = forward_selection(library(name, degree), measured(1), constraints, 10)
+    for before, after in pairwise(found):
+        assert set(before) < set(after)
+        assert len(after) - len(before) <= (2 if constraints == "hysteresis" else 1)
+        assert list(after) == [item for item in library(name, degree) if item in set(after)]
+
+
+def test_without_a_constraint_every_size_is_there_and_the_residual_falls():
+    data = measured(2)
+    found = forward_selection(library("polynomial", 2), data, "none", 10)
+    assert [len(structure) for structure in found] == list(range(1, 11))
+    variances = [estimate(structure, data, "none", LAGS).residual_variance for structure in found]
+    assert variances == sorted(variances, reverse=True)
+
+
+# Right.
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sparse_system_out_of_the_library_is_found_and_nothing_else(seed, degree, noise):
+    u = white(1000, seed)
+    data = Dataset(u, narx(u, noise, seed), 0.1)
+    found = forward_selection(library("polynomial", degree), data, "none", 4)
+    assert sorted(texts(found[-1])) == sorted(NARX)
+    model = estimate(found[-1], data).model
+    for text, parameter, error in zip(texts(found[-1]), model.theta, model.standard_errors, strict=True):
+        assert parameter == pytest.approx(NARX[text], abs=max(1e-9, 5 * error))
+        assert error < 0.05
+
+
+@pytest.mark.parametrize("constraints", CONSTRAINTS)
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+@pytest.mark.parametrize("seed", range(4))
+def test_sparse_hysteresis_out_of_the_library_is_found_with_and_without_the_constraint(
+    seed, noise, constraints
+):
+    u = walk(1000, seed)
+    data = Dataset(u, hysteresis(u, noise, seed), 0.1)
+    found = forward_selection(library("phi-polynomial", 3), data, constraints, 4)
+    assert sorted(texts(found[-1])) == sorted(HYSTERESIS)
+    model = estimate(found[-1], data, constraints).model
+    for text, parameter, error in zip(texts(found[-1]), model.theta, model.standard_errors, strict=True):
+        assert parameter == pytest.approx(HYSTERESIS[text], abs=max(1e-9, 5 * error))
+    if constraints == "hysteresis":
+        assert model.theta[0] == pytest.approx(1.0, abs=1e-15)
+
+
+def test_of_two_inputs_the_one_that_acts_is_found():
+    u = walk(1000, 5, inputs=2)
+    y = hysteresis(u[:, 1:], 0.0, 5)
+    found = forward_selection(library("phi-polynomial", 3, inputs=2), Dataset(u, y, 0.1), "hysteresis", 4)
+    expected = [text.replace("u(", "u2(") for text in HYSTERESIS]
+    assert sorted(texts(found[-1], inputs=2)) == sorted(expected)
+
+
+# Constrained.
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("name", "degree"), [("polynomial", 2), ("phi-polynomial", 3)])
+def test_under_the_hysteresis_constraint_every_estimated_structure_meets_it(name, degree, seed):
+    data = measured(seed)
+    found = forward_selection(library(name, degree), data, "hysteresis", 12)
+    assert len(found) >= 4
+    for structure in found:
+        estimated = estimate(structure, data, "hysteresis", LAGS)
+        assert isinstance(estimated, Estimated)
+        # Nothing that was selected is dropped again.
+        assert estimated.model.regressors == structure
+        sums = {entry.cluster: entry.sum for entry in cluster_sums(estimated.model)}
+        assert sums.pop("y") == pytest.approx(1.0, abs=1e-9)
+        assert all(total == pytest.approx(0.0, abs=1e-9) for total in sums.values())
+
+
+def test_selecting_under_the_constraint_beats_repairing_a_free_selection():
+    # Selected freely, part of the terms is what the constraint then forbids.
+    data = measured(1)
+    free, bound = (forward_selection(library("polynomial", 2), data, name, 8) for name in CONSTRAINTS)
+    repaired = [estimate(structure, data, "hysteresis", LAGS) for structure in free]
+    assert [entry.model.size for entry in repaired] == [1, 2, 3, 3, 5, 6, 6, 8]
+    for size in range(3, 9):
+        structure = max((item for item in bound if len(item) <= size), key=len)
+        chosen = estimate(structure, data, "hysteresis", LAGS)
+        assert chosen.residual_variance < 0.8 * repaired[size - 1].residual_variance
+
+
+def test_a_library_that_cannot_meet_the_constraint_is_an_outcome():
+    without = [item for item in library("phi-polynomial", 2) if plain(item.expression) != "y(k-1)"]
+    found = forward_selection(without, measured(), "hysteresis")
+    assert isinstance(found, Outcome)
+    assert found.verdict is Verdict.INFEASIBLE
+    assert found.reason == "no candidate is y at rest: add y(k-1) to the library"
+
+
+def test_an_output_that_never_moves_needs_no_increment():
+    still = Dataset(walk(100, 0), np.full(100, 3.0), 0.1)
+    found = forward_selection(library("phi-polynomial", 2), still, "hysteresis")
+    assert [texts(structure) for structure in found] == [["y(k-1)"]]
+    assert forward_selection(library("polynomial", 2), Dataset(walk(100, 0), np.zeros(100), 0.1)) == ()
+
+
+# Segments.
+
+
+@pytest.mark.parametrize(("name", "degree", "constraints"), SETTINGS)
+def test_recordings_that_overlap_by_the_deepest_lag_are_one_recording(name, degree, constraints):
+    # Then their rows are the record's own, each once. A cut without overlap loses the rows that reach across.
+    data = measured(3)
+    cut = join((data[:170], data[170 - LAGS :]))
+    whole = forward_selection(library(name, degree), data, constraints, 8)
+    assert forward_selection(library(name, degree), cut, constraints, 8) == whole
+    turned = join((data[170 - LAGS :], data[:170]))
+    assert forward_selection(library(name, degree), turned, constraints, 8) == whole
+
+
+def test_no_row_reaches_across_a_boundary():
+    parts = []
+    for seed, start in ((7, 0.0), (8, 40.0), (9, -70.0)):
+        u = walk(300, seed)
+        parts.append(Dataset(u, hysteresis(u, 0.0, seed, start), 0.1))
+    recordings = join(tuple(parts))
+    found = forward_selection(library("phi-polynomial", 3), recordings, "hysteresis", 4)[-1]
+    assert sorted(texts(found)) == sorted(HYSTERESIS)
+    assert estimate(found, recordings, "hysteresis").residual_variance < 1e-20
+    across = Dataset(recordings.u, recordings.y, 0.1)
+    assert estimate(found, across, "hysteresis").residual_variance > 1.0
+
+
+# From a structure to a model.
+
+
+def test_an_estimate_keeps_the_records_columns_and_sampling_time():
+    data = Dataset(measured().u, measured().y, 0.25, ("u_V",), "y_um")
+    model = estimate(library("polynomial", 1), data).model
+    assert (model.input_names, model.output_name, model.dt) == (("u_V",), "y_um", 0.25)
+    assert len(model.theta) == len(model.standard_errors) == 7
+
+
+def test_a_regressor_may_be_given_twice_and_in_any_order():
+    terms = library("polynomial", 1)
+    assert estimate((*reversed(terms), terms[0]), measured()) == estimate(terms, measured())
+
+
+def test_a_warm_up_leaves_the_rows_before_it_out():
+    u = walk(200, 1)
+    y = hysteresis(u, 0.0, 1)
+    y[:50] = np.random.default_rng(1).normal(size=50)
+    data = Dataset(u, y, 0.1)
+    terms = islands.model_of([(islands.parse(text), value) for text, value in HYSTERESIS.items()]).regressors
+    assert estimate(terms, data).residual_variance > 1e-3
+    assert estimate(terms, data, warm_up=53).residual_variance < 1e-25
+
+
+@pytest.mark.parametrize(
+    ("samples", "constraints", "verdict"),
+    [(10, "none", Verdict.TOO_FEW_ROWS), (400, "none", Verdict.SINGULAR), (400, "hysteresis", Verdict.OK)],
+)
+def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
+    # u(k-1), u(k-2) and their difference depend on each other; the constraint drops the lone u(k-1)*y(k-1).
+    names = ["y(k-1)", "u(k-1) - u(k-2)", "u(k-1)", "u(k-2)", "1", "u(k-3)", "u(k-3)^2", "y(k-1)*u(k-1)"]
+    if verdict is Verdict.OK:
+        names = ["y(k-1)", "u(k-1) - u(k-2)", "y(k-1)*u(k-1)"]
+    terms = islands.model_of([(islands.parse(text), 1.0) for text in names]).regressors
+    found = estimate(terms, measured(samples=samples), constraints)
+    if verdict is Verdict.OK:
+        assert texts(found.model.regressors) == ["y(k-1)", "u(k-1) - u(k-2)"]
+    else:
+        assert found.verdict is verdict
+        assert found.reason
+
+
+def test_a_structure_without_y_cannot_be_estimated_under_the_constraint():
+    terms = islands.model_of([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
+    assert estimate(terms, measured(), "hysteresis").verdict is Verdict.INFEASIBLE
