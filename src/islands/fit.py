@@ -9,6 +9,7 @@ from islands.errors import SettingsError
 from islands.estimation.constraints import constraint
 from islands.estimation.estimation import estimate
 from islands.estimation.forward_selection import forward_selection
+from islands.io.results import record_document
 from islands.model.library import candidates, full_set, library_named
 from islands.result import Result
 from islands.simulation.outcome import Outcome
@@ -113,7 +114,7 @@ def fit(
         "max_terms": max_terms,
         "constraints": constraints,
         "shooting": shooting,
-        "validation": "record" if isinstance(validation, Dataset) else validation,
+        "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
     return Result(Findings(record, parts, seed, settings, search, ranked(models)))
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import SettingsError, chosen
+from islands.errors import RecordError, SettingsError, chosen
 from islands.estimation.estimation import estimate
 from islands.estimation.refinement import refine
 from islands.evolution.archipelago import Archipelago
@@ -19,6 +19,7 @@ from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem, problem
 from islands.evolution.settings import Settings
 from islands.fit import parts_of
+from islands.io.results import record_document
 from islands.model.library import full_set
 from islands.model.model import Model, canonical_order
 from islands.model.regressor import Regressor
@@ -29,6 +30,9 @@ from islands.validation.assessment import assess
 from islands.validation.findings import Assessed, Findings, Progress, Search, ranked
 from islands.validation.metrics import metrics
 from islands.validation.physics import physics
+
+#: Predictions on the validation data that a test of the residual takes.
+_RESIDUALS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +107,10 @@ def identify(
     )
     if islands < 1:
         raise SettingsError(f"there is at least one island, got {islands}")
+    if seed < 0:
+        raise SettingsError(f"a seed is not negative, got {seed}")
     split = parts_of(record, validation)
+    _refuse_short(split.validation, settings)
     posed = problem(split.estimation, settings)
     state = start or State()
     runner = engine or SerialEngine()
@@ -117,9 +124,20 @@ def identify(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
             "record"
         )
-    described = {"method": "identify", "preset": preset, "islands": islands, **asdict(settings)}
-    described["validation"] = "record" if isinstance(validation, Dataset) else validation
+    count = len(state.archipelago.islands)
+    described = {"method": "identify", "preset": preset, "islands": count, **asdict(settings)}
+    described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     return Result(Findings(record, split, seed, described, _search(state, posed), models))
+
+
+def _refuse_short(validation: Dataset, settings: Settings) -> None:
+    # Before the search: nobody wants to learn it after an hour.
+    needed = settings.maximum_lag + _RESIDUALS
+    if max(validation.segments) < needed:
+        raise RecordError(
+            f"the longest recording of the validation data has {max(validation.segments)} samples: with lags "
+            f"down to {settings.maximum_lag} it takes {needed}; give more, or a smaller max_height"
+        )
 
 
 def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
@@ -136,6 +154,8 @@ def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
     if "max_terms" in changes and "initial_terms" not in changes:
         fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
         changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}
+    if "max_height" in changes and "initial_height" not in changes:
+        changes = {**changes, "initial_height": max(0, min(base.initial_height, changes["max_height"]))}
     return replace(base, **changes)
 
 

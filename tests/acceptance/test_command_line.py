@@ -112,7 +112,7 @@ def test_the_folder_holds_models_figures_and_a_summary(folder: Path, result: dic
         document = json.loads((folder / "fit" / "models" / f"{model['rank']:02d}.json").read_text())
         assert document["terms"] == model["terms"]
     figures = {path.stem for path in (folder / "fit" / "figures").glob("*.svg")}
-    assert figures == {"free-run", "loop", "hold", "residuals"}
+    assert figures == {"free-run", "loop", "hold", "residuals", "record", "front"}
     assert result["models"][0]["equation"] in (folder / "fit" / "summary.txt").read_text()
 
 

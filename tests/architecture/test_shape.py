@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 from islands.estimation.constraints import CONSTRAINTS
-from islands.figures.gallery import FIGURES
+from islands.evolution.constraints import STRUCTURES
+from islands.evolution.fitness import FITNESSES
+from islands.evolution.presets import PRESETS
+from islands.figures.gallery import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS
 from islands.model.library import LIBRARIES
@@ -56,7 +59,21 @@ def test_the_folder_api_is_not_importable_as_a_package() -> None:
 
 
 @pytest.mark.parametrize(
-    "table", [PRIMITIVES, LIBRARIES, CONSTRAINTS, SYSTEMS, PUBLISHED, FIGURES, EXPORTS, READERS]
+    "table",
+    [
+        PRIMITIVES,
+        LIBRARIES,
+        CONSTRAINTS,
+        STRUCTURES,
+        FITNESSES,
+        PRESETS,
+        SYSTEMS,
+        PUBLISHED,
+        FIGURES,
+        SEARCH_FIGURES,
+        EXPORTS,
+        READERS,
+    ],
 )
 def test_every_table_entry_is_documented(table: dict[str, object]) -> None:
     text = (ROOT / "docs" / "reference.md").read_text()

@@ -50,7 +50,7 @@ def fit(
     with progress("fit") as tell:
         tell("reading", 0.0)
         data = read_record(record, names, output_column, dt, options.rows(rows))
-        held_out = options.validation(validation, record, names, output_column, dt)
+        held_out = options.validation(validation, record, names, output_column, dt, rows)
         began = perf_counter()
         result = islands.fit(
             data,

@@ -47,27 +47,46 @@ def rows(text: str | None) -> slice | None:
 
 
 def validation(
-    text: str | None, record: Path, inputs: list[str], output: str, dt: float | None
+    text: str | None,
+    record: Path,
+    inputs: list[str],
+    output: str,
+    dt: float | None,
+    used: str | None = None,
+    option: str = "--validation",
 ) -> Dataset | float:
     """Read ``--validation``: a fraction of the record's end, rows of the record's file, or a file of its own.
+
+    ``--test`` is read in the same way; ``option`` is what a message calls it. ``used`` are the ``--rows``
+    that estimate; rows that are held out have to be others.
 
     Raises
     ------
     SettingsError
-        It is none of the three.
+        It is none of the three, or rows that estimate as well.
     """
     if text is None:
         return 0.25
     if Path(text).exists():
         return read_record(text, inputs, output, dt)
     if ":" in text:
+        if used is None or _overlap(rows(used), rows(text)):
+            raise SettingsError(f"{option} {text}: say with --rows START:STOP which other samples estimate")
         return read_record(record, inputs, output, dt, rows(text))
     try:
         return float(text)
     except ValueError:
         raise SettingsError(
-            f"--validation {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
+            f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
         ) from None
+
+
+def _overlap(one: slice | None, other: slice | None) -> bool:
+    """Tell whether two selections share samples; an open end reaches as far as there are any."""
+    if one is None or other is None:
+        return True
+    ends = [part.stop for part in (one, other) if part.stop is not None]
+    return not ends or max(one.start or 0, other.start or 0) < min(ends)
 
 
 def model(text: str) -> Model:

@@ -1,7 +1,8 @@
 """Constrained least squares from inner products alone: what a search can afford a million times.
 
-The Gram matrix squares the condition of the regressor matrix. Where a pivot of its equilibrated Cholesky
-factor gets too small, the caller has to factor the columns; that depends on nothing but the matrix.
+The Gram matrix squares the condition of the regressor matrix. Where a pivot of its Cholesky factor gets too
+small beside the regressors' own norms, the caller has to factor the columns; that depends on nothing but the
+matrix.
 """
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.linalg import solve_triangular
 from islands.estimation.constrained import null_space
 from islands.simulation.outcome import Outcome
 
-#: Squared pivots under this leave fewer than six digits of the parameters.
+#: Squared pivots under this leave fewer than six digits of the parameters: a direction that the constraints
+#: leave free (the difference of two neighbouring samples) has lost them before it is equilibrated.
 ILL_CONDITIONED = 1e-10
 
 
@@ -49,7 +51,7 @@ def from_gram(
         lower = np.linalg.cholesky(reduced * scale[:, None] * scale)
     except np.linalg.LinAlgError:
         return None
-    if np.diag(lower).min() ** 2 < ILL_CONDITIONED:
+    if (np.diag(lower) / scale).min() ** 2 < ILL_CONDITIONED:
         return None
     wanted = scale * (basis.T @ (right - scaled @ particular))
     eta = solve_triangular(lower, solve_triangular(lower, wanted, lower=True), trans="T", lower=True)

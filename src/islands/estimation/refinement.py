@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.errors import RecordError
 from islands.estimation.constrained import null_space
 from islands.estimation.constraints import constraint
 from islands.kernels.simulate import Layout, simulate
@@ -19,7 +20,7 @@ from islands.model.model import Model
 from islands.program.linker import link
 from islands.simulation.layout import layout
 from islands.simulation.outcome import Outcome, Verdict
-from islands.simulation.predictors import bound_of
+from islands.simulation.predictors import bound_of, multiple_shooting
 
 #: Step of a central difference, in units of a parameter's size: between truncation and rounding.
 _DIFFERENCE = 1e-5
@@ -67,12 +68,29 @@ def refine(
     Returns
     -------
     Refined or Outcome
-        With standard errors from the Jacobian at the end. INFEASIBLE where the constraint refuses the model,
-        DIVERGED where the model diverges as it is.
+        With standard errors from the Jacobian at the end. INFEASIBLE where the constraint refuses the model
+        or one of its regressors, DIVERGED where the model diverges as it is.
+
+    Raises
+    ------
+    ModelError
+        The model has no parameters.
+    RecordError
+        The record is incomplete, has another number of inputs, or is too short.
+    SettingsError
+        The warm-up is shorter than the model's deepest lag, or the interval is under 1.
     """
     constrained = constraint(constraints).constrain(model.regressors)
     if isinstance(constrained, Outcome):
         return constrained
+    if constrained.regressors != model.regressors:
+        return Outcome(Verdict.INFEASIBLE, "the constraint forces a parameter to zero: leave its term out")
+    # It checks what the kernel does not: inputs, lags, the record's length.
+    started = multiple_shooting(model, record, interval, warm_up)
+    if not started.outcome:
+        return started.outcome
+    if np.isnan(started.mean_squared_error):
+        raise RecordError(f"{record.output_name} is missing somewhere: refinement needs every sample")
     theta = np.array(model.parameters)
     # Each parameter in units of its own size: their sizes differ by many orders.
     unit = np.where(theta == 0.0, 1.0, np.abs(theta))
@@ -82,8 +100,7 @@ def refine(
     directions = unit[:, None] * found[1]
     residual = _Residual(model, record, interval, warm_up)
     error = residual(theta)
-    if error is None:
-        return Outcome(Verdict.DIVERGED, "an interval left the bound before refinement")
+    assert error is not None, "it did not diverge a moment ago"
     before = residual.mean_square(error)
     damping, steps = _DAMPING, 0
     normal, gradient = residual.normal_equations(theta, error, directions)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.model.expression import Apply, Expression, Lagged, Shift
+from islands.model.primitives import PRIMITIVES, SIGN, SUB
 
 Structure = Callable[[Expression], Expression]
 
@@ -20,22 +21,48 @@ def free(expression: Expression) -> Expression:
 
 
 def phi(expression: Expression) -> Expression:
-    """Mend phi functions (Figure 3): an argument that is no lagged input becomes u(k-1).
+    """Mend phi functions (Figure 3): what is no input under an argument's back-shifts becomes u(k-1).
 
-    Both arguments are lags of the same input, that of the first one; a lag of another input in the second
-    place becomes u(k-1) of that input too.
+    The back-shifts stay: ``phi1(q1(y(k-1)), q4(u(k-1)*y(k-1)))`` becomes ``phi1(q1(u(k-1)), q4(u(k-1)))``, as
+    in the figure. Both arguments are lags of the same input, that of the first one, or of the second where
+    the first has none.
     """
     match expression:
         case Apply(primitive, (first, second)) if primitive.name in PHI:
-            one = first if is_lagged_input(first) else Lagged(max(1, _input_of(second)))
-            other = second if _input_of(second) == _input_of(one) else Lagged(_input_of(one))
-            return Apply(primitive, (one, other))
+            channel = _input_of(first) or _input_of(second) or 1
+            return Apply(primitive, (_lag_of(channel, first), _lag_of(channel, second)))
         case Apply(primitive, arguments):
             return Apply(primitive, tuple(phi(argument) for argument in arguments))
         case Shift(samples, argument):
             return Shift(samples, phi(argument))
         case _:
             return expression
+
+
+def _lag_of(channel: int, argument: Expression) -> Expression:
+    """Put an input in the place of whatever else stands under an argument's back-shifts."""
+    match argument:
+        case Shift(samples, inner):
+            return Shift(samples, _lag_of(channel, inner))
+        case Lagged(own, _) if own == channel:
+            return argument
+    return Lagged(channel)
+
+
+def with_phi(expression: Expression) -> Expression:
+    """Write differences of two lags of one input, and their signs, as phi1 and phi2.
+
+    Canonical form writes them ``sub`` and ``sign``, which variation would open to any argument.
+    """
+    if not isinstance(expression, Apply):
+        return expression
+    arguments = tuple(with_phi(argument) for argument in expression.arguments)
+    match expression.primitive, arguments:
+        case primitive, (first, second) if primitive == SUB and _same_input(first, second):
+            return Apply(PRIMITIVES["phi1"], arguments)
+        case primitive, (Apply(inner, lags),) if primitive == SIGN and inner.name == "phi1":
+            return Apply(PRIMITIVES["phi2"], lags)
+    return Apply(expression.primitive, arguments)
 
 
 def increment(expression: Expression) -> Expression:
@@ -54,9 +81,9 @@ def is_linear_output(expression: Expression) -> bool:
     return isinstance(expression, Lagged) and expression.channel == 0
 
 
-def is_lagged_input(expression: Expression) -> bool:
-    """Tell whether an expression is an input under back-shifts alone."""
-    return _input_of(expression) > 0
+def _same_input(first: Expression, second: Expression) -> bool:
+    """Tell whether two expressions are lags of one input."""
+    return _input_of(first) == _input_of(second) > 0
 
 
 def _input_of(expression: Expression) -> int:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import inf
+from math import inf, isnan
 
 from islands.errors import ModelError
 from islands.model.expression import Expression
@@ -23,7 +23,8 @@ class Individual:
     theta : tuple of float
         Their parameters; empty where the outcome is a failure.
     fitness : float
-        Lower is better; infinite before evaluation and after a failure.
+        Lower is better; infinite before evaluation and after a failure, and where NaN is given: NaN compares
+        with nothing, and would win where it came first.
     outcome : Outcome
     """
 
@@ -32,6 +33,10 @@ class Individual:
     theta: tuple[float, ...] = ()
     fitness: float = inf
     outcome: Outcome = OK
+
+    def __post_init__(self) -> None:
+        if isnan(self.fitness):
+            object.__setattr__(self, "fitness", inf)
 
     @property
     def size(self) -> int:

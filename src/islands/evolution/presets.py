@@ -40,8 +40,9 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
             fitness="one-step",
         ),
         "hysteresis": Settings(
-            population=200,
-            generations=60,
+            population=300,
+            generations=80,
+            shooting=1000,
             elite=0.2,
             crossover=0.4,
             mutation=1.0,

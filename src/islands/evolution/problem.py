@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
+from islands.evolution.constraints import with_phi
 from islands.evolution.settings import Settings
 from islands.evolution.variation import Genes
-from islands.model.expression import Expression
+from islands.model.expression import Expression, height
 from islands.model.library import candidates
 from islands.simulation.outcome import Outcome
 
@@ -35,19 +36,25 @@ class Problem:
 def problem(record: Dataset, settings: Settings) -> Problem:
     """Pose a problem; with a library in the settings its forward selection is done here, once.
 
+    Regressors of the library that are higher than a gene may be are left out.
+
     Raises
     ------
+    SettingsError
+        The library would have too many candidates.
     RecordError
-        The record is incomplete or shorter than the deepest lag.
+        Its forward selection finds the record incomplete, or shorter than the library's deepest lag.
     """
     if not settings.library:
         return Problem(record, settings)
-    library = candidates(settings.library, settings.library_degree, settings.library_lags, record.inputs)
+    every = candidates(settings.library, settings.library_degree, settings.library_lags, record.inputs)
+    genes = {item: with_phi(item.expression) for item in every}
+    library = [item for item in every if height(genes[item]) <= settings.max_height]
     found = forward_selection(library, record, settings.constraints, settings.max_terms)
     structures = () if isinstance(found, Outcome) else found
     return Problem(
         record,
         settings,
-        tuple(tuple(item.expression for item in structure) for structure in structures),
-        tuple(item.expression for item in library),
+        tuple(tuple(genes[item] for item in structure) for structure in structures),
+        tuple(genes[item] for item in library),
     )

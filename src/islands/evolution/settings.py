@@ -6,6 +6,7 @@ from islands.errors import SettingsError, chosen
 from islands.estimation.constraints import CONSTRAINTS
 from islands.evolution.constraints import STRUCTURES
 from islands.evolution.fitness import FITNESSES
+from islands.model.library import library_named
 from islands.model.primitives import PRIMITIVES
 
 
@@ -50,7 +51,8 @@ class Settings:
     initial_terms : tuple of int
         Fewest and most genes of a first individual; the paper is silent.
     initial_height : int
-        Greatest height of a first gene, and of a subtree that mutation grows; the paper is silent.
+        Greatest height of a first gene, and of a subtree that mutation grows, at most ``max_height``; the
+        paper is silent.
     library : str
         A library whose constrained forward selection seeds the first population, and whose regressors an
         outer mutation may take; "" for none.
@@ -111,6 +113,14 @@ class Settings:
             raise SettingsError(
                 f"initial_terms {self.initial_terms} lie between 1 and max_terms {self.max_terms}"
             )
+        if not 0 <= self.initial_height <= self.max_height:
+            raise SettingsError(
+                f"initial_height {self.initial_height} lies between 0 and max_height {self.max_height}"
+            )
+        if not (self.primitives or self.shifts):
+            raise SettingsError("genes are made of primitives and back-shifts: give at least one of them")
+        if self.library:
+            library_named(self.library)
         chosen(STRUCTURES, self.structure, "structure")
         chosen(CONSTRAINTS, self.constraints, "constraints")
         chosen(FITNESSES, self.fitness, "fitness")
@@ -121,9 +131,12 @@ class Settings:
 
     @property
     def maximum_lag(self) -> int:
-        """The deepest lag that a gene can reach: a leaf's own, and a back-shift on every edge above it."""
-        deepest = 1 + self.max_height * max(self.shifts, default=0)
-        return max(deepest, self.library_lags) if self.library else deepest
+        """The deepest lag that a gene can reach: a leaf's own, and a back-shift on every edge above it.
+
+        A leaf that comes from a library has a lag of the library, and variation may put it at any depth.
+        """
+        leaf = self.library_lags if self.library else 1
+        return leaf + self.max_height * max(self.shifts, default=0)
 
     @property
     def elites(self) -> int:

@@ -9,6 +9,7 @@ from islands.data.split import Split
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.loop import draw_loop
+from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.search import draw_convergence, draw_front
 from islands.simulation.predictors import free_run
@@ -37,9 +38,14 @@ FIGURES: Mapping[str, FigureOf] = MappingProxyType(
     {"free-run": _free_run, "loop": _loop, "hold": _hold, "residuals": _residuals}
 )
 
+
+def _record(findings: Findings) -> Figure:
+    return draw_record(findings.split.estimation)
+
+
 #: Figures of a whole search; those of its course need a history.
 SEARCH_FIGURES: Mapping[str, Callable[[Findings], Figure]] = MappingProxyType(
-    {"front": draw_front, "convergence": draw_convergence}
+    {"record": _record, "front": draw_front, "convergence": draw_convergence}
 )
 
 

@@ -13,7 +13,7 @@ from islands.figures.lines import limits, say_diverged, within_reach
 from islands.figures.style import FRAME, blank, house_style, label, settled
 from islands.figures.thinning import thin
 from islands.model.model import Model
-from islands.validation.physics import LEVELS, hold_response
+from islands.validation.physics import LEVELS, hold_response, percent_of_range
 
 #: From the lowest level to the highest, darker to lighter: apart for colour-blind eyes and in grey print.
 _COLOURS = ("#440154", "#3b528b", "#21918c", "#4cb04f", "#c2a500")
@@ -84,9 +84,9 @@ def _held(model: Model, record: Dataset, level: float, loading: bool) -> _Held:
     u, y = hold_response(model, record, level, loading)
     begin = int(np.flatnonzero(u != u[-1])[-1]) + 1
     # As the physics check: from where every lag of the input has its level.
-    drift = abs(y[-1] - y[begin + model.maximum_lag]) / record.output_range
+    drift = percent_of_range(y[-1] - y[begin + model.maximum_lag], record.output_range)
     time = record.dt * np.arange(-begin, len(u) - begin, dtype=np.float64)
-    return _Held(time, u, y, 100 * float(drift))
+    return _Held(time, u, y, drift)
 
 
 def _drift(words: str, side: Sequence[_Held]) -> str:

@@ -1,12 +1,18 @@
 """The course of a search, and what size buys: error against generations, and error against terms."""
 
+from math import ceil
+
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 
 from islands.figures.style import MEASURED, SIMULATED, blank, house_style, settled
 from islands.validation.findings import Findings
+
+#: Sizes in a column of a legend that is as high as its figure.
+_COLUMN = 15
 
 
 @house_style()
@@ -20,12 +26,15 @@ def draw_convergence(findings: Findings) -> Figure:
         points = [(point.generation, point.best[size]) for point in history if size in point.best]
         generations, errors = zip(*points, strict=True)
         shade = colormaps["viridis"](0.9 * position / max(1, len(sizes) - 1))
-        axes.step(generations, np.sqrt(errors), where="post", color=shade, label=str(size))
-    axes.set_yscale("log")
+        # A line of one generation is a point.
+        (line,) = axes.step(generations, np.sqrt(errors), where="post", color=shade, label=str(size))
+        line.set(marker="o" if len(points) == 1 else "", markersize=3)
+    _logarithmic(axes)
     axes.set_xlabel("generation")
     axes.set_ylabel("RMSE of multiple shooting")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(title="terms", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    _counted(axes)
+    columns = ceil(len(sizes) / _COLUMN)
+    axes.legend(title="terms", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
     return settled(figure)
 
 
@@ -40,9 +49,25 @@ def draw_front(findings: Findings) -> Figure:
         )
         sizes, errors = zip(*points, strict=True)
         axes.plot(sizes, errors, marker=marker, color=colour, label=part)
-    axes.set_yscale("log")
+    _logarithmic(axes)
     axes.set_xlabel("terms")
     axes.set_ylabel("free-run MAPE (% of the range)")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    _counted(axes)
     axes.legend(frameon=False)
     return settled(figure)
+
+
+def _logarithmic(axes: Axes) -> None:
+    """Scale the errors by decades, labelled with plain numbers."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    # Within a decade there may be no power of ten: then numbers between them are written.
+    axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.5)))
+
+
+def _counted(axes: Axes) -> None:
+    """Give whole numbers alone to the axis of what is counted."""
+    low, high = axes.get_xlim()
+    if high - low < 1.0:
+        axes.set_xlim((low + high) / 2 - 0.5, (low + high) / 2 + 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))

@@ -53,14 +53,14 @@ def read_checkpoint(
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ModelError(f"cannot read the checkpoint {path}: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA:
         raise ModelError(f"{path} is no checkpoint of schema {SCHEMA}")
     try:
         islands = tuple(_read_island(island, primitives) for island in document["islands"])
         return Archipelago(islands, int(document["epoch"])), dict(document["about"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, ModelError) as error:
         raise ModelError(f"the checkpoint {path} is damaged: {error!r}") from error
 
 
@@ -91,7 +91,12 @@ def _read_island(document: Mapping[str, Any], primitives: Mapping[str, Primitive
         for name in ("population", "elite", "hall")
     )
     return Island(
-        document["index"], document["seed"], document["generation"], population, elite, HallOfFame(hall)
+        int(document["index"]),
+        int(document["seed"]),
+        int(document["generation"]),
+        population,
+        elite,
+        HallOfFame(hall),
     )
 
 
@@ -100,7 +105,7 @@ def _read_individual(document: Mapping[str, Any], primitives: Mapping[str, Primi
     return Individual(
         tuple(parse(text, primitives) for text in document["genes"]),
         tuple(Regressor(parse(text, primitives)) for text in document["regressors"]),
-        tuple(document["theta"]),
-        inf if document["fitness"] is None else document["fitness"],
-        Outcome(Verdict[verdict], reason),
+        tuple(map(float, document["theta"])),
+        inf if document["fitness"] is None else float(document["fitness"]),
+        Outcome(Verdict[verdict], str(reason)),
     )

@@ -50,6 +50,7 @@ def record_document(record: Dataset) -> dict[str, Any]:
         "sha256": record.sha256 or content_sha256(record),
         "samples": record.samples,
         "dt": record.dt,
+        "start": record.start,
         "names": {"inputs": list(record.input_names), "output": record.output_name},
         "units": {"inputs": list(record.input_units), "output": record.output_unit},
         "segments": list(record.segments),

@@ -244,7 +244,7 @@ def _hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float)
     level, loading = kind
     # A divergence on the way to the level leaves NaN at rest as well.
     bounded = not np.isnan(y).any()
-    drift = _percent(y[-1] - y[0], output_range) if bounded else np.inf
+    drift = percent_of_range(y[-1] - y[0], output_range) if bounded else np.inf
     moves = np.ptp(y[len(y) // 2 :]) if bounded else np.inf
     return Hold(level, loading, bounded, bool(moves <= CONSTANT * output_range), drift)
 
@@ -260,11 +260,14 @@ def _excursion(
     largest = np.flatnonzero(signal >= signal.max() * (1 - 1e-9))
     before, last = largest[np.diff(largest, prepend=-2) > 1][-2:]
     return Excursion(
-        name, True, _percent(y[last] - y[before], output_range), _percent(np.ptp(y), output_range)
+        name,
+        True,
+        percent_of_range(y[last] - y[before], output_range),
+        percent_of_range(np.ptp(y), output_range),
     )
 
 
-def _percent(distance: float, output_range: float) -> float:
+def percent_of_range(distance: float, output_range: float) -> float:
     """Return a distance in per cent of a range; of a range of 0 it is nothing, or infinitely much."""
     share = abs(float(distance)) / output_range if output_range > 0 else np.inf
     return 100 * share if distance else 0.0

@@ -155,6 +155,13 @@ def u(a, b):
     return 0.5 * a - b
 
 
+def nested(a):
+    def half(b):
+        return 0.5 * b
+
+    return half(a) - half(1.0)
+
+
 def limited(limit):
     def clipped(a):
         return max(-limit, min(limit, a))
@@ -176,6 +183,7 @@ OWN = {
     "a function of math": taken_from_math,
     "a name of the export": predict,
     "a name of a signal": u,
+    "a function of its own": nested,
     "a closure": limited(0.5),
 }
 

@@ -162,6 +162,10 @@ BROKEN = {
     "a list": ("[]", "the file: Input should be an object"),
     "another schema": (document(schema="islands.model/2"), "schema: Input should be 'islands.model/1'"),
     "a stranger": (document(author="me"), "author: Extra inputs are not permitted"),
+    "a stranger in a term": (
+        document(terms=[term("u(k-1)", unit="V")]),
+        "terms.0.unit: Extra inputs are not permitted",
+    ),
     "no inputs": (document(inputs=[]), "inputs: Tuple should have at least 1 item"),
     "inputs as a number": (document(inputs=1), "inputs: Input should be a valid array"),
     "no output": (document(output=...), "output: Field required"),

@@ -44,7 +44,7 @@ def test_models_that_diverged_even_one_step_ahead_come_behind_those_that_did_not
 
 
 def test_ties_go_to_the_smaller_model_and_then_to_the_text():
-    small, large = ("u(k-2)",), ("u(k-1)", "y(k-1)")
+    small, large = ("y(k-1)",), ("u(k-1)", "u(k-2)")
     in_any_order(entry(0.1, terms=small), entry(0.1, terms=large))
     in_any_order(entry(0.1, terms=("u(k-1)",)), entry(0.1, terms=("u(k-2)",)), entry(0.1, terms=("y(k-1)",)))
     in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))

@@ -40,7 +40,7 @@ def archive(path: Path, **arrays: object) -> Path:
 
 def measured(name: str) -> Path:
     """Return the path of a measured record; skip the test where it is absent."""
-    root = Path(__file__).resolve().parents[3]
+    root = Path(__file__).resolve().parents[4]
     file = Path(os.environ.get("ISLANDS_DATA_DIR", root.parent / "shared" / "data")) / name
     if not file.exists():
         pytest.skip(f"needs the measured record {name}: set ISLANDS_DATA_DIR to the folder that has it")

@@ -1,0 +1,26 @@
+"""The data themselves: inputs and output over time, Figure 4 of the paper."""
+
+from matplotlib.figure import Figure
+
+from islands.data.dataset import Dataset
+from islands.figures.lines import broken
+from islands.figures.style import FRAME, MEASURED, RESIDUAL, blank, house_style, label, settled
+from islands.figures.thinning import thin
+
+
+@house_style()
+def draw_record(record: Dataset, title: str = "") -> Figure:
+    """Draw every input and, under them, the output; a boundary between recordings is a gap."""
+    names = [*record.input_names, record.output_name]
+    units = [*record.input_units, record.output_unit]
+    figure = blank(1.0 + 1.3 * len(names), title)
+    panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+    for axes, name, unit, values in zip(panels, names, units, [*record.u.T, record.y], strict=True):
+        colour = MEASURED if axes is panels[-1] else RESIDUAL
+        line = thin(broken(record, record.time), broken(record, values))
+        axes.plot(*line, color=colour, linewidth=0.7)
+        axes.set_ylabel(label(name, unit))
+        for begin, _ in record.bounds[1:]:
+            axes.axvline(record.time[begin], color=FRAME, linewidth=0.6)
+    panels[-1].set_xlabel("time (s)")
+    return settled(figure)

@@ -1,0 +1,158 @@
+"""Laws of the hall of fame: halls gathered in any order, in any groups, any number of times are one hall."""
+
+from collections import Counter
+from itertools import pairwise
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.evolution.hall_of_fame import DEPTH, HallOfFame, merge, with_entries
+from islands.evolution.individual import Individual, regressor_of
+from islands.model.expression import Lagged, Shift
+from islands.model.model import canonical_order
+from islands.model.parsing import parse
+
+#: Leaves enough for more structures of one size than a hall keeps.
+LEAVES = [Lagged(channel, lag) for channel in (0, 1) for lag in (1, 2, 3, 4, 5, 6)]
+
+#: Few values, so that ties are common; failures among them.
+FITNESSES = [0.25, 0.5, 1.0, 2.0, 3.0, inf, nan]
+
+
+@st.composite
+def individuals(draw):
+    """Small models; equal structures come with other genes, other parameters and other fitnesses."""
+    leaves = draw(st.lists(st.sampled_from(LEAVES), min_size=1, max_size=3, unique=True))
+    genes = []
+    for leaf in leaves:
+        # u(k-3) is also q2(u(k-1)): one structure, written in two ways.
+        shift = draw(st.integers(0, leaf.lag - 1))
+        genes.append(Shift(shift, Lagged(leaf.channel, leaf.lag - shift)) if shift else leaf)
+    regressors = tuple(canonical_order(regressor_of(gene) for gene in genes))
+    theta = tuple(draw(st.sampled_from([-1.0, 0.5, 1.0])) for _ in regressors)
+    return Individual(tuple(genes), regressors, theta, draw(st.sampled_from(FITNESSES)))
+
+
+halls = st.lists(individuals(), max_size=25).map(lambda found: with_entries(HallOfFame(), found))
+
+
+def exactly(hall):
+    """All that a checkpoint would hold of it: equality of dataclasses does not look into regressors."""
+    return [
+        (
+            [repr(gene) for gene in entry.genes],
+            [repr(item.expression) for item in entry.regressors],
+            entry.theta,
+            entry.fitness,
+            entry.outcome,
+        )
+        for entry in hall.entries
+    ]
+
+
+@given(halls, halls)
+def test_merging_is_commutative(one, other):
+    assert exactly(merge(one, other)) == exactly(merge(other, one))
+
+
+@given(halls, halls, halls)
+def test_merging_is_associative(one, other, third):
+    together = exactly(merge(one, other, third))
+    assert exactly(merge(merge(one, other), third)) == together
+    assert exactly(merge(one, merge(other, third))) == together
+
+
+@given(halls, halls)
+def test_merging_is_idempotent(one, other):
+    assert exactly(merge(one, one)) == exactly(one)
+    both = merge(one, other)
+    assert exactly(merge(both, one, other, both)) == exactly(both)
+    assert exactly(merge(one, HallOfFame())) == exactly(one)
+
+
+@given(st.lists(individuals(), max_size=30), st.randoms(use_true_random=False))
+def test_the_order_in_which_individuals_come_does_not_matter(found, random):
+    expected = exactly(with_entries(HallOfFame(), found))
+    shuffled = list(found)
+    random.shuffle(shuffled)
+    assert exactly(with_entries(HallOfFame(), shuffled)) == expected
+    one_by_one = HallOfFame()
+    for each in shuffled:
+        one_by_one = with_entries(one_by_one, [each])
+    assert exactly(one_by_one) == expected
+
+
+@given(st.lists(individuals(), max_size=40))
+def test_it_keeps_the_best_of_every_size_each_structure_once(found):
+    hall = with_entries(HallOfFame(), found)
+    best = {}
+    for each in found:
+        if each.fitness < inf:
+            best[each.key] = min(each.fitness, best.get(each.key, inf))
+    for size in (1, 2, 3):
+        expected = sorted(value for key, value in best.items() if len(key) == size)[:DEPTH]
+        kept = [entry for entry in hall.entries if entry.size == size]
+        assert [entry.fitness for entry in kept] == expected
+        assert [best[entry.key] for entry in kept] == expected
+    assert max(Counter(entry.key for entry in hall.entries).values(), default=1) == 1
+    assert [entry.size for entry in hall.entries] == sorted(entry.size for entry in hall.entries)
+
+
+@given(halls)
+def test_the_front_gets_better_with_every_term(hall):
+    front = hall.front()
+    assert all(one.size < other.size and one.fitness > other.fitness for one, other in pairwise(front))
+    for entry in hall.entries:
+        assert min(each.fitness for each in front if each.size <= entry.size) <= entry.fitness
+    assert hall.best() == {
+        size: next(entry for entry in hall.entries if entry.size == size)
+        for size in {entry.size for entry in hall.entries}
+    }
+
+
+def entry(fitness, *texts, theta=None):
+    genes = tuple(parse(text) for text in texts)
+    regressors = tuple(canonical_order(regressor_of(gene) for gene in genes))
+    return Individual(genes, regressors, theta or (1.0,) * len(genes), fitness)
+
+
+def test_of_equal_structures_the_fitter_stays_whatever_its_genes():
+    worse, better = entry(2.0, "q1(y(k-1))"), entry(1.0, "y(k-2)")
+    hall = with_entries(HallOfFame(), [better, worse])
+    assert [(each.fitness, each.genes) for each in hall.entries] == [(1.0, (Lagged(0, 2),))]
+
+
+def test_a_tie_of_fitness_and_structure_goes_to_the_smaller_parameters():
+    one, other = entry(1.0, "y(k-1)", theta=(0.5,)), entry(1.0, "y(k-1)", theta=(0.25,))
+    assert with_entries(HallOfFame(), [one, other]).entries[0].theta == (0.25,)
+
+
+def test_a_tie_of_fitness_goes_by_the_structure_s_text():
+    hall = with_entries(HallOfFame(), [entry(1.0, "y(k-1)"), entry(1.0, "u(k-1)")])
+    assert [each.key for each in hall.entries] == [("u1(k-1)",), ("y(k-1)",)]
+
+
+def test_at_most_eight_models_of_a_size_are_kept():
+    assert DEPTH == 8
+    many = [entry(float(lag), f"y(k-{lag})") for lag in range(1, 20)]
+    hall = with_entries(HallOfFame(), many[::-1])
+    assert [each.fitness for each in hall.entries] == [float(lag) for lag in range(1, 9)]
+
+
+@pytest.mark.parametrize("fitness", [nan, inf, -inf])
+def test_what_is_not_finite_never_enters(fitness):
+    assert with_entries(HallOfFame(), [entry(fitness, "y(k-1)")]) == HallOfFame()
+    good = with_entries(HallOfFame(), [entry(3.0, "y(k-1)")])
+    assert with_entries(good, [entry(fitness, "y(k-1)")]) == good
+
+
+def test_a_larger_model_that_is_no_better_is_off_the_front():
+    hall = with_entries(
+        HallOfFame(),
+        [entry(1.0, "y(k-1)"), entry(1.0, "y(k-1)", "u(k-1)"), entry(0.5, "y(k-1)", "y(k-2)", "u(k-1)")],
+    )
+    assert [each.size for each in hall.front()] == [1, 3]
+    assert sorted(hall.best()) == [1, 2, 3]
+    assert HallOfFame().front() == ()

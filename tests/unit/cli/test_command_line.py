@@ -1,0 +1,265 @@
+"""The command line from inside: how options are understood, and what becomes of every error."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.errors import IslandsError, RecordError, SettingsError
+from islands.io.models import write_model
+from islands.io.records import write_record
+from islands.systems.published_models import PUBLISHED
+from islands_api.cli import options
+from islands_api.cli.app import main
+from islands_api.cli.fit import check_folder
+
+
+def record(samples=120, seed=0):
+    rng = np.random.default_rng(seed)
+    u, y = 0.1 * np.cumsum(rng.normal(size=samples)), np.zeros(samples)
+    for k in range(3, samples):
+        y[k] = y[k - 1] + 0.8 * (u[k - 1] - u[k - 2]) - 0.3 * y[k - 1] * abs(u[k - 1] - u[k - 2])
+    return Dataset(u, y + 0.001 * rng.normal(size=samples), 0.01, ("u_V",), "y_um")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run the command line in a folder of its own; return exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments):
+        monkeypatch.setattr(sys, "argv", ["islands", *map(str, arguments)])
+        try:
+            main()
+            code = 0
+        except SystemExit as stop:
+            code = stop.code
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return command
+
+
+FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")
+
+
+# Options.
+
+
+@pytest.mark.parametrize(
+    ("texts", "names"),
+    [(["u_V"], ["u_V"]), (["a,b", "c"], ["a", "b", "c"]), (["a,,b,"], ["a", "b"]), ([""], [])],
+)
+def test_inputs_are_repeated_or_separated_by_commas(texts, names):
+    assert options.columns(texts) == names
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (None, None),
+        ("0:5000", slice(0, 5000)),
+        ("100:", slice(100, None)),
+        (":100", slice(None, 100)),
+        ("-200:", slice(-200, None)),
+    ],
+)
+def test_rows_are_start_and_stop(text, expected):
+    assert options.rows(text) == expected
+
+
+@pytest.mark.parametrize("text", ["5", "a:b", "1:2:3", "", "1.5:3"])
+def test_other_rows_are_refused(text):
+    with pytest.raises(SettingsError) as caught:
+        options.rows(text)
+    assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
+
+
+def test_validation_is_a_file_a_fraction_or_rows(tmp_path):
+    here, there = tmp_path / "r.csv", tmp_path / "other.csv"
+    write_record(record(), here)
+    write_record(record(60, 1), there)
+
+    def read(text, used="0:80"):
+        return options.validation(text, here, ["u_V"], "y_um", None, used)
+
+    assert read(None) == 0.25
+    assert read("0.4") == 0.4
+    assert np.array_equal(read(str(there)).y, record(60, 1).y)
+    assert np.array_equal(read("80:").y, record().y[80:])
+    with pytest.raises(SettingsError) as caught:
+        read("nowhere.csv")
+    assert str(caught.value) == (
+        "--validation nowhere.csv: give a file that exists, a fraction such as 0.25, or rows START:STOP"
+    )
+    with pytest.raises(RecordError, match="is a folder: give the path of the file in it"):
+        read(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("text", "used"), [("80:", None), ("80:", "0:81"), ("0:90", "80:"), ("50:60", "0:100"), (":", "0:10")]
+)
+def test_rows_that_estimate_cannot_be_held_out(tmp_path, text, used):
+    write_record(record(), tmp_path / "r.csv")
+    with pytest.raises(SettingsError, match="say with --rows START:STOP which other samples estimate"):
+        options.validation(text, tmp_path / "r.csv", ["u_V"], "y_um", None, used)
+
+
+def test_a_model_is_a_file_or_a_published_one(tmp_path):
+    write_model(PUBLISHED["12"].model, tmp_path / "m.json")
+    assert options.model(str(tmp_path / "m.json")) == options.model("published:12") == PUBLISHED["12"].model
+
+
+# The folder for a result.
+
+
+def test_a_folder_that_is_new_or_holds_no_result_will_do(tmp_path):
+    check_folder(tmp_path, force=False)
+    check_folder(tmp_path / "new" / "deeper", force=False)
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_result_is_replaced_by_force_alone(tmp_path):
+    (tmp_path / "result.json").write_text("{}")
+    with pytest.raises(SettingsError, match="holds a result already: give another --out, or --force"):
+        check_folder(tmp_path, force=False)
+    check_folder(tmp_path, force=True)
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_done(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    for path in (file, file / "out", file / "out" / "deeper"):
+        with pytest.raises(SettingsError) as caught:
+            check_folder(path, force=True)
+        assert str(caught.value) == f"--out {path}: {file} is a file, give a folder"
+
+
+def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
+    # Whoever runs the tests may be allowed everything, so the question is answered here.
+    monkeypatch.setattr(os, "access", lambda path, _mode: Path(path) != tmp_path)
+    with pytest.raises(SettingsError, match=r"nothing may be written in .*, give another folder"):
+        check_folder(tmp_path / "out", force=False)
+
+
+# Commands.
+
+
+def test_fit_shows_what_it_found_and_where_it_is(run):
+    write_record(record(), "r.csv")
+    code, out, _ = run(*FIT)
+    assert code == 0
+    assert "120 samples, 0.01 s: u_V to y_um" in out
+    assert "3 models estimated: 3 ok" in out
+    assert "out/: result.json, models/, figures/, summary.txt" in out
+    assert Path("out/summary.txt").read_text() in out
+    assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
+
+
+def test_force_replaces_a_result_and_leaves_no_model_of_the_old_one(run):
+    write_record(record(), "r.csv")
+    assert run(*FIT)[0] == 0
+    code, _, err = run(*FIT)
+    assert code == 2
+    assert "--force" in err
+    assert run(*FIT, "--force", "--max-terms", "1")[0] == 0
+    assert [path.name for path in Path("out/models").iterdir()] == ["01.json"]
+
+
+def test_simulate_takes_the_columns_that_the_model_names(run):
+    write_record(record(), "r.csv")
+    run(*FIT)
+    code, out, _ = run("simulate", "out/models/01.json", "r.csv", "--mode", "one-step", "--out", "s.csv")
+    assert code == 0
+    assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step: ok"]
+    assert "um  fit" in out
+    assert Path("s.csv").read_text().startswith("time,y_sim\n")
+    renamed = Dataset(record().u, record().y, 0.01, ("volt_V",), "way_um")
+    write_record(renamed, "other.csv")
+    assert run("simulate", "out/models/01.json", "other.csv")[0] == 2
+    columns = ("--input", "volt_V", "--output", "way_um")
+    assert run("simulate", "out/models/01.json", "other.csv", *columns)[0] == 0
+
+
+def test_simulate_refuses_another_sampling_time(run):
+    write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
+    code, _, err = run("simulate", "published:12", "slow.csv")
+    assert code == 2
+    assert "the model holds for a sampling time of 0.001 s, the record has 0.0011 s" in err
+
+
+def test_systems_are_made_into_a_folder_with_any_name(run):
+    Path("[red]").mkdir()
+    code, out, _ = run("systems", "make", "s1", "--out", "[red]/a[b].csv")
+    assert code == 0
+    assert out.startswith("[red]/a[b].csv: 500 samples, ")
+
+
+def test_the_commands_are_listed(run):
+    code, out, _ = run("--help")
+    assert code == 0
+    for name in ("fit", "simulate", "show", "demo", "systems"):
+        assert name in out
+
+
+# Errors: one line that says what to do, and no trace of the program.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("show", "[/red]"), "cannot read the model file [/red]"),
+        (("show", "y[k-1].json"), "cannot read the model file y[k-1].json"),
+        (("show", "published:12", "--format", "[bold]"), "unknown format '[bold]'"),
+        (("simulate", "published:12", "nowhere.csv"), "there is no file nowhere.csv"),
+        (("systems", "make", "s1", "--out", "no/where.csv"), "cannot write no/where.csv: No such file"),
+    ],
+)
+def test_an_error_is_said_as_it_is_whatever_brackets_it_holds(run, arguments, message):
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert message in err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (IslandsError("take less"), 2, "error: take less"),
+        (PermissionError(13, "Permission denied", "out"), 2, "error: [Errno 13] Permission denied: 'out'"),
+        (OSError(28, "No space left on device"), 2, "error: [Errno 28] No space left on device"),
+    ],
+)
+def test_what_stops_a_command_stops_it_with_a_message(run, monkeypatch, error, code, said):
+    def stop(*_):
+        raise error
+
+    monkeypatch.setattr("islands_api.cli.show.export", stop)
+    found, _, err = run("show", "published:12")
+    assert found == code
+    assert err.strip() == said
+
+
+def test_a_programming_error_is_not_hidden(run, monkeypatch):
+    def stop(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("islands_api.cli.show.export", stop)
+    with pytest.raises(ZeroDivisionError):
+        run("show", "published:12")
+
+
+def test_an_interrupt_is_not_an_error_message(run, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("islands_api.cli.show.export", stop)
+    code, _, err = run("show", "published:12")
+    assert code == 130
+    assert "Traceback" not in err

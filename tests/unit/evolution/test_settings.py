@@ -1,0 +1,85 @@
+"""Settings: every bad value is refused with a message that names it."""
+
+import pytest
+
+from islands.errors import SettingsError
+from islands.evolution.settings import Settings
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"population": 0}, "population is at least 1, got 0"),
+        ({"population": -3}, "population is at least 1, got -3"),
+        ({"max_terms": 0}, "max_terms is at least 1, got 0"),
+        ({"shooting": 0}, "shooting is at least 1, got 0"),
+        ({"generations": -1}, "generations is at least 0, got -1"),
+        ({"max_height": -1}, "max_height is at least 0, got -1"),
+        ({"tournament": 0}, "tournament is at least 1, got 0"),
+        *(
+            ({name: value}, f"{name} lies between 0 and 1, got {value}")
+            for name in ("elite", "crossover", "mutation", "prune", "high_level", "outer", "from_library")
+            for value in (-0.1, 1.1, float("nan"))
+        ),
+        ({"tolerance": -1e-9}, "tolerance of pruning is not negative, got -1e-09"),
+        ({"tolerance": float("nan")}, "tolerance of pruning is not negative, got nan"),
+        ({"initial_terms": (0, 3)}, r"initial_terms \(0, 3\) lie between 1 and max_terms 10"),
+        ({"initial_terms": (4, 3)}, r"initial_terms \(4, 3\) lie between 1 and max_terms 10"),
+        ({"initial_terms": (1, 11)}, r"initial_terms \(1, 11\) lie between 1 and max_terms 10"),
+        ({"max_terms": 4}, r"initial_terms \(1, 10\) lie between 1 and max_terms 4"),
+        ({"initial_height": -1}, "initial_height -1 lies between 0 and max_height 5"),
+        ({"initial_height": 6}, "initial_height 6 lies between 0 and max_height 5"),
+        ({"max_height": 2}, "initial_height 3 lies between 0 and max_height 2"),
+        ({"structure": "tree"}, "unknown structure 'tree': take one of free, phi, increment"),
+        ({"constraints": "physics"}, "unknown constraints 'physics': take one of none, hysteresis"),
+        ({"fitness": "bic"}, "unknown fitness 'bic': take one of one-step, shooting, free-run"),
+        ({"primitives": ("mul", "gamma")}, "unknown primitive 'gamma': take one of mul, sub"),
+        ({"shifts": (1, 0)}, r"back-shifts are at least 1, got \(1, 0\)"),
+        ({"shifts": (), "primitives": ()}, "give at least one of them"),
+        ({"library": "fourier"}, "unknown library 'fourier': take one of phi-polynomial, polynomial"),
+    ],
+)
+def test_a_bad_value_is_refused_by_name(changes, message):
+    with pytest.raises(SettingsError, match=message):
+        Settings(**changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"generations": 0},
+        {"population": 1, "elite": 0.0},
+        {"max_height": 0, "initial_height": 0},
+        {"max_terms": 1, "initial_terms": (1, 1)},
+        {"tolerance": 0.0, "prune": 1.0, "crossover": 0.0, "mutation": 1.0},
+        {"shifts": ()},
+        {"primitives": ()},
+        {"library": "polynomial", "from_library": 1.0},
+    ],
+)
+def test_the_edges_of_the_ranges_are_allowed(changes):
+    made = Settings(**changes)
+    assert all(getattr(made, name) == value for name, value in changes.items())
+
+
+@pytest.mark.parametrize(
+    ("changes", "deepest"),
+    [
+        ({}, 1 + 5 * 5),
+        ({"max_height": 3, "shifts": (1, 2, 3)}, 1 + 3 * 3),
+        ({"shifts": ()}, 1),
+        ({"max_height": 0, "initial_height": 0}, 1),
+        # A leaf of a library has a lag of its own, and variation puts it at any depth.
+        ({"library": "polynomial", "library_lags": 4, "shifts": (2,)}, 4 + 5 * 2),
+        ({"library": "polynomial", "library_lags": 4, "shifts": ()}, 4),
+    ],
+)
+def test_the_deepest_lag_is_that_of_a_leaf_under_back_shifts_alone(changes, deepest):
+    assert Settings(**changes).maximum_lag == deepest
+
+
+@pytest.mark.parametrize(
+    ("population", "elite", "elites"), [(500, 0.1, 50), (10, 0.0, 1), (3, 0.1, 1), (4, 1.0, 4)]
+)
+def test_the_elite_is_a_share_of_the_population_and_never_empty(population, elite, elites):
+    assert Settings(population=population, elite=elite).elites == elites
