@@ -62,7 +62,14 @@ def _logarithmic(axes: Axes) -> None:
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     # Within a decade there may be no power of ten: then numbers between them are written.
-    axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.5)))
+    axes.yaxis.set_minor_formatter(_Between(minor_thresholds=(1.0, 0.5)))
+
+
+class _Between(LogFormatter):
+    """Writes a number where matplotlib would, and plainly."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
 
 
 def _counted(axes: Axes) -> None:

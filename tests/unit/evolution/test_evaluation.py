@@ -262,8 +262,9 @@ def test_model_13_written_as_genes_gets_the_fitness_of_constrained_least_squares
     (found,), _ = Evaluator(data, setting).evaluate([(each, False)])
     assert found.regressors == model.regressors
     expected = estimate(model.regressors, data, "hysteresis", setting.maximum_lag).model
-    assert found.theta == pytest.approx(expected.theta, rel=1e-9)
+    # Four of its terms are differences of the slow input over samples close by: seven digits are known.
+    assert found.theta == pytest.approx(expected.theta, rel=1e-6)
     simulated = multiple_shooting(expected, data, 500, setting.maximum_lag)
-    assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-9)
+    assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-7)
     # Its free run misses by 0.3 % of the range (Table 1); half a second of it by no more.
     assert 100 * found.fitness**0.5 / data.output_range < 0.4

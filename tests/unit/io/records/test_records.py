@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import time
 from pathlib import Path
 
 import numpy as np
@@ -141,18 +140,6 @@ def test_a_text_column_that_nobody_asked_for_does_no_harm(tmp_path):
     text = [lines[0] + ",note", *(f"{line},n.a. 1_000" for line in lines[1:])]
     (tmp_path / "r.csv").write_text("\n".join(text))
     assert read_record(tmp_path / "r.csv", ["u_V"], "y_um").u[:, 0].tolist() == U.tolist()
-
-
-def test_a_long_file_is_read_in_well_under_a_second(tmp_path):
-    count = 130_000
-    u = np.round(np.random.default_rng(1).normal(size=count), 5).tolist()
-    text = "\n".join(f"{k * 2e-4:.8g},{value},{value * 2:.5f}" for k, value in enumerate(u))
-    (tmp_path / "long.csv").write_text("t_s,u_V,y_um\n" + text)
-    begin = time.process_time()
-    record = read_record(tmp_path / "long.csv", ["u_V"], "y_um")
-    assert time.process_time() - begin < 1.0
-    assert record.samples == count
-    assert record.u[:, 0].tolist() == u
 
 
 # Time

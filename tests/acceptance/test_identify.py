@@ -1,0 +1,159 @@
+"""``islands identify`` through its front door: processes, signals, files."""
+
+import csv
+import json
+import signal
+import subprocess
+import sysconfig
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
+COLUMNS = ("--input", "u_V", "--output", "y_um")
+BUDGET = ("--population", "30", "--max-terms", "5", "--shooting", "200", "--seed", "2")
+
+
+def islands(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=240
+    )
+
+
+def succeed(*arguments: object) -> str:
+    done = islands(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def fail(*arguments: object) -> str:
+    done = islands(*arguments)
+    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def stored(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "result.json").read_text())
+
+
+def models(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted((folder / "models").iterdir())}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record of 4000 samples and what six generations make of it, the last fifth kept for a test."""
+    base = tmp_path_factory.mktemp("house")
+    rng = np.random.default_rng(0)
+    t = np.arange(4000) * 1e-2
+    u = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in ((1, 0.35, 1), (0.6, 0.83, 2), (0.4, 1.4, 3)))
+    y = np.zeros(4000)
+    for k in range(2, 4000):
+        rise = u[k - 1] - u[k - 2]
+        y[k] = y[k - 1] + 0.8 * rise - 0.35 * np.tanh(2 * y[k - 1]) * abs(rise)
+    y += 2e-3 * rng.normal(size=4000)
+    with (base / "record.csv").open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["t_s", "u_V", "y_um"])
+        writer.writerows(zip(t.round(6).tolist(), u.tolist(), y.tolist(), strict=True))
+    succeed(
+        *("identify", base / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
+        *("--test", 0.2, "--out", base / "whole"),
+    )
+    return base
+
+
+def test_one_command_turns_a_record_into_constrained_models(folder: Path) -> None:
+    result = stored(folder / "whole")
+    assert result["search"]["generations"] == 6
+    assert result["search"]["evaluations"] == 7 * 30
+    assert sum(result["search"]["outcomes"].values()) == 7 * 30
+    assert 0.5 < result["search"]["feasible_share"] <= 1.0
+    assert result["search"]["duplicates"] > 0
+    assert result["search"]["full_set"]["bytes"] > 1e6
+    assert result["record"]["samples"] == 3200
+    assert all(model["physics"]["property_1"] for model in result["models"])
+    best = result["models"][0]
+    assert best["size"] <= 5
+    assert best["metrics"]["validation"]["free_run"]["mape"] < 0.5
+    tested = json.loads((folder / "whole/test.json").read_text())
+    assert tested["outcome"] == "ok"
+    assert tested["mape"] < 0.5
+
+
+def test_the_folder_holds_models_figures_and_a_checkpoint(folder: Path) -> None:
+    names = {path.name for path in (folder / "whole").iterdir()}
+    assert names >= {"result.json", "summary.txt", "checkpoint.json", "test.json", "models", "figures"}
+    figures = {path.stem for path in (folder / "whole/figures").glob("*.svg")}
+    assert figures >= {"free-run", "loop", "hold", "residuals", "convergence", "front"}
+    shown = succeed("show", folder / "whole/models/01.json")
+    assert shown.strip() in (folder / "whole/summary.txt").read_text()
+
+
+def test_ctrl_c_writes_a_result_and_a_checkpoint_and_resume_goes_on_to_the_same_models(folder: Path) -> None:
+    out = folder / "stopped"
+    running = subprocess.Popen(
+        [
+            *(ISLANDS, "identify", folder / "record.csv", *COLUMNS, *BUDGET),
+            *("--generations", "1000000", "--test", "0.2", "--out", out),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        deadline = time.monotonic() + 60
+        # The folder is made when everything has been read, just before the search and its signals.
+        while not out.exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        time.sleep(0.5)
+        running.send_signal(signal.SIGINT)
+        said, complained = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 0, complained
+    assert f"stopped: the result is the best so far; go on with --resume {out}" in complained
+    assert "Traceback" not in complained
+    assert "MAPE val. %" in said
+    result, document = stored(out), json.loads((out / "checkpoint.json").read_text())
+    assert result["models"]
+    stopped_at = result["search"]["generations"]
+    assert stopped_at == document["epoch"] < 1_000_000
+
+    # Few generations more, instead of a million: the budget of a run is not part of its random numbers.
+    last = stopped_at + 2
+    document["about"]["job"]["changes"]["generations"] = last
+    (out / "checkpoint.json").write_text(json.dumps(document))
+    succeed("identify", "--resume", out)
+    never = folder / "never-stopped"
+    succeed(
+        *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", last),
+        *("--test", 0.2, "--out", never),
+    )
+    assert models(out) == models(never)
+    one, other = stored(out)["search"], stored(never)["search"]
+    for name in ("generations", "evaluations", "outcomes", "feasible_share", "full_set"):
+        assert one[name] == other[name], name
+    assert (out / "test.json").read_bytes() == (never / "test.json").read_bytes()
+    assert (out / "figures/convergence.svg").read_bytes() == (never / "figures/convergence.svg").read_bytes()
+
+
+def test_a_record_that_changed_is_refused_on_resume(folder: Path) -> None:
+    record, before = folder / "record.csv", (folder / "whole/result.json").read_bytes()
+    kept = record.read_text()
+    try:
+        record.write_text(kept + "\n")
+        assert "record.csv has changed since the run began" in fail("identify", "--resume", folder / "whole")
+    finally:
+        record.write_text(kept)
+    assert (folder / "whole/result.json").read_bytes() == before
+
+
+def test_a_budget_that_makes_no_sense_is_refused_in_a_line(folder: Path) -> None:
+    base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
+    assert fail(*base, "--population", 0).strip() == "error: population is at least 1, got 0"
+    assert not (folder / "never").exists()

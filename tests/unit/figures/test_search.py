@@ -1,0 +1,141 @@
+"""The figures of a search: its course, and what size buys."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from islands.figures.search import draw_convergence, draw_front
+from islands.figures.style import save
+from islands.validation.findings import Progress
+
+
+def findings(history=(), models=()):
+    """What the two figures read of a result, and no more."""
+    entries = tuple(
+        SimpleNamespace(
+            model=SimpleNamespace(size=size),
+            assessment=SimpleNamespace(
+                metrics={
+                    part: {"free_run": SimpleNamespace(mape=error)}
+                    for part, error in (("estimation", estimation), ("validation", validation))
+                }
+            ),
+        )
+        for size, estimation, validation in models
+    )
+    return SimpleNamespace(search=SimpleNamespace(history=tuple(history)), models=entries)
+
+
+#: Two sizes from the start, a third from generation 2 on; squared errors.
+COURSE = (
+    Progress(0, 10, {1: 4.0, 3: 0.04}),
+    Progress(1, 20, {1: 4.0, 3: 0.01}),
+    Progress(2, 30, {1: 1.0, 2: 0.09, 3: 0.01}),
+)
+MODELS = ((3, 0.2, 0.3), (1, 20.0, 30.0), (2, 2.0, 1.0))
+
+
+def axes_of(figure):
+    (axes,) = figure.axes
+    return axes
+
+
+def lines_of(figure):
+    return {line.get_label(): line.get_xydata().tolist() for line in axes_of(figure).lines}
+
+
+def whole_ticks(axes):
+    low, high = axes.get_xlim()
+    shown = [tick for tick in axes.get_xticks() if low <= tick <= high]
+    assert shown
+    assert all(tick == int(tick) for tick in shown)
+    return shown
+
+
+def test_the_course_shows_the_root_mean_square_of_every_size_over_the_generations():
+    figure = draw_convergence(findings(COURSE))
+    assert lines_of(figure) == {
+        "1": [[0.0, 2.0], [1.0, 2.0], [2.0, 1.0]],
+        "2": [[2.0, 0.3]],
+        "3": [[0.0, 0.2], [1.0, 0.1], [2.0, 0.1]],
+    }
+    axes = axes_of(figure)
+    assert axes.get_yscale() == "log"
+    assert whole_ticks(axes) == [0, 1, 2]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["1", "2", "3"]
+
+
+def test_a_size_that_one_generation_knows_is_a_point():
+    figure = draw_convergence(findings(COURSE))
+    markers = {line.get_label(): line.get_marker() for line in axes_of(figure).lines}
+    assert markers == {"1": "", "2": "o", "3": ""}
+
+
+def test_a_search_of_one_generation_is_points_over_a_whole_number():
+    figure = draw_convergence(findings(COURSE[:1]))
+    assert {line.get_marker() for line in axes_of(figure).lines} == {"o"}
+    assert whole_ticks(axes_of(figure)) == [0]
+
+
+def test_the_front_shows_both_parts_over_the_number_of_terms():
+    figure = draw_front(findings(models=MODELS))
+    assert lines_of(figure) == {
+        "estimation": [[1.0, 20.0], [2.0, 2.0], [3.0, 0.2]],
+        "validation": [[1.0, 30.0], [2.0, 1.0], [3.0, 0.3]],
+    }
+    assert whole_ticks(axes_of(figure)) == [1, 2, 3]
+
+
+def test_one_model_is_a_front_over_a_whole_number():
+    assert whole_ticks(axes_of(draw_front(findings(models=MODELS[:1])))) == [3]
+
+
+@pytest.mark.parametrize("errors", [(2.7, 4.2), (0.051, 0.062), (9.5, 10.5), (0.01, 100.0)])
+def test_an_error_axis_has_numbers_whatever_it_spans(errors):
+    """Within a decade there is no power of ten: without numbers between them the axis would say nothing."""
+    figure = draw_front(findings(models=((2, errors[0], errors[0]), (3, errors[1], errors[1]))))
+    axes = axes_of(figure)
+    low, high = axes.get_ylim()
+    figure.draw_without_rendering()
+    ticks = [*axes.yaxis.get_major_ticks(), *axes.yaxis.get_minor_ticks()]
+    numbers = [
+        float(tick.label1.get_text())
+        for tick in ticks
+        if low <= tick.get_loc() <= high and tick.label1.get_text()
+    ]
+    assert numbers
+    assert all(low * 0.99 <= number <= high * 1.01 for number in numbers)
+
+
+def test_a_model_that_diverged_or_is_exact_leaves_the_others_to_be_seen():
+    models = ((1, np.nan, 30.0), (2, 2.0, 0.0), (3, 0.2, 0.3))
+    figure = draw_front(findings(models=models))
+    low, high = axes_of(figure).get_ylim()
+    assert 0.0 < low < 0.2
+    assert 30.0 < high < 1000.0
+
+
+@pytest.mark.parametrize("sizes", [1, 9, 15, 30])
+def test_the_legend_of_many_sizes_stays_inside_the_figure(sizes):
+    history = [
+        Progress(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)})
+        for generation in (0, 1, 2)
+    ]
+    figure = draw_convergence(findings(history))
+    legend = axes_of(figure).get_legend()
+    assert len(legend.get_texts()) == sizes
+    box = legend.get_window_extent()
+    assert figure.bbox.x0 <= box.x0
+    assert box.x1 <= figure.bbox.x1
+    assert figure.bbox.y0 <= box.y0
+    assert box.y1 <= figure.bbox.y1
+    assert axes_of(figure).get_position().width > 0.4
+    assert box.x0 >= axes_of(figure).get_window_extent().x1
+
+
+@pytest.mark.parametrize("draw", [draw_convergence, draw_front])
+def test_saving_twice_gives_the_same_bytes(draw, tmp_path):
+    for name in ("first", "second"):
+        save(draw(findings(COURSE, MODELS)), tmp_path / f"{name}.svg")
+    assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()

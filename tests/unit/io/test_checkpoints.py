@@ -1,0 +1,226 @@
+"""Checkpoints: an archipelago comes back as it was, or not at all and with a message."""
+
+import json
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import pytest
+
+from islands.errors import ModelError
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.hall_of_fame import HallOfFame, with_entries
+from islands.evolution.individual import Individual, regressor_of
+from islands.evolution.island import Island
+from islands.io.checkpoints import SCHEMA, read_checkpoint, write_checkpoint
+from islands.model.expression import Apply
+from islands.model.model import canonical_order
+from islands.model.parsing import parse
+from islands.model.primitives import PRIMITIVES, primitive
+from islands.simulation.outcome import OK, Outcome, Verdict
+
+#: Floats that lose something in any but an exact round trip.
+FLOATS = (0.1 + 0.2, 5e-324, -1.7976931348623157e308, 1 / 3, -0.0, 1e22)
+
+GENES = (
+    "y(k-1)",
+    "q5(q5(q1(u(k-1))))",
+    "phi1(q1(u2(k-1)), q5(q4(u2(k-1))))*y(k-3)",
+    "mul(mul(u1(k-1), y(k-1)), mul(u1(k-1), q2(mul(y(k-1), y(k-1)))))",
+    "q3(tanh(q2(y(k-1)) - 0.30000000000000004*u1(k-1)))/exp(-1e-300)",
+    "2.5",
+)
+
+
+def individual(*texts, fitness=0.5, outcome=OK):
+    genes = tuple(parse(text) for text in texts)
+    regressors = tuple(canonical_order(regressor_of(gene) for gene in genes))
+    theta = tuple(FLOATS[: len(regressors)]) if outcome else ()
+    return Individual(genes, regressors, theta, fitness, outcome)
+
+
+def archipelago():
+    good = individual(*GENES, fitness=1 / 3)
+    failed = individual(
+        "u1(k-1)", fitness=inf, outcome=Outcome(Verdict.INFEASIBLE, 'no "y" at rest \u2013 add it')
+    )
+    unevaluated = Individual((parse("phi1(u1(k-1), u1(k-1))"),))
+    population = (good, failed, unevaluated, individual("y(k-2)", fitness=5e-324))
+    hall = with_entries(HallOfFame(), population)
+    assert len(hall.entries) == 2
+    here = Island(0, 2**40, 7, population, population[:1], hall)
+    return Archipelago((here, replace(here, index=1, population=population[::-1], elite=())), 7)
+
+
+ABOUT = {"job": {"record": "record.csv", "seed": 3}, "history": [[0, 200, {"1": 0.1 + 0.2}]]}
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "checkpoint.json"
+
+
+@pytest.fixture
+def document(path):
+    write_checkpoint(archipelago(), path, ABOUT)
+    return json.loads(path.read_text())
+
+
+def test_an_archipelago_comes_back_exactly(path):
+    write_checkpoint(archipelago(), path, ABOUT)
+    read, about = read_checkpoint(path)
+    assert read == archipelago()
+    assert about == ABOUT
+    # Equality of floats overlooks the sign of zero, equality of regressors all but their text.
+    assert repr(read) == repr(archipelago())
+
+
+def test_writing_what_was_read_gives_the_same_bytes(path, tmp_path):
+    write_checkpoint(archipelago(), path, ABOUT)
+    again = tmp_path / "again.json"
+    read, about = read_checkpoint(path)
+    write_checkpoint(read, again, about)
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_the_empty_archipelago_is_a_checkpoint_too(path):
+    write_checkpoint(Archipelago(), path, {})
+    assert read_checkpoint(path) == (Archipelago(), {})
+
+
+def test_it_is_json_that_others_can_read(document, path):
+    assert document["schema"] == SCHEMA == "islands.checkpoint/1"
+    assert document["islands"][0]["population"][1]["fitness"] is None
+    assert "Infinity" not in path.read_text()
+    assert "NaN" not in path.read_text()
+
+
+def test_primitives_of_the_user_s_own_are_read_back_from_their_table(path):
+    def _twice(a: float) -> float:
+        return 2.0 * a
+
+    table = {**PRIMITIVES, "twice": primitive("twice", _twice)}
+    gene = Apply(table["twice"], (parse("u(k-1)"),))
+    own = Individual((gene,), (regressor_of(gene),), (1.0,), 0.25)
+    kept = Archipelago((Island(0, 0, 0, (own,), (own,), HallOfFame((own,))),), 0)
+    write_checkpoint(kept, path, {})
+    assert read_checkpoint(path, table)[0] == kept
+    with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*unknown function 'twice'"):
+        read_checkpoint(path)
+
+
+# Written so that a crash leaves the old one or the new one.
+
+
+def test_a_crash_between_writing_and_replacing_leaves_the_old_one(path, monkeypatch):
+    write_checkpoint(Archipelago(), path, {"epoch": "old"})
+
+    def crash(self, target):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", crash)
+        with pytest.raises(KeyboardInterrupt):
+            write_checkpoint(archipelago(), path, {"epoch": "new"})
+    assert read_checkpoint(path) == (Archipelago(), {"epoch": "old"})
+    write_checkpoint(archipelago(), path, {"epoch": "new"})
+    assert read_checkpoint(path) == (archipelago(), {"epoch": "new"})
+    assert [entry.name for entry in path.parent.iterdir()] == ["checkpoint.json"]
+
+
+def test_a_crash_while_writing_leaves_the_old_one(path, monkeypatch):
+    write_checkpoint(Archipelago(), path, {"epoch": "old"})
+
+    def full(document, stream):
+        stream.write('{"schema": "islands.che')
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(json, "dump", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_checkpoint(archipelago(), path, {"epoch": "new"})
+    assert read_checkpoint(path) == (Archipelago(), {"epoch": "old"})
+
+
+def test_it_is_on_the_disk_before_it_takes_the_old_one_s_place(path, monkeypatch):
+    import os
+
+    order = []
+    synchronise, put = os.fsync, Path.replace
+    monkeypatch.setattr(os, "fsync", lambda number: (order.append("synchronised"), synchronise(number))[1])
+    monkeypatch.setattr(Path, "replace", lambda self, to: (order.append("replaced"), put(self, to))[1])
+    write_checkpoint(archipelago(), path, {})
+    assert order == ["synchronised", "replaced"]
+
+
+# What is no checkpoint is refused with a message that names the file.
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ModelError, match=r"cannot read the checkpoint .*nothing\.json: .*No such file"):
+        read_checkpoint(tmp_path / "nothing.json")
+    with pytest.raises(ModelError, match="cannot read the checkpoint"):
+        read_checkpoint(tmp_path)
+
+
+def test_a_file_that_was_cut_is_refused_wherever_it_was_cut(document, path):
+    whole = path.read_bytes()
+    for end in (0, 1, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:end])
+        with pytest.raises(ModelError, match=r"cannot read the checkpoint .*checkpoint\.json"):
+            read_checkpoint(path)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"y = a*b", b"[" * 100_000])
+def test_a_foreign_file_is_refused(path, content):
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match="cannot read the checkpoint"):
+        read_checkpoint(path)
+
+
+@pytest.mark.parametrize(
+    "foreign", [[], 3, {}, {"schema": "islands.model/1"}, {"schema": "islands.checkpoint/2"}]
+)
+def test_another_schema_is_refused(path, foreign):
+    path.write_text(json.dumps(foreign))
+    with pytest.raises(
+        ModelError, match=r"checkpoint\.json is no checkpoint of schema islands\.checkpoint/1"
+    ):
+        read_checkpoint(path)
+
+
+@pytest.mark.parametrize("key", ["about", "epoch", "islands"])
+def test_a_missing_part_is_named(document, path, key):
+    del document[key]
+    path.write_text(json.dumps(document))
+    with pytest.raises(ModelError, match=f"checkpoint.json is damaged: KeyError\\('{key}'\\)"):
+        read_checkpoint(path)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("epoch",), "seven"),
+        (("islands",), 5),
+        (("islands", 0), []),
+        (("islands", 0, "index"), None),
+        (("islands", 0, "population"), 3),
+        (("islands", 0, "population", 0, "genes", 0), "y(k-"),
+        (("islands", 0, "population", 0, "genes", 0), "os.remove(k-1)"),
+        (("islands", 0, "population", 0, "genes", 0), 7),
+        (("islands", 0, "population", 0, "regressors", 0), None),
+        (("islands", 0, "population", 0, "theta", 0), "much"),
+        (("islands", 0, "population", 0, "theta"), None),
+        (("islands", 0, "population", 0, "fitness"), "best"),
+        (("islands", 0, "population", 0, "outcome"), ["FINE", ""]),
+        (("islands", 0, "population", 0, "outcome"), "OK"),
+        (("about",), 3),
+    ],
+)
+def test_a_damaged_part_is_refused(document, path, place, value):
+    part = document
+    for step in place[:-1]:
+        part = part[step]
+    part[place[-1]] = value
+    path.write_text(json.dumps(document))
+    with pytest.raises(ModelError, match=r"the checkpoint .*checkpoint\.json is damaged: "):
+        read_checkpoint(path)
