@@ -410,6 +410,45 @@ def test_runs_of_other_seeds_differ():
     assert evolved(2, seed=3) != replace(evolved(2, seed=4), seed=3)
 
 
+def test_every_stream_of_a_step_knows_its_island_and_its_generation():
+    """Where all else is equal, other islands and other generations select, vary and prune otherwise."""
+    for changes in (
+        {"prune": 0.0, "crossover": 0.0, "mutation": 0.0},
+        {"prune": 0.0, "tournament": 50, "mutation": 1.0, "crossover": 0.0},
+        {"prune": 0.5, "tournament": 50, "crossover": 0.0, "mutation": 0.0, "tolerance": 0.01},
+    ):
+        evaluator = Evaluator(record(), replace(SMALL, **changes))
+        island = evolved(0, evaluator.settings, evaluator=evaluator)
+        following = {
+            step(replace(island, index=index, generation=generation), evaluator)[0].population
+            for index in (0, 1)
+            for generation in (0, 1)
+        }
+        assert len(following) == 4, changes
+
+
+def test_parents_are_elite_and_offspring_together():
+    evaluator = Evaluator(record(), replace(SMALL, prune=0.0, crossover=0.0, mutation=0.0, distinct=True))
+    island = evolved(0, evaluator.settings, evaluator=evaluator)
+    best, others = island.elite[:1], island.population[1:]
+    only_in_elite = replace(island, elite=best, population=tuple(each for each in others if each != best[0]))
+    following, _ = step(only_in_elite, evaluator)
+    assert best[0] in following.population
+    assert len(set(following.population)) > 3
+
+
+def test_the_hall_of_an_island_remembers_what_its_population_has_lost():
+    evaluator = Evaluator(record(), SMALL)
+    island, _ = first_generation(0, 3, evaluator)
+    expected = with_entries(HallOfFame(), island.population)
+    for _ in range(4):
+        assert island.hall == expected
+        island, _ = step(island, evaluator)
+        expected = with_entries(expected, island.population)
+    alive = {each.key for each in island.population}
+    assert any(entry.key not in alive for entry in island.hall.entries)
+
+
 # Inner products and evaluations do not depend on company.
 
 TERMS = [
@@ -430,7 +469,7 @@ TERMS = [
 def test_cached_inner_products_equal_uncached_ones_bit_for_bit(batches):
     cache = InnerProducts(record(), 21)
     for batch in batches:
-        structure = [TERMS[position] for position in sorted(batch)]
+        structure = [TERMS[position] for position in batch]
         fresh = InnerProducts(record(), 21).gram(structure)
         assert np.array_equal(cache.gram(structure), fresh)
         assert np.array_equal(fresh, fresh.T)
@@ -442,12 +481,14 @@ def test_cached_inner_products_equal_uncached_ones_bit_for_bit(batches):
 
 
 def test_a_full_table_of_inner_products_is_emptied_and_gives_the_same():
-    small = InnerProducts(record(), 21, limit=10 * 200)
-    whole = InnerProducts(record(), 21).gram(TERMS)
-    for _ in range(2):
-        small.prepare([TERMS[:2], TERMS[2:]])
-        assert np.array_equal(small.gram(TERMS), whole)
-        assert small.bytes <= 28 * 200
+    small, large = InnerProducts(record(), 21, limit=10 * 200), InnerProducts(record(), 21)
+    for lag in range(1, 20):
+        structure = [regressor_of(parse(f"u(k-{lag})")), regressor_of(parse(f"y(k-{lag})*u(k-1)"))]
+        small.prepare([TERMS[:1], structure])
+        assert np.array_equal(small.gram(structure), large.gram(structure))
+        # Two and the target are six pairs; it may hold ten, and what a call adds to them.
+        assert small.bytes <= (10 + 8) * 200
+    assert large.bytes > 60 * 200
 
 
 def test_a_batch_equals_one_by_one():
