@@ -32,7 +32,7 @@ def draw_convergence(findings: Findings) -> Figure:
     _logarithmic(axes)
     axes.set_xlabel("generation")
     axes.set_ylabel("RMSE of multiple shooting")
-    _counted(axes)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     columns = ceil(len(sizes) / _COLUMN)
     axes.legend(title="terms", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
     return settled(figure)
@@ -52,7 +52,7 @@ def draw_front(findings: Findings) -> Figure:
     _logarithmic(axes)
     axes.set_xlabel("terms")
     axes.set_ylabel("free-run MAPE (% of the range)")
-    _counted(axes)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.legend(frameon=False)
     return settled(figure)
 
@@ -70,11 +70,3 @@ class _Between(LogFormatter):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         return f"{x:g}" if super().__call__(x, pos) else ""
-
-
-def _counted(axes: Axes) -> None:
-    """Give whole numbers alone to the axis of what is counted."""
-    low, high = axes.get_xlim()
-    if high - low < 1.0:
-        axes.set_xlim((low + high) / 2 - 0.5, (low + high) / 2 + 0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))

@@ -189,6 +189,7 @@ def test_the_time_of_a_resumed_run_counts_that_before_it(run, interrupted, tmp_p
     assert run("--resume", "out")[0] == 0
     search = json.loads((tmp_path / "out/result.json").read_text())["search"]
     assert 1000 < search["wall_s"] < 1100
+    assert 1000 < json.loads(path.read_text())["about"]["wall_s"] < search["wall_s"]
     assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
 
 

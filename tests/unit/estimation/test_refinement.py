@@ -144,6 +144,16 @@ def test_standard_errors_match_a_monte_carlo():
     assert np.all(np.abs(mean - model(HYSTERESIS).parameters) < 4 * said / np.sqrt(60))
 
 
+@pytest.mark.parametrize("constraints", ["none", "hysteresis"])
+def test_one_step_ahead_they_are_those_of_least_squares(constraints):
+    """Where the error is linear in the parameters, few rows or many."""
+    record = driven(CLUSTERED, samples=14, noise=0.05)
+    start = estimate(model(CLUSTERED).regressors, record, constraints).model
+    found = refined(start, record, 1, constraints)
+    assert found.model.parameters == pytest.approx(start.parameters, rel=1e-6)
+    assert found.model.standard_errors == pytest.approx(start.standard_errors, rel=1e-6)
+
+
 def test_standard_errors_know_of_the_constraint():
     """Of two parameters that sum to one, both are known as well as either; one alone is known exactly."""
     record = driven(CLUSTERED, noise=0.02)
