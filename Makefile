@@ -29,7 +29,7 @@ lint: setup
 	$(BIN)/lint-imports --no-cache
 
 bench: setup
-	$(BIN)/python tests/benchmarks/kernel.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/kernel.py
 
 wheel: setup
 	$(BIN)/python -m build --no-isolation --wheel --outdir dist .
