@@ -10,10 +10,10 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import SerialEngine
+from islands.evolution.engine import SerialEngine, together
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
-from islands.evolution.island import first_generation, step
+from islands.evolution.island import StepInfo, first_generation, step
 from islands.evolution.problem import problem
 from islands.evolution.settings import Settings
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
@@ -146,6 +146,14 @@ def test_what_is_said_of_an_epoch_is_the_sum_over_its_islands(course):
             bool(each.outcome) for island in epoch.archipelago.islands for each in island.population
         )
         assert 0 <= epoch.info.duplicates < epoch.info.evaluations
+
+
+def test_what_several_islands_did_is_added_up():
+    """For every engine to use, and for the sum not to depend on which."""
+    one, other = StepInfo(3, 1, {"ok": 2, "singular": 1}), StepInfo(5, 2, {"diverged": 1, "ok": 4})
+    expected = StepInfo(8, 3, {"ok": 6, "singular": 1, "diverged": 1})
+    assert together([one, other]) == together([other, one]) == expected
+    assert together([]) == StepInfo(0, 0, {})
 
 
 def test_the_hall_of_an_archipelago_is_gathered_from_its_islands(course):

@@ -22,7 +22,7 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual, distinct_genes, regressor_of
-from islands.evolution.island import first_generation, step
+from islands.evolution.island import _elite, first_generation, step
 from islands.evolution.problem import problem
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import tournament
@@ -386,6 +386,9 @@ def test_cleared_and_overflowing_caches_change_nothing(monkeypatch):
     steady_state.cache_clear()
     monkeypatch.setattr("islands.evolution.evaluation._REMEMBERED", 0)
     forgetful = Evaluator(record(), SMALL)
+    known = [(Individual((Lagged(0),)), False)]
+    assert [forgetful.evaluate(known)[1] for _ in range(3)] == [0, 0, 0]
+    assert [Evaluator(record(), SMALL).evaluate(known * 2)[1] for _ in range(2)] == [1, 1]
     forgetful._products = InnerProducts(record(), forgetful.warm_up, limit=0)
     assert evolved(4, evaluator=forgetful) == expected
 
@@ -412,13 +415,16 @@ def test_runs_of_other_seeds_differ():
 
 def test_every_stream_of_a_step_knows_its_island_and_its_generation():
     """Where all else is equal, other islands and other generations select, vary and prune otherwise."""
-    for changes in (
-        {"prune": 0.0, "crossover": 0.0, "mutation": 0.0},
-        {"prune": 0.0, "tournament": 50, "mutation": 1.0, "crossover": 0.0},
-        {"prune": 0.5, "tournament": 50, "crossover": 0.0, "mutation": 0.0, "tolerance": 0.01},
+    for one_parent, changes in (
+        (False, {"prune": 0.0, "crossover": 0.0, "mutation": 0.0}),
+        (True, {"prune": 0.0, "crossover": 0.0, "mutation": 1.0}),
+        (True, {"prune": 0.5, "crossover": 0.0, "mutation": 0.0, "tolerance": 0.01}),
     ):
         evaluator = Evaluator(record(), replace(SMALL, **changes))
         island = evolved(0, evaluator.settings, evaluator=evaluator)
+        if one_parent:
+            largest = max(island.population, key=lambda each: each.size)
+            island = replace(island, population=(largest,), elite=(largest,))
         following = {
             step(replace(island, index=index, generation=generation), evaluator)[0].population
             for index in (0, 1)
@@ -549,6 +555,17 @@ def test_the_first_population_begins_with_the_seeds():
     assert island.population[len(posed.seeds) :] == unseeded.population[: -len(posed.seeds)]
 
 
+def test_seeds_are_mended_and_cut_like_everybody():
+    setting = replace(SMALL, prune=0.0, max_terms=3, initial_terms=(1, 3))
+    given_seeds = [
+        (parse("phi1(y(k-1), q1(u(k-1)))"),),
+        tuple(parse(f"phi1(u(k-1), u(k-{lag}))") for lag in (2, 3, 4, 5)),
+    ]
+    island, _ = first_generation(0, 1, Evaluator(record(), setting), given_seeds)
+    assert island.population[0].genes == (Lagged(0), parse("phi1(u(k-1), q1(u(k-1)))"))
+    assert island.population[1].genes == (Lagged(0), *given_seeds[1][:2])
+
+
 def test_more_seeds_than_the_population_are_cut():
     setting = replace(SMALL, population=2)
     given_seeds = [(Lagged(0), parse(f"phi1(u(k-1), u(k-{lag}))")) for lag in (2, 3, 4)]
@@ -576,6 +593,17 @@ def test_the_elite_is_the_best_of_old_elite_and_offspring(distinct):
             best = sorted(each.fitness for each in union)
         assert fitness == best[: len(fitness)]
         assert len(island.population) == setting.population
+
+
+def test_ties_for_the_elite_go_to_the_smaller_then_to_the_structure_s_text():
+    def each(*texts):
+        regressors = tuple(regressor_of(parse(text)) for text in texts)
+        return Individual(tuple(map(parse, texts)), regressors, (1.0,) * len(texts), 0.5)
+
+    large, late, early = each("y(k-1)", "u(k-1)"), each("y(k-3)"), each("y(k-2)")
+    assert _elite((large, late, early), 3, False) == (early, late, large)
+    assert _elite((large, late, early, early), 2, False) == (early, early)
+    assert _elite((large, late, early, early), 2, True) == (early, late)
 
 
 def finite(fitness, text="y(k-1)"):

@@ -257,6 +257,7 @@ def test_refinement_takes_nothing_away(data):
     errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in refined.models}
     for fitted in plain.models:
         assert errors[fitted.model.size] <= fitted.metrics["validation"]["free_run"].rmse
+    assert min(errors.values()) < 0.999 * plain.best.metrics["validation"]["free_run"].rmse
 
 
 def test_without_a_constraint_models_need_no_property_1(data):

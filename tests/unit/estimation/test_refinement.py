@@ -202,12 +202,46 @@ def test_segments_are_refined_together_and_none_reaches_into_another():
     assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
-def test_it_goes_on_from_a_model_close_to_divergence():
-    """Steps that diverge are failed steps: the damping grows until one does not."""
+def test_steps_that_diverge_are_failed_steps(monkeypatch):
+    """From far away the first steps overshoot: the damping grows until one does not."""
+    diverged = []
+    original = _Residual.__call__
+
+    def watched(self, theta):
+        error = original(self, theta)
+        diverged.append(error is None)
+        return error
+
+    monkeypatch.setattr(_Residual, "__call__", watched)
+    start = model(dict(zip(HYSTERESIS, (0.93, 0.46, -0.28, 0.39), strict=True)))
+    found = refined(start, driven(HYSTERESIS), None)
+    assert sum(diverged) >= 1
+    assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
+
+
+def test_a_direction_in_which_the_model_diverges_stands_still(monkeypatch):
     record = driven(HYSTERESIS)
-    start = model({**HYSTERESIS, "y(k-1)": 1.01, "phi1(u(k-1), u(k-2))": 3.0})
-    found = refined(start, record, 200)
-    assert found.after < 1e-3 * found.before
+    start = perturbed(HYSTERESIS)
+    theta = np.array(start.parameters)
+    residual = _Residual(start, record, 30, None)
+    error = residual(theta)
+    whole, _ = residual.normal_equations(theta, error, np.eye(4))
+    original = _Residual.__call__
+    monkeypatch.setattr(
+        _Residual, "__call__", lambda self, at: None if at[1] > theta[1] else original(self, at)
+    )
+    normal, gradient = residual.normal_equations(theta, error, np.eye(4))
+    assert not normal[1].any()
+    assert not normal[:, 1].any()
+    assert gradient[1] == 0.0
+    others = np.ix_([0, 2, 3], [0, 2, 3])
+    assert np.array_equal(normal[others], whole[others])
+
+
+def test_a_parameter_that_starts_at_zero_is_moved():
+    start = model({**HYSTERESIS, "u(k-1)*phi1(u(k-1), u(k-2))": 0.0})
+    found = refined(start, driven(HYSTERESIS), 50)
+    assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
 # Outcomes and mistakes.

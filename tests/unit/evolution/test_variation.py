@@ -187,6 +187,14 @@ def test_random_phi_functions_come_mended_and_with_lags_of_all_depths():
     assert not any("y" in text for text in phis)
 
 
+def test_where_the_structure_is_free_a_phi_function_takes_anything():
+    setting = replace(SETTINGS, structure="free", primitives=("phi1",), shifts=(1,))
+    found = {plain(random_gene(setting, 1, stream(seed))) for seed in range(500)}
+    assert "phi1(y(k-1), u(k-1))" in found
+    assert any("phi1(phi1(" in text for text in found)
+    assert legal((parse("phi1(y(k-1), u(k-1))"),), setting) == (parse("phi1(y(k-1), u(k-1))"),)
+
+
 def test_mending_adds_a_linear_y_in_front_where_the_constraint_needs_one():
     constrained = replace(SETTINGS, constraints="hysteresis", structure="phi")
     assert texts(legal(NUMBERS, constrained)) == ("y(k-1)", "u(k-1)", "u(k-2)")
