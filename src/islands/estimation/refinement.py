@@ -119,7 +119,7 @@ def refine(
     after = residual.mean_square(error)
     variance = after * error.size / max(1, error.size - directions.shape[1])
     covariance = directions @ np.linalg.pinv(normal) @ directions.T
-    errors = np.sqrt(variance * np.maximum(np.diag(covariance), 0.0))
+    errors = np.sqrt(variance) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return Refined(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)
 
 

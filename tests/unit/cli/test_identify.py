@@ -10,7 +10,7 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.evolution.settings import Settings
-from islands.identify import State
+from islands.identify import State, settings_of
 from islands.io.checkpoints import read_checkpoint
 from islands.io.records import write_record
 from islands.validation.findings import Progress
@@ -32,6 +32,7 @@ SMALL = (
     "3",
 )
 COLUMNS = ("--input", "u_V", "--output", "y_um")
+DEEPEST = settings_of("hysteresis", {"max_height": 12}).maximum_lag
 
 
 def record(samples=700, seed=0, dt=0.01):
@@ -317,8 +318,8 @@ def test_a_diverging_test_is_said_and_stored_as_null_never_as_a_number(tmp_path,
         (("--test", "1.5"), "lies between 0 and 1, got 1.5"),
         (("--test", "slow.csv"), "sampled at 0.05 s, the record at 0.01 s: resample"),
         (
-            ("--rows", "0:660", "--test", "660:700", "--max-height", "8"),
-            "the test data has 40 samples and lags reach down to 43: give more",
+            ("--rows", "0:660", "--test", "660:700", "--max-height", "12"),
+            f"the test data has 40 samples and lags reach down to {DEEPEST}: give more",
         ),
     ],
 )
