@@ -29,7 +29,6 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.findings import Assessed, Findings, Progress, Search, ranked
 from islands.validation.metrics import metrics
-from islands.validation.physics import physics
 
 #: Predictions on the validation data that a test of the residual takes.
 _RESIDUALS = 3
@@ -190,8 +189,9 @@ def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Assess
     for entries in found.values():
         entries.sort(key=lambda entry: (entry[0], tuple(item.text for item in entry[1].regressors)))
         for _, model in entries:
-            if settings.constraints == "none" or physics(model, split.estimation).property_1:
-                kept.append(Assessed(model, assess(model, split, settings.shooting, settings.maximum_lag)))
+            assessment = assess(model, split, settings.shooting, settings.maximum_lag)
+            if settings.constraints == "none" or assessment.physics.property_1:
+                kept.append(Assessed(model, assessment))
                 break
     return ranked(kept)
 

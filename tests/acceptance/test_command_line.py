@@ -4,36 +4,15 @@ import csv
 import importlib.util
 import json
 import subprocess
-import sysconfig
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
+from front_door import fail, succeed
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
-
-
-def islands(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=240
-    )
-
-
-def succeed(*arguments: object) -> str:
-    done = islands(*arguments)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def fail(*arguments: object) -> str:
-    done = islands(*arguments)
-    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
-    assert "Traceback" not in done.stderr
-    return done.stderr
 
 
 @pytest.fixture(scope="module")

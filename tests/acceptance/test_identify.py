@@ -4,36 +4,16 @@ import csv
 import json
 import signal
 import subprocess
-import sysconfig
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from front_door import ISLANDS, fail, succeed
 
-ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
 COLUMNS = ("--input", "u_V", "--output", "y_um")
 BUDGET = ("--population", "30", "--max-terms", "5", "--shooting", "200", "--seed", "2")
-
-
-def islands(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=240
-    )
-
-
-def succeed(*arguments: object) -> str:
-    done = islands(*arguments)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def fail(*arguments: object) -> str:
-    done = islands(*arguments)
-    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
-    assert "Traceback" not in done.stderr
-    return done.stderr
 
 
 def stored(folder: Path) -> dict[str, Any]:
