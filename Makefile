@@ -29,10 +29,10 @@ lint: setup
 	$(BIN)/lint-imports --no-cache
 
 bench: setup
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/benchmarks/kernel.py
+	$(BIN)/islands bench
 
 wheel: setup
 	$(BIN)/python -m build --no-isolation --wheel --outdir dist .
 
 clean:
-	rm -rf .venv dist demo-out
+	rm -rf .venv dist demo-out bench-out

@@ -30,6 +30,9 @@ from islands.validation.assessment import assess
 from islands.validation.findings import Assessed, Findings, Progress, Search, ranked
 from islands.validation.metrics import metrics
 
+#: Outcomes of individuals that have a model.
+FEASIBLE = ("ok", "abandoned")
+
 #: Predictions on the validation data that a test of the residual takes.
 _RESIDUALS = 3
 
@@ -46,6 +49,8 @@ class State:
     outcomes : mapping
         Number of individuals by outcome.
     history : tuple of Progress
+    caches : mapping
+        Bytes that every cache takes, and its limit.
     """
 
     archipelago: Archipelago = field(default_factory=Archipelago)
@@ -53,6 +58,7 @@ class State:
     duplicates: int = 0
     outcomes: Mapping[str, int] = field(default_factory=dict)
     history: tuple[Progress, ...] = ()
+    caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
 
 #: Called after every epoch; a true answer ends the search there, and the best so far is the result.
@@ -168,6 +174,7 @@ def after(state: State, epoch: Epoch) -> State:
         state.duplicates + epoch.info.duplicates,
         dict(Counter(state.outcomes) + Counter(epoch.info.outcomes)),
         (*state.history, Progress(epoch.archipelago.epoch, evaluations, best)),
+        epoch.caches,
     )
 
 
@@ -228,8 +235,9 @@ def _search(state: State, posed: Problem) -> Search:
         None,
         state.archipelago.epoch,
         state.duplicates,
-        state.outcomes.get("ok", 0) / max(1, state.evaluations),
+        sum(state.outcomes.get(name, 0) for name in FEASIBLE) / max(1, state.evaluations),
         state.history,
+        state.caches,
     )
 
 

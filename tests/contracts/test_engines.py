@@ -3,7 +3,9 @@
 A new engine joins the table and is held to all of it.
 """
 
+from collections import Counter
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -93,6 +95,8 @@ def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, cour
     write_checkpoint(course[1].archipelago, paths[2], {})
     stored, _ = read_checkpoint(paths[2])
     assert stored == course[1].archipelago
+    # What the islands abandon next hangs on their bars.
+    assert all(island.bar < inf for island in stored.islands)
     *_, last = engine.run(posed, 7, 2, stored)
     write_checkpoint(course[-1].archipelago, paths[0], {})
     write_checkpoint(last.archipelago, paths[1], {})
@@ -142,10 +146,18 @@ def test_what_is_said_of_an_epoch_is_the_sum_over_its_islands(course):
     for epoch in course:
         assert epoch.info.evaluations == 2 * SETTINGS.population
         assert sum(epoch.info.outcomes.values()) == epoch.info.evaluations
-        assert epoch.info.outcomes["ok"] == sum(
-            bool(each.outcome) for island in epoch.archipelago.islands for each in island.population
+        assert epoch.info.outcomes == Counter(
+            each.outcome.verdict.name.lower()
+            for island in epoch.archipelago.islands
+            for each in island.population
         )
         assert 0 <= epoch.info.duplicates < epoch.info.evaluations
+
+
+def test_an_epoch_says_what_the_caches_take_and_what_they_may(course):
+    for epoch in course:
+        assert set(epoch.caches) == {"pairs", "genes", "structures"}
+        assert all(0 < taken <= limit for taken, limit in epoch.caches.values())
 
 
 def test_what_several_islands_did_is_added_up():

@@ -6,9 +6,9 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.constrained import constrained_least_squares
-from islands.estimation.constraints import CONSTRAINTS, constraint
+from islands.estimation.constraints import CONSTRAINTS, Constraint, constraint, every_regressor
 from islands.estimation.least_squares import least_squares
-from islands.model.clusters import steady_state
+from islands.model.clusters import OUTPUT_AT_REST, steady_state
 from islands.model.expression import Lagged
 from islands.model.model import model_of
 from islands.model.parsing import parse
@@ -125,6 +125,58 @@ def test_an_unknown_constraint_is_refused():
     with pytest.raises(SettingsError) as caught:
         constraint("backlash")
     assert str(caught.value) == "unknown constraints 'backlash': take one of none, hysteresis"
+
+
+# An entry of one's own: a group and what it sums to.
+
+
+def first_signal(item):
+    """Put a regressor, its degree for a weight, with the first of its signals; a constant has no group."""
+    channels = sorted(channel for channel, _ in item.lags)
+    return (float(item.degree), Lagged(channels[0], 0)) if channels else (0.0, Lagged(0, 0))
+
+
+def of_ones_own(**sums):
+    return Constraint(
+        first_signal,
+        {Lagged(int(name[1:]), 0): total for name, total in sums.items()},
+        "none",
+        every_regressor,
+        "",
+    )
+
+
+def test_an_entry_says_what_its_groups_sum_to():
+    items = made("y(k-1)", "u1(k-1)", "y(k-1)*u2(k-3)", "u1(k-2)^2", "1", "u2(k-1)")
+    found = of_ones_own(c0=0.5, c1=-2.0, c2=3.0).constrain(items)
+    assert found.regressors == tuple(items)
+    assert found.S.tolist() == [
+        [1.0, 0.0, 2.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 2.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+    ]
+    assert found.c.tolist() == [0.5, -2.0, 3.0]
+
+
+def test_a_group_that_no_sum_is_wanted_of_sums_to_zero_and_one_alone_in_it_is_left_out():
+    items = made("y(k-1)", "u1(k-1)", "u1(k-2)^2", "u2(k-1)", "1")
+    found = of_ones_own(c0=0.5).constrain(items)
+    assert [plain(item.expression, 2) for item in found.regressors] == ["y(k-1)", "u1(k-1)", "u1(k-2)^2", "1"]
+    assert found.S.tolist() == [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 2.0, 0.0]]
+    assert found.c.tolist() == [0.5, 0.0]
+
+
+@pytest.mark.parametrize("sums", [{"c1": 1.0}, {"c0": 1.0, "c2": 0.5}])
+def test_a_structure_that_lacks_a_group_with_a_sum_is_infeasible(sums):
+    assert of_ones_own(**sums).constrain(made("y(k-1)", "y(k-2)")) == Outcome(Verdict.INFEASIBLE, "none")
+
+
+def test_the_table_holds_group_and_sums():
+    assert dict(CONSTRAINTS["hysteresis"].sums) == {OUTPUT_AT_REST: 1.0}
+    assert dict(CONSTRAINTS["none"].sums) == {}
+    for item in MODEL_14:
+        assert CONSTRAINTS["hysteresis"].group(item) == steady_state(item)
+        assert CONSTRAINTS["none"].group(item)[0] == 0.0
 
 
 # Its null space, for selection.

@@ -2,9 +2,12 @@
 
 import math
 import os
+import pickle
 import re
 import subprocess
 import sys
+from copy import deepcopy
+from dataclasses import replace
 
 import pytest
 from hypothesis import assume, given, settings
@@ -264,3 +267,87 @@ def test_text_and_clusters_do_not_depend_on_the_seed_of_the_hash():
     one, other = (run.communicate()[0] for run in runs)
     assert one == other
     assert one.count("\n") == 7
+
+
+# Hashes are kept within a process, and never leave it.
+
+
+def again(expression):
+    """The same tree, of nodes of its own."""
+    match expression:
+        case Shift(samples, argument):
+            return Shift(samples, again(argument))
+        case Apply(primitive, arguments):
+            return Apply(replace(primitive), tuple(again(argument) for argument in arguments))
+        case Constant(number):
+            return Constant(number)
+        case _:
+            return Lagged(expression.channel, expression.lag)
+
+
+@given(expressions(), expressions())
+def test_equal_trees_have_equal_hashes_and_others_are_other_keys(expression, other):
+    same = again(expression)
+    assert same is not expression
+    assert same == expression
+    assert hash(same) == hash(expression)
+    assert len({expression, same, other}) == (1 if other == expression else 2)
+
+
+@given(expressions())
+def test_trees_that_differ_in_one_node_are_other_keys(expression):
+    wider = Apply(PRIMITIVES["tanh"], (expression,))
+    others = [Shift(1, expression), Shift(2, expression), wider, Apply(PRIMITIVES["sin"], (expression,))]
+    assert len({expression, *others, *map(again, others)}) == 5
+
+
+@given(expressions())
+def test_copies_and_pickles_are_equal_and_found_under_the_same_key(expression):
+    for copied in (pickle.loads(pickle.dumps(expression)), deepcopy(expression)):
+        assert copied == expression
+        assert hash(copied) == hash(expression)
+        assert {expression: "found"}[copied] == "found"
+
+
+CARRIED = """
+import pickle, sys
+from islands.model.expression import walk
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+trees = [parse(text) for text in sys.argv[1:]]
+regressors = [regressor(tree)[1] for tree in trees]
+carried = sys.stdin.buffer.read()
+if carried:
+    others, other_regressors = pickle.loads(carried)
+    assert others == trees and other_regressors == regressors
+    found = dict.fromkeys(node for tree in trees for node in walk(tree))
+    assert all(node in found for tree in others for node in walk(tree))
+    assert [hash(tree) for tree in others] == [hash(tree) for tree in trees]
+    assert {*others} == {*trees} and {*other_regressors} == {*regressors}
+    assert {item.expression for item in other_regressors} == {item.expression for item in regressors}
+sys.stderr.write(str(hash(trees[0])))
+sys.stdout.buffer.write(pickle.dumps((trees, regressors)))
+"""
+
+
+def test_in_a_process_with_another_seed_of_the_hash_pickled_trees_are_as_good_as_its_own():
+    texts = [
+        "q5(q3(tanh(u(k-1)*y(k-2))))",
+        "phi1(u(k-1), q4(u(k-1)))*y(k-1)^2",
+        "2.5*y(k-1) - u2(k-3)",
+        "y(k-7)",
+    ]
+    carried, seeds = b"", []
+    for seed in ("1", "2", "1"):
+        run = subprocess.run(
+            [sys.executable, "-c", CARRIED, *texts],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            input=carried,
+            capture_output=True,
+            check=False,
+        )
+        assert run.returncode == 0, run.stderr.decode()
+        carried = run.stdout
+        seeds.append(run.stderr)
+    # The law says nothing where the hashes of the processes are the same.
+    assert seeds[0] == seeds[2] != seeds[1]

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
-from islands.estimation.froe import froe, prune
+from islands.estimation.froe import froe
 from islands.estimation.least_squares import least_squares
+from islands.kernels import selection
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
@@ -37,6 +38,13 @@ def squares(psi, y, theta):
 def inner_products(psi, y):
     stacked = np.vstack([psi, y])
     return stacked @ stacked.T
+
+
+def prune(gram, tolerance):
+    """Return the positions that pruning leaves."""
+    terms = len(gram) - 1
+    kept = np.full(terms, -1)
+    return tuple(kept[: selection.prune(gram, terms, tolerance, kept)].tolist())
 
 
 def textbook(psi, y):

@@ -100,6 +100,42 @@ def test_it_keeps_the_best_of_every_size_each_structure_once(found):
     assert [entry.size for entry in hall.entries] == sorted(entry.size for entry in hall.entries)
 
 
+single = st.tuples(st.sampled_from(LEAVES), st.sampled_from(FITNESSES)).map(
+    lambda drawn: Individual((drawn[0],), (regressor_of(drawn[0]),), (1.0,), drawn[1])
+)
+
+
+@given(st.lists(single, min_size=10, max_size=60), st.integers(1, 12))
+def test_a_full_hall_takes_in_generations_what_it_takes_at_once(found, generation):
+    """Whoever is less fit than the last of a full size is passed over, whoever is as fit is not."""
+    hall = HallOfFame()
+    for begin in range(0, len(found), generation):
+        hall = with_entries(hall, found[begin : begin + generation])
+    assert exactly(hall) == exactly(with_entries(HallOfFame(), found))
+
+
+def test_one_as_fit_as_the_last_of_a_full_size_takes_its_place_by_its_text():
+    full = with_entries(HallOfFame(), [entry(1.0, f"y(k-{lag})") for lag in range(1, DEPTH + 1)])
+    early, late = entry(1.0, "u(k-1)"), entry(1.0, "y(k-9)")
+    assert with_entries(full, [late]) == full
+    assert [each.key for each in with_entries(full, [early]).entries] == [
+        ("u1(k-1)",),
+        *(each.key for each in full.entries[:-1]),
+    ]
+    assert with_entries(full, [entry(1.5, "u(k-1)")]) == full
+
+
+@given(halls)
+def test_the_places_are_counted_within_a_size(hall):
+    counted = [(place, each.size) for place, each in hall.places()]
+    assert [each for _, each in hall.places()] == list(hall.entries)
+    assert counted == [
+        (place, size)
+        for size in sorted({each.size for each in hall.entries})
+        for place in range(1, 1 + sum(each.size == size for each in hall.entries))
+    ]
+
+
 @given(halls)
 def test_the_front_gets_better_with_every_term(hall):
     front = hall.front()

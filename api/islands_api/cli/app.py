@@ -6,6 +6,7 @@ import typer
 from rich.markup import escape
 
 from islands.errors import IslandsError
+from islands_api.cli.bench import bench
 from islands_api.cli.console import errors
 from islands_api.cli.demo import demo
 from islands_api.cli.fit import fit
@@ -17,7 +18,7 @@ from islands_api.cli.systems import systems
 app = typer.Typer(
     help="Find the equation behind measured data.", no_args_is_help=True, pretty_exceptions_enable=False
 )
-for command in (identify, fit, simulate, show, demo):
+for command in (identify, fit, simulate, show, demo, bench):
     app.command()(command)
 app.add_typer(systems, name="systems")
 

@@ -18,7 +18,7 @@ from islands.simulation.predictors import free_run
 from islands.systems.catalogue import SYSTEMS, make_record
 from islands.systems.published_models import PUBLISHED
 from islands.validation.metrics import Metrics, metrics
-from islands_api.cli.console import output, progress
+from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.fit import check_folder, show_result
 from islands_api.cli.identify import course
 
@@ -38,6 +38,7 @@ def demo(
     out.mkdir(parents=True, exist_ok=True)
     for part in SELECTING:
         write_record(records[part], out / f"{part}.csv")
+    compile_kernels()
     began = perf_counter()
     with progress("demo") as tell:
         where = course(tell)
@@ -45,7 +46,7 @@ def demo(
         def watch(state: State, settings: Settings) -> None:
             where(state, settings)
 
-        result = islands.identify(estimation, validation, preset="hysteresis", progress=watch)
+        result = islands.identify(estimation, validation, preset="paper-case1", progress=watch)
         result = result.with_wall_time(perf_counter() - began)
         tell("figures", 1.0)
         result.save(out)

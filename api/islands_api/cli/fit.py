@@ -14,7 +14,7 @@ from islands.io.records import read_record
 from islands.model.library import LIBRARIES
 from islands.result import Result
 from islands_api.cli import options
-from islands_api.cli.console import output, progress
+from islands_api.cli.console import compile_kernels, output, progress
 
 
 def fit(
@@ -47,6 +47,7 @@ def fit(
     """Fit small models to a record by forward selection and least squares, and assess them."""
     check_folder(out, force)
     names = options.columns(inputs)
+    compile_kernels()
     with progress("fit") as tell:
         tell("reading", 0.0)
         data = read_record(record, names, output_column, dt, options.rows(rows))

@@ -25,7 +25,7 @@ from islands.model.primitives import PRIMITIVES
 from islands.validation.findings import Progress
 from islands.validation.metrics import metrics
 from islands_api.cli import options
-from islands_api.cli.console import errors, output, progress
+from islands_api.cli.console import compile_kernels, errors, output, progress
 from islands_api.cli.fit import check_folder, show_result
 
 CHECKPOINT = "checkpoint.json"
@@ -66,11 +66,12 @@ def identify(
     seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
     resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to go on with.")] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Tell what the caches take, too.")] = False,
 ) -> None:
     """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR goes on."""
     if resume is not None:
         _refuse_others(context)
-        _run(resume, *_stored(resume))
+        _run(resume, *_stored(resume), verbose=verbose)
     else:
         if record is None or not inputs or output_column is None or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
@@ -95,17 +96,23 @@ def identify(
             "seed": seed,
             "changes": changes,
         }
-        _run(out, job)
+        _run(out, job, verbose=verbose)
 
 
 def _refuse_others(context: typer.Context) -> None:
     for name in context.params:
         source = context.get_parameter_source(name)
-        if name != "resume" and source is not None and source.name == "COMMANDLINE":
+        if name not in ("resume", "verbose") and source is not None and source.name == "COMMANDLINE":
             raise SettingsError("--resume goes on with the run's own record and settings: give nothing else")
 
 
-def _run(folder: Path, job: dict[str, Any], state: State | None = None, spent: float = 0.0) -> None:
+def _run(
+    folder: Path,
+    job: dict[str, Any],
+    state: State | None = None,
+    spent: float = 0.0,
+    verbose: bool = False,
+) -> None:
     settings = settings_of(job["preset"], job["changes"])
     data, held_out, tested = _data(job, settings)
     folder.mkdir(parents=True, exist_ok=True)
@@ -113,6 +120,7 @@ def _run(folder: Path, job: dict[str, Any], state: State | None = None, spent: f
         # What another run left here belongs to that run.
         for name in (CHECKPOINT, TEST):
             (folder / name).unlink(missing_ok=True)
+    compile_kernels()
     began = perf_counter() - spent
     with progress("identify") as tell, _stop_requests() as stop:
         watch = _Watch(folder, job, tell, stop, spent)
@@ -124,6 +132,9 @@ def _run(folder: Path, job: dict[str, Any], state: State | None = None, spent: f
     if watch.stopped:
         errors.print(f"stopped: the result is the best so far; go on with --resume {folder}", markup=False)
     show_result(result, folder)
+    if verbose:
+        for name, (size, limit) in result.findings.search.caches.items():
+            output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
     if tested is not None:
         _test(result, tested, folder)
 

@@ -11,7 +11,7 @@ from islands.io.records import read_record, write_simulation
 from islands.result import simulate as run
 from islands.validation.metrics import metrics
 from islands_api.cli import options
-from islands_api.cli.console import output
+from islands_api.cli.console import compile_kernels, output
 
 
 def simulate(
@@ -42,6 +42,7 @@ def simulate(
         raise ModelError(
             f"the model holds for a sampling time of {chosen.dt:g} s, the record has {data.dt:g} s"
         )
+    compile_kernels()
     simulation = run(chosen, data, mode, shooting)
     if out is not None:
         write_simulation(data, simulation.y, out)

@@ -1,6 +1,7 @@
 """The table of parameter constraints: what a model's parameters must obey whatever the data say.
 
-An entry turns regressors into ``S theta = c``. Add one here and it can be chosen by name.
+An entry groups regressors and says what the parameters of a group sum to: ``S theta = c``. Add one here and
+it can be chosen by name; a search evaluates it in its kernel.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import chosen
-from islands.model.clusters import OUTPUT_AT_REST, Cluster, clusters
+from islands.model.clusters import OUTPUT_AT_REST, Cluster, clusters, steady_state
 from islands.model.expression import Apply, Constant, Expression, Lagged
 from islands.model.primitives import ADD, MUL
 from islands.model.regressor import Regressor, canonical
@@ -71,42 +72,63 @@ class Directions:
 
 @dataclass(frozen=True, slots=True)
 class Constraint:
-    """An entry of the table: on given regressors, and on a library from which regressors are selected."""
+    """An entry of the table: sums of parameters over groups of regressors that have no member in common.
 
-    constrain: Callable[[Sequence[Regressor]], Constrained | Outcome]
+    Attributes
+    ----------
+    group : callable
+        A regressor's weight in the sum, and what its group has in common; with the weight 0 it has no group.
+    sums : mapping
+        What the weighted parameters of a group sum to where that is not zero; a structure has to have these
+        groups.
+    lacking : str
+        What is said of a structure that has not.
+    directions : callable
+        The same for a library from which regressors are selected.
+    description : str
+    """
+
+    group: Callable[[Regressor], tuple[float, Expression]]
+    sums: Mapping[Expression, float]
+    lacking: str
     directions: Callable[[Sequence[Regressor]], Directions | Outcome]
     description: str
+
+    def constrain(self, regressors: Sequence[Regressor]) -> Constrained | Outcome:
+        """Return the constraint on given regressors.
+
+        A regressor alone in a group that sums to zero has the parameter zero and is left out.
+        """
+        groups = clusters(regressors, self.group)
+        alone = {
+            group.members[0]
+            for group in groups
+            if len(group.members) == 1 and group.steady_state not in self.sums
+        }
+        kept = tuple(item for position, item in enumerate(regressors) if position not in alone)
+        groups = clusters(kept, self.group)
+        if not self.sums.keys() <= {group.steady_state for group in groups}:
+            return Outcome(Verdict.INFEASIBLE, self.lacking)
+        S = np.zeros((len(groups), len(kept)))
+        for row, group in enumerate(groups):
+            S[row, group.members] = group.weights
+        return Constrained(kept, S, np.array([self.sums.get(group.steady_state, 0.0) for group in groups]))
 
 
 _PRESENT = Lagged(0, 0)
 
+#: Property 1 of the paper, section 3: with these sums every output is an equilibrium at constant input.
+PROPERTY_1: Mapping[Expression, float] = MappingProxyType({OUTPUT_AT_REST: 1.0})
 
-def unconstrained(regressors: Sequence[Regressor]) -> Constrained:
-    """Leave every parameter free."""
-    return Constrained(tuple(regressors), np.empty((0, len(regressors))), np.empty(0))
+
+def free(_regressor: Regressor) -> tuple[float, Expression]:
+    """Put no regressor into any group."""
+    return 0.0, _PRESENT
 
 
 def every_regressor(library: Sequence[Regressor]) -> Directions:
     """Let a model grow by any regressor."""
     return Directions(_PRESENT, (), tuple(Direction(item.expression, (item,)) for item in library))
-
-
-def continuum_of_equilibria(regressors: Sequence[Regressor]) -> Constrained | Outcome:
-    """Make every output an equilibrium at constant input: Property 1 of the paper, section 3.
-
-    The parameters of the cluster y sum to 1, those of every other cluster to 0. A regressor alone in another
-    cluster than y has the parameter zero and is left out. Without a cluster y the structure is infeasible.
-    """
-    groups = clusters(regressors)
-    alone = {group.members[0] for group in groups if len(group.members) == 1 and not is_output(group)}
-    kept = tuple(item for position, item in enumerate(regressors) if position not in alone)
-    groups = clusters(kept)
-    if not any(is_output(group) for group in groups):
-        return Outcome(Verdict.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
-    S = np.zeros((len(groups), len(kept)))
-    for row, group in enumerate(groups):
-        S[row, group.members] = group.weights
-    return Constrained(kept, S, np.array([target(group.steady_state) for group in groups]))
 
 
 def increments(library: Sequence[Regressor]) -> Directions | Outcome:
@@ -146,11 +168,6 @@ def _difference(
     return canonical(Apply(ADD, tuple(terms)))[1]
 
 
-def target(steady_state: Expression) -> float:
-    """Return what the parameters of a cluster sum to when there is a continuum of equilibria."""
-    return 1.0 if steady_state == OUTPUT_AT_REST else 0.0
-
-
 def is_output(cluster: Cluster) -> bool:
     """Tell whether a cluster is that of y itself."""
     return cluster.steady_state == OUTPUT_AT_REST
@@ -158,9 +175,13 @@ def is_output(cluster: Cluster) -> bool:
 
 CONSTRAINTS: Mapping[str, Constraint] = MappingProxyType(
     {
-        "none": Constraint(unconstrained, every_regressor, "parameters are free"),
+        "none": Constraint(free, {}, "", every_regressor, "parameters are free"),
         "hysteresis": Constraint(
-            continuum_of_equilibria, increments, "a continuum of equilibria (Property 1)"
+            steady_state,
+            PROPERTY_1,
+            "no regressor is y at rest: add y(k-1)",
+            increments,
+            "a continuum of equilibria (Property 1)",
         ),
     }
 )

@@ -15,7 +15,7 @@ from islands.errors import RecordError
 from islands.estimation.constrained import null_space
 from islands.estimation.constraints import constraint
 from islands.kernels.simulate import Layout, simulate
-from islands.kernels.sums import FOLD, dot
+from islands.kernels.sums import dot
 from islands.model.model import Model
 from islands.program.linker import link
 from islands.simulation.layout import layout
@@ -134,21 +134,22 @@ class _Residual:
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True
-        self._fold = np.empty(FOLD)
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return prediction minus measurement over all predicted samples; None after a divergence."""
         lanes = len(self._cut.start)
         predicted = np.empty(len(self._y))
         diverged = np.full(lanes, -1, np.int64)
-        simulate(self._program, theta, self._cut, self._bound, False, np.empty(lanes), diverged, predicted)
+        simulate(
+            self._program, theta, self._cut, self._bound, np.inf, False, np.empty(lanes), diverged, predicted
+        )
         if (diverged >= 0).any():
             return None
         return np.ascontiguousarray((predicted - self._y)[self._predicted])
 
     def mean_square(self, error: NDArray[np.float64]) -> float:
         """Return the mean of the squares."""
-        return float(dot(error, 0, error, 0, error.size, self._fold)) / error.size
+        return float(dot(error, 0, error, 0, error.size)) / error.size
 
     def normal_equations(
         self, theta: NDArray[np.float64], error: NDArray[np.float64], directions: NDArray[np.float64]
@@ -164,7 +165,7 @@ class _Residual:
         gradient: NDArray[np.float64] = np.empty(free)
         flat, rows = jacobian.reshape(-1), error.size
         for i in range(free):
-            gradient[i] = dot(flat, i * rows, error, 0, rows, self._fold)
+            gradient[i] = dot(flat, i * rows, error, 0, rows)
             for j in range(i + 1):
-                normal[i, j] = normal[j, i] = dot(flat, i * rows, flat, j * rows, rows, self._fold)
+                normal[i, j] = normal[j, i] = dot(flat, i * rows, flat, j * rows, rows)
         return normal, gradient

@@ -1,8 +1,8 @@
 """Engines: how epochs are carried out. Every engine yields the same archipelagos, bit for bit."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from islands.evolution.archipelago import Archipelago
@@ -13,10 +13,11 @@ from islands.evolution.problem import Problem
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """An archipelago, and what its islands did to get there."""
+    """An archipelago, what its islands did to get there, and what their caches take: (bytes, limit)."""
 
     archipelago: Archipelago
     info: StepInfo
+    caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
 
 class Engine(Protocol):
@@ -52,7 +53,7 @@ class SerialEngine:
             else:
                 stepped = [step(island, evaluator, problem.pool) for island in archipelago.islands]
             archipelago = Archipelago(tuple(island for island, _ in stepped), archipelago.epoch + 1)
-            yield Epoch(archipelago, together([info for _, info in stepped]))
+            yield Epoch(archipelago, together([info for _, info in stepped]), evaluator.memory)
 
 
 def together(infos: Sequence[StepInfo]) -> StepInfo:

@@ -3,9 +3,10 @@
 Merging is associative, commutative and idempotent, so halls may be gathered from islands in any order.
 """
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite
 
 from islands.evolution.individual import Individual
 
@@ -18,6 +19,13 @@ class HallOfFame:
     """Individuals, by size and within a size best first; each structure once."""
 
     entries: tuple[Individual, ...] = ()
+
+    def places(self) -> Iterator[tuple[int, Individual]]:
+        """Yield the individuals, each with its place among those of its size, from 1 on."""
+        places: Counter[int] = Counter()
+        for entry in self.entries:
+            places[entry.size] += 1
+            yield places[entry.size], entry
 
     def best(self) -> dict[int, Individual]:
         """Return the best individual of every size."""
@@ -37,19 +45,23 @@ class HallOfFame:
 
 def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfFame:
     """Return the hall with individuals added; a fitness that is not finite never enters."""
+    full = {entry.size: entry.fitness for place, entry in hall.places() if place == DEPTH}
     found: dict[tuple[str, ...], Individual] = {}
     for entry in (*hall.entries, *individuals):
+        if not isfinite(entry.fitness) or entry.fitness > full.get(entry.size, inf):
+            continue
         known = found.get(entry.key)
-        if isfinite(entry.fitness) and (known is None or _order(entry) < _order(known)):
+        if known is None or _order(entry) < _order(known):
             found[entry.key] = entry
-    kept: list[Individual] = []
-    places: dict[int, int] = {}
-    for entry in sorted(found.values(), key=_order):
-        places[entry.size] = places.get(entry.size, 0) + 1
-        if places[entry.size] <= DEPTH:
-            # Genes in canonical form: which of two ways to write a model came first must not matter.
-            kept.append(replace(entry, genes=tuple(item.expression for item in entry.regressors)))
-    return HallOfFame(tuple(kept))
+    ordered = HallOfFame(tuple(sorted(found.values(), key=_order)))
+    # Genes in canonical form: which of two ways to write a model came first must not matter.
+    return HallOfFame(
+        tuple(
+            replace(entry, genes=tuple(item.expression for item in entry.regressors))
+            for place, entry in ordered.places()
+            if place <= DEPTH
+        )
+    )
 
 
 def merge(*halls: HallOfFame) -> HallOfFame:

@@ -1,7 +1,6 @@
 """An individual: a vector of trees (genes), each the basis function of one term (equation (10))."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import inf, isnan
 
 from islands.errors import ModelError
@@ -49,7 +48,6 @@ class Individual:
         return tuple(item.text for item in self.regressors)
 
 
-@lru_cache(maxsize=1 << 16)
 def regressor_of(gene: Expression) -> Regressor | None:
     """Return a gene's regressor, None where it is identically zero or its numbers overflow."""
     try:

@@ -1,14 +1,16 @@
 """One island: its whole state as a value, and the step from one generation to the next."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf, isfinite
 
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.hall_of_fame import HallOfFame, with_entries
+from islands.evolution.hall_of_fame import DEPTH, HallOfFame, with_entries
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
-from islands.evolution.selection import tournament
+from islands.evolution.selection import tournaments
+from islands.evolution.settings import Settings
 from islands.evolution.variation import (
     Genes,
     high_level_crossover,
@@ -17,10 +19,14 @@ from islands.evolution.variation import (
     low_level_crossover,
     outer_mutation,
     random_genes,
+    with_linear_output,
 )
 from islands.model.expression import Expression
 
 Population = tuple[Individual, ...]
+
+#: Share of the parents that are better than the bar.
+_MIDDLE = 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +45,8 @@ class Island:
     elite : tuple of Individual
         The best of all so far, fittest first.
     hall : HallOfFame
+    bar : float
+        Whoever of the population was abandoned is less fit than this.
     """
 
     index: int
@@ -47,6 +55,7 @@ class Island:
     population: Population
     elite: Population
     hall: HallOfFame
+    bar: float = inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +109,18 @@ def step(island: Island, evaluator: Evaluator, pool: Sequence[Expression] = ()) 
     following = replace(island, generation=island.generation + 1)
     select = Stream(island.seed, island.index, following.generation, Purpose.SELECTION)
     draw = Stream(island.seed, island.index, following.generation, Purpose.VARIATION)
-    parents = (*island.elite, *island.population)
+    pairs = -(-settings.population // 2)
+    parents = tournaments(
+        (*island.elite, *island.population),
+        2 * pairs,
+        settings.tournament,
+        select,
+        island.bar,
+        evaluator.settled,
+    )
     offspring: list[Genes] = []
-    while len(offspring) < settings.population:
-        pair = [tournament(parents, settings.tournament, select).genes for _ in range(2)]
+    for couple in range(pairs):
+        pair = [parent.genes for parent in parents[2 * couple : 2 * couple + 2]]
         if draw.chance(settings.crossover):
             cross = high_level_crossover if draw.chance(settings.high_level) else low_level_crossover
             pair = list(cross(pair[0], pair[1], settings, draw))
@@ -115,7 +132,7 @@ def step(island: Island, evaluator: Evaluator, pool: Sequence[Expression] = ()) 
                         if draw.chance(settings.outer)
                         else inner_mutation(genes, settings, inputs, draw)
                     )
-        offspring += [legal(genes, settings) for genes in pair]
+        offspring += [with_linear_output(genes, settings) for genes in pair]
     return _evaluated(following, offspring[: settings.population], evaluator)
 
 
@@ -124,21 +141,44 @@ def _evaluated(island: Island, genes: Sequence[Genes], evaluator: Evaluator) -> 
     draw = Stream(island.seed, island.index, island.generation, Purpose.PRUNING)
     # Every individual draws, whether its structure is known or not: a cache never changes what is bred.
     decided = [(Individual(each), draw.chance(settings.prune)) for each in genes]
-    population, duplicates = evaluator.evaluate(decided)
-    elite = _elite((*island.elite, *population), settings.elites, settings.distinct)
+    bar = _bar(island, settings)
+    population, duplicates = evaluator.evaluate(decided, _bars(island.hall, bar, settings.max_terms))
+    worst = _worst(island, settings)
+    contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
+    elite = _elite(contenders, settings.elites, settings.distinct)
     info = StepInfo(
         len(population),
         duplicates,
         Counter(each.outcome.verdict.name.lower() for each in population),
     )
-    return replace(
-        island, population=population, elite=elite, hall=with_entries(island.hall, population)
-    ), info
+    hall = with_entries(island.hall, population)
+    return replace(island, population=population, elite=elite, hall=hall, bar=bar), info
 
 
-def _elite(union: Population, count: int, distinct: bool) -> Population:
-    """Keep the fittest of old elite and offspring; ties go to the smaller, then to the structure's text."""
-    ordered = sorted(union, key=lambda each: (each.fitness, each.size, each.key))
+def _worst(island: Island, settings: Settings) -> float:
+    """Return the fitness that an individual needs to enter the elite."""
+    return island.elite[-1].fitness if len(island.elite) == settings.elites else inf
+
+
+def _bar(island: Island, settings: Settings) -> float:
+    """Return the fitness above which nobody enters the elite and few win a tournament.
+
+    It is that of a parent in the middle, or of the last one whose fitness is known.
+    """
+    known = sorted(each.fitness for each in (*island.elite, *island.population) if isfinite(each.fitness))
+    middle = int(_MIDDLE * (len(island.elite) + len(island.population)))
+    return max(_worst(island, settings), known[min(middle, len(known) - 1)] if known else inf)
+
+
+def _bars(hall: HallOfFame, bar: float, most: int) -> list[float]:
+    """Return, for every size of a model, the fitness above which nobody needs to know it."""
+    last = {entry.size: entry.fitness for place, entry in hall.places() if place == DEPTH}
+    return [max(bar, last.get(size, inf)) for size in range(most + 1)]
+
+
+def _elite(contenders: Iterable[Individual], count: int, distinct: bool) -> Population:
+    """Keep the fittest; ties go to the smaller, then to the structure's text."""
+    ordered = sorted(contenders, key=lambda each: (each.fitness, each.size, each.key))
     if distinct:
         first: dict[tuple[str, ...], Individual] = {}
         for each in ordered:

@@ -1,8 +1,8 @@
 """Variation: two crossovers and two mutations (the paper, section 5.1, Figure 1), and random genes.
 
-An individual recombines or mutates, never both. Children are legal by construction: no gene is higher than
-the limit (such a child keeps its parent's gene), no individual has more genes, phi functions are mended, and
-where the parameters are constrained every individual has a linear y.
+An individual recombines or mutates, never both. Children of legal parents are legal by construction: no gene
+is higher than the limit (such a child keeps its parent's gene), no individual has more genes, phi functions
+of a new gene are mended, and where the parameters are constrained every individual has a linear y.
 """
 
 from collections.abc import Sequence
@@ -85,7 +85,7 @@ def outer_mutation(
     position = draw.below(len(genes))
     if not (pool and draw.chance(settings.from_library)):
         return _with_gene(genes, position, random_gene(settings, inputs, draw), settings)
-    fresh = draw.pick(pool)
+    fresh = STRUCTURES[settings.structure](draw.pick(pool))
     match draw.below(4):
         case 0 if len(genes) > 1:
             return genes[:position] + genes[position + 1 :]
@@ -95,19 +95,23 @@ def outer_mutation(
 
 
 def legal(genes: Genes, settings: Settings) -> Genes:
-    """Mend what variation may have broken: phi functions, and a linear y where the constraint needs one."""
+    """Mend genes from elsewhere: phi functions, and a linear y where the constraint needs one."""
     mend = STRUCTURES[settings.structure]
-    genes = tuple(mend(gene) for gene in genes)
+    return with_linear_output(tuple(mend(gene) for gene in genes), settings)
+
+
+def with_linear_output(genes: Genes, settings: Settings) -> Genes:
+    """Give an individual back the linear y that it has lost, where the constraint needs one."""
     if settings.constraints == "none" or any(is_linear_output(gene) for gene in genes):
         return genes
     return (LINEAR_OUTPUT, *genes[: settings.max_terms - 1])
 
 
 def _with_gene(genes: Genes, position: int, gene: Expression, settings: Settings) -> Genes:
-    """Put a gene in its place, or leave the parent's where it is too high."""
+    """Put a gene in its place, mended, or leave the parent's where it is too high."""
     if height(gene) > settings.max_height:
         return genes
-    return (*genes[:position], gene, *genes[position + 1 :])
+    return (*genes[:position], STRUCTURES[settings.structure](gene), *genes[position + 1 :])
 
 
 _Path = tuple[int, ...]

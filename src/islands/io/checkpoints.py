@@ -22,7 +22,7 @@ from islands.model.regressor import Regressor
 from islands.model.text import plain
 from islands.simulation.outcome import Outcome, Verdict
 
-SCHEMA = "islands.checkpoint/1"
+SCHEMA = "islands.checkpoint/2"
 
 
 def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, Any]) -> None:
@@ -72,6 +72,7 @@ def _island(island: Island) -> dict[str, Any]:
         "population": [_individual(each) for each in island.population],
         "elite": [_individual(each) for each in island.elite],
         "hall": [_individual(each) for each in island.hall.entries],
+        "bar": None if island.bar == inf else island.bar,
     }
 
 
@@ -97,6 +98,7 @@ def _read_island(document: Mapping[str, Any], primitives: Mapping[str, Primitive
         population,
         elite,
         HallOfFame(hall),
+        inf if document["bar"] is None else float(document["bar"]),
     )
 
 

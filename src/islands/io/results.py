@@ -38,6 +38,9 @@ def result_json(findings: Findings) -> str:
             "generations": search.generations,
             "duplicates": search.duplicates,
             "feasible_share": search.feasible_share,
+            "caches": {
+                name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
+            },
         },
         "models": [_model_document(rank, entry) for rank, entry in enumerate(findings.models, start=1)],
     }

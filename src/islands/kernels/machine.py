@@ -12,15 +12,22 @@ from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from islands.kernels.compilation import kernel
+from islands.kernels.lanes import VECTOR, add, multiply, read, sign, subtract, write
+
 #: Instructions built into the machine; every other one calls a row function through its address.
-ADD, SUBTRACT, MULTIPLY, SIGN, CALL = 0, 1, 2, 3, 4
+ADD, SUBTRACT, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, CALL = range(6)
 
 #: The largest number of factors that one term multiplies on the fly.
 MAX_FACTORS = 4
+
+
+#: In the place of an operand's channel: it is no signal.
+TEMPORARY = -1
 
 
 class Program(NamedTuple):
@@ -33,7 +40,7 @@ class Program(NamedTuple):
     addresses : ndarray of int64, shape (instructions,)
         Machine address of the row function that a CALL calls, else 0.
     operands : ndarray of int64, shape (operands, 2)
-        Channel and lag, or -1 and the index of a temporary. Channel 0 is the output.
+        Channel and lag, or `TEMPORARY` and its index. Channel 0 is the output.
     constants : ndarray of float64
         The first temporaries hold these.
     temporaries : int
@@ -71,31 +78,41 @@ def call_row(_typingctx, address, target, first, second, lanes):
     return types.void(types.int64, types.int64, types.int64, types.int64, types.int64), generate
 
 
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def execute(arena, operation, target, first, second, lanes, address):
-    """Carry out one instruction on a row: ``arena[target] = operation(arena[first], arena[second])``.
+@kernel(forceinline=True)
+def execute(operation, target, first, second, function, count, times):
+    """Carry out one instruction on rows: ``target = operation(first, second)``.
 
-    ``target``, ``first`` and ``second`` are the rows' offsets in the arena, ``lanes`` their length (uint64).
+    ``target``, ``first`` and ``second`` are addresses; ``function`` is that of a CALL. A row is ``times``
+    times ``count`` vectors, both constants, of which ``count`` are worked at once.
     """
-    if operation == MULTIPLY:
-        for lane in range(lanes):
-            arena[target + lane] = arena[first + lane] * arena[second + lane]
+    step, size = 8 * VECTOR * count, 8 * VECTOR * count * times
+    if operation == CALL:
+        call_row(function, target, first, second, VECTOR * count * times)
+    elif operation == MULTIPLY:
+        for at in range(0, size, step):
+            write(target + at, multiply(read(first + at, count), read(second + at, count)))
     elif operation == SUBTRACT:
-        for lane in range(lanes):
-            arena[target + lane] = arena[first + lane] - arena[second + lane]
+        for at in range(0, size, step):
+            write(target + at, subtract(read(first + at, count), read(second + at, count)))
+    elif operation == SIGN_OF_DIFFERENCE:
+        for at in range(0, size, step):
+            write(target + at, sign(subtract(read(first + at, count), read(second + at, count))))
     elif operation == SIGN:
-        for lane in range(lanes):
-            value = arena[first + lane]
-            arena[target + lane] = np.float64(value > 0.0) - np.float64(value < 0.0)
-    elif operation == ADD:
-        for lane in range(lanes):
-            arena[target + lane] = arena[first + lane] + arena[second + lane]
+        for at in range(0, size, step):
+            write(target + at, sign(read(first + at, count)))
     else:
-        base = arena.ctypes.data
-        call_row(
-            address,
-            base + np.int64(target) * 8,
-            base + np.int64(first) * 8,
-            base + np.int64(second) * 8,
-            np.int64(lanes),
-        )
+        for at in range(0, size, step):
+            write(target + at, add(read(first + at, count), read(second + at, count)))
+
+
+@kernel(forceinline=True)
+def multiply_factors(a, b, c, d, degree, count):
+    """Return the product of the first ``degree`` of four rows, from the left; they are given as addresses."""
+    product = read(a, count)
+    if degree > 1:
+        product = multiply(product, read(b, count))
+        if degree > 2:
+            product = multiply(product, read(c, count))
+            if degree > 3:
+                product = multiply(product, read(d, count))
+    return product

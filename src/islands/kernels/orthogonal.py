@@ -6,12 +6,12 @@ linear algebra library happens to use.
 """
 
 import numpy as np
-from numba import njit
 
-from islands.kernels.sums import FOLD, dot
+from islands.kernels.compilation import kernel
+from islands.kernels.sums import dot
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def orthogonalise(
     matrix,  # in and out, float64 [column, row]: becomes Q, its columns of norm 1
     target,  # in and out, float64 [row]: becomes the residual, orthogonal to Q
@@ -25,18 +25,17 @@ def orthogonalise(
     """
     columns, rows = matrix.shape
     flat = matrix.reshape(-1)
-    fold = np.empty(FOLD)
     triangle[:] = 0.0
     projection[:] = 0.0
     for j in range(columns):
         at = j * rows
-        norm = np.sqrt(dot(flat, at, flat, at, rows, fold))
+        norm = np.sqrt(dot(flat, at, flat, at, rows))
         for _ in range(2):
             for i in range(j):
-                weight = dot(flat, i * rows, flat, at, rows, fold)
+                weight = dot(flat, i * rows, flat, at, rows)
                 triangle[i, j] += weight
                 _subtract(flat, at, weight, flat, i * rows, rows)
-        kept = np.sqrt(dot(flat, at, flat, at, rows, fold))
+        kept = np.sqrt(dot(flat, at, flat, at, rows))
         if not kept > tolerance * norm:
             return j
         triangle[j, j] = kept
@@ -44,13 +43,13 @@ def orthogonalise(
             flat[np.uint64(at) + index] /= kept
     for _ in range(2):
         for j in range(columns):
-            weight = dot(flat, j * rows, target, 0, rows, fold)
+            weight = dot(flat, j * rows, target, 0, rows)
             projection[j] += weight
             _subtract(target, 0, weight, flat, j * rows, rows)
     return -1
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _subtract(x, x_at, weight, y, y_at, rows):
     """``x -= weight * y``."""
     for index in range(np.uint64(rows)):

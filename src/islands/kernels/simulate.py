@@ -4,18 +4,48 @@ The record is cut into intervals; each starts from measured values and runs free
 block is a row of lanes that are simulated together, so that one instruction of the program works on a whole
 row (layout ``[block][time][lane]``). Intervals of one sample are one-step-ahead prediction, a single interval
 is the free run.
+
+A row is always computed whole. Lanes behind the block's last one repeat its first, and a lane that has ended
+runs on; what they yield is never counted.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from islands.kernels.machine import execute
+from islands.kernels.compilation import kernel
+from islands.kernels.lanes import (
+    VECTOR,
+    add,
+    address,
+    load,
+    multiply,
+    outside,
+    read,
+    room,
+    splat,
+    subtract,
+    write,
+)
+from islands.kernels.machine import TEMPORARY, execute, multiply_factors
 
 #: Steps that are simulated before the history is moved and the bound is checked.
 CHUNK = 64
+
+#: Vectors of a row that the kernel is compiled for: a single lane, a short record, and as many as keep the
+#: history of a model inside the first-level cache.
+NARROW, MIDDLE, WIDE = 1, 3, 13
+
+#: Lanes of those rows.
+WIDTHS = (VECTOR * NARROW, VECTOR * MIDDLE, VECTOR * WIDE)
+
+#: How a simulation ended: after its last step, in a divergence, or beyond the error that it was allowed.
+COMPLETE, DIVERGED, BEYOND = 0, 1, 2
+
+#: A sum in another order may differ from the written one by its rounding, and nothing may be given up for
+#: that.
+_ROUNDING = 1.0 + 1e-9
 
 
 class Layout(NamedTuple):
@@ -24,7 +54,7 @@ class Layout(NamedTuple):
     Attributes
     ----------
     signals : ndarray of float64, shape (channel, flat)
-        Channel 0 is the measured output, then come the inputs.
+        Channel 0 is the measured output, then come the inputs. A row may be read behind the last sample.
     block_offset : ndarray of int64, shape (block,)
         Where in a channel the first warm-up row of the block stands.
     block_lanes : ndarray of int64, shape (block,)
@@ -36,9 +66,11 @@ class Layout(NamedTuple):
     length : ndarray of int64, shape (lane of all blocks,)
         Samples of the interval; not increasing within a block.
     width : int
-        The most lanes of a block.
+        Lanes of a row, one of `WIDTHS`.
     warm_up : int
         Rows before the first predicted one.
+    largest : float
+        The largest size of a measured output.
     """
 
     signals: NDArray[np.float64]
@@ -49,169 +81,162 @@ class Layout(NamedTuple):
     length: NDArray[np.int64]
     width: int
     warm_up: int
+    largest: float
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def simulate(
     program,
     theta,  # float64 [term]
     layout,
     bound,  # a larger absolute prediction is a divergence
+    allowed,  # stop where the sum of all squared errors is larger
     patient,  # False: stop at the end of the first chunk in which an interval diverged
     squared_error,  # out, float64 [lane of all blocks]: sum over the interval, in the order of time
     diverged,  # out, int64 [lane of all blocks]: step at which the interval left the bound, or -1
     predicted,  # out, float64 [sample] in the record's order; size 0: not wanted
 ):
-    """Simulate every interval from measured values; the caller sums over intervals."""
-    signals, warm_up, width, row_stride = layout.signals, layout.warm_up, layout.width, layout.row_stride
-    start, length = layout.start, layout.length
-    code, addresses = program.code, program.addresses
-    channels = signals.shape[0]
-    row = np.uint64(width)
-    history = warm_up + CHUNK
-    arena = np.empty((channels * history + program.temporaries) * width)
-    first_temporary = np.uint64(channels * history * width)
-    home, stride = _operand_rows(program, first_temporary, history, warm_up, row)
-    place = np.empty_like(home)
-    for index in range(program.constants.size):
-        at = first_temporary + np.uint64(index) * row
-        for lane in range(row):
-            arena[at + lane] = program.constants[index]
+    """Simulate every interval from measured values, and tell how it ended; the caller sums over intervals."""
+    # Functions of their own: in each, the lanes of a row are known to the compiler.
+    if layout.width == VECTOR * WIDE:
+        return _wide(program, theta, layout, bound, allowed, patient, squared_error, diverged, predicted)
+    if layout.width == VECTOR * MIDDLE:
+        return _middle(program, theta, layout, bound, allowed, patient, squared_error, diverged, predicted)
+    return _narrow(program, theta, layout, bound, allowed, patient, squared_error, diverged, predicted)
 
-    y_home = np.uint64(warm_up) * row
-    lane_base = 0
-    for block in range(layout.block_offset.size):
-        lanes = np.uint64(layout.block_lanes[block])
-        offset = layout.block_offset[block]
-        for lane in range(lane_base, lane_base + layout.block_lanes[block]):
-            squared_error[lane] = 0.0
-            diverged[lane] = -1
-        for channel in range(channels):
-            target = np.uint64(channel * history) * row
-            _copy_rows(signals, channel, offset, row_stride, arena, target, row, lanes, warm_up)
-        steps = length[lane_base]
-        active = lanes
-        done = 0
-        while done < steps:
-            chunk = min(CHUNK, steps - done)
-            measured = offset + (warm_up + done) * row_stride
-            for channel in range(1, channels):
-                target = np.uint64(channel * history + warm_up) * row
-                _copy_rows(signals, channel, measured, row_stride, arena, target, row, lanes, chunk)
-            place[:] = home
-            y_row = y_home
-            outside = 0
-            for step in range(done, done + chunk):
-                while length[lane_base + np.int64(active) - 1] <= step:
-                    active -= np.uint64(1)
-                for index in range(code.shape[0]):
-                    target = first_temporary + np.uint64(code[index, 1]) * row
-                    first, second = place[code[index, 2]], place[code[index, 3]]
-                    execute(arena, code[index, 0], target, first, second, active, addresses[index])
-                _sum_terms(arena, program.factors, program.degree, theta, place, y_row, active)
-                outside += _add_squared_error(
-                    arena, y_row, signals, measured, squared_error, lane_base, active, bound
-                )
+
+def _simulator(count):
+    """Make the simulation of rows of ``count`` vectors."""
+    width = VECTOR * count
+
+    @kernel
+    def run(program, theta, layout, bound, allowed, patient, squared_error, diverged, predicted):
+        signals, warm_up, apart = layout.signals.reshape(-1), layout.warm_up, 8 * layout.row_stride
+        start, length = layout.start, layout.length
+        code, addresses = program.code, program.addresses
+        operands, factors, degree = program.operands, program.factors, program.degree
+        flat = layout.signals.shape[1]
+        # The predictions, the temporaries, and last the squared errors of a block.
+        arena = room((warm_up + CHUNK + program.temporaries + 1) * width)
+        predictions, squares = warm_up * width, arena.size - width
+        temporaries = (warm_up + CHUNK) * width
+        place, stride = np.empty(operands.shape[0], np.int64), np.empty(operands.shape[0], np.int64)
+        for index in range(program.constants.size):
+            write(address(arena, temporaries + index * width), splat(program.constants[index], count))
+        targets = np.empty(code.shape[0], np.int64)
+        for index in range(code.shape[0]):
+            targets[index] = address(arena, temporaries + code[index, 1] * width)
+
+        # An error this small in every lane, and no prediction was outside the bound. A square that vanishes
+        # or overflows tells nothing.
+        safe = (bound - layout.largest) ** 2 * 0.99 if bound > layout.largest else -1.0
+        if not 1e-290 < safe < 1e300:
+            safe = -1.0
+        ending, error_before, lane_base = COMPLETE, 0.0, 0
+        for block in range(layout.block_offset.size):
+            lanes = layout.block_lanes[block]
+            offset = layout.block_offset[block]
+            write(address(arena, squares), splat(0.0, count))
+            for lane in range(lane_base, lane_base + lanes):
+                diverged[lane] = -1
+            for step in range(warm_up):
+                row = read(address(signals, offset) + step * apart, count)
+                write(address(arena, step * width), row)
+            steps = length[lane_base]
+            active = lanes
+            done = 0
+            while done < steps:
+                chunk = min(CHUNK, steps - done)
+                sample = offset + (warm_up + done) * layout.row_stride
                 for index in range(place.size):
-                    place[index] += stride[index]
-                y_row += row
-                measured += row_stride
-            if outside > 0:
-                _find_divergence(arena, y_home, row, lane_base, lanes, length, done, chunk, bound, diverged)
-                if not patient:
-                    return
-            if predicted.size > 0:
-                _scatter(arena, y_home, row, lane_base, lanes, start, length, done, chunk, predicted)
-            for channel in range(channels):
-                base = np.uint64(channel * history) * row
-                for index in range(np.uint64(warm_up) * row):
-                    arena[base + index] = arena[base + index + np.uint64(chunk) * row]
-            done += chunk
-        lane_base += layout.block_lanes[block]
+                    channel, lag = operands[index]
+                    if channel == TEMPORARY:
+                        place[index], stride[index] = address(arena, temporaries + lag * width), 0
+                    elif channel == 0:
+                        place[index], stride[index] = address(arena, predictions - lag * width), 8 * width
+                    else:
+                        place[index], stride[index] = (
+                            address(signals, channel * flat + sample) - lag * apart,
+                            apart,
+                        )
+                measured, prediction = address(signals, sample), address(arena, predictions)
+                for step in range(done, done + chunk):
+                    while length[lane_base + active - 1] <= step:
+                        active -= 1
+                        squared_error[lane_base + active] = arena[squares + active]
+                    for index in range(code.shape[0]):
+                        first, second = place[code[index, 2]], place[code[index, 3]]
+                        execute(code[index, 0], targets[index], first, second, addresses[index], count, 1)
+                    # The terms are added in their order.
+                    y = splat(0.0, count)
+                    for term in range(theta.size):
+                        a, b = place[factors[term, 0]], place[factors[term, 1]]
+                        c, d = place[factors[term, 2]], place[factors[term, 3]]
+                        product = multiply_factors(a, b, c, d, degree[term], count)
+                        y = add(y, multiply(splat(theta[term], count), product))
+                    write(prediction, y)
+                    error = subtract(y, read(measured, count))
+                    square = add(read(address(arena, squares), count), multiply(error, error))
+                    write(address(arena, squares), square)
+                    for index in range(place.size):
+                        place[index] += stride[index]
+                    prediction += 8 * width
+                    measured += apart
+                if outside(load(arena, squares, count), safe) and _find_divergence(
+                    arena, predictions, width, lane_base, lanes, length, done, chunk, bound, diverged
+                ):
+                    ending = DIVERGED
+                    if not patient:
+                        return ending
+                if predicted.size > 0:
+                    _scatter(
+                        arena, predictions, width, lane_base, lanes, start, length, done, chunk, predicted
+                    )
+                done += chunk
+                if done < steps:
+                    if error_before + _running_error(arena, squares, active) > allowed * _ROUNDING:
+                        return BEYOND
+                    for step in range(warm_up):
+                        row = load(arena, (step + chunk) * width, count)
+                        write(address(arena, step * width), row)
+            for lane in range(active):
+                squared_error[lane_base + lane] = arena[squares + lane]
+            for lane in range(lanes):
+                error_before += squared_error[lane_base + lane]
+            if error_before > allowed * _ROUNDING:
+                return BEYOND
+            lane_base += lanes
+        return ending
+
+    return run
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _operand_rows(program, first_temporary, history, warm_up, row):
-    """Return every operand's offset at the first step, and by how much it moves with a step."""
-    count = program.operands.shape[0]
-    home = np.empty(count, np.uint64)
-    stride = np.empty(count, np.uint64)
-    for index in range(count):
-        channel, lag = program.operands[index]
-        if channel < 0:
-            home[index] = first_temporary + np.uint64(lag) * row
-            stride[index] = np.uint64(0)
-        else:
-            home[index] = np.uint64(channel * history + warm_up - lag) * row
-            stride[index] = row
-    return home, stride
+_narrow, _middle, _wide = _simulator(NARROW), _simulator(MIDDLE), _simulator(WIDE)
 
 
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _copy_rows(signals, channel, offset, row_stride, arena, target, row, lanes, rows):
-    for index in range(rows):
-        source = np.uint64(offset + index * row_stride)
-        for lane in range(lanes):
-            arena[target + lane] = signals[channel, source + lane]
-        target += row
-
-
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _sum_terms(arena, factors, degree, theta, place, y_row, active):
-    """``y = theta_1 psi_1 + theta_2 psi_2 + ...`` in the order of the terms, each product from the left."""
+@kernel
+def _running_error(arena, squares, active):
+    total = 0.0
     for lane in range(active):
-        arena[y_row + lane] = 0.0
-    for term in range(theta.size):
-        weight = theta[term]
-        a = place[factors[term, 0]]
-        if degree[term] == 1:
-            for lane in range(active):
-                arena[y_row + lane] += weight * arena[a + lane]
-            continue
-        b = place[factors[term, 1]]
-        if degree[term] == 2:
-            for lane in range(active):
-                arena[y_row + lane] += weight * (arena[a + lane] * arena[b + lane])
-            continue
-        c = place[factors[term, 2]]
-        if degree[term] == 3:
-            for lane in range(active):
-                arena[y_row + lane] += weight * (arena[a + lane] * arena[b + lane] * arena[c + lane])
-            continue
-        d = place[factors[term, 3]]
-        for lane in range(active):
-            arena[y_row + lane] += weight * (
-                arena[a + lane] * arena[b + lane] * arena[c + lane] * arena[d + lane]
-            )
+        total += arena[squares + lane]
+    return total
 
 
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _add_squared_error(arena, y_row, signals, measured, squared_error, lane_base, active, bound):
-    """Add the row's squared errors; return how many lanes left the bound (NaN counts as leaving)."""
-    outside = 0
-    source = np.uint64(measured)
-    total = np.uint64(lane_base)
-    for lane in range(active):
-        value = arena[y_row + lane]
-        error = value - signals[0, source + lane]
-        squared_error[total + lane] += error * error
-        outside += np.int64(not (abs(value) <= bound))
-    return outside
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _find_divergence(arena, y_home, row, lane_base, lanes, length, done, chunk, bound, diverged):
-    for lane in range(np.int64(lanes)):
+@kernel
+def _find_divergence(arena, predictions, width, lane_base, lanes, length, done, chunk, bound, diverged):
+    """Note where lanes of the block left the bound in this chunk; tell whether one has, now or before."""
+    found = False
+    for lane in range(lanes):
         for step in range(min(chunk, length[lane_base + lane] - done)):
-            value = arena[y_home + np.uint64(step) * row + np.uint64(lane)]
+            value = arena[predictions + step * width + lane]
             if diverged[lane_base + lane] < 0 and not (abs(value) <= bound):
                 diverged[lane_base + lane] = done + step
+        found |= diverged[lane_base + lane] >= 0
+    return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _scatter(arena, y_home, row, lane_base, lanes, start, length, done, chunk, predicted):
-    for lane in range(np.int64(lanes)):
+@kernel
+def _scatter(arena, predictions, width, lane_base, lanes, start, length, done, chunk, predicted):
+    for lane in range(lanes):
         for step in range(min(chunk, length[lane_base + lane] - done)):
-            predicted[start[lane_base + lane] + done + step] = arena[
-                y_home + np.uint64(step) * row + np.uint64(lane)
-            ]
+            predicted[start[lane_base + lane] + done + step] = arena[predictions + step * width + lane]

@@ -5,9 +5,8 @@ belongs to no cluster. The others are put together when their steady states are 
 and y(k-6) u(k-10) both are ybar ubar. The sums of the parameters over each cluster decide the equilibria.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 from islands.model.expression import Apply, Expression, Lagged, Shift, content
 from islands.model.regressor import Regressor, canonical
@@ -41,17 +40,22 @@ class Cluster:
         )
 
 
-@lru_cache(maxsize=1 << 16)
 def steady_state(regressor: Regressor) -> tuple[float, Expression]:
     """Return (weight, expression) of a regressor at rest; the weight is 0 where a phi factor vanishes."""
     return canonical(_at_rest(regressor.expression))
 
 
-def clusters(regressors: Sequence[Regressor]) -> tuple[Cluster, ...]:
-    """Group the regressors that do not vanish at rest; clusters stand in the order of their content."""
+def clusters(
+    regressors: Sequence[Regressor],
+    group: Callable[[Regressor], tuple[float, Expression]] = steady_state,
+) -> tuple[Cluster, ...]:
+    """Group the regressors that do not vanish at rest; clusters stand in the order of their content.
+
+    Another ``group`` than the steady state may be given: a regressor's weight, 0 for none, and its group.
+    """
     groups: dict[Expression, list[tuple[int, float]]] = {}
     for position, regressor in enumerate(regressors):
-        weight, state = steady_state(regressor)
+        weight, state = group(regressor)
         if weight:
             groups.setdefault(state, []).append((position, weight))
     return tuple(

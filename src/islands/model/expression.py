@@ -70,6 +70,18 @@ class Shift:
 
     samples: int
     argument: "Expression"
+    _hash: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # Trees are looked up a million times in a search, and share their subtrees.
+        object.__setattr__(self, "_hash", hash((self.samples, self.argument)))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        # A hash is of one process alone.
+        return Shift, (self.samples, self.argument)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +90,16 @@ class Apply:
 
     primitive: Primitive
     arguments: "tuple[Expression, ...]"
+    _hash: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_hash", hash((self.primitive.name, self.arguments)))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        return Apply, (self.primitive, self.arguments)
 
 
 Expression = Lagged | Constant | Shift | Apply

@@ -9,12 +9,10 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels import columns as column_kernel
 from islands.kernels import gram as gram_kernel
+from islands.kernels.columns import Rows
 from islands.kernels.machine import Program
-from islands.model.expression import Expression
-from islands.model.regressor import Regressor
 from islands.program.linker import link
-
-Term = Regressor | Expression
+from islands.program.store import Term
 
 
 def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray[np.float64]:
@@ -32,9 +30,9 @@ def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> ND
     """
     program = link(terms)
     _refuse_unreadable(program, record, warm_up)
-    signals, first, rows = _rows(record, warm_up)
-    out = np.empty((len(terms), int(rows.sum())))
-    column_kernel.columns(program, signals, first, rows, warm_up, out)
+    rows = rows_of(record, warm_up)
+    out = np.empty((len(terms), int(rows.rows.sum())))
+    column_kernel.columns(program, rows, out)
     return out
 
 
@@ -69,9 +67,8 @@ def inner_products(
     """
     program = link(terms)
     _refuse_unreadable(program, record, warm_up)
-    signals, first, rows = _rows(record, warm_up)
     out = np.empty(len(pairs))
-    gram_kernel.inner_products(program, signals, first, rows, warm_up, np.ascontiguousarray(pairs), out)
+    gram_kernel.inner_products(program, rows_of(record, warm_up), np.ascontiguousarray(pairs), out)
     return out
 
 
@@ -85,7 +82,14 @@ def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
         raise SettingsError(f"the terms read {lag} samples back, the warm-up has {warm_up}")
 
 
-def _rows(record: Dataset, warm_up: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+def rows_of(record: Dataset, warm_up: int) -> Rows:
+    """Return the rows that estimate: those of every segment after its warm-up.
+
+    Raises
+    ------
+    RecordError
+        An output is missing, or no segment is longer than the warm-up.
+    """
     missing = np.flatnonzero(np.isnan(record.y))
     if missing.size:
         raise RecordError(
@@ -102,4 +106,4 @@ def _rows(record: Dataset, warm_up: int) -> tuple[NDArray[np.float64], NDArray[n
         )
     first, rows = np.array(spans, np.int64).T
     signals = np.ascontiguousarray(np.vstack([record.y, record.u.T]))
-    return signals, np.ascontiguousarray(first), np.ascontiguousarray(rows)
+    return Rows(signals, np.ascontiguousarray(first), np.ascontiguousarray(rows), warm_up)

@@ -5,10 +5,11 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.kernels.simulate import Layout
+from islands.kernels.lanes import room
+from islands.kernels.simulate import WIDTHS, Layout
 
-#: Most lanes of a block: its rows of 832 bytes keep the history of a model inside the first-level cache.
-WIDTH = 104
+#: What an instruction costs besides the work on its row, in lanes.
+_OVERHEAD = 24
 
 
 def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout:
@@ -34,44 +35,46 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     start, length = _intervals(record, warm_up, interval)
     _check_warm_up(record.y, start, warm_up)
     signals = np.ascontiguousarray(np.vstack([record.y, record.u.T]))
-    cuts = np.arange(0, len(start), WIDTH)
+    known = record.y[~np.isnan(record.y)]
+    largest = float(np.abs(known).max()) if known.size else 0.0
+    width = min(WIDTHS, key=lambda lanes: -(-len(start) // lanes) * (lanes + _OVERHEAD))
+    cuts = np.arange(0, len(start), width)
     if interval == 1:
         # One step ahead needs no gathering: neighbouring lanes are neighbouring samples of one segment.
         cuts = np.union1d(cuts, np.flatnonzero(np.diff(start) != 1) + 1)
         lanes = np.diff(np.append(cuts, len(start)))
-        return Layout(signals, start[cuts] - warm_up, lanes, 1, start, length, int(lanes.max()), warm_up)
+        padded = np.pad(signals, ((0, 0), (0, width)), mode="edge")
+        return Layout(padded, start[cuts] - warm_up, lanes, 1, start, length, width, warm_up, largest)
     order = np.argsort(-length, kind="stable")
     start, length = start[order], length[order]
     lanes = np.diff(np.append(cuts, len(start)))
-    width = int(lanes.max())
     rows = warm_up + length[cuts]
     offset = width * (np.cumsum(rows) - rows)
-    gathered = np.zeros((len(signals), int(rows.sum()) * width))
+    gathered = room(len(signals) * int(rows.sum()) * width).reshape(len(signals), -1)
     for cut, count, at, steps in zip(cuts, lanes, offset, rows, strict=True):
+        # A short lane goes on at the record's end; lanes that nobody has asked for repeat the first.
         samples = start[cut : cut + count] - warm_up + np.arange(steps)[:, None]
         block = gathered[:, at : at + steps * width].reshape(len(signals), steps, width)
-        # A short lane ends before the block does; what stands behind its end is never read.
         block[:, :, :count] = signals[:, np.minimum(samples, record.samples - 1)]
-    return Layout(gathered, offset, lanes, width, start, length, width, warm_up)
+        block[:, :, count:] = block[:, :, :1]
+    return Layout(gathered, offset, lanes, width, start, length, width, warm_up, largest)
 
 
 def _intervals(
     record: Dataset, warm_up: int, interval: int | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return first sample and length of every interval, in the order of time."""
-    pairs = [
-        (start, min(interval or record.samples, end - start))
-        for begin, end in record.bounds
-        for start in range(begin + warm_up, end, interval or record.samples)
-    ]
-    if not pairs:
+    step = interval or record.samples
+    starts = [np.arange(begin + warm_up, end, step) for begin, end in record.bounds]
+    if not any(begun.size for begun in starts):
         longest = max(record.segments)
         raise RecordError(
             f"the longest recording has {longest} samples and the warm-up takes {warm_up}: "
             "take a longer recording, smaller lags or a shorter warm-up"
         )
-    start, length = np.array(pairs, np.int64).T
-    return np.ascontiguousarray(start), np.ascontiguousarray(length)
+    ends = [np.full(begun.size, end) for begun, (_, end) in zip(starts, record.bounds, strict=True)]
+    start = np.concatenate(starts)
+    return start, np.minimum(step, np.concatenate(ends) - start)
 
 
 def _check_warm_up(y: NDArray[np.float64], start: NDArray[np.int64], warm_up: int) -> None:

@@ -19,6 +19,7 @@ class Verdict(Enum):
     TOO_FEW_ROWS = (
         "there are not more rows than parameters: take a longer record, fewer terms or smaller lags"
     )
+    ABANDONED = "nothing to do: others are better"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """What a search found: assessed models, the best first, and what it took to find them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
@@ -57,9 +57,11 @@ class Search:
         Seconds it took, from whoever has a clock.
     generations, duplicates, feasible_share
         Of an evolution: generations done, individuals whose structure had been evaluated before, and the
-        share of individuals that got a finite fitness; None for other searches.
+        share of individuals that got parameters; None for other searches.
     history : tuple of Progress
         The course of an evolution, oldest first.
+    caches : mapping
+        Bytes that every cache of an evolution takes at its end, and its limit.
     """
 
     evaluations: int
@@ -70,6 +72,7 @@ class Search:
     duplicates: int | None = None
     feasible_share: float | None = None
     history: tuple[Progress, ...] = ()
+    caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def evaluations_per_second(self) -> float | None:

@@ -45,11 +45,13 @@ def archipelago():
         "u1(k-1)", fitness=inf, outcome=Outcome(Verdict.INFEASIBLE, 'no "y" at rest \u2013 add it')
     )
     unevaluated = Individual((parse("phi1(u1(k-1), u1(k-1))"),))
-    population = (good, failed, unevaluated, individual("y(k-2)", fitness=5e-324))
+    abandoned = individual("y(k-3)", fitness=inf, outcome=Outcome(Verdict.ABANDONED, "beyond the bar"))
+    population = (good, failed, unevaluated, individual("y(k-2)", fitness=5e-324), abandoned)
     hall = with_entries(HallOfFame(), population)
     assert len(hall.entries) == 2
-    here = Island(0, 2**40, 7, population, population[:1], hall)
-    return Archipelago((here, replace(here, index=1, population=population[::-1], elite=())), 7)
+    here = Island(0, 2**40, 7, population, population[:1], hall, 0.1 + 0.2)
+    beside = replace(here, index=1, population=population[::-1], elite=(), bar=inf)
+    return Archipelago((here, beside), 7)
 
 
 ABOUT = {"job": {"record": "record.csv", "seed": 3}, "history": [[0, 200, {"1": 0.1 + 0.2}]]}
@@ -89,8 +91,9 @@ def test_the_empty_archipelago_is_a_checkpoint_too(path):
 
 
 def test_it_is_json_that_others_can_read(document, path):
-    assert document["schema"] == SCHEMA == "islands.checkpoint/1"
+    assert document["schema"] == SCHEMA == "islands.checkpoint/2"
     assert document["islands"][0]["population"][1]["fitness"] is None
+    assert [island["bar"] for island in document["islands"]] == [0.1 + 0.2, None]
     assert "Infinity" not in path.read_text()
     assert "NaN" not in path.read_text()
 
@@ -106,6 +109,15 @@ def test_primitives_of_the_user_s_own_are_read_back_from_their_table(path):
     write_checkpoint(kept, path, {})
     assert read_checkpoint(path, table)[0] == kept
     with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*unknown function 'twice'"):
+        read_checkpoint(path)
+
+
+@pytest.mark.parametrize("name", ["index", "seed", "generation", "population", "elite", "hall", "bar"])
+def test_an_island_that_lacks_a_part_is_refused(document, path, name):
+    """An island without its bar is one of the first schema, whose tournaments knew every fitness."""
+    del document["islands"][1][name]
+    path.write_text(json.dumps(document))
+    with pytest.raises(ModelError, match=f"checkpoint.json is damaged: KeyError\\('{name}'\\)"):
         read_checkpoint(path)
 
 
@@ -178,12 +190,12 @@ def test_a_foreign_file_is_refused(path, content):
 
 
 @pytest.mark.parametrize(
-    "foreign", [[], 3, {}, {"schema": "islands.model/1"}, {"schema": "islands.checkpoint/2"}]
+    "foreign", [[], 3, {}, {"schema": "islands.model/1"}, {"schema": "islands.checkpoint/1"}]
 )
 def test_another_schema_is_refused(path, foreign):
     path.write_text(json.dumps(foreign))
     with pytest.raises(
-        ModelError, match=r"checkpoint\.json is no checkpoint of schema islands\.checkpoint/1"
+        ModelError, match=r"checkpoint\.json is no checkpoint of schema islands\.checkpoint/2"
     ):
         read_checkpoint(path)
 
@@ -203,6 +215,8 @@ def test_a_missing_part_is_named(document, path, key):
         (("islands",), 5),
         (("islands", 0), []),
         (("islands", 0, "index"), None),
+        (("islands", 0, "bar"), "high"),
+        (("islands", 0, "bar"), []),
         (("islands", 0, "population"), 3),
         (("islands", 0, "population", 0, "genes", 0), "y(k-"),
         (("islands", 0, "population", 0, "genes", 0), "os.remove(k-1)"),

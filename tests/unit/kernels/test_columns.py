@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from islands.kernels.columns import columns
-from islands.kernels.sums import FOLD
+from islands.kernels.columns import Rows, columns
+from islands.kernels.sums import CHUNK
 from islands.model.expression import Constant, Lagged, value
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
@@ -24,7 +24,7 @@ TERMS = [
 ]
 
 #: Segments around the kernel's 256 rows, with 9 samples before each first row.
-LENGTHS = (10, 9 + FOLD - 1, 9 + FOLD, 9 + FOLD + 1, 9 + 3 * FOLD + 5)
+LENGTHS = (10, 9 + CHUNK - 1, 9 + CHUNK, 9 + CHUNK + 1, 9 + 3 * CHUNK + 5)
 
 
 def made(text):
@@ -33,7 +33,7 @@ def made(text):
 
 def evaluated(terms, signals, first, rows, warm_up):
     out = np.full((len(terms), sum(rows)), np.nan)
-    columns(link(terms), signals, np.array(first), np.array(rows), warm_up, out)
+    columns(link(terms), Rows(signals, np.array(first), np.array(rows), warm_up), out)
     return out
 
 

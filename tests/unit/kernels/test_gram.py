@@ -1,65 +1,94 @@
-"""The Gram matrix is that of the columns, to the last bit, and the columns are never held."""
+"""Inner products are those of the columns, to the last bit, and the columns are never held."""
 
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from islands.kernels.columns import columns
+from islands.kernels.columns import Rows, columns
 from islands.kernels.gram import inner_products
-from islands.kernels.sums import FOLD, dot
+from islands.kernels.sums import CHUNK, dot
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.linker import link
 
-TEXTS = ["y(k-1)", "u(k-3)", "y(k-1)*u(k-1)^2*y(k-2)*u(k-2)", "sign(u(k-1) - u(k-2))", "1/(2 + abs(y(k-1)))"]
+#: The constant is one on rows behind a segment's end, too: they must not count.
+TEXTS = [
+    "1",
+    "y(k-1)",
+    "u(k-3)",
+    "y(k-1)*u(k-1)^2*y(k-2)*u(k-2)",
+    "sign(u(k-1) - u(k-2))",
+    "1/(2 + abs(y(k-1)))",
+]
 TERMS = [*(regressor(parse(text))[1] for text in TEXTS), Lagged(0, 0)]
+SQUARE = np.array([(i, j) for i in range(len(TERMS)) for j in range(len(TERMS))])
 WARM_UP = 3
 
-#: Rows of the segments: a short record, whole chunks, chunks that span one boundary and several.
-ROWS = [(1,), (40,), (FOLD,), (FOLD + 1,), (FOLD - 1, 1), (FOLD, FOLD), (100, 100, 100), (10, 1, 700, 3)]
+#: Rows of the segments: a short record, whole chunks, and segments that end anywhere in a chunk.
+ROWS = [
+    (1,),
+    (40,),
+    (CHUNK,),
+    (CHUNK + 1,),
+    (CHUNK - 1, 1),
+    (CHUNK, CHUNK),
+    (100, 100, 100),
+    (10, 1, 700, 3),
+]
 
 
-def spans(rows):
-    """First row and rows of every segment, and signals long enough."""
+def record(rows, seed=7):
+    """Signals of segments with so many rows, each behind a warm-up of its own."""
     begin = np.cumsum((0, *(count + WARM_UP for count in rows)))
-    signals = np.random.default_rng(7).normal(size=(2, int(begin[-1])))
-    return signals, begin[:-1] + WARM_UP, np.array(rows)
+    signals = np.random.default_rng(seed).normal(size=(2, int(begin[-1])))
+    return Rows(signals, begin[:-1] + WARM_UP, np.array(rows), WARM_UP)
 
 
-def gram(program, signals, first, rows, warm_up, out):
-    """Fill a square of inner products, every pair computed on its own."""
-    pairs = np.array([(i, j) for i in range(len(out)) for j in range(len(out))])
-    flat = np.full(len(pairs), np.nan)
-    inner_products(program, signals, first, rows, warm_up, pairs, flat)
-    out[:] = flat.reshape(out.shape)
+def products_of(terms, rows, pairs):
+    out = np.full(len(pairs), np.nan)
+    inner_products(link(terms), rows, np.asarray(pairs), out)
+    return out
 
 
 def gram_of(terms, rows):
-    out = np.full((len(terms), len(terms)), np.nan)
-    gram(link(terms), *spans(rows), WARM_UP, out)
-    return out
+    return products_of(terms, rows, SQUARE).reshape(len(terms), len(terms))
 
 
 def columns_of(terms, rows):
-    out = np.empty((len(terms), sum(rows)))
-    columns(link(terms), *spans(rows), WARM_UP, out)
+    out = np.empty((len(terms), rows.rows.sum()))
+    columns(link(terms), rows, out)
     return out
 
 
+def filled(psi, rows):
+    """Fill every segment's columns with zeros up to a multiple of 256 rows."""
+    segments = np.split(psi, np.cumsum(rows)[:-1], axis=1)
+    return np.hstack([np.pad(part, ((0, 0), (0, -part.shape[1] % CHUNK))) for part in segments])
+
+
 @pytest.mark.parametrize("rows", ROWS)
-def test_every_entry_is_the_inner_product_of_two_columns_bit_for_bit(rows):
-    psi, found = columns_of(TERMS, rows), gram_of(TERMS, rows)
-    count = psi.shape[1]
-    for i in range(len(TERMS)):
-        for j in range(i, len(TERMS)):
-            assert found[i, j] == dot(psi[i], 0, psi[j], 0, count, np.empty(FOLD))
+def test_every_entry_is_the_inner_product_of_two_filled_columns_bit_for_bit(rows):
+    found, psi = gram_of(TERMS, record(rows)), filled(columns_of(TERMS, record(rows)), rows)
+    for i, one in enumerate(psi):
+        for j, other in enumerate(psi):
+            assert found[i, j] == dot(one, 0, other, 0, one.size)
+
+
+@given(st.lists(st.integers(1, 600), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
+def test_the_order_begins_anew_in_every_segment_whatever_their_lengths(rows, seed):
+    data = record(rows, seed)
+    psi = filled(columns_of(TERMS, data), rows)
+    expected = [[dot(one, 0, other, 0, one.size) for other in psi] for one in psi]
+    assert np.array_equal(gram_of(TERMS, data), expected)
 
 
 @pytest.mark.parametrize("rows", ROWS)
 def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
-    psi, found = columns_of(TERMS, rows), gram_of(TERMS, rows)
+    psi, found = columns_of(TERMS, record(rows)), gram_of(TERMS, record(rows))
     for i, a in enumerate(psi.tolist()):
         for j, b in enumerate(psi.tolist()):
             products = [left * right for left, right in zip(a, b, strict=True)]
@@ -67,22 +96,47 @@ def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
 
 
 def test_a_gram_matrix_is_symmetric_and_has_no_negative_direction():
-    found = gram_of(TERMS, (10, 1, 700, 3))
+    found = gram_of(TERMS, record((10, 1, 700, 3)))
     assert np.array_equal(found, found.T)
     assert np.linalg.eigvalsh(found).min() > 0
 
 
 def test_an_entry_does_not_depend_on_the_terms_beside_it():
-    together = gram_of(TERMS, (300, 500))
+    data = record((300, 500))
+    together = gram_of(TERMS, data)
     for i in range(len(TERMS)):
         for j in range(len(TERMS)):
-            assert gram_of([TERMS[i], TERMS[j]], (300, 500))[0, 1] == together[i, j]
+            assert products_of([TERMS[i], TERMS[j]], data, [(0, 1)])[0] == together[i, j]
 
 
-def test_cutting_a_record_in_segments_that_warm_up_on_it_changes_no_bit():
-    # The fold's order knows rows, not segments: the same rows in other stretches give the same sums.
-    signals = np.random.default_rng(8).normal(size=(2, 603))
-    whole, cut = np.empty((2, len(TERMS), len(TERMS)))
-    gram(link(TERMS), signals, np.array([3]), np.array([600]), WARM_UP, whole)
-    gram(link(TERMS), signals, np.array([3, 103, 404]), np.array([100, 301, 199]), WARM_UP, cut)
+place = st.integers(0, len(TERMS) - 1)
+
+
+@given(st.lists(st.tuples(place, st.lists(place, min_size=1, max_size=9)), min_size=1, max_size=6))
+def test_an_entry_does_not_depend_on_the_pairs_beside_it(drawn):
+    """Neighbours that share their first term are computed four at a time, others alone."""
+    data = record((300, 40))
+    pairs = [(one, other) for one, others in drawn for other in others]
+    together = gram_of(TERMS, data)
+    assert products_of(TERMS, data, pairs).tolist() == [together[pair] for pair in pairs]
+
+
+def test_more_pairs_than_a_pass_over_the_record_takes_are_all_computed():
+    data = record((5, 2))
+    one = products_of(TERMS, data, SQUARE)
+    repeats = (1 << 20) // len(SQUARE) + 2
+    many = products_of(TERMS, data, np.tile(SQUARE, (repeats, 1)))
+    assert many.size > 1 << 20
+    assert np.array_equal(many, np.tile(one, repeats))
+
+
+def test_a_segment_of_its_own_record_gives_the_same_bits_as_alone():
+    # What a segment adds does not know what came before it: two halves of whole chunks are one record.
+    signals = np.random.default_rng(8).normal(size=(2, 1027))
+    whole = gram_of(TERMS, Rows(signals, np.array([3]), np.array([1024]), WARM_UP))
+    cut = gram_of(TERMS, Rows(signals, np.array([3, 259, 771]), np.array([256, 512, 256]), WARM_UP))
     assert np.array_equal(whole, cut)
+
+
+def test_no_pairs_are_no_numbers():
+    assert products_of(TERMS, record((5,)), np.empty((0, 2), np.int64)).size == 0

@@ -1,10 +1,16 @@
-"""The simulation kernel's own contract: its outputs a lane, its bound, its impatience."""
+"""The simulation kernel's own contract: a plain recursion on every lane, at every width of a row."""
+
+import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
-from islands.kernels.simulate import CHUNK, simulate
+from islands.kernels.simulate import BEYOND, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
+from islands.kernels.sums import total
+from islands.model.expression import value
 from islands.model.model import model_of
 from islands.model.parsing import parse
 from islands.program.linker import link
@@ -12,16 +18,25 @@ from islands.simulation.layout import layout
 
 SAMPLES = 3 * CHUNK + 12
 
+#: Of several chunks, shorter than a warm-up, of a few samples: lanes end at different times.
+SEGMENTS = (SAMPLES, 2, 70, 9, CHUNK + 3, 30)
 
-def run(model, record, interval, bound=1e6, patient=True, wanted=True):
-    """Return squared error, step of divergence and prediction, on outputs full of rubbish before."""
-    cut = layout(record, model.maximum_lag, interval)
+
+def run_on(model, cut, samples, bound=1e6, patient=True, allowed=math.inf):
+    """Return ending, squared error, step of divergence and prediction; before, they hold rubbish."""
     squared_error = np.full(len(cut.start), 12345.0)
     diverged = np.full(len(cut.start), 12345)
-    predicted = np.full(record.samples if wanted else 0, np.nan)
-    theta = np.array(model.parameters)
-    simulate(link(model.regressors), theta, cut, bound, patient, squared_error, diverged, predicted)
-    return cut, squared_error, diverged, predicted
+    predicted = np.full(samples, np.nan)
+    theta, program = np.array(model.parameters), link(model.regressors)
+    ending = simulate(program, theta, cut, bound, allowed, patient, squared_error, diverged, predicted)
+    return ending, squared_error, diverged, predicted
+
+
+def run(model, record, interval, bound=1e6, patient=True, wanted=True):
+    """Return the layout, squared error, step of divergence and prediction."""
+    cut = layout(record, model.maximum_lag, interval)
+    _, *found = run_on(model, cut, record.samples if wanted else 0, bound, patient)
+    return cut, *found
 
 
 def echo():
@@ -29,15 +44,102 @@ def echo():
     return model_of([(parse("u(k-1)"), 1.0)])
 
 
-def record(u=None, y=None):
-    generator = np.random.default_rng(5)
-    drawn = generator.normal(size=(2, SAMPLES))
-    return Dataset(drawn[0] if u is None else u, drawn[1] if y is None else y, 1.0)
+def record(u=None, y=None, segments=(SAMPLES,), seed=5):
+    generator = np.random.default_rng(seed)
+    drawn = generator.normal(size=(2, sum(segments)))
+    return Dataset(drawn[0] if u is None else u, drawn[1] if y is None else y, 1.0, segments=segments)
+
+
+def recursion(model, data, start, length, bound):
+    """Simulate one interval in plain floats: squared error, step of divergence and predictions."""
+    channels = [data.y[: int(start)].tolist(), *data.u.T.tolist()]
+    squares, diverged = 0.0, -1
+    for step in range(int(length)):
+        k, prediction = int(start) + step, 0.0
+        for weight, item in zip(model.theta, model.regressors, strict=True):
+            prediction += weight * value(
+                item.expression, lambda channel, lag, k=k: channels[channel][k - lag]
+            )
+        channels[0].append(prediction)
+        squares += (prediction - float(data.y[k])) * (prediction - float(data.y[k]))
+        if diverged < 0 and not abs(prediction) <= bound:
+            diverged = step
+    return squares, diverged, channels[0][int(start) :]
+
+
+@pytest.fixture(params=WIDTHS)
+def width(request, monkeypatch):
+    """Every width of a row that the kernel is compiled for, whatever the layout would have chosen."""
+    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (request.param,))
+    return request.param
 
 
 @pytest.fixture
 def damped():
     return model_of([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
+
+
+@pytest.mark.parametrize("interval", [1, 2, 7, CHUNK, CHUNK + 1, None])
+def test_every_lane_is_a_recursion_in_plain_floats_at_every_width(damped, interval, width):
+    data = record(segments=SEGMENTS)
+    cut, squared_error, diverged, predicted = run(damped, data, interval)
+    assert cut.width == width
+    lanes = list(zip(cut.start, cut.length, strict=True))
+    for lane, (start, length) in enumerate(lanes):
+        squares, step, expected = recursion(damped, data, start, length, 1e6)
+        assert (squared_error[lane], diverged[lane]) == (squares, step)
+        assert predicted[start : start + length].tolist() == expected
+    assert np.isfinite(predicted).sum() == cut.length.sum()
+
+
+@pytest.mark.parametrize("interval", [1, 2, 7, CHUNK, None])
+@pytest.mark.parametrize("bound", [1.0, 2.5])
+def test_every_lane_diverges_where_the_recursion_does(damped, interval, bound, width):
+    data = record(segments=SEGMENTS)
+    cut, squared_error, diverged, _ = run(damped, data, interval, bound)
+    found = 0
+    for lane, (start, length) in enumerate(zip(cut.start, cut.length, strict=True)):
+        squares, step, _ = recursion(damped, data, start, length, bound)
+        assert (squared_error[lane], diverged[lane]) == (squares, step)
+        found += step >= 0
+    assert found > 0
+
+
+@pytest.mark.parametrize("interval", [2, 7, CHUNK + 1, None])
+@pytest.mark.parametrize("poison", [math.nan, 1e300])
+def test_what_stands_in_lanes_that_nobody_asked_for_is_never_counted(damped, interval, poison, width):
+    data = record(segments=SEGMENTS)
+    cut = layout(data, damped.maximum_lag, interval)
+    signals = cut.signals.copy()
+    base = poisoned = 0
+    for offset, lanes in zip(cut.block_offset, cut.block_lanes, strict=True):
+        rows = cut.warm_up + cut.length[base]
+        block = signals[:, offset : offset + rows * width].reshape(len(signals), rows, width)
+        block[:, :, lanes:] = poison  # behind the block's last lane
+        for lane in range(lanes):
+            block[:, cut.warm_up + cut.length[base + lane] :, lane] = poison  # behind a lane's end
+        poisoned += np.count_nonzero(~(np.abs(block) < 1e299))
+        base += lanes
+    assert poisoned > 0
+    for patient in (True, False):
+        expected = run_on(damped, cut, data.samples, patient=patient)
+        found = run_on(damped, cut._replace(signals=signals), data.samples, patient=patient)
+        assert expected[0] == found[0] == COMPLETE
+        for left, right in zip(expected[1:], found[1:], strict=True):
+            assert np.array_equal(left, right, equal_nan=True)
+
+
+def test_one_step_ahead_reads_nothing_behind_a_blocks_last_lane(damped, width):
+    data = record(segments=SEGMENTS)
+    cut = layout(data, damped.maximum_lag, 1)
+    signals = cut.signals.copy()
+    signals[:, data.samples :] = math.nan
+    for patient in (True, False):
+        expected = run_on(damped, cut, data.samples, patient=patient)
+        found = run_on(damped, cut._replace(signals=signals), data.samples, patient=patient)
+        assert expected[0] == found[0] == COMPLETE
+        for left, right in zip(expected[1:], found[1:], strict=True):
+            assert np.array_equal(left, right, equal_nan=True)
 
 
 @pytest.mark.parametrize("interval", [1, 7, CHUNK, CHUNK + 1, None])
@@ -66,6 +168,15 @@ def test_the_bound_itself_is_still_inside(prediction, step):
     u = np.zeros(SAMPLES)
     u[0] = prediction
     assert run(echo(), record(u=u), None, bound=8.0)[2].tolist() == [step]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_prediction_just_outside_is_found_where_its_error_alone_would_be_small(sign, width):
+    u, y = np.zeros(SAMPLES), np.zeros(SAMPLES)
+    u[5] = sign * np.nextafter(8.0, 9.0)
+    assert run(echo(), record(u=u, y=y), None, bound=8.0)[2].tolist() == [5]
+    y[6] = sign * 7.0  # close to the prediction
+    assert run(echo(), record(u=u, y=y), None, bound=8.0)[2].tolist() == [5]
 
 
 @pytest.mark.parametrize("step", [0, 1, CHUNK - 1, CHUNK, 2 * CHUNK + 3, SAMPLES - 2])
@@ -106,3 +217,106 @@ def test_impatience_changes_nothing_where_nothing_diverges(damped, interval):
     patient, hasty = (run(damped, record(), interval, patient=patient)[1:] for patient in (True, False))
     for left, right in zip(patient, hasty, strict=True):
         assert np.array_equal(left, right, equal_nan=True)
+
+
+# How a simulation ends.
+
+
+@pytest.mark.parametrize("patient", [True, False])
+@pytest.mark.parametrize("step", [-1, 0, CHUNK, SAMPLES - 2])
+def test_the_ending_tells_of_a_divergence(patient, step, width):
+    u = np.zeros(SAMPLES)
+    if step >= 0:
+        u[step] = 9.0
+    cut = layout(record(u=u), 1, None)
+    assert run_on(echo(), cut, 0, bound=8.0, patient=patient)[0] == (COMPLETE if step < 0 else DIVERGED)
+
+
+@given(
+    st.sampled_from([1, 2, 7, CHUNK, 100, None]),
+    st.floats(0.0, 2.0) | st.sampled_from([1.0, 1 - 1e-12, 1 + 1e-12, 1 - 1e-8, math.inf]),
+    st.sampled_from(WIDTHS),
+    st.integers(0, 2**32 - 1),
+)
+def test_what_is_allowed_ends_a_simulation_only_beyond_it_and_changes_nothing_else(
+    interval, share, chosen, seed
+):
+    model = model_of([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
+    data = record(segments=SEGMENTS, seed=seed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("islands.simulation.layout.WIDTHS", (chosen,))
+        cut = layout(data, model.maximum_lag, interval)
+    whole, *expected = run_on(model, cut, data.samples)
+    error = total(expected[0])
+    allowed = share * error
+    for patient in (True, False):
+        ending, *found = run_on(model, cut, data.samples, patient=patient, allowed=allowed)
+        if ending == BEYOND:
+            assert error > allowed
+        else:
+            assert ending == whole == COMPLETE
+            assert error <= allowed * (1 + 2e-9)
+            for left, right in zip(expected, found, strict=True):
+                assert np.array_equal(left, right, equal_nan=True)
+
+
+def test_a_simulation_that_is_beyond_what_is_allowed_stops_at_once(width):
+    """After the first chunk nothing is predicted any more."""
+    y, u = np.zeros(SAMPLES), np.zeros(SAMPLES)
+    u[3] = 100.0
+    data = record(u=u, y=y)
+    cut = layout(data, 1, None)
+    ending, _, _, predicted = run_on(echo(), cut, SAMPLES, allowed=9999.0)
+    assert ending == BEYOND
+    assert np.isfinite(predicted[1 : CHUNK + 1]).all()
+    assert np.isnan(predicted[CHUNK + 1 :]).all()
+    assert run_on(echo(), cut, SAMPLES, allowed=10000.0)[0] == COMPLETE
+
+
+def test_the_error_of_earlier_blocks_counts_towards_what_is_allowed():
+    u, y = np.zeros(1000), np.zeros(1000)
+    u[[3, 500]] = 10.0
+    cut = layout(record(u=u, y=y, segments=(1000,)), 1, 2)
+    assert len(cut.block_lanes) > 1
+    assert run_on(echo(), cut, 0, allowed=199.0)[0] == BEYOND
+    assert run_on(echo(), cut, 0, allowed=200.0)[0] == COMPLETE
+
+
+def test_the_error_of_earlier_blocks_stops_a_later_one_after_its_first_chunk(monkeypatch):
+    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (8,))
+    u, y = np.zeros(1001), np.zeros(1001)
+    u[[3, 810]] = 10.0
+    cut = layout(record(u=u, y=y, segments=(1001,)), 1, 100)
+    assert cut.block_lanes.tolist() == [8, 2]
+    ending, _, _, predicted = run_on(echo(), cut, 1001, allowed=199.0)
+    assert ending == BEYOND
+    assert np.isfinite(predicted[801 : 801 + CHUNK]).all()
+    assert np.isnan(predicted[801 + CHUNK : 901]).all()
+
+
+def test_an_error_that_is_no_number_is_not_beyond_what_is_allowed(damped, width):
+    y = record().y.copy()
+    y[10] = math.nan
+    cut = layout(record(y=y), damped.maximum_lag, None)
+    ending, squared_error, diverged, predicted = run_on(damped, cut, SAMPLES, allowed=1e-3)
+    assert ending == COMPLETE
+    assert np.isnan(squared_error).all()
+    assert (diverged == -1).all()
+    assert np.isfinite(predicted[damped.maximum_lag :]).all()
+
+
+@pytest.mark.parametrize(("bound", "prediction"), [(1e200, 1e250), (1e-170, 1e-168), (1e-160, -1e-159)])
+def test_a_bound_whose_square_is_no_number_is_still_a_bound(bound, prediction, width):
+    u, y = np.zeros(SAMPLES), np.zeros(SAMPLES)
+    u[10] = prediction
+    assert run(echo(), record(u=u, y=y), None, bound=bound)[2].tolist() == [10]
+
+
+def test_no_terms_predict_zero(width):
+    data = record()
+    cut = layout(data, 0, 50)
+    squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
+    predicted = np.full(SAMPLES, np.nan)
+    ending = simulate(link([]), np.empty(0), cut, 1e6, math.inf, True, squared_error, diverged, predicted)
+    assert ending == COMPLETE
+    assert np.array_equal(predicted, np.zeros(SAMPLES))

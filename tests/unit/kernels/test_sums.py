@@ -4,24 +4,33 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from islands.kernels.sums import FOLD, dot, dot_chunk, total
+from islands.kernels.sums import CHUNK, dot, total
 
-LENGTHS = [1, 2, 127, 128, 129, 255, 256, 257, 511, 512, 513, 1000, 5000]
+LENGTHS = [1, 2, 31, 32, 33, 127, 128, 129, 255, 256, 257, 511, 512, 513, 1000, 5000]
+
+
+def folded(numbers, left):
+    """Add the second half to the first until so many are left."""
+    while len(numbers) > left:
+        middle = len(numbers) // 2
+        numbers = [a + b for a, b in zip(numbers[:middle], numbers[middle:], strict=True)]
+    return numbers
 
 
 def written_order(x, y):
-    """The docstring of `sums` in plain floats: 256 products folded in halves, chunks from first to last."""
+    """The docstring of `sums` in plain floats."""
     products = [a * b for a, b in zip(x.tolist(), y.tolist(), strict=True)]
-    result = 0.0
+    products += [0.0] * (-len(products) % 256)
+    running = [0.0] * 8
     for begin in range(0, len(products), 256):
-        chunk = products[begin : begin + 256]
-        chunk += [0.0] * (256 - len(chunk))
-        while len(chunk) > 1:
-            half = len(chunk) // 2
-            chunk = [a + b for a, b in zip(chunk[:half], chunk[half:], strict=True)]
-        result += chunk[0]
-    return result
+        lanes = [0.0] * 32
+        for row in range(256):
+            lanes[row % 32] += products[begin + row]
+        running = [a + b for a, b in zip(running, folded(lanes, 8), strict=True)]
+    return folded(running, 1)[0]
 
 
 def pair(seed, length):
@@ -29,7 +38,7 @@ def pair(seed, length):
 
 
 def inner(x, y, x_at=0, y_at=0, rows=None):
-    return dot(x, x_at, y, y_at, x.size if rows is None else rows, np.empty(FOLD))
+    return dot(x, x_at, y, y_at, x.size if rows is None else rows)
 
 
 @pytest.mark.parametrize("length", LENGTHS)
@@ -37,6 +46,13 @@ def inner(x, y, x_at=0, y_at=0, rows=None):
 def test_an_inner_product_is_summed_in_the_written_order(seed, length):
     x, y = pair(seed, length)
     assert inner(x, y) == written_order(x, y)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 900), st.integers(0, 40), st.integers(0, 40))
+def test_the_order_is_the_same_wherever_the_rows_begin(seed, rows, x_at, y_at):
+    x, y = pair(seed, rows + 80)
+    expected = written_order(x[x_at : x_at + rows], y[y_at : y_at + rows])
+    assert inner(x, y, x_at, y_at, rows) == expected
 
 
 @pytest.mark.parametrize("length", LENGTHS)
@@ -48,12 +64,21 @@ def test_an_inner_product_is_exact_to_1e_15_of_the_sum_of_its_absolute_products(
 
 
 def test_the_order_is_not_that_of_a_plain_loop():
-    # 1e16 meets -1e16 in the first fold, before the ones are added: a loop from first to last loses them.
-    x = np.zeros(FOLD)
-    x[0], x[128], x[1:9] = 1e16, -1e16, 1.0
-    assert inner(x, np.ones(FOLD)) == 8.0
-    x[128], x[129] = 0.0, -1e16
-    assert inner(x, np.ones(FOLD)) != 8.0
+    # 1e16 meets -1e16 in its own lane, before the ones are added: a loop from first to last loses them.
+    x = np.zeros(CHUNK)
+    x[0], x[32], x[1:9] = 1e16, -1e16, 1.0
+    assert inner(x, np.ones(CHUNK)) == 8.0
+    x[32], x[33] = 0.0, -1e16
+    assert inner(x, np.ones(CHUNK)) != 8.0
+
+
+def test_products_are_rounded_before_they_are_added():
+    # A fused multiply-add would keep what is left of the square of 1 + 2^-30.
+    x = np.zeros(CHUNK)
+    x[0], x[32] = 1 + 2.0**-30, 1.0
+    y = x.copy()
+    y[32] = -(1 + 2.0**-29)
+    assert inner(x, y) == 0.0
 
 
 def test_a_sum_begins_at_its_offsets_and_reads_no_further_than_its_rows():
@@ -64,13 +89,6 @@ def test_a_sum_begins_at_its_offsets_and_reads_no_further_than_its_rows():
 
 def test_no_rows_sum_to_zero():
     assert inner(np.full(3, np.nan), np.full(3, np.nan), rows=0) == 0.0
-
-
-def test_the_room_for_the_fold_may_hold_anything():
-    x, y = pair(3, 200)
-    dirty = np.full(FOLD, np.nan)
-    zero, rows = np.uint64(0), np.uint64(200)
-    assert dot_chunk(x, zero, y, zero, rows, dirty) == written_order(x, y)
 
 
 def test_adding_zeros_at_the_end_changes_nothing():
@@ -89,8 +107,10 @@ def test_the_total_of_nothing_is_zero():
     assert total(np.empty(0)) == 0.0
 
 
+@pytest.mark.parametrize("place", [0, 300, 399])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_not_finite_is_not_lost(value):
+def test_what_is_not_finite_is_not_lost(value, place):
     x, y = pair(6, 400)
-    x[300] = value
+    x[place] = value
     assert not math.isfinite(inner(x, y))
+    assert not math.isfinite(total(x))

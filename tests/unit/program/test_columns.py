@@ -10,12 +10,12 @@ from strategies import INPUTS, nearly, records, regressors, settled_value
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.kernels.sums import FOLD, dot
+from islands.kernels.sums import CHUNK, dot
 from islands.model.expression import Constant, Lagged
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.model.regressor import regressor
-from islands.program.columns import gram_matrix, regressor_matrix
+from islands.program.columns import gram_matrix, inner_products, regressor_matrix, rows_of
 
 
 def of(text, table=PRIMITIVES):
@@ -86,7 +86,7 @@ def test_no_row_reads_the_present_or_the_future():
     assert before[0, 27] != after[0, 27]
 
 
-@pytest.mark.parametrize("samples", [FOLD - 1, FOLD, FOLD + 1, 3 * FOLD + 5])
+@pytest.mark.parametrize("samples", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 5])
 def test_stretches_of_rows_join_without_a_seam(samples):
     record = noise(samples + 2)
     found = regressor_matrix([of("y(k-1)*u(k-2)"), of("u(k-1) - u(k-2)"), of("3")], record, 2)
@@ -117,7 +117,16 @@ def test_a_users_primitive_gives_the_numbers_of_its_python_function():
     np.testing.assert_allclose(found[0], expected, rtol=1e-15)
 
 
-SEGMENTS = ((1000,), (100, 300, 7, 593), (FOLD + 3, FOLD + 3, FOLD + 3), (3 + FOLD // 2,) * 4)
+SEGMENTS = ((1000,), (100, 300, 7, 593), (CHUNK + 3, CHUNK + 3, CHUNK + 3), (3 + CHUNK // 2,) * 4)
+
+
+def products(terms, record, warm_up):
+    """Return the columns' inner products, every segment filled with zeros up to a multiple of 256 rows."""
+    columns = regressor_matrix(terms, record, warm_up)
+    rows = [max(end - begin - warm_up, 0) for begin, end in record.bounds]
+    parts = np.split(columns, np.cumsum(rows)[:-1], axis=1)
+    filled = np.hstack([np.pad(part, ((0, 0), (0, -part.shape[1] % CHUNK))) for part in parts])
+    return [[dot(one, 0, other, 0, one.size) for other in filled] for one in filled]
 
 
 @pytest.mark.parametrize("segments", SEGMENTS)
@@ -131,10 +140,7 @@ def test_the_gram_matrix_is_the_inner_products_of_the_columns_bit_for_bit(segmen
         of("sign(u1(k-1) - u1(k-2))"),
         Lagged(0),
     ]
-    columns = regressor_matrix(terms, record, 3)
-    rows, fold = columns.shape[1], np.empty(FOLD)
-    expected = [[dot(one, 0, other, 0, rows, fold) for other in columns] for one in columns]
-    np.testing.assert_array_equal(gram_matrix(terms, record, 3), expected)
+    np.testing.assert_array_equal(gram_matrix(terms, record, 3), products(terms, record, 3))
 
 
 @settings(max_examples=30)
@@ -142,9 +148,26 @@ def test_the_gram_matrix_is_the_inner_products_of_the_columns_bit_for_bit(segmen
 def test_the_gram_matrix_is_the_inner_products_whatever_the_segments(record, terms):
     warm_up = max(item.maximum_lag for item in terms)
     assume(max(record.segments) > warm_up)
-    columns, fold = regressor_matrix(terms, record, warm_up), np.empty(FOLD)
-    expected = [[dot(one, 0, other, 0, columns.shape[1], fold) for other in columns] for one in columns]
-    np.testing.assert_array_equal(gram_matrix(terms, record, warm_up), expected)
+    np.testing.assert_array_equal(gram_matrix(terms, record, warm_up), products(terms, record, warm_up))
+
+
+def test_chosen_inner_products_are_those_of_the_gram_matrix():
+    record, terms = (
+        noise(900, (600, 300)),
+        [of("y(k-1)"), of("u(k-3)*y(k-2)^2"), of("exp(u(k-1))"), Lagged(0)],
+    )
+    gram = gram_matrix(terms, record, 3)
+    pairs = np.array([(2, 3), (0, 0), (1, 2), (3, 1), (2, 3)])
+    assert inner_products(terms, pairs, record, 3).tolist() == gram[pairs[:, 0], pairs[:, 1]].tolist()
+    assert np.array_equal(gram, gram.T)
+
+
+def test_the_rows_of_a_record_are_those_of_every_segment_after_its_warm_up():
+    found = rows_of(ramp((3, 5, 2, 4)), 3)
+    assert found.first.tolist() == [6, 13]
+    assert found.rows.tolist() == [2, 1]
+    assert found.warm_up == 3
+    assert found.signals.tolist() == [list(map(float, range(14))), [100.0 * k for k in range(14)]]
 
 
 def test_the_gram_matrix_of_a_ramp_worked_by_hand():

@@ -8,12 +8,21 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import regressors, signals
 
-from islands.kernels.machine import ADD, CALL, MAX_FACTORS, MULTIPLY, SIGN, SUBTRACT
+from islands.kernels.machine import (
+    ADD,
+    CALL,
+    MAX_FACTORS,
+    MULTIPLY,
+    SIGN,
+    SIGN_OF_DIFFERENCE,
+    SUBTRACT,
+    TEMPORARY,
+)
 from islands.model.expression import Lagged, value
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.program.linker import TEMPORARY, link
+from islands.program.linker import link
 from islands.program.row_functions import row_address
 
 several = st.lists(regressors(), min_size=1, max_size=4)
@@ -42,11 +51,16 @@ def interpreted(program, signal, operations, called, product=math.prod):
     return [product(map(read, several[:degree])) for several, degree in factors], computed
 
 
+def sign(a):
+    return float((a > 0.0) - (a < 0.0))
+
+
 NUMBERS = {
     MULTIPLY: lambda a, b: a * b,
     ADD: lambda a, b: a + b,
     SUBTRACT: lambda a, b: a - b,
-    SIGN: lambda a: math.copysign(1.0, a) if a else 0.0,
+    SIGN: sign,
+    SIGN_OF_DIFFERENCE: lambda a, b: sign(a - b),
 }
 
 
@@ -62,7 +76,7 @@ def test_a_program_computes_its_terms_whatever_rows_are_reused(called, terms, si
 
 @given(several)
 def test_nothing_is_computed_twice(called, terms):
-    names = {MULTIPLY: "mul", ADD: "add", SUBTRACT: "sub", SIGN: "sign"}
+    names = {MULTIPLY: "mul", ADD: "add", SUBTRACT: "sub", SIGN: "sign", SIGN_OF_DIFFERENCE: "phi2"}
 
     def written(name):
         return lambda *arguments: f"{name}({', '.join(map(str, arguments))})"
@@ -113,6 +127,12 @@ def test_a_shared_subexpression_is_computed_once():
     both = linked("exp(u(k-1) - u(k-2))*y(k-1)", "tanh(exp(u(k-1) - u(k-2)))", "u(k-1) - u(k-2)")
     assert operations(alone) == [SUBTRACT, CALL]
     assert operations(both) == [SUBTRACT, CALL, CALL]
+
+
+@pytest.mark.parametrize("text", ["sign(u(k-1) - u(k-2))", "phi2(u(k-1), u(k-2))"])
+def test_the_sign_of_a_difference_is_one_instruction(text):
+    assert operations(linked(text)) == [SIGN_OF_DIFFERENCE]
+    assert operations(linked("sign(u(k-1) + u(k-2))")) == [ADD, SIGN]
 
 
 def test_long_products_share_what_they_have_in_common():

@@ -5,7 +5,8 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.simulation.layout import WIDTH, layout
+from islands.kernels.simulate import WIDTHS
+from islands.simulation.layout import layout
 
 SEGMENTS = (230, 4, 5, 120, 6)
 WARM_UP = 5
@@ -52,7 +53,8 @@ def test_the_kernel_finds_every_sample_of_a_lane_with_its_warm_up(record, interv
 @pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
 def test_blocks_are_no_wider_than_the_width_and_their_intervals_do_not_lengthen(record, interval):
     cut = layout(record, WARM_UP, interval)
-    assert cut.block_lanes.max() == cut.width <= WIDTH
+    assert cut.width in WIDTHS
+    assert 1 <= cut.block_lanes.min() <= cut.block_lanes.max() <= cut.width
     for _, _, _, lengths in blocks(cut):
         assert (np.diff(lengths) <= 0).all()
 
@@ -72,10 +74,42 @@ def test_the_last_shorter_interval_of_a_segment_counts(record):
 def test_one_step_ahead_gathers_nothing(record):
     cut = layout(record, WARM_UP, 1)
     assert cut.row_stride == 1
-    assert np.array_equal(cut.signals, np.vstack([record.y, record.u.T]))
+    assert np.array_equal(cut.signals[:, : record.samples], np.vstack([record.y, record.u.T]))
+    # The row of the last sample may be read whole.
+    assert cut.signals.shape[1] == record.samples + cut.width
     # A block never reaches across a boundary: its lanes are neighbouring samples.
     for _, _, starts, _ in blocks(cut):
         assert (np.diff(starts) == 1).all()
+
+
+@pytest.mark.parametrize(("intervals", "width"), [(1, 8), (8, 8), (20, 24), (24, 24), (60, 104), (1000, 104)])
+def test_a_row_is_as_wide_as_pays(intervals, width):
+    record = Dataset(np.zeros(3 * intervals + 1), np.zeros(3 * intervals + 1), 1.0)
+    cut = layout(record, 1, 3)
+    assert (len(cut.start), cut.width) == (intervals, width)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("interval", [2, 7, 100, None])
+def test_a_gathered_row_is_full_of_numbers_of_the_record(monkeypatch, record, interval, width):
+    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (width,))
+    cut = layout(record, WARM_UP, interval)
+    assert cut.row_stride == cut.width == width
+    assert np.isin(cut.signals[0], record.y).all()
+    for channel, base in enumerate((0, 1000, 2000)):
+        assert np.array_equal(cut.signals[channel], cut.signals[0] + base)
+    # Lanes that nobody has asked for repeat the first: they do not run away where it does not.
+    for offset, lanes, _, lengths in blocks(cut):
+        block = cut.signals[0, offset : offset + (WARM_UP + lengths[0]) * width].reshape(-1, width)
+        assert np.array_equal(block[:, lanes:], np.repeat(block[:, :1], width - lanes, axis=1))
+
+
+def test_the_largest_measured_output_is_known(record):
+    assert layout(record, WARM_UP, None).largest == sum(SEGMENTS) - 1
+    y = np.full(9, np.nan)
+    assert layout(Dataset(np.zeros(9), y, 1.0), 0, None).largest == 0.0
+    y[[2, 5]] = -7.0, 3.0
+    assert layout(Dataset(np.zeros(9), y, 1.0), 0, None).largest == 7.0
 
 
 def test_no_warm_up_is_needed_where_nothing_is_read_back(record):

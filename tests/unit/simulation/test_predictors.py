@@ -123,16 +123,19 @@ def test_the_earliest_of_several_diverging_intervals_is_named():
     assert found.outcome.reason.endswith("at sample 88")
 
 
-def test_what_a_lane_left_behind_is_not_read_as_the_next_ones(monkeypatch):
-    # Blocks of two lanes: the third segment leaves the bound at its 41st step, and the arena still holds that
-    # when the first, in the same lane, ends after 30 while its neighbour leaves the bound.
-    monkeypatch.setattr("islands.simulation.layout.WIDTH", 2)
-    chosen, data = model((1.0, "u(k-1)")), record(spikes(s172=1e9, s243=1e9), segments=(31, 101, 101, 61, 6))
-    assert layout(data, 1).length.tolist() == [100, 100, 60, 30, 5]
+def test_what_a_block_left_behind_is_not_read_as_the_next_ones(monkeypatch):
+    # Blocks of eight lanes: the first block leaves the bound at its 41st step, and the arena still holds that
+    # when a lane of the second block ends after 30 while its neighbour leaves the bound.
+    monkeypatch.setattr("islands.simulation.layout.WIDTHS", (8,))
+    chosen, segments = model((1.0, "u(k-1)")), (31, *(101,) * 8, 61, 6)
+    u, y = np.random.default_rng(12).normal(size=(2, sum(segments)))
+    u[[31 + 40, sum(segments) - 4]] = 1e9
+    data = Dataset(u, y, 0.1, segments=segments)
+    assert layout(data, 1).length.tolist() == [100] * 8 + [60, 30, 5]
     expected, first = judged(chosen, data)
     found = free_run(chosen, data)
-    assert first == 173
-    assert found.outcome.reason.endswith("at sample 173")
+    assert first == 31 + 41
+    assert found.outcome.reason.endswith("at sample 72")
     assert np.array_equal(found.y, expected, equal_nan=True)
 
 

@@ -1,0 +1,122 @@
+"""Whole searches of the paper's case 1, timed: one island in this process, or several in one process each."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
+
+from islands.benchmark import ours
+from islands.benchmark.clock import cpu, wall
+from islands.benchmark.workload import CASE1
+from islands.data.dataset import Dataset
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Individual
+from islands.evolution.island import Population, first_generation, step
+from islands.evolution.settings import Settings
+
+#: The paper's population of 500, on two islands.
+ISLANDS = 2
+ISLAND = replace(CASE1, population=CASE1.population // ISLANDS)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What an island's search took.
+
+    Attributes
+    ----------
+    evaluations, duplicates : int
+        Individuals, and those among them whose structure was known.
+    cpu_s, wall_s : float
+        Of the whole search, from the first population on.
+    evaluating_cpu_s : float
+        Of that, in the evaluator: the rest is breeding.
+    caches : mapping
+        What the caches hold at the end.
+    """
+
+    evaluations: int
+    duplicates: int
+    cpu_s: float
+    wall_s: float
+    evaluating_cpu_s: float
+    caches: Mapping[str, int]
+
+    @property
+    def amortised_ms(self) -> float:
+        """CPU milliseconds of the evaluator for every structure that was not known."""
+        return 1e3 * self.evaluating_cpu_s / (self.evaluations - self.duplicates)
+
+    @property
+    def per_cpu_second(self) -> float:
+        """Individuals per second of CPU time, breeding included."""
+        return self.evaluations / self.cpu_s
+
+    @property
+    def per_second(self) -> float:
+        """Individuals per second on the wall."""
+        return self.evaluations / self.wall_s
+
+
+def run_island(
+    record: Dataset, settings: Settings, index: int, tell: Callable[[float], None] = lambda _share: None
+) -> Run:
+    """Run one island from its first population to the settings' last generation."""
+    evaluator = _Timed(record, settings)
+    began_cpu, began = cpu(), wall()
+    island, info = first_generation(index, 0, evaluator)
+    evaluations, duplicates = info.evaluations, info.duplicates
+    while island.generation < settings.generations:
+        island, info = step(island, evaluator)
+        evaluations += info.evaluations
+        duplicates += info.duplicates
+        tell(island.generation / settings.generations)
+    return Run(
+        evaluations,
+        duplicates,
+        cpu() - began_cpu,
+        wall() - began,
+        evaluator.spent,
+        dict(ours.cache_statistics(evaluator)),
+    )
+
+
+def run_apart(
+    record: Dataset, settings: Settings, indices: Sequence[int], warm: bool = False
+) -> tuple[float, tuple[Run, ...]]:
+    """Run islands at the same time, each in a new process; return the seconds on the wall, and every run.
+
+    The seconds begin before the processes do.
+
+    Parameters
+    ----------
+    warm : bool
+        Go through two generations before a run is timed, so that it holds no loading of kernels.
+    """
+    began = wall()
+    with ProcessPoolExecutor(len(indices), get_context("spawn")) as processes:
+        job = partial(_warm_run if warm else run_island, record, settings)
+        runs = tuple(processes.map(job, indices))
+    return wall() - began, runs
+
+
+def _warm_run(record: Dataset, settings: Settings, index: int) -> Run:
+    run_island(record, replace(settings, generations=1), index)
+    return run_island(record, settings, index)
+
+
+class _Timed(Evaluator):
+    """An evaluator that knows how much CPU time it took, in seconds."""
+
+    def __init__(self, record: Dataset, settings: Settings) -> None:
+        super().__init__(record, settings)
+        self.spent = 0.0
+
+    def evaluate(
+        self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
+    ) -> tuple[Population, int]:
+        began = cpu()
+        evaluated = super().evaluate(population, bars)
+        self.spent += cpu() - began
+        return evaluated

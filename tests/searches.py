@@ -1,0 +1,51 @@
+"""Small searches: a record that takes milliseconds to search, settings for it, islands that evolve on it."""
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.island import first_generation, step
+from islands.evolution.settings import Settings
+
+SMALL = Settings(
+    population=24,
+    generations=10,
+    prune=0.3,
+    tolerance=1e-4,
+    max_terms=5,
+    initial_terms=(1, 4),
+    max_height=4,
+    shooting=60,
+)
+
+
+def record(samples=400, inputs=1, seed=0, rate=25, **changes):
+    """A noisy hysteresis, the same bits on every call and in every process."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(samples) / rate
+    u = np.column_stack([np.sin(time * (1 + 0.3 * i)) + 0.5 * np.sin(2.6 * time + i) for i in range(inputs)])
+    y = np.zeros(samples)
+    for k in range(2, samples):
+        rise = u[k - 1] - u[k - 2]
+        y[k] = y[k - 1] + np.sum(0.8 * rise - 0.3 * y[k - 1] * np.abs(rise))
+    return Dataset(u, y + 1e-3 * rng.normal(size=samples), 1 / rate, **changes)
+
+
+def islands_of(evaluator, generations, seed=3):
+    """One island after every generation, from the first population on."""
+    island, _ = first_generation(0, seed, evaluator)
+    islands = [island]
+    for _ in range(generations):
+        island, _ = step(island, evaluator)
+        islands.append(island)
+    return islands
+
+
+def evolved(generations, setting=SMALL, seed=3, evaluator=None):
+    """One island after some generations."""
+    return islands_of(evaluator or Evaluator(record(), setting), generations, seed)[-1]
+
+
+def exactly(island):
+    """All that a checkpoint would hold of an island: equality of regressors sees their text alone."""
+    return repr(island)

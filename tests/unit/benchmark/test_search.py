@@ -1,0 +1,56 @@
+"""Timed searches: they are the search itself, and count what it did."""
+
+from dataclasses import replace
+
+import pytest
+
+from islands.benchmark.search import ISLAND, Run, run_apart, run_island
+from islands.benchmark.workload import benchmark_record
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import SerialEngine
+from islands.evolution.problem import Problem
+
+SMALL = replace(ISLAND, population=10, generations=3)
+
+
+@pytest.fixture(scope="module")
+def piezo():
+    return benchmark_record(2_000)
+
+
+def test_two_islands_are_the_papers_population():
+    assert (ISLAND.population, ISLAND.generations) == (250, 500)
+
+
+def test_a_timed_search_evaluates_what_the_engine_does(piezo):
+    told = []
+    found = run_island(piezo, SMALL, 0, told.append)
+    epochs = list(SerialEngine().run(Problem(piezo, SMALL), 0, 1, Archipelago()))
+    assert found.evaluations == sum(epoch.info.evaluations for epoch in epochs) == 40
+    assert found.duplicates == sum(epoch.info.duplicates for epoch in epochs)
+    assert told == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert 0.0 < found.evaluating_cpu_s < found.cpu_s
+    assert found.wall_s > 0.0
+    assert all(size > 0 for size in found.caches.values())
+    assert found.caches
+
+
+def test_rates_are_counts_over_times():
+    run = Run(
+        evaluations=1000, duplicates=200, cpu_s=2.0, wall_s=4.0, evaluating_cpu_s=1.6, caches={"bytes": 1}
+    )
+    assert run.per_cpu_second == 500.0
+    assert run.per_second == 250.0
+    # Duplicates are no evaluations: what they save is not counted for the kernels.
+    assert run.amortised_ms == 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("warm", [False, True])
+def test_processes_run_the_same_searches_as_this_one(piezo, warm):
+    seconds, runs = run_apart(piezo, SMALL, [0, 1], warm)
+    here = [run_island(piezo, SMALL, index) for index in (0, 1)]
+    assert [(run.evaluations, run.duplicates) for run in runs] == [
+        (run.evaluations, run.duplicates) for run in here
+    ]
+    assert seconds > max(run.wall_s for run in runs)
