@@ -19,7 +19,7 @@ from islands.evolution.vocabulary import Vocabulary
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 
-LIMITS = Limits(pairs=1 << 15, genes=200_000, structures=40_000)
+LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)
 
 
 def test_every_cache_stays_within_its_limit_but_for_one_generation():

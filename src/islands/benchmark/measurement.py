@@ -12,8 +12,8 @@ from islands.benchmark.machine import this_machine
 from islands.benchmark.peak import peak
 from islands.benchmark.report import Report
 from islands.benchmark.scaling import against_islands, against_samples, against_terms, against_tree_size
-from islands.benchmark.search import ISLAND, ISLANDS, Run, run_apart, run_island
-from islands.benchmark.workload import SAMPLES, benchmark_record, fingerprint, workload
+from islands.benchmark.search import Run, run_apart, run_island
+from islands.benchmark.workload import ISLAND, ISLANDS, SAMPLES, benchmark_record, fingerprint, workload
 from islands.data.dataset import Dataset
 
 Tell = Callable[[str, float], None]
@@ -68,7 +68,8 @@ def measure(quick: bool, tell: Tell) -> Report:
     effort = QUICK if quick else FULL
     tell("record and individuals", 0.0)
     record = benchmark_record()
-    individuals = workload(record, effort.individuals)
+    searched = replace(ISLAND, generations=effort.generations)
+    individuals = workload(record, effort.individuals, searched)
     state = ours.prepared(record)
     with TemporaryDirectory() as folder:
         kinds: dict[str, Comparison] = {}
@@ -84,8 +85,7 @@ def measure(quick: bool, tell: Tell) -> Report:
     runs = {}
     for share, samples in ((0.47, SAMPLES), (0.65, SAMPLES // 10)):
         told = _part(tell, f"search on {samples} samples", share, 0.15)
-        settings = replace(ISLAND, generations=effort.generations)
-        runs[f"n{samples}"] = run_island(record[:samples], settings, 0, told)
+        runs[f"n{samples}"] = run_island(record[:samples], searched, 0, told)
     tell("search in one process, then in two", 0.8)
     together = _processes(record, effort.parallel)
     alone, pair = (sum(run.per_second for run in each) for each in together.values())

@@ -20,7 +20,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.vocabulary import Vocabulary
 from islands.kernels.columns import Rows
 from islands.kernels.evaluate import evaluate
-from islands.kernels.gram import inner_products
+from islands.kernels.gram import gram
 from islands.kernels.machine import Program
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
@@ -84,9 +84,8 @@ def simulation_ms(state: Prepared, candidate: Candidate) -> float:
 def gram_ms(state: Prepared, candidate: Candidate) -> float:
     """Time the inner products of all terms and the target, columns made in the same call."""
     program = link([*candidate.regressors, Lagged(0, 0)])
-    pairs = np.column_stack(np.triu_indices(len(candidate.regressors) + 1))
-    numbers = np.empty(len(pairs))
-    return milliseconds(lambda: inner_products(program, state.rows, pairs, numbers))
+    numbers = np.empty((program.degree.size, program.degree.size))
+    return milliseconds(lambda: gram(program, state.rows, numbers))
 
 
 def squared_error(state: Prepared, candidate: Candidate) -> float:

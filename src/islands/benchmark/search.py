@@ -8,16 +8,11 @@ from multiprocessing import get_context
 
 from islands.benchmark import ours
 from islands.benchmark.clock import cpu, wall
-from islands.benchmark.workload import CASE1
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual
 from islands.evolution.island import Population, first_generation, step
 from islands.evolution.settings import Settings
-
-#: The paper's population of 500, on two islands.
-ISLANDS = 2
-ISLAND = replace(CASE1, population=CASE1.population // ISLANDS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,8 +35,9 @@ SAMPLES = 100_000
 #: Terms of an individual of the two drawn kinds, and their deepest lag.
 TERMS, DEEPEST = 10, 25
 
-#: The run that ``gp`` comes from: short, and long enough that selection has shaped it.
-_LOGGED = replace(CASE1, population=100, generations=250)
+#: The paper's population of 500, on two islands.
+ISLANDS = 2
+ISLAND = replace(CASE1, population=CASE1.population // ISLANDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +69,12 @@ def benchmark_record(samples: int = SAMPLES) -> Dataset:
     return scaled[:samples]
 
 
-def workload(record: Dataset, count: int) -> dict[str, tuple[Candidate, ...]]:
-    """Return so many individuals of every kind: ``poly``, ``general``, ``gp``."""
+def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple[Candidate, ...]]:
+    """Return so many individuals of every kind: ``poly``, ``general``, and ``gp`` of a run with settings."""
     return {
         "poly": drawn(monomial, count),
         "general": drawn(tree, count),
-        "gp": evolved(record, count),
+        "gp": evolved(record, count, settings),
     }
 
 
@@ -143,32 +144,36 @@ def drawn(
     return tuple(candidates)
 
 
-def evolved(record: Dataset, count: int) -> tuple[Candidate, ...]:
-    """Return individuals that a seeded run of the paper's case 1 evaluates, evenly spread over its course.
+def evolved(record: Dataset, count: int, settings: Settings) -> tuple[Candidate, ...]:
+    """Return individuals whose structure is new to a run, evenly spread over its course: island 0, seed 0.
 
-    The run has a tenth of the record; the individuals' parameters are estimated on the whole one. They have
-    every gene that they were bred with: pruning is a part of their evaluation.
+    They have every gene that they were bred with: pruning is a part of their evaluation.
     """
-    logging = _Logging(record[: record.samples // 10], _LOGGED)
-    island, _ = first_generation(0, 1, logging)
-    for _ in range(_LOGGED.generations):
+    logging = _Logging(record, settings)
+    island, _ = first_generation(0, 0, logging)
+    while island.generation < settings.generations:
         island, _ = step(island, logging)
-    evaluator = Evaluator(record, _LOGGED)
+    evaluator = Evaluator(record, settings)
     last = [(1 + place) * len(logging.bred) // count - 1 for place in range(count)]
     return tuple(_bounded(logging.bred[position::-1], evaluator) for position in last)
 
 
 class _Logging(Evaluator):
-    """Keeps what it is asked to evaluate."""
+    """Keeps what it has to evaluate: the first individual of every structure."""
 
     def __init__(self, record: Dataset, settings: Settings) -> None:
         super().__init__(record, settings)
         self.bred: list[Individual] = []
+        self._met: set[tuple[frozenset[int], bool]] = set()
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
     ) -> tuple[Population, int]:
-        self.bred += [individual for individual, _ in population]
+        for individual, pruned in population:
+            key = frozenset(map(self._vocabulary.number, individual.genes)), pruned
+            if key not in self._met:
+                self._met.add(key)
+                self.bred.append(individual)
         return super().evaluate(population, bars)
 
 
@@ -177,5 +182,5 @@ def _bounded(individuals: Sequence[Individual], evaluator: Evaluator) -> Candida
     for individual in individuals:
         ((evaluated,), _) = evaluator.evaluate([(individual, False)])
         if isfinite(evaluated.fitness):
-            return Candidate(evaluated.regressors, evaluated.theta, _LOGGED.constraints)
+            return Candidate(evaluated.regressors, evaluated.theta, evaluator.settings.constraints)
     raise ModelError("every individual of the search diverges on the record: something is broken")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.kernels.columns import arena_for, evaluate
 from islands.kernels.compilation import kernel
 from islands.kernels.lanes import VECTOR, fold, load, multiply, room, splat, store, subtract
-from islands.kernels.sums import CHUNK, COUNT, dot_chunk
+from islands.kernels.sums import CHUNK, dot_chunk
 
 #: Squared pivots under this, beside the regressors' own norms, leave fewer than about six digits of the
 #: parameters.
@@ -136,10 +136,10 @@ def from_columns(program, rows, terms, reduction, factor, eta):
             evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
             _reduce_columns(chunk, terms, reduction)
             for a in range(count):
-                one = np.uint64(free[a] * CHUNK)
-                right[a] += fold(dot_chunk(chunk, one, chunk, np.uint64(terms * CHUNK)))
+                one = free[a] * CHUNK
+                right[a] += fold(dot_chunk(chunk, one, chunk, terms * CHUNK))
                 for b in range(a + 1):
-                    reduced[a, b] += fold(dot_chunk(chunk, one, chunk, np.uint64(free[b] * CHUNK)))
+                    reduced[a, b] += fold(dot_chunk(chunk, one, chunk, free[b] * CHUNK))
     least = _factorise(reduced, np.diag(reduced), factor)
     if least > 0.0:
         _solve(factor, right, eta)
@@ -156,7 +156,7 @@ def correct(program, rows, terms, reduction, factor, eta):
     free = reduction.free
     arena, place = arena_for(program, rows)
     chunk = room((terms + 1) * CHUNK)
-    target = np.uint64(terms * CHUNK)
+    target = terms * CHUNK
     right, correction = np.zeros(free.size), np.empty(free.size)
     for segment in range(rows.first.size):
         for done in range(0, rows.rows[segment], CHUNK):
@@ -164,9 +164,9 @@ def correct(program, rows, terms, reduction, factor, eta):
             evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
             _reduce_columns(chunk, terms, reduction)
             for a in range(free.size):
-                _take_off(chunk, target, eta[a], np.uint64(free[a] * CHUNK))
+                _take_off(chunk, target, eta[a], free[a] * CHUNK)
             for a in range(free.size):
-                right[a] += fold(dot_chunk(chunk, np.uint64(free[a] * CHUNK), chunk, target))
+                right[a] += fold(dot_chunk(chunk, free[a] * CHUNK, chunk, target))
     _solve(factor, right, correction)
     eta += correction
 
@@ -204,17 +204,17 @@ def _reduce_columns(chunk, terms, reduction):
     for j in range(terms):
         p = reduction.pivot[j]
         if reduction.fixed[j] != 0.0:
-            _take_off(chunk, np.uint64(terms * CHUNK), reduction.fixed[j], np.uint64(j * CHUNK))
+            _take_off(chunk, terms * CHUNK, reduction.fixed[j], j * CHUNK)
         if p >= 0 and p != j:
-            _take_off(chunk, np.uint64(j * CHUNK), reduction.share[j], np.uint64(p * CHUNK))
+            _take_off(chunk, j * CHUNK, reduction.share[j], p * CHUNK)
 
 
 @kernel(forceinline=True)
 def _take_off(chunk, at, share, other):
     """``chunk[at] -= share * chunk[other]``, a column each."""
-    for step in range(np.uint64(0), np.uint64(CHUNK), np.uint64(VECTOR * COUNT)):
-        part = multiply(splat(share, COUNT), load(chunk, other + step, COUNT))
-        store(chunk, at + step, subtract(load(chunk, at + step, COUNT), part))
+    for row in range(0, CHUNK, 4 * VECTOR):
+        part = multiply(splat(share, 4), load(chunk, other + row, 4))
+        store(chunk, at + row, subtract(load(chunk, at + row, 4), part))
 
 
 @kernel

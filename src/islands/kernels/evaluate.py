@@ -21,7 +21,7 @@ from islands.kernels.constrained import (
     from_gram,
     reduce,
 )
-from islands.kernels.gram import inner_products
+from islands.kernels.gram import gram, inner_products
 from islands.kernels.linker import link
 from islands.kernels.pairs import key_of, place_of
 from islands.kernels.selection import prune
@@ -78,7 +78,7 @@ def evaluate(
     place = np.full(nodes.operation.size, -1, np.int64)
     _fill(structures, sizes, target, nodes, pairs, rows, place)
     most = structures.shape[1]
-    gram = np.empty((most + 1, most + 1))
+    matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
     squared, diverged, nothing = np.empty(lanes), np.empty(lanes, np.int64), np.empty(0)
     available = rows.rows.sum()
@@ -89,11 +89,11 @@ def evaluate(
         size = sizes[index]
         positions[:size] = np.arange(size)
         lengths[index] = size
-        if not _read(terms, positions, size, target, pairs, gram):
+        if not _read(terms, positions, size, target, pairs, matrix):
             ending[index] = OVERFLOW
             continue
         if pruned[index]:
-            size = prune(gram, size, tolerance, positions)
+            size = prune(matrix, size, tolerance, positions)
         if groups.wanted.size > 0:
             size = _without_lone(terms, positions, size, groups)
         lengths[index] = size
@@ -108,14 +108,14 @@ def evaluate(
         if available <= size:
             ending[index] = TOO_FEW_ROWS
             continue
-        _read(terms, positions, size, target, pairs, gram)
-        if not np.diag(gram)[:size].all():  # zero on the record, and not pruned
+        _read(terms, positions, size, target, pairs, matrix)
+        if not np.diag(matrix)[:size].all():  # zero on the record, and not pruned
             ending[index] = DEPENDENT
             continue
-        reduction = reduce(gram, size, group, weight, wanted)
+        reduction = reduce(matrix, size, group, weight, wanted)
         count = reduction.free.size
         factor, eta = Factor(np.empty((count, count)), np.empty(count)), np.empty(count)
-        least = from_gram(gram, size, reduction, factor, eta)
+        least = from_gram(matrix, size, reduction, factor, eta)
         if least < ILL_CONDITIONED:
             program = link(nodes, np.append(chosen, target), place)
             if least < SINGULAR and from_columns(program, rows, size, reduction, factor, eta) < SINGULAR:
@@ -169,6 +169,12 @@ def _fill(structures, sizes, target, nodes, pairs, rows, place):
     if count == 0:
         return
     program = link(nodes, terms[:used], place)
+    if count == used * (used + 1) // 2:
+        products = np.empty((used, used))
+        gram(program, rows, products)
+        for index in range(count):
+            pairs.values[places[index]] = products[missing[index, 0], missing[index, 1]]
+        return
     numbers = np.empty(count)
     inner_products(program, rows, missing[:count], numbers)
     for index in range(count):

@@ -1,88 +1,143 @@
-"""Inner products of pairs of columns, without ever holding the columns of the whole record.
+"""Inner products of columns, without ever holding the columns of the whole record.
 
 The regressor matrix of a large library does not fit into memory (80 730 candidates of the paper's appendix on
 100 000 rows: 65 GB). Inner products are numbers, and selection and least squares need nothing else.
-"""
 
-import numpy as np
+All sums have the written order of `sums`, begun anew in every segment. A number does not depend on which
+others are computed with it, nor on whether all pairs were asked for or a few.
+"""
 
 from islands.kernels.columns import arena_for, evaluate
 from islands.kernels.compilation import kernel
-from islands.kernels.lanes import VECTOR, add, fold, half, load, multiply, room, splat, store
-from islands.kernels.sums import CHUNK, COUNT, dot_chunk
+from islands.kernels.lanes import (
+    VECTOR,
+    add,
+    fold,
+    gather,
+    load,
+    multiply,
+    outer,
+    outer_upper,
+    repeat,
+    room,
+    splat,
+    store,
+)
+from islands.kernels.sums import CHUNK
 
-#: Pairs whose running sums are held at a time, 64 bytes each; more take another pass over the record.
-_AT_A_TIME = 1 << 20
+#: Bytes of running sums that are held at a time; more take another pass over the record.
+_ROOM = 1 << 26
+
+#: Pairs of a group, and tiles, that fit into it.
+_GROUPS, _TILES = _ROOM // (4 * 8 * VECTOR), _ROOM // (16 * 8 * VECTOR)
 
 
 @kernel
 def inner_products(
     program,
     rows,
-    pairs,  # int64 [pair, 2]: the terms of each pair; quick where neighbours share the first
+    pairs,  # int64 [pair, 2]: the terms of each pair; quick where four neighbours share the first
     out,  # out, float64 [pair]
 ):
-    """Compute inner products over all rows in the written order of `sums`, begun anew in every segment.
-
-    A pair's number does not depend on which other terms and pairs are computed with it.
-    """
+    """Compute the inner products of some pairs of terms."""
     arena, place = arena_for(program, rows)
     chunk = room(program.degree.size * CHUNK)
-    running = room(VECTOR * min(_AT_A_TIME, pairs.shape[0]))
-    for begin in range(0, pairs.shape[0], _AT_A_TIME):
-        batch = pairs[begin : begin + _AT_A_TIME]
+    for begin in range(0, pairs.shape[0], 4 * _GROUPS):
+        some = pairs[begin : begin + 4 * _GROUPS]
+        running = room(4 * VECTOR * -(-some.shape[0] // 4))
         running[:] = 0.0
         for segment in range(rows.first.size):
             for done in range(0, rows.rows[segment], CHUNK):
                 lanes = min(CHUNK, rows.rows[segment] - done)
                 evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
-                _add_products(chunk, batch, running)
-        for pair in range(batch.shape[0]):
-            out[begin + pair] = fold(load(running, np.uint64(VECTOR * pair), 1))
+                _add_pairs(chunk, some, running)
+        for pair in range(some.shape[0]):
+            out[begin + pair] = fold(load(running, VECTOR * pair, 1))
 
 
 @kernel
-def _add_products(chunk, pairs, running):
-    """Add the products of a chunk of rows to the running sums of every pair."""
-    pair, count = 0, pairs.shape[0]
-    while pair < count:
-        one = np.uint64(pairs[pair, 0] * CHUNK)
-        at = np.uint64(VECTOR * pair)
-        if (
-            pair + 3 < count
-            and pairs[pair, 0] == pairs[pair + 3, 0] == pairs[pair + 1, 0] == pairs[pair + 2, 0]
-        ):
-            # Four at once: what they share is read once.
-            others = (
-                np.uint64(pairs[pair, 1] * CHUNK),
-                np.uint64(pairs[pair + 1, 1] * CHUNK),
-                np.uint64(pairs[pair + 2, 1] * CHUNK),
-                np.uint64(pairs[pair + 3, 1] * CHUNK),
-            )
-            a, b, c, d = splat(0.0, COUNT), splat(0.0, COUNT), splat(0.0, COUNT), splat(0.0, COUNT)
-            for group in range(0, CHUNK, VECTOR * COUNT):
-                step = np.uint64(group)
-                x = load(chunk, one + step, COUNT)
-                a = add(a, multiply(x, load(chunk, others[0] + step, COUNT)))
-                b = add(b, multiply(x, load(chunk, others[1] + step, COUNT)))
-                c = add(c, multiply(x, load(chunk, others[2] + step, COUNT)))
-                d = add(d, multiply(x, load(chunk, others[3] + step, COUNT)))
-            store(running, at, add(load(running, at, 1), half(half(a))))
-            store(
-                running, at + np.uint64(VECTOR), add(load(running, at + np.uint64(VECTOR), 1), half(half(b)))
-            )
-            store(
-                running,
-                at + np.uint64(2 * VECTOR),
-                add(load(running, at + np.uint64(2 * VECTOR), 1), half(half(c))),
-            )
-            store(
-                running,
-                at + np.uint64(3 * VECTOR),
-                add(load(running, at + np.uint64(3 * VECTOR), 1), half(half(d))),
-            )
-            pair += 4
+def gram(
+    program,
+    rows,
+    out,  # out, float64 [term, term]
+):
+    """Compute the inner products of all pairs of terms."""
+    terms = program.degree.size
+    blocks = -(-terms // 4)
+    arena, place = arena_for(program, rows)
+    chunk = room(4 * blocks * CHUNK)
+    chunk[:] = 0.0  # behind the last term as well
+    tiles = blocks * (blocks + 1) // 2
+    for begin in range(0, tiles, _TILES):
+        end = min(tiles, begin + _TILES)
+        running = room(16 * VECTOR * (end - begin))
+        running[:] = 0.0
+        for segment in range(rows.first.size):
+            for done in range(0, rows.rows[segment], CHUNK):
+                lanes = min(CHUNK, rows.rows[segment] - done)
+                evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
+                _add_tiles(chunk, blocks, begin, end, running)
+        _read_tiles(running, blocks, begin, end, terms, out)
+
+
+@kernel
+def _add_pairs(chunk, pairs, running):
+    """Add the products of a chunk of rows to the running sums of every pair, four pairs at a time."""
+    last = pairs.shape[0] - 1
+    for pair in range(0, last + 1, 4):
+        a, b, c, d = pair, min(pair + 1, last), min(pair + 2, last), min(pair + 3, last)
+        i, j, k, m = pairs[a, 0] * CHUNK, pairs[b, 0] * CHUNK, pairs[c, 0] * CHUNK, pairs[d, 0] * CHUNK
+        p, q, r, s = pairs[a, 1] * CHUNK, pairs[b, 1] * CHUNK, pairs[c, 1] * CHUNK, pairs[d, 1] * CHUNK
+        sums = splat(0.0, 4)
+        if i == j == k == m:
+            for row in range(0, CHUNK, VECTOR):
+                others = gather(chunk, p + row, q + row, r + row, s + row)
+                sums = add(sums, multiply(repeat(load(chunk, i + row, 1)), others))
         else:
-            other = np.uint64(pairs[pair, 1] * CHUNK)
-            store(running, at, add(load(running, at, 1), dot_chunk(chunk, one, chunk, other)))
-            pair += 1
+            for row in range(0, CHUNK, VECTOR):
+                ones = gather(chunk, i + row, j + row, k + row, m + row)
+                sums = add(sums, multiply(ones, gather(chunk, p + row, q + row, r + row, s + row)))
+        store(running, VECTOR * pair, add(load(running, VECTOR * pair, 4), sums))
+
+
+@kernel
+def _add_tiles(chunk, blocks, begin, end, running):
+    """Add the products of a chunk of rows to the running sums of some tiles, four terms times four."""
+    tile = 0
+    for one in range(blocks):
+        i = 4 * one * CHUNK
+        for other in range(one, blocks):
+            if begin <= tile < end:
+                at = 16 * VECTOR * (tile - begin)
+                if one == other:
+                    upper = splat(0.0, 10)
+                    for row in range(i, i + CHUNK, VECTOR):
+                        x = gather(chunk, row, row + CHUNK, row + 2 * CHUNK, row + 3 * CHUNK)
+                        upper = add(upper, outer_upper(x))
+                    store(running, at, add(load(running, at, 10), upper))
+                else:
+                    apart = 4 * (other - one) * CHUNK
+                    whole = splat(0.0, 16)
+                    for row in range(i, i + CHUNK, VECTOR):
+                        x = gather(chunk, row, row + CHUNK, row + 2 * CHUNK, row + 3 * CHUNK)
+                        there = row + apart
+                        y = gather(chunk, there, there + CHUNK, there + 2 * CHUNK, there + 3 * CHUNK)
+                        whole = add(whole, outer(x, y))
+                    store(running, at, add(load(running, at, 16), whole))
+            tile += 1
+
+
+@kernel
+def _read_tiles(running, blocks, begin, end, terms, out):
+    tile = 0
+    for one in range(blocks):
+        for other in range(one, blocks):
+            if begin <= tile < end:
+                at = 16 * VECTOR * (tile - begin)
+                for i in range(4 * one, 4 * one + 4):
+                    for j in range(max(i, 4 * other), 4 * other + 4):
+                        if j < terms:
+                            out[i, j] = fold(load(running, at, 1))
+                            out[j, i] = out[i, j]
+                        at += VECTOR
+            tile += 1

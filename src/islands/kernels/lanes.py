@@ -59,7 +59,7 @@ def load(_typingctx, array, offset, count):
         first = _address(context, builder, signature, arguments)
         return _made(builder, signature.return_type.count, lambda i: _read(builder, first, i))
 
-    return Lanes(count.literal_value)(array, types.uint64, count), generate
+    return Lanes(count.literal_value)(array, types.int64, count), generate
 
 
 @intrinsic
@@ -72,7 +72,7 @@ def store(_typingctx, array, offset, lanes):
             _align(builder.store(builder.extract_value(arguments[2], i), _vector_at(builder, first, i)))
         return context.get_dummy_value()
 
-    return types.void(array, types.uint64, lanes), generate
+    return types.void(array, types.int64, lanes), generate
 
 
 @intrinsic
@@ -171,18 +171,50 @@ def outside(_typingctx, a, bound):
 
 
 @intrinsic
-def half(_typingctx, a):
-    """Return half as many lanes: the second half of the vectors added to the first."""
-    return Lanes(a.count // 2)(a), _generate_half
+def gather(_typingctx, array, a, b, c, d):
+    """Return four vectors, eight numbers each from four offsets on."""
+
+    def generate(context, builder, signature, arguments):
+        firsts = [_address(context, builder, signature, (arguments[0], offset)) for offset in arguments[1:]]
+        return _made(builder, 4, lambda i: _read(builder, firsts[i], 0))
+
+    return Lanes(4)(array, types.int64, types.int64, types.int64, types.int64), generate
 
 
-def _generate_half(_context, builder, signature, arguments):
-    count = signature.return_type.count
-    return _made(
-        builder,
-        count,
-        lambda i: builder.fadd(*(builder.extract_value(arguments[0], j) for j in (i, i + count))),
-    )
+@intrinsic
+def repeat(_typingctx, a):
+    """Return four times the same vector."""
+
+    def generate(_context, builder, _signature, arguments):
+        return _made(builder, 4, lambda _i: builder.extract_value(arguments[0], 0))
+
+    return Lanes(4)(a), generate
+
+
+@intrinsic
+def outer(_typingctx, a, b):
+    """Return the products of four vectors with four others, the first with all, the second with all, ..."""
+    return Lanes(16)(a, b), _products([(i, j) for i in range(4) for j in range(4)])
+
+
+@intrinsic
+def outer_upper(_typingctx, a):
+    """Return the products of four vectors among themselves: each with itself and those behind it."""
+    return Lanes(10)(a), _products([(i, j) for i in range(4) for j in range(i, 4)])
+
+
+def _products(places):
+    def generate(_context, builder, _signature, arguments):
+        one, other = arguments[0], arguments[-1]
+        return _made(
+            builder,
+            len(places),
+            lambda k: builder.fmul(
+                builder.extract_value(one, places[k][0]), builder.extract_value(other, places[k][1])
+            ),
+        )
+
+    return generate
 
 
 @intrinsic

@@ -20,7 +20,7 @@ from islands.kernels.compilation import kernel
 from islands.kernels.lanes import VECTOR, add, multiply, read, sign, subtract, write
 
 #: Instructions built into the machine; every other one calls a row function through its address.
-ADD, SUBTRACT, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, CALL = range(6)
+ADD, SUBTRACT, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SIGN_OF_PRODUCT, CALL = range(7)
 
 #: The largest number of factors that one term multiplies on the fly.
 MAX_FACTORS = 4
@@ -97,6 +97,9 @@ def execute(operation, target, first, second, function, count, times):
     elif operation == SIGN_OF_DIFFERENCE:
         for at in range(0, size, step):
             write(target + at, sign(subtract(read(first + at, count), read(second + at, count))))
+    elif operation == SIGN_OF_PRODUCT:
+        for at in range(0, size, step):
+            write(target + at, sign(multiply(read(first + at, count), read(second + at, count))))
     elif operation == SIGN:
         for at in range(0, size, step):
             write(target + at, sign(read(first + at, count)))

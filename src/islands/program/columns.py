@@ -44,31 +44,10 @@ def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray
     RecordError, SettingsError
         As in `regressor_matrix`.
     """
-    upper = np.triu_indices(len(terms))
-    gram = np.empty((len(terms), len(terms)))
-    gram[upper] = inner_products(terms, np.column_stack(upper), record, warm_up)
-    return np.triu(gram) + np.triu(gram, 1).T
-
-
-def inner_products(
-    terms: Sequence[Term], pairs: NDArray[np.int64], record: Dataset, warm_up: int
-) -> NDArray[np.float64]:
-    """Return the inner products of chosen pairs of terms.
-
-    Parameters
-    ----------
-    pairs : ndarray of int64, shape (pairs, 2)
-        Positions among the terms.
-
-    Raises
-    ------
-    RecordError, SettingsError
-        As in `regressor_matrix`.
-    """
     program = link(terms)
     _refuse_unreadable(program, record, warm_up)
-    out = np.empty(len(pairs))
-    gram_kernel.inner_products(program, rows_of(record, warm_up), np.ascontiguousarray(pairs), out)
+    out = np.empty((len(terms), len(terms)))
+    gram_kernel.gram(program, rows_of(record, warm_up), out)
     return out
 
 

@@ -5,22 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.kernels import machine
 from islands.kernels.linker import CONSTANT, LAGGED, Nodes
-from islands.kernels.machine import (
-    ADD,
-    CALL,
-    MAX_FACTORS,
-    MULTIPLY,
-    SIGN,
-    SIGN_OF_DIFFERENCE,
-    SUBTRACT,
-)
-from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.kernels.machine import CALL, MAX_FACTORS, MULTIPLY
+from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive
+from islands.model.primitives import ADD, MUL, SIGN, SUB
 from islands.model.regressor import Regressor
 from islands.program.row_functions import row_address
 
 #: Primitives that the machine carries out itself; every other one is called through an address.
-_OPERATIONS = {"add": ADD, "sub": SUBTRACT, "mul": MULTIPLY, "sign": SIGN}
+_OPERATIONS = {ADD: machine.ADD, SUB: machine.SUBTRACT, MUL: MULTIPLY, SIGN: machine.SIGN}
+
+#: The sign of a difference is phi2 of the paper, the most frequent of all functions.
+_SIGNS = {SUB: machine.SIGN_OF_DIFFERENCE, MUL: machine.SIGN_OF_PRODUCT}
 
 Term = Regressor | Expression
 
@@ -49,7 +46,7 @@ class Store:
         known = self._terms.get(expression)
         if known is not None:
             return known
-        product = isinstance(expression, Apply) and expression.primitive.name == "mul"
+        product = isinstance(expression, Apply) and expression.primitive == MUL
         parts = expression.arguments if isinstance(expression, Apply) and product else (expression,)
         factors = [self._node(part) for part in parts]
         while len(factors) > MAX_FACTORS:
@@ -79,23 +76,20 @@ class Store:
                 return self._add(LAGGED, channel, lag)
             case Constant(value):
                 return self._add(CONSTANT, value=value)
+            case Apply(primitive, (Apply(inner, (*firsts, last)),)) if primitive == SIGN and inner in _SIGNS:
+                first = firsts[0] if len(firsts) == 1 else Apply(inner, tuple(firsts))
+                return self._add(_SIGNS[inner], self._node(first), self._node(last))
+            case Apply(primitive, (first, *others)) if primitive in _OPERATIONS:
+                result = self._node(first)
+                if not others:
+                    return self._add(_OPERATIONS[primitive], result, result)
+                for other in others:
+                    operation, operand = _operation(primitive, other)
+                    result = self._add(operation, result, self._node(operand))
+                return result
         assert isinstance(expression, Apply), "a canonical expression has its back-shifts at the leaves"
-        match expression:
-            case Apply(sign, (Apply(difference, (first, second)),)) if (
-                sign.name == "sign" and difference.name == "sub"
-            ):
-                # phi2 of the paper, the most frequent of all functions.
-                return self._add(SIGN_OF_DIFFERENCE, self._node(first), self._node(second))
         arguments = [self._node(argument) for argument in expression.arguments]
-        operation = _OPERATIONS.get(expression.primitive.name)
-        if operation is None:
-            return self._add(CALL, arguments[0], arguments[-1], row_address(expression.primitive))
-        if len(arguments) == 1:
-            return self._add(operation, arguments[0], arguments[0])
-        result = arguments[0]
-        for argument in arguments[1:]:
-            result = self._add(operation, result, argument)
-        return result
+        return self._add(CALL, arguments[0], arguments[-1], row_address(expression.primitive))
 
     def _add(
         self, operation: int, first: int = 0, second: int = 0, address: int = 0, value: float = 0.0
@@ -110,6 +104,15 @@ class Store:
         for column, entry in zip(self.nodes, key, strict=False):
             column[number] = entry
         return number
+
+
+def _operation(primitive: Primitive, operand: Expression) -> tuple[int, Expression]:
+    """Return the instruction that takes an operand in, and what is left of the operand."""
+    match primitive, operand:
+        case _, Apply(inner, (Constant(-1.0), *rest)) if primitive == ADD and inner == MUL:
+            # Canonical form writes a - b + c as a + (-1)*b + c; a difference has the same bits.
+            return machine.SUBTRACT, rest[0] if len(rest) == 1 else Apply(MUL, tuple(rest))
+    return _OPERATIONS[primitive], operand
 
 
 def _room(nodes: int, terms: int) -> Nodes:

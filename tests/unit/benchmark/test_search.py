@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from islands.benchmark.search import ISLAND, Run, run_apart, run_island
-from islands.benchmark.workload import benchmark_record
+from islands.benchmark.search import Run, run_apart, run_island
+from islands.benchmark.workload import ISLAND, benchmark_record
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem

@@ -9,6 +9,7 @@ from islands.benchmark import workload as module
 from islands.benchmark.workload import (
     DEEPEST,
     INTERVAL,
+    ISLAND,
     WARM_UP,
     Candidate,
     benchmark_record,
@@ -100,10 +101,10 @@ def test_the_record_is_in_units_of_three_times_its_spread(piezo):
     assert benchmark_record(500).y.tolist() == piezo.y[:500].tolist()
 
 
-def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo, monkeypatch):
-    monkeypatch.setattr(module, "_LOGGED", replace(module._LOGGED, population=12, generations=6))
-    found = evolved(piezo, 4)
-    assert found == evolved(piezo, 4)
+def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo):
+    short = replace(ISLAND, population=12, generations=6)
+    found = evolved(piezo, 4, short)
+    assert found == evolved(piezo, 4, short)
     assert len(found) == 4
     assert {each.constraints for each in found} == {"hysteresis"}
     for each in found:
@@ -113,19 +114,18 @@ def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo, monk
 
 
 def test_individuals_of_a_search_come_from_its_whole_course(piezo, monkeypatch):
-    monkeypatch.setattr(module, "_LOGGED", replace(module._LOGGED, population=12, generations=8))
     asked = []
     monkeypatch.setattr(module, "_bounded", lambda individuals, _evaluator: asked.append(individuals))
-    evolved(piezo, 3)
+    evolved(piezo, 3, replace(ISLAND, population=12, generations=8))
     bred = asked[-1][::-1]
-    # Nine populations, and whom the search looked at once more.
-    assert len(bred) >= 9 * 12
+    # Nine populations, less those whose structure was known.
+    assert 12 < len(bred) <= 9 * 12
     assert [each[0] for each in asked] == [bred[len(bred) // 3 - 1], bred[2 * len(bred) // 3 - 1], bred[-1]]
     assert all(genes.genes for genes in bred)
 
 
 def test_an_individual_that_diverges_gives_way_to_the_next(piezo):
-    evaluator = Evaluator(piezo, module._LOGGED)
+    evaluator = Evaluator(piezo, ISLAND)
     # Without y(k-1) the parameters' sum can't be one.
     infeasible = Individual((parse("u(k-1)"),))
     usable = Individual((parse("y(k-1)"), parse("y(k-1)*phi1(u(k-1), u(k-2))")))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.kernels.columns import Rows, columns
-from islands.kernels.gram import inner_products
+from islands.kernels.gram import gram, inner_products
 from islands.kernels.sums import CHUNK, dot
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
@@ -55,7 +55,9 @@ def products_of(terms, rows, pairs):
 
 
 def gram_of(terms, rows):
-    return products_of(terms, rows, SQUARE).reshape(len(terms), len(terms))
+    out = np.full((len(terms), len(terms)), np.nan)
+    gram(link(terms), rows, out)
+    return out
 
 
 def columns_of(terms, rows):
@@ -68,6 +70,14 @@ def filled(psi, rows):
     """Fill every segment's columns with zeros up to a multiple of 256 rows."""
     segments = np.split(psi, np.cumsum(rows)[:-1], axis=1)
     return np.hstack([np.pad(part, ((0, 0), (0, -part.shape[1] % CHUNK))) for part in segments])
+
+
+@pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
+@pytest.mark.parametrize("rows", ROWS)
+def test_some_pairs_have_the_numbers_that_all_together_have(rows, terms):
+    square = np.array([(i, j) for i in range(len(terms)) for j in range(len(terms))])
+    some = products_of(terms, record(rows), square[::-1])[::-1]
+    assert np.array_equal(some.reshape(len(terms), len(terms)), gram_of(terms, record(rows)))
 
 
 @pytest.mark.parametrize("rows", ROWS)

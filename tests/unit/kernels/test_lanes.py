@@ -13,10 +13,13 @@ from islands.kernels.lanes import (
     VECTOR,
     address,
     fold,
-    half,
+    gather,
     load,
+    outer,
+    outer_upper,
     outside,
     read,
+    repeat,
     room,
     sign,
     splat,
@@ -48,7 +51,7 @@ def pairwise(name, count):
 
     @njit
     def run(x, y, out):
-        zero = np.uint64(0)
+        zero = 0
         store(out, zero, operation(load(x, zero, count), load(y, zero, count)))
 
     return run
@@ -58,32 +61,39 @@ def pairwise(name, count):
 def signs(count):
     @njit
     def run(x, out):
-        store(out, np.uint64(0), sign(load(x, np.uint64(0), count)))
+        store(out, 0, sign(load(x, 0, count)))
 
     return run
 
 
-@cache
-def halves(count):
-    @njit
-    def run(x, out):
-        store(out, np.uint64(0), half(load(x, np.uint64(0), count)))
+@njit
+def gathered(x, a, b, c, d, out):
+    store(out, 0, gather(x, a, b, c, d))
 
-    return run
+
+@njit
+def repeated(x, out):
+    store(out, 0, repeat(load(x, 0, 1)))
+
+
+@njit
+def products(x, y, whole, upper):
+    store(whole, 0, outer(load(x, 0, 4), load(y, 0, 4)))
+    store(upper, 0, outer_upper(load(x, 0, 4)))
 
 
 @cache
 def bounded(count):
     @njit
     def run(x, bound):
-        return outside(load(x, np.uint64(0), count), bound)
+        return outside(load(x, 0, count), bound)
 
     return run
 
 
 @njit
 def folded(x):
-    return fold(load(x, np.uint64(0), 1))
+    return fold(load(x, 0, 1))
 
 
 @njit
@@ -123,14 +133,24 @@ def test_the_sign_is_one_minus_one_or_zero(count, data):
     assert same(out, np.where(x > 0, 1.0, np.where(x < 0, -1.0, 0.0)))
 
 
-@pytest.mark.parametrize("count", [2, 4, 26])
+def test_gathered_vectors_are_those_that_begin_at_the_offsets():
+    x, out = np.arange(100.0), np.empty(32)
+    gathered(x, 3, 50, 0, 17, out)
+    assert out.tolist() == [*range(3, 11), *range(50, 58), *range(8), *range(17, 25)]
+
+
 @given(st.data())
-def test_half_adds_the_second_half_to_the_first(count, data):
-    (x,) = data.draw(rows(count, 1))
-    out = np.empty(x.size // 2)
-    halves(count)(x, out)
+def test_products_of_four_vectors_with_four_others_stand_row_by_row(data):
+    x, y = data.draw(rows(4, 2))
+    whole, upper, four = np.empty(128), np.empty(80), np.empty(32)
+    products(x, y, whole, upper)
+    repeated(x, four)
     with np.errstate(all="ignore"):
-        assert same(out, x[: x.size // 2] + x[x.size // 2 :])
+        one, other = x.reshape(4, 1, 8), y.reshape(1, 4, 8)
+        assert same(whole, (one * other).reshape(-1))
+        squares = (one * x.reshape(1, 4, 8))[np.triu_indices(4)]
+        assert same(upper, squares.reshape(-1))
+    assert same(four, np.tile(x[:8], 4))
 
 
 @given(rows(1, 1))

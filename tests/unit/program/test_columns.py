@@ -15,7 +15,7 @@ from islands.model.expression import Constant, Lagged
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.model.regressor import regressor
-from islands.program.columns import gram_matrix, inner_products, regressor_matrix, rows_of
+from islands.program.columns import gram_matrix, regressor_matrix, rows_of
 
 
 def of(text, table=PRIMITIVES):
@@ -149,17 +149,6 @@ def test_the_gram_matrix_is_the_inner_products_whatever_the_segments(record, ter
     warm_up = max(item.maximum_lag for item in terms)
     assume(max(record.segments) > warm_up)
     np.testing.assert_array_equal(gram_matrix(terms, record, warm_up), products(terms, record, warm_up))
-
-
-def test_chosen_inner_products_are_those_of_the_gram_matrix():
-    record, terms = (
-        noise(900, (600, 300)),
-        [of("y(k-1)"), of("u(k-3)*y(k-2)^2"), of("exp(u(k-1))"), Lagged(0)],
-    )
-    gram = gram_matrix(terms, record, 3)
-    pairs = np.array([(2, 3), (0, 0), (1, 2), (3, 1), (2, 3)])
-    assert inner_products(terms, pairs, record, 3).tolist() == gram[pairs[:, 0], pairs[:, 1]].tolist()
-    assert np.array_equal(gram, gram.T)
 
 
 def test_the_rows_of_a_record_are_those_of_every_segment_after_its_warm_up():

@@ -15,6 +15,7 @@ from islands.kernels.machine import (
     MULTIPLY,
     SIGN,
     SIGN_OF_DIFFERENCE,
+    SIGN_OF_PRODUCT,
     SUBTRACT,
     TEMPORARY,
 )
@@ -61,6 +62,7 @@ NUMBERS = {
     SUBTRACT: lambda a, b: a - b,
     SIGN: sign,
     SIGN_OF_DIFFERENCE: lambda a, b: sign(a - b),
+    SIGN_OF_PRODUCT: lambda a, b: sign(a * b),
 }
 
 
@@ -132,7 +134,14 @@ def test_a_shared_subexpression_is_computed_once():
 @pytest.mark.parametrize("text", ["sign(u(k-1) - u(k-2))", "phi2(u(k-1), u(k-2))"])
 def test_the_sign_of_a_difference_is_one_instruction(text):
     assert operations(linked(text)) == [SIGN_OF_DIFFERENCE]
+    assert operations(linked("sign(u(k-1)*y(k-2))")) == [SIGN_OF_PRODUCT]
+    assert operations(linked("sign(u(k-1)*u(k-2)*y(k-2))")) == [MULTIPLY, SIGN_OF_PRODUCT]
     assert operations(linked("sign(u(k-1) + u(k-2))")) == [ADD, SIGN]
+
+
+def test_a_negative_summand_is_subtracted():
+    assert operations(linked("u(k-1) - u(k-2) + u(k-3)")) == [SUBTRACT, ADD]
+    assert operations(linked("u(k-1) - u(k-2)*y(k-1) + u(k-3)")) == [ADD, MULTIPLY, SUBTRACT]
 
 
 def test_long_products_share_what_they_have_in_common():

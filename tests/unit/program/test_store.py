@@ -9,7 +9,16 @@ from strategies import regressors, signals
 
 from islands.kernels import linker
 from islands.kernels.linker import CONSTANT, LAGGED
-from islands.kernels.machine import ADD, CALL, MAX_FACTORS, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SUBTRACT
+from islands.kernels.machine import (
+    ADD,
+    CALL,
+    MAX_FACTORS,
+    MULTIPLY,
+    SIGN,
+    SIGN_OF_DIFFERENCE,
+    SIGN_OF_PRODUCT,
+    SUBTRACT,
+)
 from islands.model.expression import Constant, Lagged, value
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
@@ -43,6 +52,7 @@ NUMBERS = {
     SUBTRACT: lambda a, b: a - b,
     SIGN: lambda a, _: sign(a),
     SIGN_OF_DIFFERENCE: lambda a, b: sign(a - b),
+    SIGN_OF_PRODUCT: lambda a, b: sign(a * b),
 }
 
 
