@@ -4,6 +4,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import regressor_of
 from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
 
@@ -49,3 +50,13 @@ def evolved(generations, setting=SMALL, seed=3, evaluator=None):
 def exactly(island):
     """All that a checkpoint would hold of an island: equality of regressors sees their text alone."""
     return repr(island)
+
+
+def distinct_genes(genes):
+    """Return the first gene of every regressor; genes that are zero are left out."""
+    found = {}
+    for gene in genes:
+        item = regressor_of(gene)
+        if item is not None:
+            found.setdefault(item, gene)
+    return found

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from searches import record
+from searches import distinct_genes, record
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained import constrained_least_squares, null_space
 from islands.estimation.constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.fitness import FITNESSES
-from islands.evolution.individual import Individual, distinct_genes
+from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
 from islands.evolution.variation import random_genes

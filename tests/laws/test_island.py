@@ -10,13 +10,13 @@ from math import inf, isfinite, nan
 from pathlib import Path
 
 import pytest
-from searches import SMALL, evolved, record
+from searches import SMALL, distinct_genes, evolved, record
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, distinct_genes, regressor_of
+from islands.evolution.individual import Individual, regressor_of
 from islands.evolution.island import _elite, first_generation, step
 from islands.evolution.problem import problem
 from islands.io.checkpoints import write_checkpoint

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from searches import distinct_genes
 
 import islands
 from islands.data.dataset import Dataset
@@ -13,7 +14,6 @@ from islands.errors import RecordError, SettingsError
 from islands.estimation.estimation import estimate
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.individual import distinct_genes
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import problem
 from islands.identify import State, identify, settings_of

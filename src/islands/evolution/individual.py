@@ -54,13 +54,3 @@ def regressor_of(gene: Expression) -> Regressor | None:
         return regressor(gene)[1]
     except ModelError:
         return None
-
-
-def distinct_genes(genes: tuple[Expression, ...]) -> dict[Regressor, Expression]:
-    """Return the first gene of every regressor; genes that are zero are left out."""
-    found: dict[Regressor, Expression] = {}
-    for gene in genes:
-        item = regressor_of(gene)
-        if item is not None:
-            found.setdefault(item, gene)
-    return found

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from searches import distinct_genes
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.evolution.constraints import with_phi
-from islands.evolution.individual import distinct_genes, regressor_of
+from islands.evolution.individual import regressor_of
 from islands.evolution.problem import problem
 from islands.evolution.settings import Settings
 from islands.model.expression import Apply, height, walk
