@@ -1,6 +1,8 @@
 """Columns of the regressor matrix: the same program as in a simulation, over measured rows alone.
 
-Here a lane is a sample: the lags of a signal are stretches of one row, so nothing is gathered.
+A recording is cut into 32 stretches of equal length that lie side by side, a lane each, so that a lag is an
+earlier row and every vector begins at a line of the cache: read along the record, most lags would lie across
+two lines.
 """
 
 from typing import NamedTuple
@@ -13,28 +15,41 @@ from islands.kernels.lanes import VECTOR, address, multiply, read, room, write
 from islands.kernels.machine import TEMPORARY, execute, multiply_factors
 from islands.kernels.sums import CHUNK
 
+#: Lanes of a row, and rows of a chunk.
+LANES = 32
+TIMES = CHUNK // LANES
+
 #: A chunk of rows is worked through in this many strides of so many vectors.
 _COUNT = 4
 _STRIDES = CHUNK // (VECTOR * _COUNT)
 
 
 class Rows(NamedTuple):
-    """The rows of a record that estimate.
+    """The rows of a record that estimate, in chunks of eight times 32 lanes.
 
     Attributes
     ----------
-    signals : ndarray of float64, shape (channel, sample)
-        Channel 0 is the output, then come the inputs.
-    first, rows : ndarray of int64, shape (segment,)
-        Sample of a segment's first row, and how many rows it has.
-    warm_up : int
-        Samples before each first row that may be read.
+    signals : ndarray of float64, shape (channel, flat)
+        Channel 0 is the output, then come the inputs: [time][lane], the warm-up first, one segment after the
+        other.
+    offset : ndarray of int64, shape (chunk,)
+        Where in a channel the chunk's first time stands.
+    lanes : ndarray of int64, shape (chunk, 8)
+        How many lanes of every time are rows; what is behind them is not.
+    row : ndarray of int64, shape (chunk, 8)
+        The row of the first lane, counted through all segments.
+    apart : ndarray of int64, shape (chunk,)
+        How many rows the next lane is further.
+    count : int
+        Rows of all segments.
     """
 
     signals: NDArray[np.float64]
-    first: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    warm_up: int
+    offset: NDArray[np.int64]
+    lanes: NDArray[np.int64]
+    row: NDArray[np.int64]
+    apart: NDArray[np.int64]
+    count: int
 
 
 @kernel
@@ -44,35 +59,30 @@ def columns(
     out,  # out, float64 [term, row of all segments]
 ):
     """Evaluate every term on every row."""
-    arena, place = arena_for(program, rows)
+    arena, place = arena_for(program)
     chunk = room(program.degree.size * CHUNK)
-    row = 0
-    for segment in range(rows.first.size):
-        for done in range(0, rows.rows[segment], CHUNK):
-            lanes = min(CHUNK, rows.rows[segment] - done)
-            evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
-            for term in range(program.degree.size):
-                for lane in range(lanes):
-                    out[term, row + lane] = chunk[term * CHUNK + lane]
-            row += lanes
+    for index in range(rows.offset.size):
+        evaluate(program, rows, index, arena, place, chunk)
+        for term in range(program.degree.size):
+            for time in range(TIMES):
+                at = term * CHUNK + time * LANES
+                for lane in range(rows.lanes[index, time]):
+                    out[term, rows.row[index, time] + lane * rows.apart[index]] = chunk[at + lane]
 
 
 @kernel
-def arena_for(program, rows):
-    """Return room for the temporaries and for a stretch of the signals, and the addresses of the operands.
+def arena_for(program):
+    """Return room for the temporaries, and the addresses of the operands.
 
     Those of signals are filled in by `evaluate`.
     """
-    stretch = rows.warm_up + CHUNK
-    home = -(-rows.signals.shape[0] * stretch // VECTOR) * VECTOR  # temporaries begin at a line of the cache
-    arena = room(home + program.temporaries * CHUNK)
-    arena[:] = 0.0
+    arena = room(program.temporaries * CHUNK)
     for index in range(program.constants.size):
-        arena[home + index * CHUNK : home + (index + 1) * CHUNK] = program.constants[index]
+        arena[index * CHUNK : (index + 1) * CHUNK] = program.constants[index]
     place = np.empty(program.operands.shape[0], np.int64)
     for index in range(place.size):
         if program.operands[index, 0] == TEMPORARY:
-            place[index] = address(arena, home + program.operands[index, 1] * CHUNK)
+            place[index] = address(arena, program.operands[index, 1] * CHUNK)
     return arena, place
 
 
@@ -80,35 +90,25 @@ def arena_for(program, rows):
 def evaluate(
     program,
     rows,
-    sample,  # the first row's sample
-    lanes,  # rows to evaluate, at most 256
+    index,  # of the chunk
     arena,
     place,  # as `arena_for` made them
-    chunk,  # out, float64 [term * 256]: zero behind the last row
+    chunk,  # out, float64 [term * 256]: zero where there is no row
 ):
-    """Evaluate every term on a stretch of rows of one segment."""
+    """Evaluate every term on a chunk of rows."""
     # Fields are taken out of their tuples once: each time costs as much as a row.
-    signals, warm_up = rows.signals, rows.warm_up
+    signals, offset, lanes = rows.signals, rows.offset, rows.lanes
     code, addresses, operands = program.code, program.addresses, program.operands
     factors, degree = program.factors, program.degree
-    samples = signals.shape[1]
-    source, stride, base = address(signals, 0), samples, sample
-    if lanes < CHUNK:
-        # Rows are computed whole, and behind the last one the record may end: read a copy.
-        stretch = warm_up + CHUNK
-        for channel in range(signals.shape[0]):
-            for index in range(warm_up + lanes):
-                arena[channel * stretch + index] = signals[channel, sample - warm_up + index]
-        source, stride, base = address(arena, 0), stretch, warm_up
-    for index in range(place.size):
-        channel, lag = operands[index, 0], operands[index, 1]
+    for operand in range(place.size):
+        channel, lag = operands[operand, 0], operands[operand, 1]
         if channel != TEMPORARY:
-            place[index] = source + 8 * (channel * stride + base - lag)
-    first_temporary = address(arena, arena.size - program.temporaries * CHUNK)
-    for index in range(code.shape[0]):
-        target = first_temporary + 8 * CHUNK * code[index, 1]
-        first, second = place[code[index, 2]], place[code[index, 3]]
-        execute(code[index, 0], target, first, second, addresses[index], _COUNT, _STRIDES)
+            place[operand] = address(signals, channel * signals.shape[1] + offset[index] - lag * LANES)
+    first_temporary = address(arena, 0)
+    for step in range(code.shape[0]):
+        target = first_temporary + 8 * CHUNK * code[step, 1]
+        first, second = place[code[step, 2]], place[code[step, 3]]
+        execute(code[step, 0], target, first, second, addresses[step], _COUNT, _STRIDES)
     for term in range(degree.size):
         target = address(chunk, term * CHUNK)
         a, b = place[factors[term, 0]], place[factors[term, 1]]
@@ -122,5 +122,6 @@ def evaluate(
         else:
             for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
                 write(target + at, multiply_factors(a + at, b + at, c + at, d + at, degree[term], _COUNT))
-        for lane in range(lanes, CHUNK):
-            chunk[term * CHUNK + lane] = 0.0
+        for time in range(TIMES):
+            for lane in range(lanes[index, time], LANES):
+                chunk[term * CHUNK + time * LANES + lane] = 0.0

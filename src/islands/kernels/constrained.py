@@ -127,19 +127,17 @@ def from_columns(program, rows, terms, reduction, factor, eta):
     """
     free = reduction.free
     count = free.size
-    arena, place = arena_for(program, rows)
+    arena, place = arena_for(program)
     chunk = room((terms + 1) * CHUNK)
     reduced, right = np.zeros((count, count)), np.zeros(count)
-    for segment in range(rows.first.size):
-        for done in range(0, rows.rows[segment], CHUNK):
-            lanes = min(CHUNK, rows.rows[segment] - done)
-            evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
-            _reduce_columns(chunk, terms, reduction)
-            for a in range(count):
-                one = free[a] * CHUNK
-                right[a] += fold(dot_chunk(chunk, one, chunk, terms * CHUNK))
-                for b in range(a + 1):
-                    reduced[a, b] += fold(dot_chunk(chunk, one, chunk, free[b] * CHUNK))
+    for index in range(rows.offset.size):
+        evaluate(program, rows, index, arena, place, chunk)
+        _reduce_columns(chunk, terms, reduction)
+        for a in range(count):
+            one = free[a] * CHUNK
+            right[a] += fold(dot_chunk(chunk, one, chunk, terms * CHUNK))
+            for b in range(a + 1):
+                reduced[a, b] += fold(dot_chunk(chunk, one, chunk, free[b] * CHUNK))
     least = _factorise(reduced, np.diag(reduced), factor)
     if least > 0.0:
         _solve(factor, right, eta)
@@ -154,19 +152,17 @@ def correct(program, rows, terms, reduction, factor, eta):
     target.
     """
     free = reduction.free
-    arena, place = arena_for(program, rows)
+    arena, place = arena_for(program)
     chunk = room((terms + 1) * CHUNK)
     target = terms * CHUNK
     right, correction = np.zeros(free.size), np.empty(free.size)
-    for segment in range(rows.first.size):
-        for done in range(0, rows.rows[segment], CHUNK):
-            lanes = min(CHUNK, rows.rows[segment] - done)
-            evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
-            _reduce_columns(chunk, terms, reduction)
-            for a in range(free.size):
-                _take_off(chunk, target, eta[a], free[a] * CHUNK)
-            for a in range(free.size):
-                right[a] += fold(dot_chunk(chunk, free[a] * CHUNK, chunk, target))
+    for index in range(rows.offset.size):
+        evaluate(program, rows, index, arena, place, chunk)
+        _reduce_columns(chunk, terms, reduction)
+        for a in range(free.size):
+            _take_off(chunk, target, eta[a], free[a] * CHUNK)
+        for a in range(free.size):
+            right[a] += fold(dot_chunk(chunk, free[a] * CHUNK, chunk, target))
     _solve(factor, right, correction)
     eta += correction
 

@@ -81,7 +81,6 @@ def evaluate(
     matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
     squared, diverged, nothing = np.empty(lanes), np.empty(lanes, np.int64), np.empty(0)
-    available = rows.rows.sum()
     patient = np.bool_(False)  # not the constant: the compiler would make another simulation of it
     for index in range(sizes.size):
         terms, positions = structures[index], kept[index]
@@ -105,7 +104,7 @@ def evaluate(
         if not feasible:
             ending[index] = INFEASIBLE
             continue
-        if available <= size:
+        if rows.count <= size:
             ending[index] = TOO_FEW_ROWS
             continue
         _read(terms, positions, size, target, pairs, matrix)

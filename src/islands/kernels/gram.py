@@ -3,8 +3,8 @@
 The regressor matrix of a large library does not fit into memory (80 730 candidates of the paper's appendix on
 100 000 rows: 65 GB). Inner products are numbers, and selection and least squares need nothing else.
 
-All sums have the written order of `sums`, begun anew in every segment. A number does not depend on which
-others are computed with it, nor on whether all pairs were asked for or a few.
+All sums have the written order of `sums` over the chunks of `Rows`. A number does not depend on which others
+are computed with it, nor on whether all pairs were asked for or a few.
 """
 
 from islands.kernels.columns import arena_for, evaluate
@@ -40,17 +40,15 @@ def inner_products(
     out,  # out, float64 [pair]
 ):
     """Compute the inner products of some pairs of terms."""
-    arena, place = arena_for(program, rows)
+    arena, place = arena_for(program)
     chunk = room(program.degree.size * CHUNK)
     for begin in range(0, pairs.shape[0], 4 * _GROUPS):
         some = pairs[begin : begin + 4 * _GROUPS]
         running = room(4 * VECTOR * -(-some.shape[0] // 4))
         running[:] = 0.0
-        for segment in range(rows.first.size):
-            for done in range(0, rows.rows[segment], CHUNK):
-                lanes = min(CHUNK, rows.rows[segment] - done)
-                evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
-                _add_pairs(chunk, some, running)
+        for index in range(rows.offset.size):
+            evaluate(program, rows, index, arena, place, chunk)
+            _add_pairs(chunk, some, running)
         for pair in range(some.shape[0]):
             out[begin + pair] = fold(load(running, VECTOR * pair, 1))
 
@@ -64,7 +62,7 @@ def gram(
     """Compute the inner products of all pairs of terms."""
     terms = program.degree.size
     blocks = -(-terms // 4)
-    arena, place = arena_for(program, rows)
+    arena, place = arena_for(program)
     chunk = room(4 * blocks * CHUNK)
     chunk[:] = 0.0  # behind the last term as well
     tiles = blocks * (blocks + 1) // 2
@@ -72,11 +70,9 @@ def gram(
         end = min(tiles, begin + _TILES)
         running = room(16 * VECTOR * (end - begin))
         running[:] = 0.0
-        for segment in range(rows.first.size):
-            for done in range(0, rows.rows[segment], CHUNK):
-                lanes = min(CHUNK, rows.rows[segment] - done)
-                evaluate(program, rows, rows.first[segment] + done, lanes, arena, place, chunk)
-                _add_tiles(chunk, blocks, begin, end, running)
+        for index in range(rows.offset.size):
+            evaluate(program, rows, index, arena, place, chunk)
+            _add_tiles(chunk, blocks, begin, end, running)
         _read_tiles(running, blocks, begin, end, terms, out)
 
 

@@ -9,7 +9,8 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels import columns as column_kernel
 from islands.kernels import gram as gram_kernel
-from islands.kernels.columns import Rows
+from islands.kernels.columns import LANES, TIMES, Rows
+from islands.kernels.lanes import room
 from islands.kernels.machine import Program
 from islands.program.linker import link
 from islands.program.store import Term
@@ -31,7 +32,7 @@ def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> ND
     program = link(terms)
     _refuse_unreadable(program, record, warm_up)
     rows = rows_of(record, warm_up)
-    out = np.empty((len(terms), int(rows.rows.sum())))
+    out = np.empty((len(terms), rows.count))
     column_kernel.columns(program, rows, out)
     return out
 
@@ -83,6 +84,34 @@ def rows_of(record: Dataset, warm_up: int) -> Rows:
             f"the longest recording has {max(record.segments)} samples and {warm_up} are needed before the "
             "first row: take a longer recording or smaller lags"
         )
-    first, rows = np.array(spans, np.int64).T
-    signals = np.ascontiguousarray(np.vstack([record.y, record.u.T]))
-    return Rows(signals, np.ascontiguousarray(first), np.ascontiguousarray(rows), warm_up)
+    return arranged(np.vstack([record.y, record.u.T]), spans, warm_up)
+
+
+def arranged(signals: NDArray[np.float64], spans: Sequence[tuple[int, int]], warm_up: int) -> Rows:
+    """Arrange signals in chunks of times and lanes.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (channel, sample)
+    spans : sequence of pairs of int
+        Of every segment the sample of its first row, and how many rows it has.
+    warm_up : int
+        Samples before each first row that may be read.
+    """
+    samples, chunks = [], []
+    flat = count = 0
+    for first, rows in spans:
+        length = -(-rows // LANES)
+        times = -(-length // TIMES) * TIMES
+        time, lane = np.arange(times), np.arange(LANES)
+        samples.append(first + np.arange(-warm_up, times)[:, None] + length * lane)
+        begin = flat + (warm_up + time[::TIMES]) * LANES
+        full = np.where(time < length, -(-(rows - time) // length), 0).reshape(-1, TIMES)
+        chunks.append((begin, full, (count + time).reshape(-1, TIMES), np.full(begin.size, length)))
+        flat, count = flat + (warm_up + times) * LANES, count + rows
+    # What stands behind a segment's last row is read and never counted.
+    places = np.minimum(np.concatenate(samples), signals.shape[1] - 1).reshape(-1)
+    gathered = room(len(signals) * flat).reshape(-1, flat)
+    gathered[:] = signals[:, places]
+    offset, lanes, row, apart = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
+    return Rows(gathered, offset, lanes, row, apart, count)

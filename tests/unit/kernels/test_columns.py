@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from islands.kernels.columns import Rows, columns
+from islands.kernels.columns import columns
 from islands.kernels.sums import CHUNK
 from islands.model.expression import Constant, Lagged, value
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
+from islands.program.columns import arranged
 from islands.program.linker import link
 
 TERMS = [
@@ -33,7 +34,7 @@ def made(text):
 
 def evaluated(terms, signals, first, rows, warm_up):
     out = np.full((len(terms), sum(rows)), np.nan)
-    columns(link(terms), Rows(signals, np.array(first), np.array(rows), warm_up), out)
+    columns(link(terms), arranged(signals, list(zip(first, rows, strict=True)), warm_up), out)
     return out
 
 

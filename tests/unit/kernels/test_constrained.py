@@ -26,7 +26,7 @@ from islands.kernels.constrained import (
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.columns import gram_matrix, regressor_matrix, rows_of
+from islands.program.columns import arranged, gram_matrix, regressor_matrix, rows_of
 from islands.program.linker import link
 from islands.simulation.outcome import OK
 
@@ -89,9 +89,8 @@ def columns_as_record(psi, y):
     """Return the program and the rows of a record whose inputs, one sample back, are the columns."""
     terms = len(psi)
     signals = np.vstack([np.append(0.0, y), np.append(psi, np.zeros((terms, 1)), axis=1)])
-    blank = Dataset(np.zeros((len(y) + 1, terms)), np.zeros(len(y) + 1), 1.0)
     program = link([*(Lagged(index + 1, 1) for index in range(terms)), Lagged(0, 0)])
-    return program, rows_of(blank, 1)._replace(signals=signals)
+    return program, arranged(signals, [(1, len(y))], 1)
 
 
 def estimated(route, psi, y, group=None, weight=None):

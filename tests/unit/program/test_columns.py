@@ -121,11 +121,15 @@ SEGMENTS = ((1000,), (100, 300, 7, 593), (CHUNK + 3, CHUNK + 3, CHUNK + 3), (3 +
 
 
 def products(terms, record, warm_up):
-    """Return the columns' inner products, every segment filled with zeros up to a multiple of 256 rows."""
+    """Return the columns' inner products, 32 stretches of every segment side by side, filled with zeros."""
     columns = regressor_matrix(terms, record, warm_up)
-    rows = [max(end - begin - warm_up, 0) for begin, end in record.bounds]
-    parts = np.split(columns, np.cumsum(rows)[:-1], axis=1)
-    filled = np.hstack([np.pad(part, ((0, 0), (0, -part.shape[1] % CHUNK))) for part in parts])
+    rows = [end - begin - warm_up for begin, end in record.bounds if end - begin > warm_up]
+    segments = []
+    for part in np.split(columns, np.cumsum(rows)[:-1], axis=1):
+        length = -(-part.shape[1] // 32)
+        stretches = np.pad(part, ((0, 0), (0, 32 * length - part.shape[1]))).reshape(-1, 32, length)
+        segments.append(np.pad(stretches, ((0, 0), (0, 0), (0, -length % 8))).swapaxes(1, 2))
+    filled = np.hstack([part.reshape(len(columns), -1) for part in segments])
     return [[dot(one, 0, other, 0, one.size) for other in filled] for one in filled]
 
 
@@ -153,10 +157,17 @@ def test_the_gram_matrix_is_the_inner_products_whatever_the_segments(record, ter
 
 def test_the_rows_of_a_record_are_those_of_every_segment_after_its_warm_up():
     found = rows_of(ramp((3, 5, 2, 4)), 3)
-    assert found.first.tolist() == [6, 13]
-    assert found.rows.tolist() == [2, 1]
-    assert found.warm_up == 3
-    assert found.signals.tolist() == [list(map(float, range(14))), [100.0 * k for k in range(14)]]
+    assert found.count == 3
+    # One stretch is at most one row long: two rows side by side, and one; a chunk for each segment.
+    assert found.apart.tolist() == [1, 1]
+    assert found.lanes.tolist() == [[2, *[0] * 7], [1, *[0] * 7]]
+    assert found.row[:, 0].tolist() == [0, 2]
+    for begin, sample in zip(found.offset, (6, 13), strict=True):
+        assert begin % 32 == 0
+        y, u = found.signals[:, begin - 3 * 32 : begin + 32 : 32]
+        assert y.tolist() == [sample - 3, sample - 2, sample - 1, sample]
+        assert u.tolist() == [100.0 * k for k in y]
+    assert found.signals[0, found.offset[0] + 1] == 7.0
 
 
 def test_the_gram_matrix_of_a_ramp_worked_by_hand():
