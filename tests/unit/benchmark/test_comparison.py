@@ -46,7 +46,6 @@ def test_every_time_of_every_side_is_measured(state, tmp_path):
     without = {"c_simulation_ms", "simulation_fraction_of_c"} if compiler() is None else set()
     assert {name for name, time in times.items() if time is None} == without
     assert all(time > 0.0 for name, time in times.items() if name not in without)
-    assert found.numpy_ms > found.numpy_simulation_ms
 
 
 def test_without_a_compiler_its_times_are_absent(state, tmp_path, monkeypatch):
