@@ -136,7 +136,7 @@ class Evaluator:
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
-        """Bytes that every cache takes, and its limit."""
+        """Bytes that every cache has in use, and its limit."""
         return {
             "pairs": (PLACE_BYTES * int(self._pairs.taken[0]), self.limits.pairs),
             "genes": (self._vocabulary.bytes, self.limits.genes),

@@ -122,6 +122,7 @@ def evaluate(
         else:
             for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
                 write(target + at, multiply_factors(a + at, b + at, c + at, d + at, degree[term], _COUNT))
-        for time in range(TIMES):
-            for lane in range(lanes[index, time], LANES):
-                chunk[term * CHUNK + time * LANES + lane] = 0.0
+        if lanes[index, TIMES - 1] < LANES:  # a later time has no more rows than an earlier one
+            for time in range(TIMES):
+                for lane in range(lanes[index, time], LANES):
+                    chunk[term * CHUNK + time * LANES + lane] = 0.0
