@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from oracles import side_by_side
 
 from islands.kernels.columns import columns
 from islands.kernels.gram import gram, inner_products
@@ -67,16 +68,6 @@ def columns_of(terms, rows):
     return out
 
 
-def filled(psi, rows):
-    """Lay 32 stretches of every segment side by side, zeros where there is no row; take them row by row."""
-    segments = []
-    for part in np.split(psi, np.cumsum(rows)[:-1], axis=1):
-        length = -(-part.shape[1] // 32)
-        stretches = np.pad(part, ((0, 0), (0, 32 * length - part.shape[1]))).reshape(-1, 32, length)
-        segments.append(np.pad(stretches, ((0, 0), (0, 0), (0, -length % 8))).swapaxes(1, 2))
-    return np.hstack([part.reshape(len(psi), -1) for part in segments])
-
-
 @pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
 @pytest.mark.parametrize("rows", ROWS)
 def test_some_pairs_have_the_numbers_that_all_together_have(rows, terms):
@@ -87,7 +78,7 @@ def test_some_pairs_have_the_numbers_that_all_together_have(rows, terms):
 
 @pytest.mark.parametrize("rows", ROWS)
 def test_every_entry_is_the_inner_product_of_two_filled_columns_bit_for_bit(rows):
-    found, psi = gram_of(TERMS, record(rows)), filled(columns_of(TERMS, record(rows)), rows)
+    found, psi = gram_of(TERMS, record(rows)), side_by_side(columns_of(TERMS, record(rows)), rows)
     for i, one in enumerate(psi):
         for j, other in enumerate(psi):
             assert found[i, j] == dot(one, 0, other, 0, one.size)
@@ -96,7 +87,7 @@ def test_every_entry_is_the_inner_product_of_two_filled_columns_bit_for_bit(rows
 @given(st.lists(st.integers(1, 600), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
 def test_the_order_begins_anew_in_every_segment_whatever_their_lengths(rows, seed):
     data = record(rows, seed)
-    psi = filled(columns_of(TERMS, data), rows)
+    psi = side_by_side(columns_of(TERMS, data), rows)
     expected = [[dot(one, 0, other, 0, one.size) for other in psi] for one in psi]
     assert np.array_equal(gram_of(TERMS, data), expected)
 

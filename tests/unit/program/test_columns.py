@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from oracles import side_by_side
 from strategies import INPUTS, nearly, records, regressors, settled_value
 
 from islands.data.dataset import Dataset
@@ -124,12 +125,7 @@ def products(terms, record, warm_up):
     """Return the columns' inner products, 32 stretches of every segment side by side, filled with zeros."""
     columns = regressor_matrix(terms, record, warm_up)
     rows = [end - begin - warm_up for begin, end in record.bounds if end - begin > warm_up]
-    segments = []
-    for part in np.split(columns, np.cumsum(rows)[:-1], axis=1):
-        length = -(-part.shape[1] // 32)
-        stretches = np.pad(part, ((0, 0), (0, 32 * length - part.shape[1]))).reshape(-1, 32, length)
-        segments.append(np.pad(stretches, ((0, 0), (0, 0), (0, -length % 8))).swapaxes(1, 2))
-    filled = np.hstack([part.reshape(len(columns), -1) for part in segments])
+    filled = side_by_side(columns, rows)
     return [[dot(one, 0, other, 0, one.size) for other in filled] for one in filled]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from oracles import NUMBERS
 from strategies import regressors, signals
 
 from islands.kernels.machine import (
@@ -52,20 +53,6 @@ def interpreted(program, signal, operations, called, product=math.prod):
     return [product(map(read, several[:degree])) for several, degree in factors], computed
 
 
-def sign(a):
-    return float((a > 0.0) - (a < 0.0))
-
-
-NUMBERS = {
-    MULTIPLY: lambda a, b: a * b,
-    ADD: lambda a, b: a + b,
-    SUBTRACT: lambda a, b: a - b,
-    SIGN: sign,
-    SIGN_OF_DIFFERENCE: lambda a, b: sign(a - b),
-    SIGN_OF_PRODUCT: lambda a, b: sign(a * b),
-}
-
-
 @given(several, signals())
 def test_a_program_computes_its_terms_whatever_rows_are_reused(called, terms, signal):
     try:
@@ -78,8 +65,6 @@ def test_a_program_computes_its_terms_whatever_rows_are_reused(called, terms, si
 
 @given(several)
 def test_nothing_is_computed_twice(called, terms):
-    names = {MULTIPLY: "mul", ADD: "add", SUBTRACT: "sub", SIGN: "sign", SIGN_OF_DIFFERENCE: "phi2"}
-
     def written(name):
         return lambda *arguments: f"{name}({', '.join(map(str, arguments))})"
 
@@ -88,7 +73,7 @@ def test_nothing_is_computed_twice(called, terms):
             self.arity, self.scalar = entry.arity, written(entry.name)
 
     symbols = {address: Named(entry) for address, entry in called.items()}
-    operations = {operation: written(name) for operation, name in names.items()}
+    operations = {operation: written(f"instruction {operation}") for operation in NUMBERS}
     program = link(terms)
     _, computed = interpreted(program, lambda *place: f"x{place}", operations, symbols, product=list)
     assert len(set(computed)) == len(computed) == len(program.code)

@@ -5,19 +5,15 @@ import math
 import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from oracles import NUMBERS
 from strategies import regressors, signals
 
 from islands.kernels import linker
 from islands.kernels.linker import CONSTANT, LAGGED
 from islands.kernels.machine import (
-    ADD,
     CALL,
     MAX_FACTORS,
-    MULTIPLY,
     SIGN,
-    SIGN_OF_DIFFERENCE,
-    SIGN_OF_PRODUCT,
-    SUBTRACT,
 )
 from islands.model.expression import Constant, Lagged, value
 from islands.model.parsing import parse
@@ -42,20 +38,6 @@ def taken(store):
     return list(zip(*(column[:count].tolist() for column in columns), strict=True))
 
 
-def sign(a):
-    return float((a > 0.0) - (a < 0.0))
-
-
-NUMBERS = {
-    MULTIPLY: lambda a, b: a * b,
-    ADD: lambda a, b: a + b,
-    SUBTRACT: lambda a, b: a - b,
-    SIGN: lambda a, _: sign(a),
-    SIGN_OF_DIFFERENCE: lambda a, b: sign(a - b),
-    SIGN_OF_PRODUCT: lambda a, b: sign(a * b),
-}
-
-
 def node_values(store, signal):
     """Evaluate every node on single values, by the meaning of its operation."""
     called = {row_address(entry): entry for entry in PRIMITIVES.values()}
@@ -68,7 +50,8 @@ def node_values(store, signal):
         elif operation == CALL:
             found.append(called[address].scalar(*(found[first], found[second])[: called[address].arity]))
         else:
-            found.append(NUMBERS[operation](found[first], found[second]))
+            operands = (found[first],) if operation == SIGN else (found[first], found[second])
+            found.append(NUMBERS[operation](*operands))
     return found
 
 
