@@ -14,7 +14,7 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.constrained import null_space
 from islands.estimation.constraints import constraint
-from islands.kernels.simulate import Layout, simulate
+from islands.kernels.simulate import DIVERGED, Layout, simulate
 from islands.kernels.sums import dot
 from islands.model.model import Model
 from islands.program.linker import link
@@ -139,11 +139,11 @@ class _Residual:
         """Return prediction minus measurement over all predicted samples; None after a divergence."""
         lanes = len(self._cut.start)
         predicted = np.empty(len(self._y))
-        diverged = np.full(lanes, -1, np.int64)
-        simulate(
-            self._program, theta, self._cut, self._bound, np.inf, False, np.empty(lanes), diverged, predicted
+        error, diverged = np.empty(lanes), np.empty(lanes, np.int64)
+        ending = simulate(
+            self._program, theta, self._cut, self._bound, np.inf, False, error, diverged, predicted
         )
-        if (diverged >= 0).any():
+        if ending == DIVERGED:
             return None
         return np.ascontiguousarray((predicted - self._y)[self._predicted])
 

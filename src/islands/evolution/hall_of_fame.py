@@ -27,6 +27,10 @@ class HallOfFame:
             places[entry.size] += 1
             yield places[entry.size], entry
 
+    def last(self) -> dict[int, float]:
+        """Return, for every size that is full, the fitness of its last individual: nobody worse enters."""
+        return {entry.size: entry.fitness for place, entry in self.places() if place == DEPTH}
+
     def best(self) -> dict[int, Individual]:
         """Return the best individual of every size."""
         found: dict[int, Individual] = {}
@@ -45,10 +49,10 @@ class HallOfFame:
 
 def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfFame:
     """Return the hall with individuals added; a fitness that is not finite never enters."""
-    full = {entry.size: entry.fitness for place, entry in hall.places() if place == DEPTH}
+    last = hall.last()
     found: dict[tuple[str, ...], Individual] = {}
     for entry in (*hall.entries, *individuals):
-        if not isfinite(entry.fitness) or entry.fitness > full.get(entry.size, inf):
+        if not isfinite(entry.fitness) or entry.fitness > last.get(entry.size, inf):
             continue
         known = found.get(entry.key)
         if known is None or _order(entry) < _order(known):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.hall_of_fame import DEPTH, HallOfFame, with_entries
+from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import tournaments
@@ -172,7 +172,7 @@ def _bar(island: Island, settings: Settings) -> float:
 
 def _bars(hall: HallOfFame, bar: float, most: int) -> list[float]:
     """Return, for every size of a model, the fitness above which nobody needs to know it."""
-    last = {entry.size: entry.fitness for place, entry in hall.places() if place == DEPTH}
+    last = hall.last()
     return [max(bar, last.get(size, inf)) for size in range(most + 1)]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.kernels.compilation import kernel
-from islands.kernels.lanes import VECTOR, address, multiply, read, room, write
+from islands.kernels.lanes import VECTOR, address, room, write
 from islands.kernels.machine import TEMPORARY, execute, multiply_factors
 from islands.kernels.sums import CHUNK
 
@@ -113,15 +113,8 @@ def evaluate(
         target = address(chunk, term * CHUNK)
         a, b = place[factors[term, 0]], place[factors[term, 1]]
         c, d = place[factors[term, 2]], place[factors[term, 3]]
-        if degree[term] == 1:
-            for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
-                write(target + at, read(a + at, _COUNT))
-        elif degree[term] == 2:
-            for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
-                write(target + at, multiply(read(a + at, _COUNT), read(b + at, _COUNT)))
-        else:
-            for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
-                write(target + at, multiply_factors(a + at, b + at, c + at, d + at, degree[term], _COUNT))
+        for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
+            write(target + at, multiply_factors(a + at, b + at, c + at, d + at, degree[term], _COUNT))
         if lanes[index, TIMES - 1] < LANES:  # a later time has no more rows than an earlier one
             for time in range(TIMES):
                 for lane in range(lanes[index, time], LANES):

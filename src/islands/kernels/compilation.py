@@ -37,7 +37,7 @@ STAMP = "complete"
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Compile a function as a kernel: without the interpreter's lock, and 1/0 is inf, not an exception.
 
-    Use it bare, ``@kernel``, or with more of Numba's options, ``@kernel(inline="always")``.
+    Use it bare, ``@kernel``, or with more of Numba's options, ``@kernel(forceinline=True)``.
 
     Functions of one factory are told apart in the cache by the numbers that they enclose. They may not
     enclose a kernel: it looks different in every process, and nothing would be found again.

@@ -4,6 +4,8 @@
 section 3). One member of each group, the pivot, is eliminated: the others then stand for ``psi_j - (w_j /
 w_p) psi_p``, the target for ``y - (c / w_p) psi_p``, and what is left is free. That is equation (4) in the
 null space of its constraints, without an inverse.
+
+Sums over columns that are differences belong to one individual alone: they are folded chunk by chunk.
 """
 
 from typing import NamedTuple
@@ -85,13 +87,7 @@ def reduce(
             if group[i] == group[j]:
                 pivot[i] = best
                 share[i] = weight[i] / weight[best]
-    free = np.empty(terms, np.int64)
-    count = 0
-    for j in range(terms):
-        if pivot[j] != j:
-            free[count] = j
-            count += 1
-    return Reduction(pivot, share, fixed, free[:count])
+    return Reduction(pivot, share, fixed, np.flatnonzero(pivot != np.arange(terms)))
 
 
 @kernel

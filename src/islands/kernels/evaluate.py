@@ -136,9 +136,9 @@ def evaluate(
 def _fill(structures, sizes, target, nodes, pairs, rows, place):
     """Compute the inner products that the table misses."""
     local = np.full(nodes.degree.size, -1, np.int64)
-    terms = np.empty(64, np.int64)
-    missing = np.empty((64, 2), np.int64)
-    places = np.empty(64, np.int64)
+    terms = np.empty_like(local)
+    most = np.sum((sizes + 1) * (sizes + 2) // 2)
+    missing, places = np.empty((most, 2), np.int64), np.empty(most, np.int64)
     count = used = 0
     for index in range(sizes.size):
         size = sizes[index]
@@ -154,14 +154,9 @@ def _fill(structures, sizes, target, nodes, pairs, rows, place):
                 pairs.taken[0] += 1
                 for term in (one, other):
                     if local[term] < 0:
-                        if used == terms.size:
-                            terms = np.append(terms, np.empty_like(terms))
                         local[term] = used
                         terms[used] = term
                         used += 1
-                if count == places.size:
-                    places = np.append(places, np.empty_like(places))
-                    missing = np.concatenate((missing, np.empty_like(missing)))
                 places[count] = at
                 missing[count] = local[one], local[other]
                 count += 1
@@ -195,17 +190,6 @@ def _read(terms, positions, size, target, pairs, gram):
 
 
 @kernel
-def _compact(positions, size):
-    """Move the positions that are left to the front; return how many."""
-    left = 0
-    for i in range(size):
-        if positions[i] >= 0:
-            positions[left] = positions[i]
-            left += 1
-    return left
-
-
-@kernel
 def _without_lone(terms, positions, size, groups):
     """Leave out a term that is alone in a group whose sum is zero."""
     lone = np.zeros(size, np.bool_)
@@ -217,10 +201,9 @@ def _without_lone(terms, positions, size, groups):
         for j in range(size):
             if j != i and groups.group[terms[positions[j]]] == group:
                 lone[i] = False
-    for i in range(size):
-        if lone[i]:
-            positions[i] = -1
-    return _compact(positions, size)
+    left = positions[:size][~lone]
+    positions[: left.size] = left
+    return left.size
 
 
 @kernel

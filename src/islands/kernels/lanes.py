@@ -54,25 +54,13 @@ class _LanesModel(models.PrimitiveModel):
 @intrinsic(prefer_literal=True)
 def load(_typingctx, array, offset, count):
     """Return ``8 * count`` numbers of a contiguous array, from an offset on."""
-
-    def generate(context, builder, signature, arguments):
-        first = _address(context, builder, signature, arguments)
-        return _made(builder, signature.return_type.count, lambda i: _read(builder, first, i))
-
-    return Lanes(count.literal_value)(array, types.int64, count), generate
+    return Lanes(count.literal_value)(array, types.int64, count), _reading(_in_array)
 
 
 @intrinsic
 def store(_typingctx, array, offset, lanes):
     """Write lanes into a contiguous array, from an offset on."""
-
-    def generate(context, builder, signature, arguments):
-        first = _address(context, builder, signature, arguments)
-        for i in range(signature.args[2].count):
-            _align(builder.store(builder.extract_value(arguments[2], i), _vector_at(builder, first, i)))
-        return context.get_dummy_value()
-
-    return types.void(array, types.int64, lanes), generate
+    return types.void(array, types.int64, lanes), _writing(_in_array)
 
 
 @intrinsic
@@ -83,7 +71,7 @@ def address(_typingctx, array, offset):
     """
 
     def generate(context, builder, signature, arguments):
-        return builder.ptrtoint(_address(context, builder, signature, arguments), ir.IntType(64))
+        return builder.ptrtoint(_in_array(context, builder, signature, arguments), ir.IntType(64))
 
     return types.int64(array, types.int64), generate
 
@@ -91,25 +79,13 @@ def address(_typingctx, array, offset):
 @intrinsic(prefer_literal=True)
 def read(_typingctx, place, count):
     """Return ``8 * count`` numbers from an address on."""
-
-    def generate(_context, builder, signature, arguments):
-        first = builder.inttoptr(arguments[0], _DOUBLE.as_pointer())
-        return _made(builder, signature.return_type.count, lambda i: _read(builder, first, i))
-
-    return Lanes(count.literal_value)(types.int64, count), generate
+    return Lanes(count.literal_value)(types.int64, count), _reading(_at_address)
 
 
 @intrinsic
 def write(_typingctx, place, lanes):
     """Write lanes from an address on."""
-
-    def generate(context, builder, signature, arguments):
-        first = builder.inttoptr(arguments[0], _DOUBLE.as_pointer())
-        for i in range(signature.args[1].count):
-            _align(builder.store(builder.extract_value(arguments[1], i), _vector_at(builder, first, i)))
-        return context.get_dummy_value()
-
-    return types.void(types.int64, lanes), generate
+    return types.void(types.int64, lanes), _writing(_at_address)
 
 
 @intrinsic(prefer_literal=True)
@@ -175,7 +151,7 @@ def gather(_typingctx, array, a, b, c, d):
     """Return four vectors, eight numbers each from four offsets on."""
 
     def generate(context, builder, signature, arguments):
-        firsts = [_address(context, builder, signature, (arguments[0], offset)) for offset in arguments[1:]]
+        firsts = [_in_array(context, builder, signature, (arguments[0], offset)) for offset in arguments[1:]]
         return _made(builder, 4, lambda i: _read(builder, firsts[i], 0))
 
     return Lanes(4)(array, types.int64, types.int64, types.int64, types.int64), generate
@@ -252,9 +228,35 @@ def _made(builder, count, vector):
     return lanes
 
 
-def _address(context, builder, signature, arguments):
+def _reading(first):
+    """Return the code that reads lanes; ``first`` points at their first number."""
+
+    def generate(context, builder, signature, arguments):
+        begin = first(context, builder, signature, arguments)
+        return _made(builder, signature.return_type.count, lambda i: _read(builder, begin, i))
+
+    return generate
+
+
+def _writing(first):
+    """Return the code that writes lanes, the last argument."""
+
+    def generate(context, builder, signature, arguments):
+        begin = first(context, builder, signature, arguments)
+        for i in range(signature.args[-1].count):
+            _align(builder.store(builder.extract_value(arguments[-1], i), _vector_at(builder, begin, i)))
+        return context.get_dummy_value()
+
+    return generate
+
+
+def _in_array(context, builder, signature, arguments):
     array = context.make_array(signature.args[0])(context, builder, arguments[0])
     return builder.gep(array.data, [arguments[1]])
+
+
+def _at_address(_context, builder, _signature, arguments):
+    return builder.inttoptr(arguments[0], _DOUBLE.as_pointer())
 
 
 def _vector_at(builder, first, i):

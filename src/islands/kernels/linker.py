@@ -129,7 +129,7 @@ def _needed(nodes, terms, place):
                 waiting = height
                 if place[node] < 0 and nodes.operation[node] >= 0:
                     if height + 2 > stack.size:
-                        stack = _grown(stack)
+                        stack = np.append(stack, np.empty_like(stack))
                     # The second first: the first is then computed before it.
                     for operand in (nodes.second[node], nodes.first[node]):
                         if place[operand] < 0:
@@ -139,15 +139,8 @@ def _needed(nodes, terms, place):
                     height -= 1
                     if place[node] < 0:
                         if count == needed.size:
-                            needed = _grown(needed)
+                            needed = np.append(needed, np.empty_like(needed))
                         place[node] = count
                         needed[count] = node
                         count += 1
     return needed[:count]
-
-
-@kernel
-def _grown(numbers):
-    grown = np.empty(2 * numbers.size, np.int64)
-    grown[: numbers.size] = numbers
-    return grown

@@ -1,9 +1,7 @@
 """The row machine: a flat program, and what one of its instructions does to a row of lanes.
 
-A program never touches single numbers. Its operands are rows of ``lanes`` consecutive float64 of one flat
-arena, so the cost of decoding an instruction is shared by the whole row and the inner loops vectorise. All
-offsets are unsigned: a signed one makes the compiler guard every access against negative indices, which
-keeps the loop from vectorising.
+A program never touches single numbers. Its operands are rows of consecutive float64, given by their
+addresses, so the cost of decoding an instruction is shared by the whole row.
 
 Nothing here is a reduction, so the processor's vector width cannot change a result.
 """
@@ -24,7 +22,6 @@ ADD, SUBTRACT, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SIGN_OF_PRODUCT, CALL = range
 
 #: The largest number of factors that one term multiplies on the fly.
 MAX_FACTORS = 4
-
 
 #: In the place of an operand's channel: it is no signal.
 TEMPORARY = -1

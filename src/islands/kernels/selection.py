@@ -77,9 +77,6 @@ def prune(gram, terms, tolerance, kept):
     stays = np.zeros(terms, np.bool_)
     for rank in range(selected):
         stays[order[rank]] = err[rank] > tolerance
-    count = 0
-    for term in range(terms):
-        if stays[term]:
-            kept[count] = term
-            count += 1
-    return count
+    found = np.flatnonzero(stays)
+    kept[: found.size] = found
+    return found.size

@@ -4,8 +4,8 @@ A loop that adds into one number can only be vectorised by adding in another ord
 depend on the processor. Here it stands in the source. Rows are taken 256 at a time: of these, lane j of eight
 adds rows j, j + 8, ... from first to last. The eight lanes are added to eight running sums, from the first
 256 rows to the last, and at the end the eight are folded to one number: the second half is added to the
-first, and again. Every kernel that sums over the rows of a record uses this order, so a number does not
-depend on which of them computed it.
+first, and again. Every kernel whose inner products are compared or kept uses this order, so a number does
+not depend on which of them computed it.
 """
 
 import numpy as np
