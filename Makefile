@@ -17,10 +17,10 @@ demo: setup
 	$(BIN)/islands demo --out demo-out
 
 test: setup
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist loadgroup
 
 slow: setup
-	$(BIN)/pytest -n 2 -m "slow or measured"
+	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or measured"
 
 lint: setup
 	$(BIN)/ruff format --check .

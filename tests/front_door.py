@@ -1,10 +1,47 @@
 """The command line as a process: what every acceptance test knocks at."""
 
+import csv
+import json
 import subprocess
 import sysconfig
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
+
+#: Options that go with `write_hysteresis`, and a search of it that takes a second.
+COLUMNS = ("--input", "u_V", "--output", "y_um")
+BUDGET = ("--population", "30", "--max-terms", "5", "--shooting", "200", "--seed", "2")
+
+
+def write_hysteresis(path: Path) -> Path:
+    """Write a record of 4000 samples of a hysteresis."""
+    rng = np.random.default_rng(0)
+    t = np.arange(4000) * 1e-2
+    u = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in ((1, 0.35, 1), (0.6, 0.83, 2), (0.4, 1.4, 3)))
+    y = np.zeros(4000)
+    for k in range(2, 4000):
+        rise = u[k - 1] - u[k - 2]
+        y[k] = y[k - 1] + 0.8 * rise - 0.35 * np.tanh(2 * y[k - 1]) * abs(rise)
+    y += 2e-3 * rng.normal(size=4000)
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["t_s", "u_V", "y_um"])
+        writer.writerows(zip(t.round(6).tolist(), u.tolist(), y.tolist(), strict=True))
+    return path
+
+
+def stored(folder: Path) -> dict[str, Any]:
+    """Return a folder's result."""
+    return json.loads((folder / "result.json").read_text())
+
+
+def found(folder: Path) -> dict[str, bytes]:
+    """Return what a search found, as bytes: the hall of fame and the models."""
+    paths = [folder / "hall.json", *sorted((folder / "models").iterdir())]
+    return {path.name: path.read_bytes() for path in paths}
 
 
 def islands(*arguments: object) -> subprocess.CompletedProcess[str]:

@@ -1,4 +1,4 @@
-"""Every generator of random values: expressions, signals, models and small records.
+"""Every generator of random values: expressions, signals, models, small records, topologies and schedules.
 
 Numbers of a *law of values* lie on a coarse grid of binary fractions, so that sums and products of a few of
 them are exact and a jump of sign, max or a protected division is met exactly or not at all.
@@ -12,6 +12,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
+from islands.evolution.topology import TOPOLOGIES, WITH_DEGREE
 from islands.model.expression import Apply, Constant, Lagged, Shift, value
 from islands.model.model import model_of
 from islands.model.primitives import ADD, MUL, PRIMITIVES
@@ -137,3 +138,32 @@ def _shaken(expression, rng):
 def nearly(a, b):
     """Equal but for rounding, in the sense of `settled_value`."""
     return math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-280)
+
+
+def edges(islands):
+    """Edges between different islands, none twice."""
+    pairs = [(source, target) for source in range(islands) for target in range(islands) if source != target]
+    return st.lists(st.sampled_from(pairs), min_size=1, max_size=3 * islands, unique=True)
+
+
+@st.composite
+def layouts(draw, most=12):
+    """The text of a topology, and a number of islands that it can be laid out over."""
+    islands = draw(st.integers(1, most))
+    texts = [st.sampled_from([name for name in TOPOLOGIES if name not in WITH_DEGREE])]
+    if islands > 1:
+        texts.append(edges(islands).map(lambda drawn: ",".join(f"{a}>{b}" for a, b in drawn)))
+        texts.append(st.integers(1, islands - 1).map(lambda degree: f"random-regular:{degree}"))
+    return draw(st.one_of(texts)), islands
+
+
+@st.composite
+def schedules(draw, least=1, most=9, latest=40):
+    """The pieces of a schedule: from which generation on, which value."""
+    begins = draw(st.lists(st.integers(1, latest), max_size=3, unique=True).map(sorted))
+    return tuple((begin, draw(st.integers(least, most))) for begin in (0, *begins))
+
+
+def schedule_text(pieces):
+    (_, first), *others = pieces
+    return ",".join([str(first), *(f"{begin}:{value}" for begin, value in others)])

@@ -2,7 +2,9 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
+from math import inf
 from typing import Any
 
 from islands.data.dataset import Dataset
@@ -10,8 +12,8 @@ from islands.data.split import Split
 from islands.errors import RecordError, SettingsError, chosen
 from islands.estimation.estimation import estimate
 from islands.estimation.refinement import refine
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import Engine, Epoch, SerialEngine
+from islands.evolution.archipelago import Archipelago, founded
+from islands.evolution.engine import Engine, Epoch, SerialEngine, Stop
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import regressor_of
@@ -53,7 +55,7 @@ class State:
         Bytes that every cache takes, and its limit.
     """
 
-    archipelago: Archipelago = field(default_factory=Archipelago)
+    archipelago: Archipelago
     evaluations: int = 0
     duplicates: int = 0
     outcomes: Mapping[str, int] = field(default_factory=dict)
@@ -61,8 +63,8 @@ class State:
     caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
 
-#: Called after every epoch; a true answer ends the search there, and the best so far is the result.
-Watch = Callable[[State, Settings], bool | None]
+#: Called after every epoch.
+Watch = Callable[[State, Settings], None]
 
 
 def identify(
@@ -71,8 +73,8 @@ def identify(
     *,
     preset: str = "hysteresis",
     seed: int = 0,
-    islands: int = 1,
     progress: Watch | None = None,
+    stop: Stop | None = None,
     start: State | None = None,
     engine: Engine | None = None,
     **changes: Any,
@@ -89,16 +91,16 @@ def identify(
         An entry of ``PRESETS``.
     seed : int
         The same seed gives the same result, bit for bit.
-    islands : int
-        Islands that evolve beside each other.
     progress : callable, optional
-        Called with the `State` after every epoch; return True to stop there.
+        Called with the `State` and the `Settings` after every epoch.
+    stop : callable, optional
+        Asked all the time; once it answers with true the search ends, and the result is the best so far.
     start : State, optional
         Go on from here, as if never stopped.
     engine : Engine, optional
         Carries out the epochs; the serial one by default.
     **changes
-        Settings that differ from the preset's: ``generations=100``.
+        Settings that differ from the preset's: ``generations=100, islands=4``.
 
     Raises
     ------
@@ -110,27 +112,32 @@ def identify(
     settings = settings_of(
         preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
     )
-    if islands < 1:
-        raise SettingsError(f"there is at least one island, got {islands}")
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
     split = parts_of(record, validation)
     _refuse_short(split.validation, settings)
     posed = problem(split.estimation, settings)
-    state = start or State()
-    runner = engine or SerialEngine()
-    for epoch in runner.run(posed, seed, islands, state.archipelago):
-        state = after(state, epoch)
-        if progress is not None and progress(state, settings):
-            break
+    stop = stop or (lambda: False)
+    state = start or State(founded(settings.islands, seed))
+    if [(island.index, island.seed) for island in state.archipelago.islands] != [
+        (index, seed) for index in range(settings.islands)
+    ]:
+        raise SettingsError("the start has other islands than the settings, or another seed: give its own")
+    with closing((engine or SerialEngine()).run(posed, state.archipelago, stop)) as epochs:
+        # What an engine has done beyond the epoch that ends a run is never asked for: it can't change it.
+        while not (stop() or ended(state, settings)) and (epoch := next(epochs, None)):
+            state = after(state, epoch)
+            if progress is not None:
+                progress(state, settings)
+    if state.archipelago.generation < 0:
+        raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
     models = final_models(state.archipelago.hall, posed, split)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
             "record"
         )
-    count = len(state.archipelago.islands)
-    described = {"method": "identify", "preset": preset, "islands": count, **asdict(settings)}
+    described = {"method": "identify", "preset": preset, **asdict(settings)}
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     return Result(Findings(record, split, seed, described, _search(state, posed), models))
 
@@ -166,16 +173,31 @@ def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
 
 def after(state: State, epoch: Epoch) -> State:
     """Return the state after one more epoch."""
-    evaluations = state.evaluations + epoch.info.evaluations
-    best = {size: entry.fitness for size, entry in epoch.archipelago.hall.best().items()}
-    return State(
-        epoch.archipelago,
-        evaluations,
-        state.duplicates + epoch.info.duplicates,
-        dict(Counter(state.outcomes) + Counter(epoch.info.outcomes)),
-        (*state.history, Progress(epoch.archipelago.epoch, evaluations, best)),
-        epoch.caches,
-    )
+    evaluations, duplicates = state.evaluations, state.duplicates
+    outcomes, history = Counter(state.outcomes), list(state.history)
+    for generation in zip(*epoch.steps, strict=True):
+        evaluations += sum(info.evaluations for info in generation)
+        duplicates += sum(info.duplicates for info in generation)
+        best: dict[int, float] = {}
+        for info in generation:
+            outcomes.update(info.outcomes)
+            for size, fitness in info.best.items():
+                best[size] = min(fitness, best.get(size, inf))
+        least = tuple(min(info.best.values(), default=inf) for info in generation)
+        history.append(Progress(generation[0].generation, evaluations, dict(sorted(best.items())), least))
+    return State(epoch.archipelago, evaluations, duplicates, dict(outcomes), tuple(history), epoch.caches)
+
+
+def ended(state: State, settings: Settings) -> str:
+    """Return the budget that a search has used up, "" where it has to go on."""
+    reached = state.history[-1].generation if state.history else state.archipelago.generation
+    if reached >= settings.generations:
+        return "generations"
+    if 0 < settings.max_evaluations <= state.evaluations:
+        return "evaluations"
+    if state.history and min(state.history[-1].islands) ** 0.5 <= settings.target_error > 0.0:
+        return "target error"
+    return ""
 
 
 def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Assessed, ...]:
@@ -233,11 +255,12 @@ def _search(state: State, posed: Problem) -> Search:
         dict(state.outcomes),
         {"candidates": count, "bytes": 8 * count * rows, "degree": degree, "lags": deepest},
         None,
-        state.archipelago.epoch,
+        state.archipelago.generation,
         state.duplicates,
         sum(state.outcomes.get(name, 0) for name in FEASIBLE) / max(1, state.evaluations),
         state.history,
         state.caches,
+        ended(state, posed.settings) or "stopped",
     )
 
 

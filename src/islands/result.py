@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 from islands.data.dataset import Dataset
 from islands.errors import chosen
-from islands.figures.gallery import FIGURES, SEARCH_FIGURES, search_figures
-from islands.figures.style import save
 from islands.io.export import export
 from islands.io.results import summary, write_result
 from islands.model.equations import equation, latex_equation
@@ -80,6 +78,9 @@ class FittedModel:
 
     def plot(self, kind: str = "free-run") -> "Figure":
         """Draw a figure of the model on the validation data: one of ``islands.figures.gallery.FIGURES``."""
+        # Drawing takes half a second to import, and every process of a cluster would wait for it.
+        from islands.figures.gallery import FIGURES  # noqa: PLC0415
+
         return chosen(FIGURES, kind, "figure")(self.assessed, self.findings.split)
 
     def export(self, kind: str = "python") -> str:
@@ -115,6 +116,9 @@ class Result:
 
     def save(self, folder: str | Path) -> Path:
         """Write ``result.json``, ``models/``, ``figures/`` (of the best model) and ``summary.txt``."""
+        from islands.figures.gallery import FIGURES, SEARCH_FIGURES, search_figures  # noqa: PLC0415
+        from islands.figures.style import save  # noqa: PLC0415
+
         folder = Path(folder)
         figures = folder / "figures"
         figures.mkdir(parents=True, exist_ok=True)

@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from islands.estimation.constraints import CONSTRAINTS
+from islands.evolution.characters import CHARACTERS
 from islands.evolution.constraints import STRUCTURES
 from islands.evolution.fitness import FITNESSES
+from islands.evolution.migration import EMIGRANTS, REPLACED
 from islands.evolution.presets import PRESETS
+from islands.evolution.topology import TOPOLOGIES
 from islands.figures.gallery import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS
@@ -18,9 +21,11 @@ from islands.model.library import LIBRARIES
 from islands.model.primitives import PRIMITIVES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
+from islands_service.engines import ENGINES
 
 ROOT = Path(__file__).parents[2]
-SOURCES = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "api").rglob("*.py")])
+FOLDERS = ("src", "services", "api")
+SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 
 
 def test_imports_keep_the_contracts() -> None:
@@ -51,9 +56,10 @@ def test_no_room_is_an_attic() -> None:
         assert not {"utils", "helpers", "common", "misc"} & {path.stem, *path.parts}, path
 
 
-def test_the_folder_api_is_not_importable_as_a_package() -> None:
+@pytest.mark.parametrize("package", ["api.islands_api", "services.islands_service"])
+def test_a_source_folder_is_not_importable_as_a_package(package: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", "import api.islands_api"], cwd=ROOT / "src", capture_output=True, check=False
+        [sys.executable, "-c", f"import {package}"], cwd=ROOT / "src", capture_output=True, check=False
     )
     assert done.returncode != 0
 
@@ -73,6 +79,11 @@ def test_the_folder_api_is_not_importable_as_a_package() -> None:
         SEARCH_FIGURES,
         EXPORTS,
         READERS,
+        TOPOLOGIES,
+        EMIGRANTS,
+        REPLACED,
+        CHARACTERS,
+        ENGINES,
     ],
 )
 def test_every_table_entry_is_documented(table: dict[str, object]) -> None:

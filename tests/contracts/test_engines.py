@@ -1,30 +1,30 @@
 """What every engine owes: the same epochs, bit for bit, wherever it starts and however it carries them out.
 
-A new engine joins the table and is held to all of it.
+A new engine joins the table of engines and is held to all of it.
 """
 
 from collections import Counter
 from dataclasses import replace
 from math import inf
 
-import numpy as np
 import pytest
+from searches import exactly, record
 
 from islands.data.dataset import Dataset
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import SerialEngine, together
+from islands.errors import RecordError
+from islands.evolution.archipelago import Archipelago, founded
+from islands.evolution.epoch import advance, emigrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
-from islands.evolution.island import StepInfo, first_generation, step
 from islands.evolution.problem import problem
 from islands.evolution.settings import Settings
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
-
-ENGINES = {"serial": SerialEngine}
+from islands.model.expression import Lagged
+from islands_service.engines import ENGINES
 
 SETTINGS = Settings(
     population=16,
-    generations=4,
+    generations=7,
     prune=0.4,
     max_terms=4,
     initial_terms=(1, 4),
@@ -33,60 +33,79 @@ SETTINGS = Settings(
     library="phi-polynomial",
     library_degree=2,
     from_library=0.5,
+    islands=3,
+    topology="ring",
+    migrate_every=2,
+    migrants=2,
+    characters=("plain", "explorer"),
 )
 
+#: The first populations, two epochs of two generations, a third, and what is left.
+GENERATIONS = [0, 2, 4, 6, 7]
 
-def record():
-    rng = np.random.default_rng(5)
-    u = np.cumsum(rng.normal(size=300)) / 10
-    y = np.zeros(300)
-    for k in range(2, 300):
-        rise = u[k - 1] - u[k - 2]
-        y[k] = y[k - 1] + 0.8 * rise - 0.3 * y[k - 1] * abs(rise)
-    return Dataset(u, y + 1e-3 * rng.normal(size=300), 0.1)
+pytestmark = pytest.mark.xdist_group("ray")
+
+
+def never():
+    return False
 
 
 @pytest.fixture(scope="module")
 def posed():
-    return problem(record(), SETTINGS)
-
-
-@pytest.fixture(params=ENGINES)
-def engine(request):
-    return ENGINES[request.param]()
+    return problem(record(300), SETTINGS)
 
 
 @pytest.fixture(params=ENGINES, scope="module")
-def course(request, posed):
-    """Every epoch of two islands, never stopped: every engine's is held against every other engine's."""
-    return list(ENGINES[request.param]().run(posed, 7, 2, Archipelago()))
+def engine(request):
+    with ENGINES[request.param](None, print) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def course(engine, posed):
+    """Every epoch of three islands, never stopped: every engine's is held against every other engine's."""
+    return list(engine.run(posed, founded(3, 7), never))
 
 
 def archipelagos(epochs):
     return [epoch.archipelago for epoch in epochs]
 
 
-def test_epochs_are_counted_from_0_to_the_last_generation(course):
-    assert [epoch.archipelago.epoch for epoch in course] == [0, 1, 2, 3, 4]
+def test_epochs_end_where_islands_migrate_and_at_the_last_generation(course):
+    assert [epoch.archipelago.generation for epoch in course] == GENERATIONS
     for epoch in course:
-        assert [island.generation for island in epoch.archipelago.islands] == [epoch.archipelago.epoch] * 2
-        assert [island.index for island in epoch.archipelago.islands] == [0, 1]
-        assert {island.seed for island in epoch.archipelago.islands} == {7}
+        islands = epoch.archipelago.islands
+        assert [island.generation for island in islands] == [epoch.archipelago.generation] * 3
+        assert [island.index for island in islands] == [0, 1, 2]
+        assert {island.seed for island in islands} == {7}
 
 
-def test_an_engine_does_what_the_steps_do(course, posed):
-    """The definition: every island by itself, step by step."""
-    for index in (0, 1):
-        evaluator = Evaluator(posed.record, posed.settings)
-        island, _ = first_generation(index, 7, evaluator, posed.seeds)
-        for epoch in course:
-            assert epoch.archipelago.islands[index] == island
-            island, _ = step(island, evaluator, posed.pool)
+def test_an_engine_does_what_the_islands_do_one_by_one(course, posed):
+    """The definition: every island by itself, and every island's emigrants handed to the next one."""
+    evaluators = [Evaluator(posed.record, posed.settings) for _ in range(3)]
+    islands, leaving = founded(3, 7).islands, [(), (), ()]
+    for epoch in course:
+        epochs = [
+            advance(island, [leaving[index - 1]], evaluators[index], posed, never)
+            for index, island in enumerate(islands)
+        ]
+        islands, leaving = [each.island for each in epochs], [each.emigrants for each in epochs]
+        assert epoch.archipelago == Archipelago(tuple(islands))
+        assert epoch.steps == tuple(each.steps for each in epochs)
 
 
-@pytest.mark.parametrize("stop", [0, 1, 2, 3])
+def test_migration_makes_a_difference(course, engine, posed):
+    alone = replace(posed, settings=replace(SETTINGS, topology="isolated"))
+    isolated = archipelagos(engine.run(alone, founded(3, 7), never))
+    # Whoever leaves at generation 2 arrives at the beginning of the epoch behind it.
+    assert isolated[:2] == archipelagos(course)[:2]
+    assert isolated[-1] != course[-1].archipelago
+    assert all(emigrants(island, SETTINGS) for island in course[1].archipelago.islands)
+
+
+@pytest.mark.parametrize("stop", range(4))
 def test_resumed_from_any_epoch_equals_never_stopped(engine, course, posed, stop):
-    resumed = engine.run(posed, 7, 2, course[stop].archipelago)
+    resumed = engine.run(posed, course[stop].archipelago, never)
     assert archipelagos(resumed) == archipelagos(course)[stop + 1 :]
 
 
@@ -97,61 +116,64 @@ def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, cour
     assert stored == course[1].archipelago
     # What the islands abandon next hangs on their bars.
     assert all(island.bar < inf for island in stored.islands)
-    *_, last = engine.run(posed, 7, 2, stored)
+    *_, last = engine.run(posed, stored, never)
     write_checkpoint(course[-1].archipelago, paths[0], {})
     write_checkpoint(last.archipelago, paths[1], {})
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-def test_an_engine_may_run_twice_and_stop_between(engine, course, posed):
-    first = engine.run(posed, 7, 2, Archipelago())
+def test_an_engine_may_run_twice_and_be_left_between(engine, course, posed):
+    first = engine.run(posed, founded(3, 7), never)
     assert next(first).archipelago == course[0].archipelago
     first.close()
-    assert archipelagos(engine.run(posed, 7, 2, Archipelago())) == archipelagos(course)
+    assert archipelagos(engine.run(posed, founded(3, 7), never)) == archipelagos(course)
 
 
 def test_from_the_last_epoch_there_is_nothing_to_do(engine, course, posed):
-    assert list(engine.run(posed, 7, 2, course[-1].archipelago)) == []
+    assert list(engine.run(posed, course[-1].archipelago, never)) == []
 
 
 def test_more_generations_go_on_where_fewer_ended(engine, course, posed):
-    shorter = replace(posed, settings=replace(SETTINGS, generations=2))
-    *_, stopped = engine.run(shorter, 7, 2, Archipelago())
-    assert archipelagos(engine.run(posed, 7, 2, stopped.archipelago)) == archipelagos(course)[3:]
+    shorter = replace(posed, settings=replace(SETTINGS, generations=4))
+    *_, stopped = engine.run(shorter, founded(3, 7), never)
+    assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
 
 
-def test_the_islands_of_a_start_are_those_that_go_on(engine, course, posed):
-    """Number and seed of the call are those of a new run; a start brings its own."""
-    assert archipelagos(engine.run(posed, 99, 5, course[2].archipelago)) == archipelagos(course)[3:]
+def test_a_run_that_ended_between_two_stops_goes_on_to_the_same_stops(engine, course, posed):
+    shorter = replace(posed, settings=replace(SETTINGS, generations=5))
+    *_, stopped = engine.run(shorter, founded(3, 7), never)
+    assert stopped.archipelago.generation == 5
+    assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
 
 
-def test_two_islands_differ_and_neither_knows_of_the_other(engine, course, posed):
-    alone = archipelagos(engine.run(posed, 7, 1, Archipelago()))
-    for one, two in zip(alone, archipelagos(course), strict=True):
-        assert len(one.islands) == 1
-        assert one.islands[0] == two.islands[0]
-    here, there = course[-1].archipelago.islands
-    assert here.population != there.population
-    assert not set(here.population) >= set(there.population)
+def test_told_to_stop_an_engine_ends_and_what_it_yielded_stands(engine, course, posed):
+    seen = []
+    for epoch in engine.run(posed, founded(3, 7), lambda: len(seen) == 2):
+        seen.append(epoch.archipelago)  # noqa: PERF401 - the engine asks while the list grows
+    assert seen == archipelagos(course)[:2]
+    assert list(engine.run(posed, founded(3, 7), lambda: True)) == []
 
 
 def test_another_seed_is_another_run(engine, course, posed):
-    other = next(iter(engine.run(posed, 8, 2, Archipelago()))).archipelago
+    other = next(iter(engine.run(posed, founded(3, 8), never))).archipelago
     assert [island.population for island in other.islands] != [
         island.population for island in course[0].archipelago.islands
     ]
 
 
-def test_what_is_said_of_an_epoch_is_the_sum_over_its_islands(course):
+def test_every_step_is_told(course):
+    before = -1
     for epoch in course:
-        assert epoch.info.evaluations == 2 * SETTINGS.population
-        assert sum(epoch.info.outcomes.values()) == epoch.info.evaluations
-        assert epoch.info.outcomes == Counter(
-            each.outcome.verdict.name.lower()
-            for island in epoch.archipelago.islands
-            for each in island.population
-        )
-        assert 0 <= epoch.info.duplicates < epoch.info.evaluations
+        for island, steps in zip(epoch.archipelago.islands, epoch.steps, strict=True):
+            assert [info.generation for info in steps] == list(range(before + 1, island.generation + 1))
+            assert all(info.evaluations == SETTINGS.population for info in steps)
+            assert all(sum(info.outcomes.values()) == info.evaluations for info in steps)
+            assert all(0 <= info.duplicates <= info.evaluations for info in steps)
+            assert steps[-1].best == {size: each.fitness for size, each in island.hall.best().items()}
+            assert steps[-1].outcomes == Counter(
+                each.outcome.verdict.name.lower() for each in island.population
+            )
+        before = epoch.archipelago.generation
 
 
 def test_an_epoch_says_what_the_caches_take_and_what_they_may(course):
@@ -160,19 +182,31 @@ def test_an_epoch_says_what_the_caches_take_and_what_they_may(course):
         assert all(0 < taken <= limit for taken, limit in epoch.caches.values())
 
 
-def test_what_several_islands_did_is_added_up():
-    """For every engine to use, and for the sum not to depend on which."""
-    one, other = StepInfo(3, 1, {"ok": 2, "singular": 1}), StepInfo(5, 2, {"diverged": 1, "ok": 4})
-    expected = StepInfo(8, 3, {"ok": 6, "singular": 1, "diverged": 1})
-    assert together([one, other]) == together([other, one]) == expected
-    assert together([]) == StepInfo(0, 0, {})
-
-
 def test_the_hall_of_an_archipelago_is_gathered_from_its_islands(course):
     last = course[-1].archipelago
-    assert last.hall == merge(last.islands[1].hall, last.islands[0].hall)
+    assert exactly(last.hall) == exactly(merge(*(island.hall for island in reversed(last.islands))))
     for size, entry in last.hall.best().items():
         assert entry.fitness == min(
             island.hall.best()[size].fitness for island in last.islands if size in island.hall.best()
         )
     assert Archipelago().hall.entries == ()
+
+
+def test_what_is_wrong_with_a_problem_comes_out_as_it_is(engine, posed):
+    """Not as a lost actor that is replaced again and again."""
+    for wrong in (
+        replace(posed, seeds=((Lagged(2),),)),
+        replace(posed, record=Dataset(posed.record.u[:3], posed.record.y[:3], posed.record.dt)),
+    ):
+        with pytest.raises(RecordError) as raised:
+            list(engine.run(wrong, founded(3, 7), never))
+        assert type(raised.value) is RecordError
+
+
+def test_more_islands_than_processors_share_them(engine, posed):
+    many = replace(posed, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2))
+    *_, last = engine.run(many, founded(9, 1), never)
+    apart = replace(many, settings=replace(many.settings, generations=0))
+    *_, first = engine.run(apart, founded(9, 1), never)
+    assert last.archipelago.generation == 2
+    assert len({island.population for island in first.archipelago.islands}) == 9

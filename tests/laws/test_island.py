@@ -10,14 +10,14 @@ from math import inf, isfinite, nan
 from pathlib import Path
 
 import pytest
-from searches import SMALL, distinct_genes, evolved, record
+from searches import SMALL, distinct_genes, evolved, exactly, islands_of, record
 
-from islands.evolution.archipelago import Archipelago
+from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual, regressor_of
-from islands.evolution.island import _elite, first_generation, step
+from islands.evolution.island import elite_of, first_generation, step
 from islands.evolution.problem import problem
 from islands.io.checkpoints import write_checkpoint
 from islands.model.expression import Lagged
@@ -25,13 +25,15 @@ from islands.model.parsing import parse
 
 
 def digest():
-    """The hash of a checkpoint after ten generations of two islands, a library's genes among theirs."""
+    """The hash of a checkpoint after ten generations of two islands that send each other individuals."""
+    library = {"library": "phi-polynomial", "library_degree": 3, "from_library": 0.5}
+    migration = {"migrate_every": 3, "migrants": 2, "emigrants": "front", "replaced": "random"}
     setting = replace(
-        SMALL, library="phi-polynomial", library_degree=3, from_library=0.5, structure="increment"
+        SMALL, structure="increment", characters=("plain", "recombiner"), **library, **migration
     )
-    for epoch in SerialEngine().run(problem(record(), setting), 11, 2, Archipelago()):
+    for epoch in SerialEngine().run(problem(record(), setting), founded(2, 11), lambda: False):
         last = epoch.archipelago
-    assert last.epoch == 10
+    assert last.generation == 10
     with tempfile.TemporaryDirectory() as folder:
         write_checkpoint(last, Path(folder) / "checkpoint.json", {})
         return hashlib.sha256((Path(folder) / "checkpoint.json").read_bytes()).hexdigest()
@@ -82,6 +84,51 @@ def test_a_step_twice_gives_the_same_island():
     assert first[0].generation == 1
 
 
+def test_an_island_that_breeds_in_its_own_way_is_one_whose_settings_all_breed_like_it():
+    """What another island's evaluator knows, and the settings it was made for, change nothing."""
+    own = replace(SMALL, crossover=0.3, mutation=1.0, tournament=2, prune=0.7, population=30)
+    shared, alike = Evaluator(record(), SMALL), Evaluator(record(), own)
+    here, there = first_generation(0, 3, shared, (), own), first_generation(0, 3, alike)
+    for _ in range(3):
+        assert exactly(here) == exactly(there)
+        here, there = step(here[0], shared, (), own), step(there[0], alike)
+    assert len(here[0].population) == 30
+    assert step(here[0], shared)[0] != step(here[0], shared, (), own)[0]
+
+
+# What is told of a step.
+
+
+def structures(population):
+    return [each.key for each in population]
+
+
+@pytest.mark.parametrize("initial_terms", [(1, 1), (1, 4)])
+def test_a_duplicate_is_who_has_the_structure_of_a_parent_or_of_an_earlier_sibling(initial_terms):
+    evaluator = Evaluator(record(), replace(SMALL, initial_terms=initial_terms))
+    island, info = first_generation(0, 3, evaluator)
+    parents, counted = [], []
+    for _ in range(6):
+        known, expected = set(parents), 0
+        for structure in structures(island.population):
+            expected += structure in known
+            known.add(structure)
+        counted.append(expected)
+        assert (info.generation, info.duplicates) == (island.generation, expected)
+        parents = structures((*island.elite, *island.population))
+        island, info = step(island, evaluator)
+    assert min(counted) > 0
+    assert max(counted) < len(island.population)
+
+
+def test_what_is_told_of_a_step_follows_from_the_island_alone():
+    """An evaluator that has seen it all, and one that has seen nothing, as after a resume."""
+    warm = Evaluator(record(), SMALL)
+    islands = islands_of(warm, 4)
+    for island in islands[:-1]:
+        assert step(island, warm)[1] == step(island, Evaluator(record(), SMALL))[1]
+
+
 def test_ten_generations_give_the_same_bits_twice_and_in_other_processes():
     expected = digest()
     assert digest() == expected
@@ -127,8 +174,10 @@ def test_parents_are_elite_and_offspring_together():
     island = evolved(0, evaluator.settings, evaluator=evaluator)
     best, others = island.elite[:1], island.population[1:]
     only_in_elite = replace(island, elite=best, population=tuple(each for each in others if each != best[0]))
-    following, _ = step(only_in_elite, evaluator)
+    following, info = step(only_in_elite, evaluator)
     assert best[0] in following.population
+    # Copies of parents, whichever half of them these come from.
+    assert info.duplicates == len(following.population)
     assert len(set(following.population)) > 3
 
 
@@ -206,16 +255,16 @@ def test_ties_for_the_elite_go_to_the_smaller_then_to_the_structure_s_text():
         return Individual(tuple(map(parse, texts)), regressors, (1.0,) * len(texts), 0.5)
 
     large, late, early = each("y(k-1)", "u(k-1)"), each("y(k-3)"), each("y(k-2)")
-    assert _elite((large, late, early), 3, False) == (early, late, large)
-    assert _elite((large, late, early, early), 2, False) == (early, early)
-    assert _elite((large, late, early, early), 2, True) == (early, late)
+    assert elite_of((large, late, early), 3, False) == (early, late, large)
+    assert elite_of((large, late, early, early), 2, False) == (early, early)
+    assert elite_of((large, late, early, early), 2, True) == (early, late)
 
 
 def finite(fitness, text="y(k-1)"):
     return Individual((parse(text),), (regressor_of(parse(text)),), (1.0,), fitness)
 
 
-def test_a_failure_never_enters_the_hall_of_fame_and_is_last_in_an_elite():
+def test_a_failure_never_enters_the_hall_of_fame_and_is_last_in_anelite_of():
     failures = [finite(value, text) for value, text in ((nan, "y(k-2)"), (inf, "y(k-3)"))]
     good = finite(5.0)
     assert with_entries(HallOfFame(), failures) == HallOfFame()

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, replace
 from itertools import pairwise
+from math import inf, nextafter
 
 import numpy as np
 import pytest
@@ -12,14 +13,16 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimation import estimate
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import SerialEngine
+from islands.evolution.archipelago import Archipelago, founded
+from islands.evolution.engine import Epoch, SerialEngine
+from islands.evolution.island import StepInfo
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import problem
-from islands.identify import State, identify, settings_of
+from islands.identify import State, after, ended, identify, settings_of
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.library import full_set
 from islands.simulation.predictors import free_run
+from islands.validation.findings import Progress
 from islands.validation.metrics import metrics
 from islands.validation.physics import physics
 
@@ -41,6 +44,7 @@ BUDGET = {
     "library_degree": 5,
     "library_lags": 3,
     "from_library": 0.6,
+    "migrate_every": 1,
 }
 
 
@@ -70,7 +74,18 @@ def states():
 
 @pytest.fixture(scope="module")
 def result(data, states):
-    return identify(data, **BUDGET, seed=5, progress=lambda state, _settings: states.append(state))
+    return identify(data, **BUDGET, seed=5, progress=into(states))
+
+
+def into(states):
+    """Return a watcher that keeps what it sees. What it answers is nobody's business."""
+
+    def watch(state, settings):
+        assert settings.population == BUDGET["population"]
+        states.append(state)
+        return True
+
+    return watch
 
 
 def parameters(result):
@@ -91,15 +106,16 @@ def test_a_result_says_what_the_search_did(result):
     models = search.outcomes["ok"] + search.outcomes["abandoned"]
     assert search.feasible_share == models / search.evaluations > 0.5
     assert search.wall_s is None
+    assert search.ended_by == "generations"
 
 
 def test_a_result_holds_the_course_of_the_search(result, states):
     history = result.findings.search.history
     assert [point.generation for point in history] == [0, 1, 2, 3, 4]
     assert [point.evaluations for point in history] == [30, 60, 90, 120, 150]
-    for before, after in pairwise(history):
-        assert all(after.best[size] <= error for size, error in before.best.items())
-    assert [state.archipelago.epoch for state in states] == [0, 1, 2, 3, 4]
+    for before, behind in pairwise(history):
+        assert all(behind.best[size] <= error for size, error in before.best.items())
+    assert [state.archipelago.generation for state in states] == [0, 1, 2, 3, 4]
     assert [state.history for state in states] == [history[: count + 1] for count in range(5)]
 
 
@@ -176,52 +192,265 @@ def test_a_start_goes_on_as_if_never_stopped(data, result, states, stop, tmp_pat
     assert resumed.findings.search.history == result.findings.search.history
     assert resumed.findings.search.evaluations == result.findings.search.evaluations
     assert resumed.findings.search.outcomes == result.findings.search.outcomes
+    assert resumed.findings.search.duplicates == result.findings.search.duplicates
+    assert resumed.findings.search.ended_by == result.findings.search.ended_by
 
 
-def test_a_watcher_that_says_so_ends_the_search_there(data, states):
-    seen = []
+@pytest.mark.parametrize(
+    "other",
+    [
+        founded(1, 5),
+        founded(3, 5),
+        founded(2, 6),
+        Archipelago(),
+        Archipelago(founded(2, 5).islands[::-1]),
+        Archipelago(founded(3, 5).islands[1:]),
+        Archipelago((founded(2, 5).islands[0], founded(2, 6).islands[1])),
+    ],
+)
+def test_a_start_of_other_islands_or_another_seed_is_refused(data, other):
+    with pytest.raises(SettingsError, match="the start has other islands than the settings, or another seed"):
+        identify(data, **BUDGET, islands=2, seed=5, start=State(other), progress=pytest.fail)
 
-    def watch(state, settings):
-        seen.append((state.archipelago.epoch, settings.generations))
-        return state.archipelago.epoch == 1
 
-    stopped = identify(data, **BUDGET, seed=5, progress=watch)
-    assert seen == [(0, 4), (1, 4)]
-    assert stopped.findings.search.generations == 1
-    assert stopped.findings.search.history == states[1].history
+def test_a_start_of_its_own_islands_that_nobody_lives_on_is_the_beginning(data, result):
+    begun = identify(data, **BUDGET, seed=5, start=State(founded(1, 5)))
+    assert parameters(begun) == parameters(result)
+    assert begun.findings.search.history == result.findings.search.history
 
 
-def test_islands_evolve_beside_each_other(data, result, states):
-    found = []
-    both = identify(
-        data, **BUDGET, seed=5, islands=2, progress=lambda state, _settings: found.append(state.archipelago)
-    )
-    assert both.findings.settings["islands"] == 2
-    assert both.findings.search.evaluations == 2 * result.findings.search.evaluations
-    assert [archipelago.islands[0] for archipelago in found] == [
-        state.archipelago.islands[0] for state in states
+def islands_budget(**changes):
+    return {**BUDGET, "population": 12, "generations": 3, "migrants": 3, "emigrants": "random", **changes}
+
+
+def test_islands_evolve_beside_each_other(data):
+    one, three, apart = [], [], []
+    for states, changes in (
+        (one, {}),
+        (three, {"islands": 3}),
+        (apart, {"islands": 3, "topology": "isolated"}),
+    ):
+        budget = islands_budget(**changes)
+        result = identify(
+            data[:1000], **budget, seed=5, progress=lambda state, _settings, to=states: to.append(state)
+        )
+        assert result.findings.settings["islands"] == len(states[0].archipelago.islands)
+        assert result.findings.search.evaluations == 4 * 12 * result.findings.settings["islands"]
+        for state in states:
+            for place, island in enumerate(state.archipelago.islands):
+                best = min(entry.fitness for entry in island.hall.entries)
+                assert state.history[-1].islands[place] == best
+            assert min(state.history[-1].islands) == min(state.history[-1].best.values())
+    # Who receives from nobody evolves as if it were alone; nobody has left before the first epoch's end.
+    assert [state.archipelago.islands[0] for state in apart] == [
+        state.archipelago.islands[0] for state in one
     ]
-    resumed = identify(data, **BUDGET, seed=5, start=State(found[3]))
-    assert resumed.findings.settings["islands"] == 2
-    assert parameters(resumed) == parameters(both)
+    assert [state.archipelago for state in apart[:2]] == [state.archipelago for state in three[:2]]
+    assert apart[-1].archipelago != three[-1].archipelago
+    resumed = identify(data[:1000], **islands_budget(islands=3), seed=5, start=three[1])
+    assert resumed.findings.search.history == three[-1].history
+
+
+def test_an_epoch_ends_where_the_schedule_says_and_its_generations_are_all_told(data):
+    states, longer = [], []
+    for to, every in ((states, 3), (longer, "2,3:1")):
+        identify(
+            data[:1000],
+            **{**islands_budget(), "generations": 4, "migrate_every": every, "seed": 5},
+            progress=lambda state, _settings, to=to: to.append(state),
+        )
+    assert [state.archipelago.generation for state in states] == [0, 3, 4]
+    assert [state.archipelago.generation for state in longer] == [0, 2, 3, 4]
+    assert [[point.generation for point in state.history] for state in states] == [
+        [0],
+        [0, 1, 2, 3],
+        [0, 1, 2, 3, 4],
+    ]
+    # A single island does not notice.
+    assert states[-1].history == longer[-1].history
+
+
+class Telling(SerialEngine):
+    """Keeps what it yields, and knows whether it was left."""
+
+    def __init__(self):
+        self.epochs, self.left = [], False
+
+    def run(self, problem, start, stop):
+        try:
+            for epoch in super().run(problem, start, stop):
+                self.epochs.append(epoch)
+                yield epoch
+        finally:
+            self.left = True
 
 
 def test_another_engine_may_carry_it_out(data, result):
-    class Telling(SerialEngine):
-        infos = ()
-
-        def run(self, problem, seed, islands, start):
-            for epoch in super().run(problem, seed, islands, start):
-                self.infos = (*self.infos, epoch.info)
-                yield epoch
-
     engine = Telling()
     found = identify(data, **BUDGET, seed=5, engine=engine)
     assert parameters(found) == parameters(result)
-    assert len(engine.infos) == 5
+    infos = [info for epoch in engine.epochs for (info,) in epoch.steps]
+    assert len(infos) == 5
     search = found.findings.search
-    assert search.duplicates == sum(info.duplicates for info in engine.infos)
-    assert search.outcomes["ok"] == sum(info.outcomes["ok"] for info in engine.infos)
+    assert search.duplicates == sum(info.duplicates for info in infos)
+    assert search.outcomes["ok"] == sum(info.outcomes["ok"] for info in infos)
+    assert search.caches == engine.epochs[-1].caches
+
+
+# How a search ends.
+
+
+def told(*best, evaluations=10):
+    return StepInfo(3, evaluations, 4, {"ok": evaluations - 1, "diverged": 1}, dict(best))
+
+
+def test_what_islands_did_in_a_generation_is_gathered():
+    before = State(founded(2, 0), 100, 7, {"ok": 100}, (Progress(2, 100, {1: 9.0}, (9.0, inf)),))
+    steps = ((told((2, 0.5), (1, 4.0)), told((1, 2.0), (2, 0.5))), (told(), told((3, 1.0), (2, 0.25))))
+    state = after(before, Epoch(founded(2, 1), steps, {"pairs": (1, 2)}))
+    assert state.archipelago == founded(2, 1)
+    assert (state.evaluations, state.duplicates) == (140, 23)
+    assert state.outcomes == {"ok": 136, "diverged": 4}
+    assert state.history == (
+        *before.history,
+        Progress(3, 120, {1: 4.0, 2: 0.5}, (0.5, inf)),
+        Progress(3, 140, {1: 2.0, 2: 0.25, 3: 1.0}, (0.5, 0.25)),
+    )
+    assert [list(point.best) for point in state.history] == [[1], [1, 2], [1, 2, 3]]
+    assert state.caches == {"pairs": (1, 2)}
+    assert before.outcomes == {"ok": 100}
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, ""),
+        ({"generations": 7}, "generations"),
+        ({"generations": 6}, "generations"),
+        ({"generations": 8}, ""),
+        ({"max_evaluations": 400}, "evaluations"),
+        ({"max_evaluations": 399}, "evaluations"),
+        ({"max_evaluations": 401}, ""),
+        ({"target_error": 0.5}, "target error"),
+        ({"target_error": nextafter(0.5, 1.0)}, "target error"),
+        ({"target_error": nextafter(0.5, 0.0)}, ""),
+        # Squares of these are no numbers.
+        ({"target_error": 1e200}, "target error"),
+        ({"target_error": 1.7976931348623157e308}, "target error"),
+        ({"target_error": 1e-200}, ""),
+        ({"target_error": 0.5, "max_evaluations": 401}, "target error"),
+        ({"target_error": 0.4, "max_evaluations": 400}, "evaluations"),
+        ({"target_error": 0.5, "max_evaluations": 400, "generations": 7}, "generations"),
+    ],
+)
+def test_a_search_has_ended_when_one_of_its_budgets_is_used_up(changes, expected):
+    """The error is that of the best island, in the output's unit, as it is now."""
+    archipelago = Archipelago(tuple(replace(island, generation=7) for island in founded(2, 0).islands))
+    history = (Progress(6, 350, {3: 0.3}, (inf, 0.3)), Progress(7, 400, {3: 0.25}, (inf, 0.25)))
+    state = State(archipelago, 400, history=history)
+    assert ended(state, settings_of("narx", changes)) == expected
+
+
+@pytest.mark.parametrize("target", [0.0, 1.0, 1.7976931348623157e308])
+def test_a_search_has_not_ended_before_anybody_has_a_model(target):
+    settings = settings_of("narx", {"target_error": target, "max_evaluations": 1, "generations": 0})
+    assert ended(State(founded(2, 0)), settings) == ""
+    waiting = State(founded(2, 0), history=(Progress(0, 0, {}, (inf, inf)),))
+    assert ended(waiting, settings) == ""
+
+
+def test_an_exact_model_meets_every_target_and_without_a_target_none():
+    exact = State(founded(1, 0), history=(Progress(0, 0, {1: 0.0}, (0.0,)),))
+    assert ended(exact, settings_of("narx", {"target_error": 1e-9})) == "target error"
+    assert ended(exact, settings_of("narx", {"target_error": 0.0})) == ""
+
+
+@pytest.mark.parametrize("budget", [1, 30, 31, 90, 91, 150, 151])
+def test_a_search_ends_with_the_first_epoch_that_reaches_its_evaluations(data, states, budget):
+    seen = []
+    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, progress=into(seen))
+    last = next((place for place, state in enumerate(states) if state.evaluations >= budget), 4)
+    assert seen == states[: last + 1]
+    search = found.findings.search
+    assert search.evaluations == states[last].evaluations
+    assert search.ended_by == ("generations" if last == 4 else "evaluations")
+    assert found.findings.settings["max_evaluations"] == budget
+
+
+@pytest.mark.parametrize("place", range(5))
+def test_a_search_ends_with_the_first_epoch_that_reaches_its_error(data, states, place):
+    seen = []
+    target = nextafter(min(states[place].history[-1].islands) ** 0.5, inf)
+    found = identify(data, **BUDGET, target_error=target, seed=5, progress=into(seen))
+    last = next(at for at, state in enumerate(states) if min(state.history[-1].islands) <= target**2)
+    assert last <= place
+    assert seen == states[: last + 1]
+    assert found.findings.search.ended_by == ("generations" if last == 4 else "target error")
+    assert found.findings.search.history == states[last].history
+
+
+def test_a_budget_that_is_reached_within_an_epoch_ends_with_it(data, states):
+    """Every epoch is one that a longer run has too: nobody is cut off in the middle."""
+    seen = []
+    changes = {**BUDGET, "migrate_every": 3, "max_evaluations": 31}
+    found = identify(data, **changes, seed=5, progress=into(seen))
+    assert [state.evaluations for state in seen] == [30, 120]
+    assert seen[-1].history == states[3].history
+    assert (found.findings.search.generations, found.findings.search.ended_by) == (3, "evaluations")
+
+
+def test_a_search_that_ends_early_leaves_its_engine(data):
+    engine = Telling()
+    identify(data, **BUDGET, max_evaluations=60, seed=5, engine=engine)
+    assert (len(engine.epochs), engine.left) == (2, True)
+
+
+def test_a_search_that_fails_leaves_its_engine(data):
+    def broken(_state, _settings):
+        raise ZeroDivisionError
+
+    engine = Telling()
+    with pytest.raises(ZeroDivisionError) as failed:
+        identify(data, **BUDGET, seed=5, engine=engine, progress=broken)
+    # At once, and not when the error's trace is forgotten.
+    assert (len(engine.epochs), engine.left) == (1, True), failed
+
+
+def test_told_to_stop_a_search_keeps_its_last_epoch(data, states):
+    seen = []
+    found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 2)
+    assert seen == states[:2]
+    assert found.findings.search.ended_by == "stopped"
+    assert found.findings.search.generations == 1
+    assert found.findings.search.history == states[1].history
+
+
+def test_told_to_stop_within_an_epoch_a_search_keeps_the_one_before(data, states):
+    asked = []
+
+    def stop():
+        asked.append(True)
+        return len(asked) > 6
+
+    seen = []
+    found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, progress=into(seen), stop=stop)
+    assert seen == states[:1]
+    assert (found.findings.search.generations, found.findings.search.ended_by) == (0, "stopped")
+    # It goes on from there as if never stopped.
+    go_on = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, start=seen[-1])
+    assert go_on.findings.search.history == states[-1].history
+
+
+def test_told_to_stop_where_it_has_ended_anyway_a_search_has_ended(data, states):
+    seen = []
+    found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 5)
+    assert seen == states
+    assert found.findings.search.ended_by == "generations"
+
+
+def test_stopped_before_there_is_any_model_says_so(data):
+    with pytest.raises(SettingsError, match="stopped before the first populations were evaluated"):
+        identify(data, **BUDGET, progress=pytest.fail, stop=lambda: True)
 
 
 # Validation selects among the models.
@@ -330,7 +559,12 @@ def test_every_preset_runs_on_a_small_budget(data, preset):
         ({"shooting": 0}, "shooting is at least 1, got 0"),
         ({"primitives": ["mul", "gamma"]}, "unknown primitive 'gamma': take one of mul, sub"),
         ({"constraints": "physics"}, "unknown constraints 'physics': take one of none, hysteresis"),
-        ({"islands": 0}, "there is at least one island, got 0"),
+        ({"islands": 0}, "islands is at least 1, got 0"),
+        ({"topology": "rong"}, "unknown topology 'rong': take one of isolated, ring"),
+        ({"characters": ["plain", "lazy"]}, "unknown character 'lazy': take one of plain, explorer"),
+        ({"migrate_every": "5,3:2,3:1"}, "its generations ascend, from 1 on"),
+        ({"islands": 4, "migrants": 301}, "301 individuals would arrive on an island of 300"),
+        ({"target_error": -1.0}, "target_error is not negative, got -1.0"),
         ({"seed": -1}, "a seed is not negative, got -1"),
         ({"validation": 1.5}, "the validation fraction lies between 0 and 1, got 1.5"),
     ],
@@ -393,4 +627,8 @@ def test_smaller_models_begin_smaller(changes, expected):
 
 def test_it_is_among_the_public_names():
     assert islands.identify is identify
-    assert State().archipelago == Archipelago()
+
+
+def test_a_state_is_that_of_an_archipelago():
+    with pytest.raises(TypeError, match="archipelago"):
+        State()

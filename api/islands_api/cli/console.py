@@ -1,10 +1,13 @@
 """Where the command line writes: results to standard output, progress and errors to standard error."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import Protocol
 
-from rich.console import Console
+from rich.console import Console, Group
+from rich.live import Live
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from islands.warm_up import warm_up
 
@@ -12,9 +15,17 @@ output = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
+class Tell(Protocol):
+    """Takes what is to be shown: a text beside the bar, the share that is done, and lines under the bar."""
+
+    def __call__(self, text: str, share: float, lines: Sequence[str] = ()) -> None:
+        """Show it."""
+        ...
+
+
 @contextmanager
-def progress(title: str) -> Iterator[Callable[[str, float], None]]:
-    """Show a moving bar while something runs; call what is yielded with a text and the share done."""
+def progress(title: str) -> Iterator[Tell]:
+    """Show a moving bar while something runs."""
     columns = (
         SpinnerColumn(),
         TextColumn("{task.fields[title]}"),
@@ -22,9 +33,15 @@ def progress(title: str) -> Iterator[Callable[[str, float], None]]:
         TimeElapsedColumn(),
         TextColumn("{task.description}"),
     )
-    with Progress(*columns, console=errors, transient=True) as bar:
-        task = bar.add_task("", total=1.0, title=title)
-        yield lambda text, share: bar.update(task, description=text, completed=share)
+    bar = Progress(*columns, console=errors)
+    task = bar.add_task("", total=1.0, title=title)
+    with Live(bar, console=errors, transient=True, refresh_per_second=10) as live:
+
+        def tell(text: str, share: float, lines: Sequence[str] = ()) -> None:
+            bar.update(task, description=text, completed=share)
+            live.update(Group(bar, *(Text(line) for line in lines)))
+
+        yield tell
 
 
 def compile_kernels() -> None:

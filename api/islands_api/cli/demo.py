@@ -10,17 +10,19 @@ from rich.table import Table
 
 import islands
 from islands.data.dataset import Dataset
-from islands.evolution.settings import Settings
-from islands.identify import State
 from islands.io.records import write_record
 from islands.model.model import Model
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import SYSTEMS, make_record
 from islands.systems.published_models import PUBLISHED
 from islands.validation.metrics import Metrics, metrics
-from islands_api.cli.console import compile_kernels, output, progress
+from islands_api.cli.console import compile_kernels, errors, output, progress
+from islands_api.cli.course import course
 from islands_api.cli.fit import check_folder, show_result
-from islands_api.cli.identify import course
+from islands_service.engines import ENGINES
+
+#: As many as the smallest machine has cores.
+ISLANDS = 2
 
 SYSTEM, VARIANT = "bouc-wen-piezo", "authors"
 
@@ -40,13 +42,17 @@ def demo(
         write_record(records[part], out / f"{part}.csv")
     compile_kernels()
     began = perf_counter()
-    with progress("demo") as tell:
-        where = course(tell)
-
-        def watch(state: State, settings: Settings) -> None:
-            where(state, settings)
-
-        result = islands.identify(estimation, validation, preset="paper-case1", progress=watch)
+    with (
+        progress("demo") as tell,
+        ENGINES["ray"](None, lambda line: errors.print(line, markup=False)) as engine,
+    ):
+        result = islands.identify(
+            *(estimation, validation),
+            preset="paper-case1",
+            islands=ISLANDS,
+            progress=course(tell),
+            engine=engine,
+        )
         result = result.with_wall_time(perf_counter() - began)
         tell("figures", 1.0)
         result.save(out)

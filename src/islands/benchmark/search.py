@@ -10,8 +10,8 @@ from islands.benchmark import ours
 from islands.benchmark.clock import cpu, wall
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual
-from islands.evolution.island import Population, first_generation, step
+from islands.evolution.individual import Individual, Population
+from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
 
 
@@ -61,15 +61,14 @@ def run_island(
     evaluator = _Timed(record, settings)
     began_cpu, began = cpu(), wall()
     island, info = first_generation(index, 0, evaluator)
-    evaluations, duplicates = info.evaluations, info.duplicates
+    evaluations = info.evaluations
     while island.generation < settings.generations:
         island, info = step(island, evaluator)
         evaluations += info.evaluations
-        duplicates += info.duplicates
         tell(island.generation / settings.generations)
     return Run(
         evaluations,
-        duplicates,
+        evaluator.duplicates,
         cpu() - began_cpu,
         wall() - began,
         evaluator.spent,
@@ -102,16 +101,19 @@ def _warm_run(record: Dataset, settings: Settings, index: int) -> Run:
 
 
 class _Timed(Evaluator):
-    """An evaluator that knows how much CPU time it took, in seconds."""
+    """An evaluator that knows how much CPU time it took, in seconds, and how much it knew already."""
 
     def __init__(self, record: Dataset, settings: Settings) -> None:
         super().__init__(record, settings)
         self.spent = 0.0
+        self.duplicates = 0
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
     ) -> tuple[Population, int]:
         began = cpu()
-        evaluated = super().evaluate(population, bars)
+        evaluated, duplicates = super().evaluate(population, bars)
         self.spent += cpu() - began
-        return evaluated
+        # Without bars nobody is new: an individual of before is evaluated to its end.
+        self.duplicates += duplicates if bars is not None else 0
+        return evaluated, duplicates

@@ -13,8 +13,8 @@ from math import isfinite
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual
-from islands.evolution.island import Population, first_generation, step
+from islands.evolution.individual import Individual, Population
+from islands.evolution.island import first_generation, step
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.model.expression import Apply, Constant, Expression, Lagged

@@ -1,5 +1,6 @@
-"""The archipelago: all islands at one epoch. A checkpoint is this value, and nothing else."""
+"""The archipelago: all islands at one generation. A checkpoint is this value, and nothing else."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from islands.evolution.hall_of_fame import HallOfFame, merge
@@ -8,20 +9,27 @@ from islands.evolution.island import Island
 
 @dataclass(frozen=True, slots=True)
 class Archipelago:
-    """Islands at the same epoch.
+    """Islands at the same generation.
 
     Attributes
     ----------
-    islands : tuple of Island
+    islands : sequence of Island
         In the order of their index.
-    epoch : int
-        Generations that every island has taken; -1 before the first population.
     """
 
-    islands: tuple[Island, ...] = ()
-    epoch: int = -1
+    islands: Sequence[Island] = ()
+
+    @property
+    def generation(self) -> int:
+        """Steps that every island has taken; -1 before the first population."""
+        return self.islands[0].generation if self.islands else -1
 
     @property
     def hall(self) -> HallOfFame:
         """The halls of fame of all islands, gathered."""
         return merge(*(island.hall for island in self.islands))
+
+
+def founded(islands: int, seed: int) -> Archipelago:
+    """Return islands that nobody lives on yet."""
+    return Archipelago(tuple(Island(index, seed, -1, (), (), HallOfFame()) for index in range(islands)))

@@ -1,66 +1,85 @@
 """Engines: how epochs are carried out. Every engine yields the same archipelagos, bit for bit."""
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from islands.evolution.archipelago import Archipelago
+from islands.evolution.epoch import IslandEpoch, advance, emigrants
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.island import StepInfo, first_generation, step
+from islands.evolution.island import StepInfo
 from islands.evolution.problem import Problem
+from islands.evolution.topology import Topology, topology
+
+#: Answers with true once the search is to end.
+Stop = Callable[[], bool]
+
+
+#: Bytes that every cache takes, and its limit.
+Caches = Mapping[str, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """An archipelago, what its islands did to get there, and what their caches take: (bytes, limit)."""
+    """An archipelago, and what its islands did to get there.
+
+    Attributes
+    ----------
+    archipelago : Archipelago
+    steps : tuple of tuple of StepInfo
+        For every island its generations since the epoch before.
+    caches : mapping
+        Of all evaluators together.
+    """
 
     archipelago: Archipelago
-    info: StepInfo
-    caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    steps: tuple[tuple[StepInfo, ...], ...]
+    caches: Caches = field(default_factory=dict)
 
 
 class Engine(Protocol):
     """Carries a search from one epoch to the next.
 
-    Law: the archipelagos depend on the problem, the seed and the archipelago given alone; an engine that
-    starts from any archipelago that it yielded goes on as if it had never stopped.
+    Law: the archipelagos depend on the problem and the archipelago given alone; an engine that starts from
+    any archipelago that it yielded goes on as if it had never stopped.
     """
 
-    def run(self, problem: Problem, seed: int, islands: int, start: Archipelago) -> Iterator[Epoch]:
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
         """Yield every epoch after ``start``, up to the settings' last generation.
 
         Parameters
         ----------
-        islands : int
-            How many, where ``start`` is empty; else those of ``start``.
+        start : Archipelago
+            Its islands are those that go on: `founded` ones begin.
+        stop : callable
+            Asked all the time; once it answers with true, no further epoch is yielded.
         """
         ...
 
 
 class SerialEngine:
-    """Runs the islands one after the other in this process."""
+    """Runs the islands one after the other in this process, on one evaluator."""
 
-    def run(self, problem: Problem, seed: int, islands: int, start: Archipelago) -> Iterator[Epoch]:
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
         """See `Engine`."""
         evaluator = Evaluator(problem.record, problem.settings)
+        sources = topology_of(problem, start).sources
         archipelago = start
-        while archipelago.epoch < problem.settings.generations:
-            if archipelago.epoch < 0:
-                stepped = [
-                    first_generation(index, seed, evaluator, problem.seeds) for index in range(islands)
-                ]
-            else:
-                stepped = [step(island, evaluator, problem.pool) for island in archipelago.islands]
-            archipelago = Archipelago(tuple(island for island, _ in stepped), archipelago.epoch + 1)
-            yield Epoch(archipelago, together([info for _, info in stepped]), evaluator.memory)
+        leaving = [emigrants(island, problem.settings_of(island.index)) for island in start.islands]
+        while archipelago.generation < problem.settings.generations:
+            epochs: list[IslandEpoch] = []
+            for island in archipelago.islands:
+                arriving = [leaving[source] for source in sources[island.index]]
+                epoch = advance(island, arriving, evaluator, problem, stop)
+                if epoch is None:
+                    return
+                epochs.append(epoch)
+            archipelago = Archipelago(tuple(epoch.island for epoch in epochs))
+            leaving = [epoch.emigrants for epoch in epochs]
+            yield Epoch(archipelago, tuple(epoch.steps for epoch in epochs), evaluator.memory)
 
 
-def together(infos: Sequence[StepInfo]) -> StepInfo:
-    """Add up what islands did."""
-    outcomes: Counter[str] = Counter()
-    for info in infos:
-        outcomes.update(info.outcomes)
-    return StepInfo(
-        sum(info.evaluations for info in infos), sum(info.duplicates for info in infos), dict(outcomes)
-    )
+def topology_of(problem: Problem, archipelago: Archipelago) -> Topology:
+    """Return the topology of an archipelago; it follows from its islands' number and seed."""
+    islands = archipelago.islands
+    return topology(problem.settings.topology, len(islands), islands[0].seed)

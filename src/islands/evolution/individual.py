@@ -48,6 +48,9 @@ class Individual:
         return tuple(item.text for item in self.regressors)
 
 
+Population = tuple[Individual, ...]
+
+
 def regressor_of(gene: Expression) -> Regressor | None:
     """Return a gene's regressor, None where it is identically zero or its numbers overflow."""
     try:

@@ -7,7 +7,7 @@ from math import inf, isfinite
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual
+from islands.evolution.individual import Individual, Population
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import tournaments
 from islands.evolution.settings import Settings
@@ -23,8 +23,6 @@ from islands.evolution.variation import (
 )
 from islands.model.expression import Expression
 
-Population = tuple[Individual, ...]
-
 #: Share of the parents that are better than the bar.
 _MIDDLE = 0.8
 
@@ -39,7 +37,7 @@ class Island:
         Its number; with seed and generation it determines every random number.
     seed : int
     generation : int
-        How many steps it has taken; 0 is the evaluated first population.
+        How many steps it has taken; 0 is the evaluated first population, -1 before it.
     population : tuple of Individual
         The offspring of the last step, evaluated.
     elite : tuple of Individual
@@ -64,21 +62,30 @@ class StepInfo:
 
     Attributes
     ----------
+    generation : int
     evaluations : int
         Individuals evaluated.
     duplicates : int
-        Those among them whose structure had been evaluated before.
+        Those among them whose structure a parent has, or one of their generation before them.
     outcomes : mapping
         Number of individuals by outcome.
+    best : mapping
+        The least fitness of every size in the island's hall of fame.
     """
 
+    generation: int
     evaluations: int
     duplicates: int
     outcomes: Mapping[str, int]
+    best: Mapping[int, float]
 
 
 def first_generation(
-    index: int, seed: int, evaluator: Evaluator, seeds: Sequence[Genes] = ()
+    index: int,
+    seed: int,
+    evaluator: Evaluator,
+    seeds: Sequence[Genes] = (),
+    settings: Settings | None = None,
 ) -> tuple[Island, StepInfo]:
     """Draw and evaluate a first population.
 
@@ -86,26 +93,32 @@ def first_generation(
     ----------
     seeds : sequence of genes
         Individuals that are given; the others are drawn.
+    settings : Settings, optional
+        Those of this island, where its character makes it breed in another way than the evaluator's.
     """
-    settings = evaluator.settings
+    settings = settings or evaluator.settings
     draw = Stream(seed, index, 0, Purpose.INITIAL)
     given = [legal(genes[: settings.max_terms], settings) for genes in seeds[: settings.population]]
     drawn = [
         random_genes(settings, evaluator.record.inputs, draw) for _ in range(settings.population - len(given))
     ]
     empty = Island(index, seed, 0, (), (), HallOfFame())
-    return _evaluated(empty, [*given, *drawn], evaluator)
+    return _evaluated(empty, [*given, *drawn], evaluator, settings)
 
 
-def step(island: Island, evaluator: Evaluator, pool: Sequence[Expression] = ()) -> tuple[Island, StepInfo]:
+def step(
+    island: Island, evaluator: Evaluator, pool: Sequence[Expression] = (), settings: Settings | None = None
+) -> tuple[Island, StepInfo]:
     """Breed, evaluate and select one generation (Figure 2).
 
     Parameters
     ----------
     pool : sequence of Expression
         Genes that an outer mutation may take whole.
+    settings : Settings, optional
+        See `first_generation`.
     """
-    settings, inputs = evaluator.settings, evaluator.record.inputs
+    settings, inputs = settings or evaluator.settings, evaluator.record.inputs
     following = replace(island, generation=island.generation + 1)
     select = Stream(island.seed, island.index, following.generation, Purpose.SELECTION)
     draw = Stream(island.seed, island.index, following.generation, Purpose.VARIATION)
@@ -133,25 +146,29 @@ def step(island: Island, evaluator: Evaluator, pool: Sequence[Expression] = ()) 
                         else inner_mutation(genes, settings, inputs, draw)
                     )
         offspring += [with_linear_output(genes, settings) for genes in pair]
-    return _evaluated(following, offspring[: settings.population], evaluator)
+    return _evaluated(following, offspring[: settings.population], evaluator, settings)
 
 
-def _evaluated(island: Island, genes: Sequence[Genes], evaluator: Evaluator) -> tuple[Island, StepInfo]:
-    settings = evaluator.settings
+def _evaluated(
+    island: Island, genes: Sequence[Genes], evaluator: Evaluator, settings: Settings
+) -> tuple[Island, StepInfo]:
     draw = Stream(island.seed, island.index, island.generation, Purpose.PRUNING)
     # Every individual draws, whether its structure is known or not: a cache never changes what is bred.
     decided = [(Individual(each), draw.chance(settings.prune)) for each in genes]
     bar = _bar(island, settings)
-    population, duplicates = evaluator.evaluate(decided, _bars(island.hall, bar, settings.max_terms))
+    population, _ = evaluator.evaluate(decided, _bars(island.hall, bar, settings.max_terms))
     worst = _worst(island, settings)
     contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
-    elite = _elite(contenders, settings.elites, settings.distinct)
-    info = StepInfo(
-        len(population),
-        duplicates,
-        Counter(each.outcome.verdict.name.lower() for each in population),
-    )
+    elite = elite_of(contenders, settings.elites, settings.distinct)
     hall = with_entries(island.hall, population)
+    known = {each.key for each in (*island.elite, *island.population)}
+    info = StepInfo(
+        island.generation,
+        len(population),
+        len(population) - len({each.key for each in population} - known),
+        dict(Counter(each.outcome.verdict.name.lower() for each in population)),
+        {size: entry.fitness for size, entry in hall.best().items()},
+    )
     return replace(island, population=population, elite=elite, hall=hall, bar=bar), info
 
 
@@ -176,7 +193,7 @@ def _bars(hall: HallOfFame, bar: float, most: int) -> list[float]:
     return [max(bar, last.get(size, inf)) for size in range(most + 1)]
 
 
-def _elite(contenders: Iterable[Individual], count: int, distinct: bool) -> Population:
+def elite_of(contenders: Iterable[Individual], count: int, distinct: bool) -> Population:
     """Keep the fittest; ties go to the smaller, then to the structure's text."""
     ordered = sorted(contenders, key=lambda each: (each.fitness, each.size, each.key))
     if distinct:

@@ -1,9 +1,10 @@
 """A problem: the record, the settings and what follows from them for every island."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
+from islands.evolution.characters import CHARACTERS
 from islands.evolution.constraints import with_phi
 from islands.evolution.settings import Settings
 from islands.evolution.variation import Genes
@@ -31,6 +32,15 @@ class Problem:
     settings: Settings
     seeds: tuple[Genes, ...] = ()
     pool: tuple[Expression, ...] = ()
+
+    def settings_of(self, island: int) -> Settings:
+        """Return the settings with what is different about an island; characters are given out in turn."""
+        characters = self.settings.characters
+        return (
+            replace(self.settings, **CHARACTERS[characters[island % len(characters)]])
+            if characters
+            else self.settings
+        )
 
 
 def problem(record: Dataset, settings: Settings) -> Problem:

@@ -17,6 +17,9 @@ class Purpose(IntEnum):
     SELECTION = 1
     VARIATION = 2
     PRUNING = 3
+    EMIGRATION = 4
+    IMMIGRATION = 5
+    TOPOLOGY = 6
 
 
 class Stream:

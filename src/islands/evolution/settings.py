@@ -4,10 +4,17 @@ from dataclasses import dataclass
 
 from islands.errors import SettingsError, chosen
 from islands.estimation.constraints import CONSTRAINTS
+from islands.evolution.characters import CHARACTERS
 from islands.evolution.constraints import STRUCTURES
 from islands.evolution.fitness import FITNESSES
+from islands.evolution.migration import EMIGRANTS, REPLACED
+from islands.evolution.schedule import Schedule, schedule
+from islands.evolution.topology import topology
 from islands.model.library import library_named
 from islands.model.primitives import PRIMITIVES
+
+#: More islands than this would not fit into any coordinator.
+MOST_ISLANDS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +71,24 @@ class Settings:
         Keep one copy of a model in the elite.
     refine : bool
         Polish the hall of fame's parameters on the shooting error.
+    islands : int
+        Islands that evolve beside each other, each with a population of its own.
+    topology : str
+        Which islands send to which: an entry of ``TOPOLOGIES`` or a list of edges, ``0>1,1>2``.
+    migrate_every : int or str
+        Generations of an epoch, at whose end individuals migrate: a number, or one that changes over the run,
+        ``5,100:20`` for 5, and 20 from generation 100 on.
+    migrants : int or str
+        How many leave an island for each of its neighbours, as a number or a schedule.
+    emigrants, replaced : str
+        Who leaves, and whose places are taken: entries of ``EMIGRANTS`` and ``REPLACED``.
+    characters : tuple of str
+        Entries of ``CHARACTERS``, given to the islands in turn; none: all are alike.
+    max_evaluations : int
+        The run ends with the first epoch at which so many individuals have been evaluated; 0: no limit.
+    target_error : float
+        The run ends with the first epoch at which an island has an individual whose RMSE, in the output's
+        unit, is not above this; 0: none.
     """
 
     population: int = 500
@@ -92,6 +117,15 @@ class Settings:
     from_library: float = 0.0
     distinct: bool = False
     refine: bool = False
+    islands: int = 1
+    topology: str = "ring"
+    migrate_every: int | str = 10
+    migrants: int | str = 1
+    emigrants: str = "best"
+    replaced: str = "worst"
+    characters: tuple[str, ...] = ()
+    max_evaluations: int = 0
+    target_error: float = 0.0
 
     def __post_init__(self) -> None:
         _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
@@ -128,6 +162,37 @@ class Settings:
             chosen(PRIMITIVES, name, "primitive")
         if any(shift < 1 for shift in self.shifts):
             raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")
+        self._check_islands()
+
+    def _check_islands(self) -> None:
+        _at_least(1, islands=self.islands)
+        _at_least(0, max_evaluations=self.max_evaluations)
+        if self.islands > MOST_ISLANDS:
+            raise SettingsError(f"at most {MOST_ISLANDS} islands, got {self.islands}")
+        if not self.target_error >= 0.0:
+            raise SettingsError(f"target_error is not negative, got {self.target_error}")
+        chosen(EMIGRANTS, self.emigrants, "emigrants")
+        chosen(REPLACED, self.replaced, "replaced")
+        for name in self.characters:
+            chosen(CHARACTERS, name, "character")
+        _ = self.stops
+        most = max(count for _, count in self.leaving.pieces)
+        arriving = most * topology(self.topology, self.islands, 0).in_degree
+        if arriving > self.population:
+            raise SettingsError(
+                f"{arriving} individuals would arrive on an island of {self.population}: fewer migrants, "
+                "a sparser topology or a larger population are needed"
+            )
+
+    @property
+    def stops(self) -> Schedule:
+        """The generations at which epochs end and individuals migrate."""
+        return schedule(self.migrate_every, 1, "migrate_every")
+
+    @property
+    def leaving(self) -> Schedule:
+        """How many leave an island for each of its neighbours."""
+        return schedule(self.migrants, 0, "migrants")
 
     @property
     def maximum_lag(self) -> int:

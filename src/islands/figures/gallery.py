@@ -11,7 +11,7 @@ from islands.figures.hold import draw_holds
 from islands.figures.loop import draw_loop
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
-from islands.figures.search import draw_convergence, draw_front
+from islands.figures.search import draw_convergence, draw_front, draw_islands
 from islands.simulation.predictors import free_run
 from islands.validation.findings import Assessed, Findings
 
@@ -45,10 +45,15 @@ def _record(findings: Findings) -> Figure:
 
 #: Figures of a whole search; those of its course need a history.
 SEARCH_FIGURES: Mapping[str, Callable[[Findings], Figure]] = MappingProxyType(
-    {"record": _record, "front": draw_front, "convergence": draw_convergence}
+    {"record": _record, "front": draw_front, "convergence": draw_convergence, "islands": draw_islands}
 )
+
+#: Islands whose course a search needs for a figure of it.
+_ISLANDS = {"convergence": 1, "islands": 2}
 
 
 def search_figures(findings: Findings) -> tuple[str, ...]:
     """Return the names of the search figures that these findings have."""
-    return tuple(name for name in SEARCH_FIGURES if name != "convergence" or findings.search.history)
+    history = findings.search.history
+    islands = len(history[-1].islands) if history else 0
+    return tuple(name for name in SEARCH_FIGURES if islands >= _ISLANDS.get(name, 0))

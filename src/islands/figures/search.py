@@ -39,6 +39,31 @@ def draw_convergence(findings: Findings) -> Figure:
 
 
 @house_style()
+def draw_islands(findings: Findings) -> Figure:
+    """Draw the least error of every island over the generations, and the best of all."""
+    figure = blank(3.4)
+    axes = figure.subplots()
+    history = findings.search.history
+    generations = [point.generation for point in history]
+    errors = np.sqrt([point.islands for point in history])
+    errors[np.isinf(errors)] = np.nan
+    # A hundred lines are a cloud: it says how far islands are apart, and none of them needs a name.
+    name = iter(["one island"])
+    for course in errors.T:
+        axes.step(
+            generations, course, where="post", color=MEASURED, lw=0.8, alpha=0.6, label=next(name, None)
+        )
+    best = np.fmin.reduce(errors, axis=1)
+    axes.step(generations, best, where="post", color=SIMULATED, lw=1.6, label="the best of all")
+    _logarithmic(axes)
+    axes.set_xlabel("generation")
+    axes.set_ylabel("RMSE of multiple shooting")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.legend(frameon=False)
+    return settled(figure)
+
+
+@house_style()
 def draw_front(findings: Findings) -> Figure:
     """Draw the free-run error of every model against its number of terms."""
     figure = blank(3.2)

@@ -22,7 +22,8 @@ from islands.model.regressor import Regressor
 from islands.model.text import plain
 from islands.simulation.outcome import Outcome, Verdict
 
-SCHEMA = "islands.checkpoint/2"
+SCHEMA = "islands.checkpoint/3"
+HALL_SCHEMA = "islands.hall/1"
 
 
 def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, Any]) -> None:
@@ -30,9 +31,17 @@ def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, A
     document = {
         "schema": SCHEMA,
         "about": dict(about),
-        "epoch": archipelago.epoch,
         "islands": [_island(island) for island in archipelago.islands],
     }
+    _write(document, path)
+
+
+def write_hall(hall: HallOfFame, path: Path) -> None:
+    """Write a hall of fame: the same bytes wherever and however it was found."""
+    _write({"schema": HALL_SCHEMA, "hall": [_individual(each) for each in hall.entries]}, path)
+
+
+def _write(document: Mapping[str, Any], path: Path) -> None:
     beside = path.with_suffix(".part")
     with beside.open("w", encoding="utf-8") as stream:
         json.dump(document, stream)
@@ -59,7 +68,9 @@ def read_checkpoint(
         raise ModelError(f"{path} is no checkpoint of schema {SCHEMA}")
     try:
         islands = tuple(_read_island(island, primitives) for island in document["islands"])
-        return Archipelago(islands, int(document["epoch"])), dict(document["about"])
+        if len({island.generation for island in islands}) != 1:
+            raise ModelError("its islands are not at one generation")
+        return Archipelago(islands), dict(document["about"])
     except (KeyError, TypeError, ValueError, AttributeError, ModelError) as error:
         raise ModelError(f"the checkpoint {path} is damaged: {error!r}") from error
 

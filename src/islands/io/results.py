@@ -36,6 +36,7 @@ def result_json(findings: Findings) -> str:
             "outcomes": dict(search.outcomes),
             "full_set": dict(search.full_set),
             "generations": search.generations,
+            "ended_by": search.ended_by,
             "duplicates": search.duplicates,
             "feasible_share": search.feasible_share,
             "caches": {

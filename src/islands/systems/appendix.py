@@ -16,8 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
@@ -116,7 +116,7 @@ def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> 
     if scaling not in SCALINGS:
         raise SettingsError(f"no scaling {scaling!r}: take one of {', '.join(SCALINGS)}")
     noise = np.sqrt(SOFT_VARIANCE) * _draw(seed, _SOFT_INPUT, samples)
-    filtered: Signal = lfilter([1.0], np.poly(POLES), noise)
+    filtered: Signal = scipy.signal.lfilter([1.0], np.poly(POLES), noise)
     return SCALINGS[scaling](filtered)
 
 

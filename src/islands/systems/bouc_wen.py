@@ -9,9 +9,9 @@ The golden tests hold the authors' records to 1e-12.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numba import njit
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
@@ -131,7 +131,7 @@ def authors_estimation(seed: int = AUTHORS_SEED) -> Dataset:
     noise[:1000] = 0
     noise[-1000:] = 0
     # Transfer-function form as in the notebook: second-order sections would differ beyond 1e-12.
-    voltage: NDArray[np.float64] = filtfilt(*butter(5, 1 / 500, btype="low"), noise)
+    voltage: NDArray[np.float64] = scipy.signal.filtfilt(*scipy.signal.butter(5, 1 / 500, btype="low"), noise)
     slope = np.diff(voltage) / np.diff(time)
     u = voltage[1000:]
     y = simulate(BoucWenPiezo(), u, DT, slope=slope[999:-1])

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfilt, sosfiltfilt
 
 from islands.errors import SettingsError
 
@@ -55,9 +55,9 @@ def filtered_noise(
         raise SettingsError(
             f"the cutoff lies between 0 and half the sampling frequency, {0.5 / dt} Hz, got {cutoff}"
         )
-    sections = butter(order, cutoff, fs=1 / dt, output="sos")
+    sections = scipy.signal.butter(order, cutoff, fs=1 / dt, output="sos")
     noise = np.random.default_rng(seed).standard_normal(samples)
-    run = sosfiltfilt if zero_phase else sosfilt
+    run = scipy.signal.sosfiltfilt if zero_phase else scipy.signal.sosfilt
     filtered: Signal = run(sections, noise)
     return filtered if peak is None else _to_peak(filtered, peak)
 

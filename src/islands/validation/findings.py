@@ -33,11 +33,14 @@ class Progress:
         Until then.
     best : mapping
         The least fitness (mean squared shooting error) of every size.
+    islands : tuple of float
+        The least fitness of every island; infinite where it has no model yet.
     """
 
     generation: int
     evaluations: int
     best: Mapping[int, float]
+    islands: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +59,14 @@ class Search:
     wall_s : float or None
         Seconds it took, from whoever has a clock.
     generations, duplicates, feasible_share
-        Of an evolution: generations done, individuals whose structure had been evaluated before, and the
-        share of individuals that got parameters; None for other searches.
+        Of an evolution: generations done, individuals whose structure was that of a parent or a sibling, and
+        the share of individuals that got parameters; None for other searches.
     history : tuple of Progress
         The course of an evolution, oldest first.
     caches : mapping
         Bytes that every cache of an evolution takes at its end, and its limit.
+    ended_by : str or None
+        The budget that an evolution used up, or ``stopped``.
     """
 
     evaluations: int
@@ -73,6 +78,7 @@ class Search:
     feasible_share: float | None = None
     history: tuple[Progress, ...] = ()
     caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    ended_by: str | None = None
 
     @property
     def evaluations_per_second(self) -> float | None:

@@ -6,8 +6,10 @@ import pytest
 
 from islands.benchmark.search import Run, run_apart, run_island
 from islands.benchmark.workload import ISLAND, benchmark_record
-from islands.evolution.archipelago import Archipelago
+from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.island import first_generation, step
 from islands.evolution.problem import Problem
 
 SMALL = replace(ISLAND, population=10, generations=3)
@@ -25,14 +27,42 @@ def test_two_islands_are_the_papers_population():
 def test_a_timed_search_evaluates_what_the_engine_does(piezo):
     told = []
     found = run_island(piezo, SMALL, 0, told.append)
-    epochs = list(SerialEngine().run(Problem(piezo, SMALL), 0, 1, Archipelago()))
-    assert found.evaluations == sum(epoch.info.evaluations for epoch in epochs) == 40
-    assert found.duplicates == sum(epoch.info.duplicates for epoch in epochs)
+    epochs = SerialEngine().run(Problem(piezo, SMALL), founded(1, 0), lambda: False)
+    assert found.evaluations == sum(info.evaluations for epoch in epochs for info in epoch.steps[0]) == 40
     assert told == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert 0.0 < found.evaluating_cpu_s < found.cpu_s
     assert found.wall_s > 0.0
     assert all(size > 0 for size in found.caches.values())
     assert found.caches
+
+
+def test_duplicates_are_offspring_that_the_evaluator_knew_already(piezo):
+    """What a benchmark saves by a cache is not what an island says of its offspring.
+
+    Nor is an individual of before that is evaluated to its end one of the offspring.
+    """
+
+    class Counting(Evaluator):
+        offspring = others = 0
+
+        def evaluate(self, population, bars=None):
+            found, known = super().evaluate(population, bars)
+            self.offspring += known if bars is not None else 0
+            self.others += known if bars is None else 0
+            return found, known
+
+    # Where anyone may win, those who were abandoned do, some of them again and again.
+    setting = replace(SMALL, population=20, generations=12, tournament=1)
+    evaluator = Counting(piezo, setting)
+    island, info = first_generation(0, 0, evaluator)
+    told = info.duplicates
+    while island.generation < setting.generations:
+        island, info = step(island, evaluator)
+        told += info.duplicates
+    assert evaluator.others > 0
+    found = run_island(piezo, setting, 0)
+    assert found.duplicates == evaluator.offspring != told
+    assert found.evaluations == 13 * 20
 
 
 def test_rates_are_counts_over_times():

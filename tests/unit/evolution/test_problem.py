@@ -9,9 +9,10 @@ from searches import distinct_genes
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
+from islands.evolution.characters import CHARACTERS
 from islands.evolution.constraints import with_phi
 from islands.evolution.individual import regressor_of
-from islands.evolution.problem import problem
+from islands.evolution.problem import Problem, problem
 from islands.evolution.settings import Settings
 from islands.model.expression import Apply, height, walk
 from islands.model.library import candidates
@@ -85,6 +86,21 @@ def test_what_is_higher_than_a_gene_may_be_is_left_out_of_the_library(max_height
 def test_seeds_have_no_more_terms_than_an_individual():
     posed = problem(record(), replace(SETTINGS, max_terms=3, initial_terms=(1, 3)))
     assert [len(genes) for genes in posed.seeds] == [1, 2, 3]
+
+
+def test_characters_are_given_to_the_islands_in_turn():
+    posed = Problem(record(), Settings(islands=5, characters=("plain", "explorer", "pruner")))
+    plain_, explorer, pruner = (
+        replace(posed.settings, **CHARACTERS[name]) for name in posed.settings.characters
+    )
+    assert plain_ == posed.settings
+    assert [posed.settings_of(island) for island in range(5)] == [plain_, explorer, pruner, plain_, explorer]
+    assert len({plain_, explorer, pruner}) == 3
+
+
+def test_without_characters_all_islands_are_alike():
+    posed = Problem(record(), Settings(islands=3))
+    assert all(posed.settings_of(island) == posed.settings for island in range(3))
 
 
 def test_a_library_without_end_and_an_incomplete_record_are_refused():

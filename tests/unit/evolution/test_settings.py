@@ -37,6 +37,31 @@ from islands.evolution.settings import Settings
         ({"shifts": (1, 0)}, r"back-shifts are at least 1, got \(1, 0\)"),
         ({"shifts": (), "primitives": ()}, "give at least one of them"),
         ({"library": "fourier"}, "unknown library 'fourier': take one of phi-polynomial, polynomial"),
+        ({"islands": 0}, "islands is at least 1, got 0"),
+        ({"islands": 10_001}, "at most 10000 islands, got 10001"),
+        ({"max_evaluations": -1}, "max_evaluations is at least 0, got -1"),
+        ({"target_error": -0.1}, "target_error is not negative, got -0.1"),
+        ({"target_error": float("nan")}, "target_error is not negative, got nan"),
+        ({"emigrants": "anyone"}, "unknown emigrants 'anyone': take one of best, random, front"),
+        ({"replaced": "best"}, "unknown replaced 'best': take one of worst, random"),
+        ({"characters": ("plain", "lazy")}, "unknown character 'lazy': take one of plain, explorer"),
+        ({"migrate_every": 0}, "migrate_every is at least 1, got 0"),
+        ({"migrate_every": "5,100:0"}, "migrate_every is at least 1, got '5,100:0'"),
+        ({"migrate_every": "often"}, "cannot read migrate_every 'often'"),
+        ({"migrate_every": 7.0}, "cannot read migrate_every 7.0"),
+        ({"migrate_every": 10**9}, "cannot read migrate_every 1000000000"),
+        ({"migrants": "1,20:"}, "cannot read migrants '1,20:'"),
+        ({"migrants": -1}, "cannot read migrants -1"),
+        ({"migrants": "1,20:2,20:3"}, "migrants '1,20:2,20:3': its generations ascend"),
+        ({"topology": "mesh"}, "unknown topology 'mesh': take one of isolated, ring"),
+        ({"topology": "ring:2", "islands": 4}, "topology 'ring:2': a degree"),
+        ({"topology": "ring:", "islands": 4}, "topology 'ring:': a degree from 1 to 99"),
+        ({"topology": "random-regular:100", "islands": 400}, "a degree from 1 to 99"),
+        ({"topology": "random-regular:6", "islands": 10_000}, "more than 50000 edges to draw"),
+        ({"topology": "1234567890>1", "islands": 4}, "cannot read the edge '1234567890>1'"),
+        ({"topology": "random-regular:4", "islands": 4}, "takes more than 4 islands, got 4"),
+        ({"topology": "0>1,1>2", "islands": 2}, "the edge 1>2 does not join two of the islands 0 to 1"),
+        ({"topology": "fully-connected", "islands": 1001}, "at most 1000 islands are fully connected"),
     ],
 )
 def test_a_bad_value_is_refused_by_name(changes, message):
@@ -55,11 +80,35 @@ def test_a_bad_value_is_refused_by_name(changes, message):
         {"shifts": ()},
         {"primitives": ()},
         {"library": "polynomial", "from_library": 1.0},
+        {"islands": 10_000},
+        {"islands": 3, "migrants": 0, "migrate_every": "5,100:20", "max_evaluations": 1},
+        {"islands": 4, "topology": "random-regular:3", "characters": ("explorer", "plain")},
+        {"islands": 2, "topology": "0>1", "target_error": 0.5},
+        {"target_error": 1e308},
+        {"population": 12, "islands": 4, "topology": "fully-connected", "migrants": 4},
     ],
 )
 def test_the_edges_of_the_ranges_are_allowed(changes):
     made = Settings(**changes)
     assert all(getattr(made, name) == value for name, value in changes.items())
+
+
+@pytest.mark.parametrize(
+    ("topology", "islands", "migrants", "arriving"),
+    [
+        ("fully-connected", 4, 4, 12),
+        # What counts is the most that ever leave, and the island that most arrive on.
+        ("ring", 3, "1,20:12,40:2", 12),
+        ("star", 7, 2, 12),
+        ("0>1,2>1,3>1,4>1,1>0", 5, 3, 12),
+    ],
+)
+def test_more_may_not_arrive_on_an_island_than_live_there(topology, islands, migrants, arriving):
+    changes = {"topology": topology, "islands": islands, "migrants": migrants}
+    Settings(population=arriving, **changes)
+    message = f"{arriving} individuals would arrive on an island of {arriving - 1}: fewer migrants"
+    with pytest.raises(SettingsError, match=message):
+        Settings(population=arriving - 1, **changes)
 
 
 @pytest.mark.parametrize(

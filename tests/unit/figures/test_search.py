@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from islands.figures.search import draw_convergence, draw_front
+from islands.figures.gallery import search_figures
+from islands.figures.search import draw_convergence, draw_front, draw_islands
 from islands.figures.style import save
 from islands.validation.findings import Progress
 
@@ -29,9 +30,16 @@ def findings(history=(), models=()):
 
 #: Two sizes from the start, a third from generation 2 on; squared errors.
 COURSE = (
-    Progress(0, 10, {1: 4.0, 3: 0.04}),
-    Progress(1, 20, {1: 4.0, 3: 0.01}),
-    Progress(2, 30, {1: 1.0, 2: 0.09, 3: 0.01}),
+    Progress(0, 10, {1: 4.0, 3: 0.04}, (0.04,)),
+    Progress(1, 20, {1: 4.0, 3: 0.01}, (0.01,)),
+    Progress(2, 30, {1: 1.0, 2: 0.09, 3: 0.01}, (0.01,)),
+)
+
+#: Three islands; the last one has a model from generation 1 on.
+ISLANDS = (
+    Progress(4, 10, {1: 4.0}, (4.0, 9.0, np.inf)),
+    Progress(5, 20, {1: 1.0}, (4.0, 1.0, 16.0)),
+    Progress(6, 30, {1: 0.25}, (0.25, 1.0, 16.0)),
 )
 MODELS = ((3, 0.2, 0.3), (1, 20.0, 30.0), (2, 2.0, 1.0))
 
@@ -119,7 +127,7 @@ def test_a_model_that_diverged_or_is_exact_leaves_the_others_to_be_seen():
 @pytest.mark.parametrize("sizes", [1, 9, 15, 30])
 def test_the_legend_of_many_sizes_stays_inside_the_figure(sizes):
     history = [
-        Progress(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)})
+        Progress(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)}, (1.0 / sizes,))
         for generation in (0, 1, 2)
     ]
     figure = draw_convergence(findings(history))
@@ -134,7 +142,41 @@ def test_the_legend_of_many_sizes_stays_inside_the_figure(sizes):
     assert box.x0 >= axes_of(figure).get_window_extent().x1
 
 
-@pytest.mark.parametrize("draw", [draw_convergence, draw_front])
+def test_the_course_of_every_island_is_a_line_and_so_is_the_best_of_all():
+    figure = draw_islands(findings(ISLANDS))
+    *islands, best = (line.get_xydata() for line in axes_of(figure).lines)
+    expected = [[2.0, 2.0, 0.5], [3.0, 1.0, 1.0], [np.nan, 4.0, 4.0]]
+    assert len(islands) == 3
+    for line, errors in zip([*islands, best], [*expected, [2.0, 1.0, 0.5]], strict=True):
+        assert line[:, 0].tolist() == [4.0, 5.0, 6.0]
+        np.testing.assert_array_equal(line[:, 1], errors)
+    axes = axes_of(figure)
+    assert axes.get_yscale() == "log"
+    assert whole_ticks(axes) == [4, 5, 6]
+    # Islands are as many as they are: one of them is named for all.
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["one island", "the best of all"]
+
+
+def test_a_generation_without_any_model_is_left_empty():
+    blank = (Progress(0, 1, {}, (np.inf, np.inf)), *ISLANDS)
+    figure = draw_islands(findings([Progress(p.generation, 1, {}, p.islands[:2]) for p in blank]))
+    best = axes_of(figure).lines[-1].get_xydata()[:, 1]
+    np.testing.assert_array_equal(best, [np.nan, 2.0, 1.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("history", "names"),
+    [
+        ((), ("record", "front")),
+        (COURSE, ("record", "front", "convergence")),
+        (ISLANDS, ("record", "front", "convergence", "islands")),
+    ],
+)
+def test_a_search_has_the_figures_that_its_course_is_enough_for(history, names):
+    assert search_figures(findings(history)) == names
+
+
+@pytest.mark.parametrize("draw", [draw_convergence, draw_front, draw_islands])
 def test_saving_twice_gives_the_same_bytes(draw, tmp_path):
     for name in ("first", "second"):
         save(draw(findings(COURSE, MODELS)), tmp_path / f"{name}.svg")

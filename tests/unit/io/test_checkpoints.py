@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from islands.errors import ModelError
-from islands.evolution.archipelago import Archipelago
-from islands.evolution.hall_of_fame import HallOfFame, with_entries
+from islands.evolution.archipelago import Archipelago, founded
+from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
 from islands.evolution.individual import Individual, regressor_of
 from islands.evolution.island import Island
-from islands.io.checkpoints import SCHEMA, read_checkpoint, write_checkpoint
+from islands.io.checkpoints import HALL_SCHEMA, SCHEMA, read_checkpoint, write_checkpoint, write_hall
 from islands.model.expression import Apply
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
@@ -51,10 +51,17 @@ def archipelago():
     assert len(hall.entries) == 2
     here = Island(0, 2**40, 7, population, population[:1], hall, 0.1 + 0.2)
     beside = replace(here, index=1, population=population[::-1], elite=(), bar=inf)
-    return Archipelago((here, beside), 7)
+    return Archipelago((here, beside))
 
 
-ABOUT = {"job": {"record": "record.csv", "seed": 3}, "history": [[0, 200, {"1": 0.1 + 0.2}]]}
+#: Nobody lives there yet.
+EMPTY = founded(2, 5)
+
+
+ABOUT = {
+    "job": {"record": "record.csv", "seed": 3},
+    "history": [[0, 200, {"1": 0.1 + 0.2}, [0.1 + 0.2, None]]],
+}
 
 
 @pytest.fixture
@@ -85,13 +92,14 @@ def test_writing_what_was_read_gives_the_same_bytes(path, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_the_empty_archipelago_is_a_checkpoint_too(path):
-    write_checkpoint(Archipelago(), path, {})
-    assert read_checkpoint(path) == (Archipelago(), {})
+def test_islands_that_nobody_lives_on_yet_are_a_checkpoint_too(path):
+    write_checkpoint(EMPTY, path, {})
+    assert read_checkpoint(path) == (EMPTY, {})
+    assert EMPTY.generation == -1
 
 
 def test_it_is_json_that_others_can_read(document, path):
-    assert document["schema"] == SCHEMA == "islands.checkpoint/2"
+    assert document["schema"] == SCHEMA == "islands.checkpoint/3"
     assert document["islands"][0]["population"][1]["fitness"] is None
     assert [island["bar"] for island in document["islands"]] == [0.1 + 0.2, None]
     assert "Infinity" not in path.read_text()
@@ -105,7 +113,7 @@ def test_primitives_of_the_user_s_own_are_read_back_from_their_table(path):
     table = {**PRIMITIVES, "twice": primitive("twice", _twice)}
     gene = Apply(table["twice"], (parse("u(k-1)"),))
     own = Individual((gene,), (regressor_of(gene),), (1.0,), 0.25)
-    kept = Archipelago((Island(0, 0, 0, (own,), (own,), HallOfFame((own,))),), 0)
+    kept = Archipelago((Island(0, 0, 0, (own,), (own,), HallOfFame((own,))),))
     write_checkpoint(kept, path, {})
     assert read_checkpoint(path, table)[0] == kept
     with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*unknown function 'twice'"):
@@ -125,7 +133,7 @@ def test_an_island_that_lacks_a_part_is_refused(document, path, name):
 
 
 def test_a_crash_between_writing_and_replacing_leaves_the_old_one(path, monkeypatch):
-    write_checkpoint(Archipelago(), path, {"epoch": "old"})
+    write_checkpoint(EMPTY, path, {"epoch": "old"})
 
     def crash(self, target):
         raise KeyboardInterrupt
@@ -134,14 +142,14 @@ def test_a_crash_between_writing_and_replacing_leaves_the_old_one(path, monkeypa
         patched.setattr(Path, "replace", crash)
         with pytest.raises(KeyboardInterrupt):
             write_checkpoint(archipelago(), path, {"epoch": "new"})
-    assert read_checkpoint(path) == (Archipelago(), {"epoch": "old"})
+    assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
     write_checkpoint(archipelago(), path, {"epoch": "new"})
     assert read_checkpoint(path) == (archipelago(), {"epoch": "new"})
     assert [entry.name for entry in path.parent.iterdir()] == ["checkpoint.json"]
 
 
 def test_a_crash_while_writing_leaves_the_old_one(path, monkeypatch):
-    write_checkpoint(Archipelago(), path, {"epoch": "old"})
+    write_checkpoint(EMPTY, path, {"epoch": "old"})
 
     def full(document, stream):
         stream.write('{"schema": "islands.che')
@@ -150,7 +158,7 @@ def test_a_crash_while_writing_leaves_the_old_one(path, monkeypatch):
     monkeypatch.setattr(json, "dump", full)
     with pytest.raises(OSError, match="No space left"):
         write_checkpoint(archipelago(), path, {"epoch": "new"})
-    assert read_checkpoint(path) == (Archipelago(), {"epoch": "old"})
+    assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
 
 
 def test_it_is_on_the_disk_before_it_takes_the_old_one_s_place(path, monkeypatch):
@@ -162,6 +170,74 @@ def test_it_is_on_the_disk_before_it_takes_the_old_one_s_place(path, monkeypatch
     monkeypatch.setattr(Path, "replace", lambda self, to: (order.append("replaced"), put(self, to))[1])
     write_checkpoint(archipelago(), path, {})
     assert order == ["synchronised", "replaced"]
+
+
+# A hall of fame by itself.
+
+
+def halls():
+    """One hall found in two ways: in another order, on islands, written otherwise."""
+    found = [
+        individual(*GENES, fitness=1 / 3),
+        individual("y(k-2)", "u1(k-1)*y(k-1)", fitness=0.25),
+        individual("y(k-3)", fitness=5e-324),
+        individual("y(k-4)", fitness=1e300),
+    ]
+    otherwise = individual("mul(y(k-1), u1(k-1))", "q1(y(k-1))", fitness=0.25)
+    one = with_entries(HallOfFame(), found)
+    parts = [with_entries(HallOfFame(), each) for each in ([found[2], otherwise], [found[0], *found[2:]])]
+    return one, merge(*parts)
+
+
+def test_equal_halls_are_the_same_bytes_however_they_were_found(tmp_path):
+    one, other = halls()
+    assert [entry.size for entry in one.entries] == [1, 1, 2, 6]
+    write_hall(one, tmp_path / "one.json")
+    write_hall(other, tmp_path / "other.json")
+    assert (tmp_path / "one.json").read_bytes() == (tmp_path / "other.json").read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {"one.json", "other.json"}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"fitness": 0.3}, {"theta": (0.3,)}, {"regressors": individual("y(k-7)").regressors}],
+)
+def test_halls_that_differ_are_other_bytes(tmp_path, change):
+    one, _ = halls()
+    first, *others = one.entries
+    write_hall(one, tmp_path / "one.json")
+    write_hall(HallOfFame((replace(first, **change), *others)), tmp_path / "other.json")
+    assert (tmp_path / "one.json").read_bytes() != (tmp_path / "other.json").read_bytes()
+
+
+def test_a_hall_is_json_that_others_can_read(tmp_path):
+    write_hall(halls()[0], tmp_path / "hall.json")
+    document = json.loads((tmp_path / "hall.json").read_text())
+    assert list(document) == ["schema", "hall"]
+    assert document["schema"] == HALL_SCHEMA == "islands.hall/1"
+    smallest, _, middle, _ = document["hall"]
+    assert smallest == {
+        "genes": ["y(k-3)"],
+        "regressors": ["y(k-3)"],
+        "theta": [0.1 + 0.2],
+        "fitness": 5e-324,
+        "outcome": ["OK", ""],
+    }
+    assert (middle["regressors"], middle["fitness"]) == (["y(k-2)", "y(k-1)*u1(k-1)"], 0.25)
+
+
+def test_a_hall_too_is_replaced_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / "hall.json"
+    write_hall(HallOfFame(), path)
+    before = path.read_bytes()
+
+    def crash(self, target):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", crash)
+    with pytest.raises(KeyboardInterrupt):
+        write_hall(halls()[0], path)
+    assert path.read_bytes() == before
 
 
 # What is no checkpoint is refused with a message that names the file.
@@ -190,17 +266,39 @@ def test_a_foreign_file_is_refused(path, content):
 
 
 @pytest.mark.parametrize(
-    "foreign", [[], 3, {}, {"schema": "islands.model/1"}, {"schema": "islands.checkpoint/1"}]
+    "foreign",
+    [
+        [],
+        3,
+        {},
+        {"schema": "islands.model/1"},
+        {"schema": "islands.hall/1"},
+        {"schema": "islands.checkpoint/2"},
+    ],
 )
 def test_another_schema_is_refused(path, foreign):
     path.write_text(json.dumps(foreign))
     with pytest.raises(
-        ModelError, match=r"checkpoint\.json is no checkpoint of schema islands\.checkpoint/2"
+        ModelError, match=r"checkpoint\.json is no checkpoint of schema islands\.checkpoint/3"
     ):
         read_checkpoint(path)
 
 
-@pytest.mark.parametrize("key", ["about", "epoch", "islands"])
+@pytest.mark.parametrize(
+    "changed", [{"islands": []}, {"islands": [0, 8]}, {"islands": [7, 6]}, {"islands": [-1, 7]}]
+)
+def test_islands_at_different_generations_are_refused(document, path, changed):
+    """And no islands at all: they are at no generation."""
+    pairs = list(zip(document["islands"], changed["islands"], strict=False))
+    for island, generation in pairs:
+        island["generation"] = generation
+    document["islands"] = [island for island, _ in pairs]
+    path.write_text(json.dumps(document))
+    with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*not at one generation"):
+        read_checkpoint(path)
+
+
+@pytest.mark.parametrize("key", ["about", "islands"])
 def test_a_missing_part_is_named(document, path, key):
     del document[key]
     path.write_text(json.dumps(document))
@@ -211,10 +309,10 @@ def test_a_missing_part_is_named(document, path, key):
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("epoch",), "seven"),
         (("islands",), 5),
         (("islands", 0), []),
         (("islands", 0, "index"), None),
+        (("islands", 0, "generation"), "seven"),
         (("islands", 0, "bar"), "high"),
         (("islands", 0, "bar"), []),
         (("islands", 0, "population"), 3),

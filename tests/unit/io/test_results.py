@@ -74,6 +74,12 @@ def test_a_result_has_every_field_of_the_contract(findings):
         assert set(model["information"]) == {"aic", "bic", "fpe"}
 
 
+def test_a_result_says_what_ended_an_evolution_and_nothing_did_end_another_search(findings):
+    assert loaded(findings)["search"]["ended_by"] is None
+    evolved = replace(findings, search=replace(findings.search, ended_by="target error"))
+    assert loaded(evolved)["search"]["ended_by"] == "target error"
+
+
 def test_the_physics_and_the_residual_tests_are_told_one_by_one(findings):
     for model in loaded(findings)["models"]:
         physics, tests = model["physics"], model["residual_tests"]

@@ -1,0 +1,1 @@
+"""The workshop: runs searches on more than one process."""

@@ -1,0 +1,146 @@
+"""The crew: the actors that carry islands. It grows with the cluster and replaces who is lost."""
+
+from time import monotonic
+
+import ray
+from ray.actor import ActorHandle
+from ray.exceptions import RayActorError, RayTaskError
+
+from islands.evolution.problem import Problem
+from islands_service.engines import Tell
+from islands_service.runtime.cluster import ClusterError
+from islands_service.runtime.island_actor import IslandActor
+
+#: Seconds that a search waits for its whole crew before it begins with those that are there.
+PATIENCE = 10.0
+
+#: Seconds after which the user is told that an actor has not got ready: it takes one or two.
+TELL_AFTER = 5.0
+
+#: Seconds between two looks at the crew, and at the size of the cluster.
+_LOOK, _MEASURE = 0.1, 1.0
+
+#: Losses without any progress between them that are put down to bad luck, for every actor.
+_LOSSES = 5
+
+#: Ray's own restarts would lose what an actor knows without a word: recovery is ours, from values.
+_ACTOR = ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrency_groups={"watch": 1})(
+    IslandActor
+)
+
+
+class Crew:
+    """Actors, one for every island as long as there are CPUs for them; further islands share them.
+
+    An actor that finds no place stays in the cluster's queue, and the others do its work meanwhile.
+
+    Parameters
+    ----------
+    problem : Problem
+    islands : int
+    tell : callable
+        Told when an actor is lost, and when some have to wait for a CPU.
+    """
+
+    def __init__(self, problem: Problem, islands: int, tell: Tell) -> None:
+        self._problem = ray.put(problem)
+        self._islands, self._tell = islands, tell
+        self._size = 0
+        # By place; with the reference that ends when the actor is prepared, or when it dies.
+        self._joining: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
+        self._members: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
+        self._began = self._since = monotonic()
+        self._looked = self._measured = -_MEASURE
+        self._sailing = False
+        self._told = ""
+        self._losses = 0
+
+    def tend(self, at_once: bool = False) -> bool:
+        """Welcome who is ready, replace who is lost, grow with the cluster; tell whether anybody is there.
+
+        Raises
+        ------
+        ClusterError
+            Actors die again and again, or cannot be made at all.
+        """
+        now = monotonic()
+        if at_once or now - self._looked > _LOOK:
+            self._looked = now
+            self._look(now)
+            if not self._sailing and self._members:
+                self._sailing = not self._joining or now - self._began > PATIENCE
+        return self._sailing and bool(self._members)
+
+    def home(self, island: int) -> ActorHandle:
+        """Return the actor for an island: the same one as long as that is there, for its warm caches."""
+        place = island % self._size
+        if place not in self._members:
+            places = sorted(self._members)
+            place = places[island % len(places)]
+        return self._members[place][0]
+
+    def progressed(self) -> None:
+        """Forget the losses so far: work gets done in spite of them."""
+        self._losses = 0
+
+    def dismiss(self) -> None:
+        """End all actors."""
+        for actor, _ in (*self._joining.values(), *self._members.values()):
+            ray.kill(actor)
+
+    def _look(self, now: float) -> None:
+        if now - self._measured > _MEASURE:
+            self._measured = now
+            cpus = int(ray.cluster_resources().get("CPU", 0))
+            self._size = max(self._size, min(self._islands, max(1, cpus)))
+        for place in _ended(self._members):
+            del self._members[place]
+            self._lost()
+        for place in _ended(self._joining):
+            actor, prepared = self._joining[place]
+            try:
+                ray.get(prepared)
+            except RayActorError as error:
+                if error.actor_init_failed:
+                    raise ClusterError(
+                        f"an actor cannot be made; is islands installed on every machine? {error}"
+                    ) from error
+                self._lost()
+            except RayTaskError as error:
+                raise error.cause from error
+            else:
+                self._members[place] = (actor, actor.live.remote())
+            del self._joining[place]
+        for place in range(self._size):
+            if place not in self._members and place not in self._joining:
+                actor = _ACTOR.remote(self._problem)
+                self._joining[place] = (actor, actor.prepare.remote())
+        self._tell_of_waiting(now)
+
+    def _lost(self) -> None:
+        self._losses += 1
+        if self._losses > _LOSSES * self._size:
+            raise ClusterError(
+                f"{self._losses} actors were lost and no epoch got done: is there enough memory for them? "
+                "Take fewer islands, or a larger machine"
+            )
+        self._tell("an actor was lost: its islands go on from their last epoch")
+
+    def _tell_of_waiting(self, now: float) -> None:
+        if not self._joining:
+            self._since = now
+        elif now - self._since > TELL_AFTER:
+            line = (
+                f"waiting for capacity: {len(self._members)} of {self._size} island actors are ready, the "
+                "others need a CPU each"
+            )
+            if line != self._told:
+                self._tell(line)
+            self._told = line
+
+
+def _ended(actors: dict[int, tuple[ActorHandle, ray.ObjectRef]]) -> list[int]:
+    """Return the places whose reference has a value or an error."""
+    places = {reference: place for place, (_, reference) in actors.items()}
+    ended, _ = ray.wait(list(places), num_returns=len(places), timeout=0) if places else ([], [])
+    return [places[reference] for reference in ended]

@@ -1,0 +1,47 @@
+"""The actor that carries islands: it holds the record and warm caches, and nothing of any island.
+
+An island enters as a value and leaves as a value. Who loses an actor loses time.
+"""
+
+from threading import Event
+
+import ray
+
+from islands.evolution.epoch import advance
+from islands.evolution.evaluation import Evaluator
+from islands.evolution.individual import Population
+from islands.evolution.problem import Problem
+from islands.warm_up import warm_up
+from islands_service.runtime.report import Report, report_of, unpacked
+
+
+class IslandActor:
+    """Carries islands of one problem, one epoch a call.
+
+    Parameters
+    ----------
+    problem : Problem
+        From the object store: all actors of a machine read one copy of its record.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._name = str(ray.get_runtime_context().get_actor_id())
+
+    def prepare(self) -> None:
+        """Make what the epochs need; what is wrong with the problem is raised here."""
+        warm_up(lambda _line: None)
+        self._evaluator = Evaluator(self._problem.record, self._problem.settings)
+
+    @ray.method(concurrency_group="watch")
+    def live(self) -> None:
+        """Never return: who waits for this learns of the actor's death."""
+        Event().wait()
+
+    @ray.method(num_returns=2)
+    def advance(self, before: Report, *arriving: Population) -> tuple[Report, Population]:
+        """Carry an island from where it stood to its next stop; return that, and who emigrates."""
+        # Nobody tells it to stop: a search that ends kills its actors, and misses nothing.
+        epoch = advance(unpacked(before), arriving, self._evaluator, self._problem, lambda: False)
+        assert epoch is not None
+        return report_of(epoch, self._name, self._evaluator.memory), epoch.emigrants

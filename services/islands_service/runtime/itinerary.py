@@ -1,0 +1,98 @@
+"""The itinerary: which island's epoch may be sent off, and when an archipelago is complete.
+
+An island waits for the epoch before of those that it receives from, and for nobody else: there is no barrier.
+It knows generations and values, and neither actors nor Ray.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import topology_of
+from islands.evolution.epoch import IslandEpoch, emigrants, next_stop
+from islands.evolution.problem import Problem
+
+#: What is kept of an island's epoch.
+T = TypeVar("T")
+
+#: Epochs that an island may be ahead of the last complete archipelago: it evens out faster and slower ones.
+AHEAD = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One epoch of one island, between two generations."""
+
+    island: int
+    begin: int
+    end: int
+
+
+class Itinerary(Generic[T]):
+    """Keeps what has been sent and what has come back of a search.
+
+    Whatever is sent may stand on what has not come back yet: Ray hands it over when it is there.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : Archipelago
+    keep : callable
+        From an epoch, what is kept of it: of the start it is made here.
+    ahead : int
+        Epochs that an island may be ahead of the last complete archipelago.
+    """
+
+    def __init__(
+        self, problem: Problem, start: Archipelago, keep: Callable[[IslandEpoch], T], ahead: int = AHEAD
+    ) -> None:
+        self._settings, self._ahead = problem.settings, ahead
+        self.sources = topology_of(problem, start).sources
+        self.complete = start.generation
+        self._sent = [start.generation] * len(start.islands)
+        #: What is known of every island by generation, from the last complete archipelago on.
+        self.known: list[dict[int, T]] = []
+        for island in start.islands:
+            leaving = emigrants(island, problem.settings_of(island.index))
+            self.known.append({start.generation: keep(IslandEpoch(island, leaving, ()))})
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last generation is complete."""
+        return self.complete >= self._settings.generations
+
+    def due(self) -> Iterator[Leg]:
+        """Yield the legs that may be sent off, and take each for sent; those of earlier epochs come first."""
+        begin, end = self.complete, self._after(self.complete)
+        for _ in range(self._ahead):
+            for island, sent in enumerate(self._sent):
+                if sent == begin:
+                    self._sent[island] = end
+                    yield Leg(island, begin, end)
+            if end >= self._settings.generations:
+                return
+            begin, end = end, self._after(end)
+
+    def lost(self, leg: Leg) -> None:
+        """Take a leg, and what was sent of its island after it, for not sent."""
+        self._sent[leg.island] = max(self.complete, min(self._sent[leg.island], leg.begin))
+
+    def back(self, leg: Leg, epoch: T) -> None:
+        """Take note of what a leg brought."""
+        if leg.end > self.complete:
+            self.known[leg.island][leg.end] = epoch
+
+    def completed(self) -> Iterator[tuple[T, ...]]:
+        """Yield what all islands brought, epoch by epoch as far as it is complete."""
+        while not self.finished:
+            end = self._after(self.complete)
+            if not all(end in known for known in self.known):
+                return
+            for known in self.known:
+                del known[self.complete]
+            self.complete = end
+            yield tuple(known[end] for known in self.known)
+
+    def _after(self, generation: int) -> int:
+        return next_stop(generation, self._settings)

@@ -1,0 +1,143 @@
+"""The engine on Ray: sends islands' epochs to actors, and replays from values what gets lost."""
+
+from collections.abc import Generator
+from time import sleep
+
+import ray
+from ray.exceptions import ObjectLostError, RayActorError, RayTaskError, WorkerCrashedError
+
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.engine import Caches, Epoch, Stop
+from islands.evolution.problem import Problem
+from islands_service.engines import Tell
+from islands_service.runtime.crew import Crew
+from islands_service.runtime.itinerary import Itinerary, Leg
+from islands_service.runtime.report import PackedIslands, Report, report_of
+
+#: What says that a machine failed rather than the search; the epoch is sent once more.
+LOST = (RayActorError, ObjectLostError, WorkerCrashedError)
+
+#: Seconds between two looks at whether the search is to stop.
+_LOOK = 0.1
+
+#: The report of an epoch, and its emigrants, wherever they are.
+References = tuple["ray.ObjectRef[Report]", "ray.ObjectRef"]
+
+
+class RayEngine:
+    """Runs every island on an actor of the cluster that this process is connected to.
+
+    Parameters
+    ----------
+    tell : callable
+        Takes a line for the user when an actor is lost, or has to wait for a CPU.
+    """
+
+    def __init__(self, tell: Tell = lambda _line: None) -> None:
+        self._tell = tell
+
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
+        """See `islands.evolution.engine.Engine`."""
+        itinerary = Itinerary(problem, start, report_of)
+        if itinerary.finished:
+            return
+        crew = Crew(problem, len(start.islands), self._tell)
+        try:
+            yield from _carried_out(itinerary, crew, stop)
+        finally:
+            crew.dismiss()
+
+
+def _carried_out(itinerary: Itinerary[Report], crew: Crew, stop: Stop) -> Generator[Epoch]:
+    voyage = _Voyage(itinerary, crew)
+    while not (itinerary.finished or stop()):
+        if crew.tend():
+            voyage.send()
+        voyage.wait()
+        for reports in itinerary.completed():
+            if stop():
+                return
+            crew.progressed()
+            yield Epoch(
+                Archipelago(PackedIslands(reports)),
+                tuple(report.steps for report in reports),
+                voyage.memory,
+            )
+
+
+class _Voyage:
+    """What is on its way: references to values that actors hold, or are about to make."""
+
+    def __init__(self, itinerary: Itinerary[Report], crew: Crew) -> None:
+        self._itinerary, self._crew = itinerary, crew
+        self._references: dict[tuple[int, int], References] = {}
+        self._out: dict[ray.ObjectRef[Report], Leg] = {}
+        self._caches: dict[str, Caches] = {}
+
+    @property
+    def memory(self) -> Caches:
+        """What the caches of all actors take."""
+        names = {name for caches in self._caches.values() for name in caches}
+        return {
+            name: (
+                sum(caches[name][0] for caches in self._caches.values()),
+                sum(caches[name][1] for caches in self._caches.values()),
+            )
+            for name in sorted(names)
+        }
+
+    def send(self) -> None:
+        """Send off all that may go. Ray hands the emigrants over when they are there."""
+        for leg in self._itinerary.due():
+            before, _ = self._at(leg.island, leg.begin)
+            arriving = [self._at(source, leg.begin)[1] for source in self._itinerary.sources[leg.island]]
+            report, leaving = self._crew.home(leg.island).advance.remote(before, *arriving)
+            self._references[leg.island, leg.end] = report, leaving
+            self._out[report] = leg
+
+    def _at(self, island: int, generation: int) -> References:
+        key = island, generation
+        if key not in self._references:
+            report = self._itinerary.known[island][generation]
+            self._references[key] = ray.put(report), ray.put(report.emigrants)
+        return self._references[key]
+
+    def wait(self) -> None:
+        """Wait a moment for somebody to come back, and take in all who are."""
+        if not self._out:
+            sleep(_LOOK)
+            return
+        ray.wait(list(self._out), num_returns=1, timeout=_LOOK, fetch_local=False)
+        back, _ = ray.wait(list(self._out), num_returns=len(self._out), timeout=0)
+        for reference in back:
+            # Lost with another leg of its island, that came back before it.
+            leg = self._out.pop(reference, None)
+            if leg is not None:
+                self._take(leg, reference)
+        oldest = self._itinerary.complete
+        for key in [key for key in self._references if key[1] < oldest]:
+            del self._references[key]
+
+    def _take(self, leg: Leg, reference: "ray.ObjectRef[Report]") -> None:
+        try:
+            report = ray.get(reference)
+        except LOST:
+            self._lost(leg)
+        except RayTaskError as error:
+            raise error.cause from error
+        else:
+            self._caches[report.actor] = report.caches
+            self._itinerary.back(leg, report)
+
+    def _lost(self, leg: Leg) -> None:
+        self._itinerary.lost(leg)
+        for reference, other in list(self._out.items()):
+            if other.island == leg.island and other.end > leg.end:
+                del self._out[reference]
+        # What is known may have been lost with the machine that held it: it is sent from here again.
+        for island, generation in list(self._references):
+            if generation in self._itinerary.known[island] or (
+                island == leg.island and generation >= leg.end
+            ):
+                del self._references[island, generation]
+        self._crew.tend(at_once=True)

@@ -1,0 +1,68 @@
+"""Migration policies: who leaves an island, and whose place they take on another.
+
+A new one is an entry of ``EMIGRANTS`` or of ``REPLACED``.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
+from types import MappingProxyType
+from typing import TypeVar
+
+from islands.evolution.individual import Individual, Population
+from islands.evolution.rng import Stream
+
+T = TypeVar("T")
+
+
+def _best(elite: Population, count: int, _draw: Stream) -> Population:
+    """Take the first of the elite, each structure once."""
+    return _structures(elite)[:count]
+
+
+def _random(elite: Population, count: int, draw: Stream) -> Population:
+    """Take anyone of the elite, each structure once."""
+    return _drawn(_structures(elite), count, draw)
+
+
+def _front(elite: Population, count: int, draw: Stream) -> Population:
+    """Take anyone of the elite's Pareto front of error and size: small models travel too."""
+    front: list[Individual] = []
+    for each in sorted(_structures(elite), key=lambda each: (each.size, each.fitness)):
+        if not front or each.fitness < front[-1].fitness:
+            front.append(each)
+    return _drawn(front, count, draw)
+
+
+def _structures(elite: Population) -> Population:
+    first: dict[tuple[str, ...], Individual] = {}
+    for each in elite:
+        if isfinite(each.fitness):
+            first.setdefault(each.key, each)
+    return tuple(first.values())
+
+
+def _worst(fitness: Callable[[], Sequence[float]], count: int, _draw: Stream) -> tuple[int, ...]:
+    """Take the least fit; of equals the first."""
+    known = fitness()
+    return tuple(sorted(range(len(known)), key=lambda place: -known[place])[:count])
+
+
+def _anyone(fitness: Callable[[], Sequence[float]], count: int, draw: Stream) -> tuple[int, ...]:
+    """Take anyone."""
+    return _drawn(range(len(fitness())), count, draw)
+
+
+def _drawn(pool: Sequence[T], count: int, draw: Stream) -> tuple[T, ...]:
+    left = list(pool)
+    return tuple(left.pop(draw.below(len(left))) for _ in range(min(count, len(left))))
+
+
+#: From the elite, how many at the most, and draws: those of whom copies leave.
+EMIGRANTS: Mapping[str, Callable[[Population, int, Stream], Population]] = MappingProxyType(
+    {"best": _best, "random": _random, "front": _front}
+)
+
+#: From the population's fitness, how many, and draws: the places that are taken.
+REPLACED: Mapping[str, Callable[[Callable[[], Sequence[float]], int, Stream], tuple[int, ...]]] = (
+    MappingProxyType({"worst": _worst, "random": _anyone})
+)

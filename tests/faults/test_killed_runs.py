@@ -1,0 +1,80 @@
+"""Runs whose process is killed or told to end: what was found is kept, and resumed it ends the same."""
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from front_door import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
+from processes import actors, alive, descendants, eventually, kill
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+JOB = (*COLUMNS, *BUDGET, "--islands", "2", "--migrate-every", "1")
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_hysteresis(tmp_path_factory.mktemp("house") / "record.csv")
+
+
+def started(record: Path, out: Path, generations: int, *options: str) -> subprocess.Popen[str]:
+    command = [ISLANDS, "identify", record, *JOB, "--generations", str(generations), "--out", out, *options]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def undisturbed(record: Path, generations: int) -> dict[str, bytes]:
+    out = record.parent / f"undisturbed-{generations}"
+    if not out.exists():
+        succeed("identify", record, *JOB, "--generations", generations, "--engine", "serial", "--out", out)
+    return found(out)
+
+
+def test_a_killed_run_leaves_no_process_and_resumed_ends_the_same(record: Path) -> None:
+    out = record.parent / "killed"
+    running = started(record, out, 60)
+    eventually((out / "checkpoint.json").exists)
+    children = descendants(running.pid)
+    assert actors(running.pid)
+    kill(running.pid)
+    running.communicate()
+    assert not (out / "result.json").exists()
+    # Two of Ray's own look only now and then whether they are still wanted.
+    eventually(lambda: not alive(children), seconds=120.0)
+    succeed("identify", "--resume", out)
+    assert found(out) == undisturbed(record, 60)
+
+
+@pytest.mark.parametrize("engine", ["serial", "ray"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_told_to_end_a_run_keeps_the_best_and_resumed_ends_the_same(
+    record: Path, engine: str, number: signal.Signals
+) -> None:
+    out = record.parent / f"{engine}-{number.name}"
+    running = started(record, out, 1_000_000, "--engine", engine)
+    try:
+        eventually((out / "checkpoint.json").exists)
+        running.send_signal(number)
+        said, complained = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 0, complained
+    assert "MAPE val. %" in said
+    assert f"go on with --resume {out}" in complained
+    assert "Traceback" not in complained
+    result = stored(out)
+    assert result["search"]["ended_by"] == "stopped"
+    last = result["search"]["generations"] + 2
+    checkpoint = out / "checkpoint.json"
+    checkpoint.write_text(checkpoint.read_text().replace('"generations": 1000000', f'"generations": {last}'))
+    succeed("identify", "--resume", out)
+    assert found(out) == undisturbed(record, last)
+
+
+def test_an_end_by_the_clock_says_that_it_is_not_reproducible(record: Path) -> None:
+    out = record.parent / "clock"
+    running = started(record, out, 1_000_000, "--engine", "serial", "--wall-time", "2")
+    _, complained = running.communicate(timeout=60)
+    assert running.returncode == 0, complained
+    assert "not reproducible" in complained
+    assert stored(out)["search"]["ended_by"] == "stopped"

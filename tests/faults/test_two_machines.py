@@ -1,0 +1,76 @@
+"""A cluster of two nodes, each with its own object store: the same result, also when a node is lost."""
+
+import os
+from dataclasses import replace
+
+import pytest
+import ray
+from processes import descendants, eventually, kill
+from ray.cluster_utils import Cluster
+from searches import SMALL, exactly, record
+
+from islands.evolution.archipelago import founded
+from islands.evolution.engine import SerialEngine
+from islands.evolution.problem import Problem
+from islands_service.runtime.cluster import cluster
+from islands_service.runtime.ray_engine import RayEngine
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+SETTINGS = replace(SMALL, islands=4, generations=8, migrate_every=1, migrants=2, topology="torus")
+
+
+POSED = Problem(record(), SETTINGS)
+
+
+def never():
+    return False
+
+
+def undisturbed():
+    return [exactly(epoch.archipelago) for epoch in SerialEngine().run(POSED, founded(4, 5), never)]
+
+
+@pytest.fixture
+def head():
+    # A process reads its token once, and another test of it may have set one.
+    os.environ.setdefault("RAY_AUTH_TOKEN", "0123456789abcdef0123456789abcdef")
+    started = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 10**8})
+    try:
+        yield started
+    finally:
+        started.shutdown()
+
+
+def add(head):
+    return head.add_node(num_cpus=1, object_store_memory=10**8)
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_two_nodes_find_what_one_process_finds_even_if_one_is_lost(head, lost):
+    nodes = [add(head), add(head)]
+    told, seen = [], []
+    with cluster(head.address):
+        eventually(lambda: ray.cluster_resources().get("CPU") == 2)
+        for epoch in RayEngine(told.append).run(POSED, founded(4, 5), never):
+            seen.append(exactly(epoch.archipelago))
+            if lost and len(seen) == 3:
+                # The machine goes, and all of its processes with it.
+                raylet = nodes[1].all_processes["raylet"][0].process.pid
+                for pid in (raylet, *descendants(raylet)):
+                    kill(pid)
+    assert seen == undisturbed()
+    assert any("an actor was lost" in line for line in told) == lost
+
+
+def test_without_a_cpu_it_says_so_and_begins_when_a_machine_joins(head):
+    told = []
+
+    def tell(line):
+        told.append(line)
+        add(head)
+
+    with cluster(head.address):
+        seen = [exactly(epoch.archipelago) for epoch in RayEngine(tell).run(POSED, founded(4, 5), never)]
+    assert told[0].startswith("waiting for capacity: 0 of 1 island actors are ready")
+    assert seen == undisturbed()
