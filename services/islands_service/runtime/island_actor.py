@@ -10,6 +10,7 @@ import ray
 from islands.evolution.epoch import advance
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Population
+from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.warm_up import warm_up
 from islands_service.runtime.report import Report, report_of, unpacked
@@ -26,6 +27,7 @@ class IslandActor:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
+        self._islands: dict[int, tuple[bytes, Island]] = {}
         self._name = str(ray.get_runtime_context().get_actor_id())
 
     def prepare(self) -> None:
@@ -42,6 +44,15 @@ class IslandActor:
     def advance(self, before: Report, *arriving: Population) -> tuple[Report, Population]:
         """Carry an island from where it stood to its next stop; return that, and who emigrates."""
         # Nobody tells it to stop: a search that ends kills its actors, and misses nothing.
-        epoch = advance(unpacked(before), arriving, self._evaluator, self._problem, lambda: False)
+        epoch = advance(self._island(before), arriving, self._evaluator, self._problem, lambda: False)
         assert epoch is not None
-        return report_of(epoch, self._name, self._evaluator.memory), epoch.emigrants
+        report = report_of(epoch, self._name, self._evaluator.memory)
+        self._islands[epoch.island.index] = report.packed, epoch.island
+        return report, epoch.emigrants
+
+    def _island(self, before: Report) -> Island:
+        """Unpack an island, unless it is the one that was packed here."""
+        for packed, island in self._islands.values():
+            if packed == before.packed:
+                return island
+        return unpacked(before)

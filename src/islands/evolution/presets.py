@@ -34,6 +34,8 @@ _OURS = Settings(
     distinct=True,
     refine=True,
     library="phi-polynomial",
+    topology="ring",
+    migrate_every=5,
 )
 
 PRESETS: Mapping[str, Settings] = MappingProxyType(

@@ -74,7 +74,8 @@ class Settings:
     islands : int
         Islands that evolve beside each other, each with a population of its own.
     topology : str
-        Which islands send to which: an entry of ``TOPOLOGIES`` or a list of edges, ``0>1,1>2``.
+        Which islands send to which: an entry of ``TOPOLOGIES`` or a list of edges, ``0>1,1>2``. Isolated
+        ones were the safest for the paper's settings (decision 0008).
     migrate_every : int or str
         Generations of an epoch, at whose end individuals migrate: a number, or one that changes over the run,
         ``5,100:20`` for 5, and 20 from generation 100 on.
@@ -118,7 +119,7 @@ class Settings:
     distinct: bool = False
     refine: bool = False
     islands: int = 1
-    topology: str = "ring"
+    topology: str = "isolated"
     migrate_every: int | str = 10
     migrants: int | str = 1
     emigrants: str = "best"
