@@ -1,10 +1,12 @@
 """Islands whose processes are killed: the result is that of a run that nobody disturbed, bit for bit."""
 
+import os
 from contextlib import suppress
 from dataclasses import replace
 from threading import Event, Thread
 
 import pytest
+import ray
 from processes import actors, eventually, kill
 from searches import SMALL, exactly, record
 
@@ -12,6 +14,7 @@ from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
+from islands_service.runtime import crew
 from islands_service.runtime.cluster import ClusterError
 
 pytestmark = pytest.mark.xdist_group("ray")
@@ -52,7 +55,7 @@ def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine
     for epoch in engine.run(posed, founded(3, SEED), never):
         found.append(exactly(epoch.archipelago))
         if len(found) in (2, 4, 6):
-            kill(eventually(actors)[0])
+            kill(min(actors()))
             # Nothing has been asked of the engine since: the loss is before what comes next.
     assert found == undisturbed
     assert told.count("an actor was lost: its islands go on from their last epoch") == 3
@@ -67,6 +70,31 @@ def test_losing_all_actors_at_once_changes_nothing(posed, undisturbed, engine, t
                 kill(pid)
     assert found == undisturbed
     assert len(told) >= 2
+
+
+def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_replaced(
+    posed, engine, told, monkeypatch
+):
+    monkeypatch.setattr(crew, "STAND_IN_AFTER", 0.0)
+    found = crew.Crew(posed, 3, told.append)
+    try:
+        everybody = min(3, len(os.sched_getaffinity(0))) + 1
+        eventually(lambda: found.tend(at_once=True) and len(found.places) == everybody)
+        regular = [found.home(island) for island in range(3)]
+        kill(min(actors()))
+        eventually(lambda: found.tend(at_once=True) and told)
+        assert found.places[0] == crew.STAND_IN
+        assert len(found.places) == everybody - 1
+        replaced = [
+            now for now, before in zip(map(found.home, range(3)), regular, strict=True) if now != before
+        ]
+        assert replaced
+        assert all(now not in regular for now in replaced)
+        ray.get([actor.prepare.remote() for actor in replaced])
+        eventually(lambda: found.tend(at_once=True) and len(found.places) == everybody)
+        assert not set(replaced) & {found.home(island) for island in range(3)}
+    finally:
+        found.dismiss()
 
 
 @pytest.mark.slow

@@ -564,7 +564,7 @@ def test_every_preset_runs_on_a_small_budget(data, preset):
         ({"characters": ["plain", "lazy"]}, "unknown character 'lazy': take one of plain, explorer"),
         ({"migrate_every": "5,3:2,3:1"}, "its generations ascend, from 1 on"),
         ({"islands": 4, "migrants": 301}, "301 individuals would arrive on an island of 300"),
-        ({"target_error": -1.0}, "target_error is not negative, got -1.0"),
+        ({"target_error": -1.0}, "target_error is a number and not negative, got -1.0"),
         ({"seed": -1}, "a seed is not negative, got -1"),
         ({"validation": 1.5}, "the validation fraction lies between 0 and 1, got 1.5"),
     ],

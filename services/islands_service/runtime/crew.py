@@ -1,5 +1,6 @@
 """The crew: the actors that carry islands. It grows with the cluster and replaces who is lost."""
 
+from math import inf
 from time import monotonic
 
 import ray
@@ -17,6 +18,10 @@ PATIENCE = 10.0
 #: Seconds after which the user is told that an actor has not got ready: it takes one or two.
 TELL_AFTER = 5.0
 
+#: The place of the actor that stands in for a lost one until that is replaced, which takes two seconds; and
+#: the seconds after which a search is long enough to have one.
+STAND_IN, STAND_IN_AFTER = -1, 10.0
+
 #: Seconds between two looks at the crew, and at the size of the cluster.
 _LOOK, _MEASURE = 0.1, 1.0
 
@@ -32,7 +37,8 @@ _ACTOR = ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrency_
 class Crew:
     """Actors, one for every island as long as there are CPUs for them; further islands share them.
 
-    An actor that finds no place stays in the cluster's queue, and the others do its work meanwhile.
+    An actor that finds no place stays in the cluster's queue, and the others do its work meanwhile. One more
+    stands by without a CPU of its own, ready to take over from whoever is lost.
 
     Parameters
     ----------
@@ -51,7 +57,7 @@ class Crew:
         self._members: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
         self._began = self._since = monotonic()
         self._looked = self._measured = -_MEASURE
-        self._sailing = False
+        self._sailed = inf
         self._told = ""
         self._losses = 0
 
@@ -67,16 +73,22 @@ class Crew:
         if at_once or now - self._looked > _LOOK:
             self._looked = now
             self._look(now)
-            if not self._sailing and self._members:
-                self._sailing = not self._joining or now - self._began > PATIENCE
-        return self._sailing and bool(self._members)
+            if self._members and (not self._joining or now - self._began > PATIENCE):
+                self._sailed = min(self._sailed, now)
+        return self._sailed < inf and bool(self._members)
+
+    @property
+    def places(self) -> list[int]:
+        """The places whose actors are ready, ascending."""
+        return sorted(self._members)
 
     def home(self, island: int) -> ActorHandle:
         """Return the actor for an island: the same one as long as that is there, for its warm caches."""
         place = island % self._size
         if place not in self._members:
-            places = sorted(self._members)
-            place = places[island % len(places)]
+            missing = min(place for place in range(self._size) if place not in self._members)
+            others = self.places
+            place = STAND_IN if place == missing and STAND_IN in others else others[island % len(others)]
         return self._members[place][0]
 
     def progressed(self) -> None:
@@ -111,9 +123,10 @@ class Crew:
             else:
                 self._members[place] = (actor, actor.live.remote())
             del self._joining[place]
-        for place in range(self._size):
+        standing_in = [STAND_IN] if now - self._sailed > STAND_IN_AFTER else []
+        for place in (*range(self._size), *standing_in):
             if place not in self._members and place not in self._joining:
-                actor = _ACTOR.remote(self._problem)
+                actor = _ACTOR.options(num_cpus=0 if place == STAND_IN else 1).remote(self._problem)
                 self._joining[place] = (actor, actor.prepare.remote())
         self._tell_of_waiting(now)
 
@@ -127,11 +140,12 @@ class Crew:
         self._tell("an actor was lost: its islands go on from their last epoch")
 
     def _tell_of_waiting(self, now: float) -> None:
-        if not self._joining:
+        waiting = sum(place != STAND_IN for place in self._joining)
+        if not waiting:
             self._since = now
         elif now - self._since > TELL_AFTER:
             line = (
-                f"waiting for capacity: {len(self._members)} of {self._size} island actors are ready, the "
+                f"waiting for capacity: {self._size - waiting} of {self._size} island actors are ready, the "
                 "others need a CPU each"
             )
             if line != self._told:

@@ -38,14 +38,6 @@ class HallOfFame:
             found.setdefault(entry.size, entry)
         return found
 
-    def front(self) -> tuple[Individual, ...]:
-        """Return the Pareto front: the best of every size that no smaller one beats."""
-        front: list[Individual] = []
-        for entry in self.best().values():
-            if not front or entry.fitness < front[-1].fitness:
-                front.append(entry)
-        return tuple(front)
-
 
 def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfFame:
     """Return the hall with individuals added; a fitness that is not finite never enters."""
@@ -66,6 +58,15 @@ def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfF
             if place <= DEPTH
         )
     )
+
+
+def front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
+    """Return the Pareto front of error and size: the best of every size that no smaller one beats."""
+    found: list[Individual] = []
+    for each in sorted(individuals, key=lambda each: (each.size, each.fitness)):
+        if not found or each.fitness < found[-1].fitness:
+            found.append(each)
+    return tuple(found)
 
 
 def merge(*halls: HallOfFame) -> HallOfFame:

@@ -8,6 +8,7 @@ from math import isfinite
 from types import MappingProxyType
 from typing import TypeVar
 
+from islands.evolution.hall_of_fame import front
 from islands.evolution.individual import Individual, Population
 from islands.evolution.rng import Stream
 
@@ -26,11 +27,7 @@ def _random(elite: Population, count: int, draw: Stream) -> Population:
 
 def _front(elite: Population, count: int, draw: Stream) -> Population:
     """Take anyone of the elite's Pareto front of error and size: small models travel too."""
-    front: list[Individual] = []
-    for each in sorted(_structures(elite), key=lambda each: (each.size, each.fitness)):
-        if not front or each.fitness < front[-1].fitness:
-            front.append(each)
-    return _drawn(front, count, draw)
+    return _drawn(front(_structures(elite)), count, draw)
 
 
 def _structures(elite: Population) -> Population:

@@ -1,6 +1,7 @@
 """Everything that determines a run of evolution, besides the record and the seed."""
 
 from dataclasses import dataclass
+from math import inf
 
 from islands.errors import SettingsError, chosen
 from islands.estimation.constraints import CONSTRAINTS
@@ -170,8 +171,8 @@ class Settings:
         _at_least(0, max_evaluations=self.max_evaluations)
         if self.islands > MOST_ISLANDS:
             raise SettingsError(f"at most {MOST_ISLANDS} islands, got {self.islands}")
-        if not self.target_error >= 0.0:
-            raise SettingsError(f"target_error is not negative, got {self.target_error}")
+        if not 0.0 <= self.target_error < inf:
+            raise SettingsError(f"target_error is a number and not negative, got {self.target_error}")
         chosen(EMIGRANTS, self.emigrants, "emigrants")
         chosen(REPLACED, self.replaced, "replaced")
         for name in self.characters:

@@ -590,8 +590,8 @@ def test_test_data_that_is_touched_or_unfit_is_refused_before_the_search(run, tm
         (("--replaced", "best"), "unknown replaced 'best': take one of worst"),
         (("--character", "plain", "--character", "lazy"), "unknown character 'lazy': take one of plain"),
         (("--max-evaluations", "-1"), "max_evaluations is at least 0, got -1"),
-        (("--target-error", "-0.1"), "target_error is not negative, got -0.1"),
-        (("--target-error", "nan"), "target_error is not negative, got nan"),
+        (("--target-error", "-0.1"), "target_error is a number and not negative, got -0.1"),
+        (("--target-error", "nan"), "target_error is a number and not negative, got nan"),
     ],
 )
 def test_a_bad_budget_is_refused_by_name_and_leaves_no_folder(run, tmp_path, options, message):
