@@ -25,11 +25,11 @@ def course(tell: Tell) -> Callable[[State, Settings], None]:
         done, last = state.history[-1].generation, settings.generations
         left = (last - done) * settings.population * len(state.archipelago.islands) / max(rate, 1e-9)
         best = " ".join(f"{size}:{error**0.5:.3g}" for size, error in state.history[-1].best.items())
-        remaining = f"{left:.0f} s left, " if rate else ""
+        remaining = f", {left:.0f} s left" if rate else ""
         tell(
-            f"generation {done}/{last}, {rate:.0f}/s, {remaining}RMSE by terms {best}",
+            f"generation {done}/{last}, {rate:.0f}/s{remaining}",
             done / max(1, last),
-            _islands(state.history),
+            [f"  RMSE by terms  {best}", *_islands(state.history)],
         )
 
     return watch
