@@ -32,6 +32,9 @@ TEST = "test.json"
 #: Seconds between two checkpoints: what a crash may cost.
 CHECKPOINT_EVERY = 10.0
 
+#: Part of a run that may go into checkpoints: of a thousand islands one takes half a minute.
+CHECKPOINT_SHARE = 0.05
+
 
 @dataclass(frozen=True, slots=True)
 class Manner:
@@ -152,23 +155,25 @@ class _Watch:
     def __init__(self, folder: Path, job: dict[str, Any], tell: Tell, spent: float) -> None:
         self._folder, self._job = folder, job
         self._show = course(tell)
-        self._written = -inf  # the first populations are kept at once
+        self._next = -inf  # the first populations are kept at once
         self._began = monotonic() - spent
         self._state: State | None = None
 
     def __call__(self, state: State, settings: Settings) -> None:
         self._state = state
         self._show(state, settings)
-        if monotonic() - self._written > CHECKPOINT_EVERY:
+        if monotonic() > self._next:
             self.write()
 
     def write(self) -> None:
         """Write the last epoch, unless there is none."""
         if self._state is not None:
-            about = _about(self._state, self._job, monotonic() - self._began)
+            now = monotonic()
+            about = _about(self._state, self._job, now - self._began)
             write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, about)
             write_hall(self._state.archipelago.hall, self._folder / HALL)
-            self._written = monotonic()
+            took = monotonic() - now
+            self._next = now + took + max(CHECKPOINT_EVERY, took / CHECKPOINT_SHARE)
 
 
 @contextmanager

@@ -322,6 +322,26 @@ def test_checkpoints_are_written_while_a_search_goes_on(run, watched, monkeypatc
     assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
 
 
+def test_checkpoints_that_take_long_are_written_less_often(run, watched, monkeypatch, tmp_path):
+    """One takes a second on this clock, and an epoch ten: a twentieth of the time is every other epoch."""
+    clock, written = [0.0], []
+    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
+
+    def slow(archipelago, path, about):
+        clock[0] += 1.0
+        written.append(archipelago.generation)
+        write_checkpoint(archipelago, path, about)
+
+    monkeypatch.setattr(command, "write_checkpoint", slow)
+
+    def watch(state):
+        clock[0] += 10.0
+
+    watched(watch)
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--generations", "6", "--out", "out")[0] == 0
+    assert written == [0, 3, 6, 6]
+
+
 def test_the_clock_may_end_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
     monkeypatch.setattr(command, "monotonic", lambda: clock[0])
