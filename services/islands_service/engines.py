@@ -4,10 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from types import MappingProxyType
 
-from islands.evolution.engine import Engine, SerialEngine
-
-#: Takes a line for the user.
-Tell = Callable[[str], None]
+from islands.evolution.engine import Engine, SerialEngine, Tell
 
 
 @contextmanager

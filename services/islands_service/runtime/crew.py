@@ -7,8 +7,8 @@ import ray
 from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
+from islands.evolution.engine import Tell
 from islands.evolution.problem import Problem
-from islands_service.engines import Tell
 from islands_service.runtime.cluster import ClusterError
 from islands_service.runtime.island_actor import IslandActor
 

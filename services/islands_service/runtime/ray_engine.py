@@ -7,9 +7,8 @@ import ray
 from ray.exceptions import ObjectLostError, RayActorError, RayTaskError, WorkerCrashedError
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import Caches, Epoch, Stop
+from islands.evolution.engine import Caches, Epoch, Stop, Tell
 from islands.evolution.problem import Problem
-from islands_service.engines import Tell
 from islands_service.runtime.crew import Crew
 from islands_service.runtime.itinerary import Itinerary, Leg
 from islands_service.runtime.report import PackedIslands, Report, report_of
@@ -107,7 +106,7 @@ class _Voyage:
         if not self._out:
             sleep(_LOOK)
             return
-        ray.wait(list(self._out), num_returns=1, timeout=_LOOK, fetch_local=False)
+        ray.wait(list(self._out), num_returns=1, timeout=_LOOK)
         back, _ = ray.wait(list(self._out), num_returns=len(self._out), timeout=0)
         for reference in back:
             # Lost with another leg of its island, that came back before it.

@@ -15,6 +15,9 @@ from islands.evolution.topology import Topology, topology
 Stop = Callable[[], bool]
 
 
+#: Takes a line for the user.
+Tell = Callable[[str], None]
+
 #: Bytes that every cache takes, and its limit.
 Caches = Mapping[str, tuple[int, int]]
 

@@ -29,10 +29,7 @@ def draw_convergence(findings: Findings) -> Figure:
         # A line of one generation is a point.
         (line,) = axes.step(generations, np.sqrt(errors), where="post", color=shade, label=str(size))
         line.set(marker="o" if len(points) == 1 else "", markersize=3)
-    _logarithmic(axes)
-    axes.set_xlabel("generation")
-    axes.set_ylabel("RMSE of multiple shooting")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    _against_generations(axes)
     columns = ceil(len(sizes) / _COLUMN)
     axes.legend(title="terms", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
     return settled(figure)
@@ -55,10 +52,7 @@ def draw_islands(findings: Findings) -> Figure:
         )
     best = np.fmin.reduce(errors, axis=1)
     axes.step(generations, best, where="post", color=SIMULATED, lw=1.6, label="the best of all")
-    _logarithmic(axes)
-    axes.set_xlabel("generation")
-    axes.set_ylabel("RMSE of multiple shooting")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    _against_generations(axes)
     axes.legend(frameon=False)
     return settled(figure)
 
@@ -80,6 +74,13 @@ def draw_front(findings: Findings) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.legend(frameon=False)
     return settled(figure)
+
+
+def _against_generations(axes: Axes) -> None:
+    _logarithmic(axes)
+    axes.set_xlabel("generation")
+    axes.set_ylabel("RMSE of multiple shooting")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
 
 
 def _logarithmic(axes: Axes) -> None:
