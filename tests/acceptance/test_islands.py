@@ -1,5 +1,6 @@
 """``islands identify`` with islands, through its front door, on every engine."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -52,11 +53,22 @@ def test_a_result_says_how_its_islands_lived(folder: Path) -> None:
     assert (folder / "ray/figures/islands.svg").exists()
 
 
-def test_islands_do_more_than_one_alone(folder: Path) -> None:
-    out = folder / "alone"
-    succeed("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", 12, "--out", out)
-    assert stored(out)["search"]["evaluations"] == 13 * 30
-    assert found(out)["hall.json"] != found(folder / "serial")["hall.json"]
+def test_isolated_islands_find_at_least_what_the_first_finds_alone(folder: Path) -> None:
+    best = []
+    for count in (1, 3):
+        out = folder / f"isolated-{count}"
+        succeed(
+            *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", 12, "--out", out),
+            *("--islands", count, "--topology", "isolated", "--engine", "serial"),
+        )
+        assert stored(out)["search"]["evaluations"] == count * 13 * 30
+        sizes: dict[int, float] = {}
+        for each in json.loads((out / "hall.json").read_text())["hall"]:
+            sizes.setdefault(len(each["regressors"]), each["fitness"])
+        best.append(sizes)
+    alone, together = best
+    assert all(together[size] <= fitness for size, fitness in alone.items())
+    assert any(together[size] < fitness for size, fitness in alone.items())
 
 
 def test_a_run_goes_on_with_another_engine(folder: Path) -> None:

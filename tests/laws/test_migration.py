@@ -339,7 +339,7 @@ def test_anyone_may_be_replaced_and_every_place_of_a_run_draws_others():
     drawn = [place(generation=generation) for generation in range(20)]
     for purpose in Purpose:
         streams = [Stream(3, 0, generation, purpose) for generation in range(20)]
-        own = [REPLACED["random"](lambda: [0.0] * 6, 1, stream)[0] for stream in streams]
+        own = [REPLACED["random"](6, pytest.fail, 1, stream)[0] for stream in streams]
         assert (own == drawn) == (purpose is Purpose.IMMIGRATION)
 
 

@@ -101,6 +101,8 @@ def identify(
     """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR goes on."""
     if engine is not None:
         chosen(ENGINES, engine, "engine")
+    if wall_time is not None and not wall_time > 0.0:
+        raise SettingsError(f"--wall-time is a number of seconds above 0, got {wall_time}")
     if ray_address is not None and engine == "serial":
         raise SettingsError("--ray-address goes with --engine ray: the serial engine runs in this process")
     manner = Manner(engine, ray_address, wall_time, verbose)

@@ -61,10 +61,6 @@ def run(
     settings = settings_of(job["preset"], job["changes"])
     data, held_out, tested = _data(job, settings)
     folder.mkdir(parents=True, exist_ok=True)
-    if state is None:
-        # What another run left here belongs to that run.
-        for name in (CHECKPOINT, HALL, TEST):
-            (folder / name).unlink(missing_ok=True)
     compile_kernels()
     carry_out = ENGINES[manner.engine_for(settings.islands)]
     with (
@@ -73,7 +69,11 @@ def run(
         carry_out(manner.address, lambda line: errors.print(line, markup=False)) as engine,
         _stop_requests(manner.wall_time) as stop,
     ):
-        watch = _Watch(folder, job, tell, spent)
+        if state is None:
+            # What another run left here belongs to that run.
+            for name in (CHECKPOINT, HALL, TEST):
+                (folder / name).unlink(missing_ok=True)
+        watch = _Watch(folder, job, tell, state, spent)
         arguments: dict[str, Any] = {"preset": job["preset"], "seed": job["seed"], **job["changes"]}
         began = perf_counter() - spent
         try:
@@ -152,12 +152,14 @@ def _refuse_test(tested: islands.Dataset, others: list[islands.Dataset], setting
 class _Watch:
     """Shows where the search stands and writes checkpoints."""
 
-    def __init__(self, folder: Path, job: dict[str, Any], tell: Tell, spent: float) -> None:
+    def __init__(
+        self, folder: Path, job: dict[str, Any], tell: Tell, state: State | None, spent: float
+    ) -> None:
         self._folder, self._job = folder, job
         self._show = course(tell)
         self._next = -inf  # the first populations are kept at once
         self._began = monotonic() - spent
-        self._state: State | None = None
+        self._state = state
 
     def __call__(self, state: State, settings: Settings) -> None:
         self._state = state
@@ -170,8 +172,8 @@ class _Watch:
         if self._state is not None:
             now = monotonic()
             about = _about(self._state, self._job, now - self._began)
-            write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, about)
             write_hall(self._state.archipelago.hall, self._folder / HALL)
+            write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, about)
             took = monotonic() - now
             self._next = now + took + max(CHECKPOINT_EVERY, took / CHECKPOINT_SHARE)
 

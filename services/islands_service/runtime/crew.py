@@ -1,5 +1,6 @@
 """The crew: the actors that carry islands. It grows with the cluster and replaces who is lost."""
 
+from importlib.metadata import version
 from math import inf
 from time import monotonic
 
@@ -9,7 +10,7 @@ from ray.exceptions import RayActorError, RayTaskError
 
 from islands.evolution.engine import Tell
 from islands.evolution.problem import Problem
-from islands_service.runtime.cluster import ClusterError
+from islands_service.runtime.cluster import LOST, ClusterError
 from islands_service.runtime.island_actor import IslandActor
 
 #: Seconds that a search waits for its whole crew before it begins with those that are there.
@@ -58,6 +59,7 @@ class Crew:
         self._began = self._since = monotonic()
         self._looked = self._measured = -_MEASURE
         self._sailed = inf
+        self._vacant: set[int] = set()  # places whose actors were lost and are not replaced yet
         self._told = ""
         self._losses = 0
 
@@ -86,9 +88,11 @@ class Crew:
         """Return the actor for an island: the same one as long as that is there, for its warm caches."""
         place = island % self._size
         if place not in self._members:
-            missing = min(place for place in range(self._size) if place not in self._members)
-            others = self.places
-            place = STAND_IN if place == missing and STAND_IN in others else others[island % len(others)]
+            regular = [each for each in self._members if each != STAND_IN]
+            if STAND_IN in self._members and (not regular or place == min(self._vacant, default=None)):
+                place = STAND_IN
+            else:
+                place = sorted(regular)[island % len(regular)]
         return self._members[place][0]
 
     def progressed(self) -> None:
@@ -106,22 +110,30 @@ class Crew:
             cpus = int(ray.cluster_resources().get("CPU", 0))
             self._size = max(self._size, min(self._islands, max(1, cpus)))
         for place in _ended(self._members):
-            del self._members[place]
-            self._lost()
+            self._lost(place, self._members.pop(place)[0])
+        if not self._members and self._sailed < inf:
+            # As at the beginning: the first that is back must not get everybody's work.
+            self._sailed, self._began = inf, now
         for place in _ended(self._joining):
             actor, prepared = self._joining[place]
             try:
-                ray.get(prepared)
-            except RayActorError as error:
-                if error.actor_init_failed:
+                theirs = ray.get(prepared)
+            except LOST as error:
+                if isinstance(error, RayActorError) and error.actor_init_failed:
                     raise ClusterError(
                         f"an actor cannot be made; is islands installed on every machine? {error}"
                     ) from error
-                self._lost()
+                self._lost(place, actor)
             except RayTaskError as error:
                 raise error.cause from error
             else:
+                if theirs != version("islands"):
+                    raise ClusterError(
+                        f"a machine of the cluster has islands {theirs}, this one {version('islands')}: the "
+                        "result would depend on who computes it; install one version on all"
+                    )
                 self._members[place] = (actor, actor.live.remote())
+                self._vacant.discard(place)
             del self._joining[place]
         standing_in = [STAND_IN] if now - self._sailed > STAND_IN_AFTER else []
         for place in (*range(self._size), *standing_in):
@@ -130,7 +142,10 @@ class Crew:
                 self._joining[place] = (actor, actor.prepare.remote())
         self._tell_of_waiting(now)
 
-    def _lost(self) -> None:
+    def _lost(self, place: int, actor: ActorHandle) -> None:
+        # Perhaps it is only out of reach: it must not keep its CPU from who takes its place.
+        ray.kill(actor)
+        self._vacant |= {place} - {STAND_IN}
         self._losses += 1
         if self._losses > _LOSSES * self._size:
             raise ClusterError(
@@ -142,7 +157,7 @@ class Crew:
     def _tell_of_waiting(self, now: float) -> None:
         waiting = sum(place != STAND_IN for place in self._joining)
         if not waiting:
-            self._since = now
+            self._since, self._told = now, ""
         elif now - self._since > TELL_AFTER:
             line = (
                 f"waiting for capacity: {self._size - waiting} of {self._size} island actors are ready, the "

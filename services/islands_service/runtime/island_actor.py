@@ -1,8 +1,9 @@
-"""The actor that carries islands: it holds the record and warm caches, and nothing of any island.
+"""The actor that carries islands: it holds the record, warm caches, and nothing that is not a copy.
 
 An island enters as a value and leaves as a value. Who loses an actor loses time.
 """
 
+from importlib.metadata import version
 from threading import Event
 
 import ray
@@ -30,10 +31,11 @@ class IslandActor:
         self._islands: dict[int, tuple[bytes, Island]] = {}
         self._name = str(ray.get_runtime_context().get_actor_id())
 
-    def prepare(self) -> None:
-        """Make what the epochs need; what is wrong with the problem is raised here."""
+    def prepare(self) -> str:
+        """Make what the epochs need; what is wrong with the problem is raised here. Return our version."""
         warm_up(lambda _line: None)
         self._evaluator = Evaluator(self._problem.record, self._problem.settings)
+        return version("islands")
 
     @ray.method(concurrency_group="watch")
     def live(self) -> None:
@@ -47,12 +49,10 @@ class IslandActor:
         epoch = advance(self._island(before), arriving, self._evaluator, self._problem, lambda: False)
         assert epoch is not None
         report = report_of(epoch, self._name, self._evaluator.memory)
-        self._islands[epoch.island.index] = report.packed, epoch.island
+        self._islands[report.index] = report.packed, epoch.island
         return report, epoch.emigrants
 
     def _island(self, before: Report) -> Island:
-        """Unpack an island, unless it is the one that was packed here."""
-        for packed, island in self._islands.values():
-            if packed == before.packed:
-                return island
-        return unpacked(before)
+        """Unpack an island, unless it is the one that was packed here last."""
+        packed, island = self._islands.pop(before.index, (b"", None))
+        return island if island is not None and packed == before.packed else unpacked(before)

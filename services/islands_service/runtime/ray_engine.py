@@ -4,17 +4,15 @@ from collections.abc import Generator
 from time import sleep
 
 import ray
-from ray.exceptions import ObjectLostError, RayActorError, RayTaskError, WorkerCrashedError
+from ray.exceptions import RayError, RayTaskError
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import Caches, Epoch, Stop, Tell
 from islands.evolution.problem import Problem
+from islands_service.runtime.cluster import LOST, ClusterError
 from islands_service.runtime.crew import Crew
 from islands_service.runtime.itinerary import Itinerary, Leg
 from islands_service.runtime.report import PackedIslands, Report, report_of
-
-#: What says that a machine failed rather than the search; the epoch is sent once more.
-LOST = (RayActorError, ObjectLostError, WorkerCrashedError)
 
 #: Seconds between two looks at whether the search is to stop.
 _LOOK = 0.1
@@ -43,6 +41,8 @@ class RayEngine:
         crew = Crew(problem, len(start.islands), self._tell)
         try:
             yield from _carried_out(itinerary, crew, stop)
+        except RayError as error:
+            raise ClusterError(f"Ray failed in a way that nobody can go on from: {error}") from error
         finally:
             crew.dismiss()
 
@@ -108,35 +108,42 @@ class _Voyage:
             return
         ray.wait(list(self._out), num_returns=1, timeout=_LOOK)
         back, _ = ray.wait(list(self._out), num_returns=len(self._out), timeout=0)
-        for reference in back:
-            # Lost with another leg of its island, that came back before it.
-            leg = self._out.pop(reference, None)
-            if leg is not None:
-                self._take(leg, reference)
+        lost = [leg for reference in back if not self._taken(leg := self._out.pop(reference), reference)]
+        if lost:
+            self._lose(lost)
         oldest = self._itinerary.complete
         for key in [key for key in self._references if key[1] < oldest]:
             del self._references[key]
 
-    def _take(self, leg: Leg, reference: "ray.ObjectRef[Report]") -> None:
+    def _taken(self, leg: Leg, reference: "ray.ObjectRef[Report]") -> bool:
+        """Take in what a leg brought; return False where it was lost."""
         try:
             report = ray.get(reference)
         except LOST:
-            self._lost(leg)
+            return False
         except RayTaskError as error:
             raise error.cause from error
-        else:
-            self._caches[report.actor] = report.caches
-            self._itinerary.back(leg, report)
+        self._caches[report.actor] = report.caches
+        self._itinerary.back(leg, report)
+        return True
 
-    def _lost(self, leg: Leg) -> None:
-        self._itinerary.lost(leg)
-        for reference, other in list(self._out.items()):
-            if other.island == leg.island and other.end > leg.end:
-                del self._out[reference]
+    def _lose(self, legs: list[Leg]) -> None:
+        """Forget legs that were lost, and what was sent of their islands after them."""
+        first: dict[int, int] = {}
+        for leg in legs:
+            self._itinerary.lost(leg)
+            first[leg.island] = min(leg.end, first.get(leg.island, leg.end))
+        self._out = {
+            reference: leg
+            for reference, leg in self._out.items()
+            if leg.end <= first.get(leg.island, leg.end)
+        }
         # What is known may have been lost with the machine that held it: it is sent from here again.
-        for island, generation in list(self._references):
-            if generation in self._itinerary.known[island] or (
-                island == leg.island and generation >= leg.end
-            ):
-                del self._references[island, generation]
+        self._references = {
+            (island, generation): references
+            for (island, generation), references in self._references.items()
+            if generation not in self._itinerary.known[island]
+            and generation < first.get(island, generation + 1)
+        }
+        self._caches.clear()  # whose they were may be gone; who is there tells anew
         self._crew.tend(at_once=True)

@@ -21,6 +21,8 @@ class Report:
 
     Attributes
     ----------
+    index : int
+        The island's.
     packed : bytes
         The island.
     emigrants : tuple of Individual
@@ -32,6 +34,7 @@ class Report:
         What the caches of the actor take.
     """
 
+    index: int
     packed: bytes
     emigrants: Population
     steps: tuple[StepInfo, ...]
@@ -42,7 +45,7 @@ class Report:
 def report_of(epoch: IslandEpoch, actor: str = "", caches: Caches | None = None) -> Report:
     """Pack what an epoch brought."""
     packed = pickle.dumps(epoch.island, pickle.HIGHEST_PROTOCOL)
-    return Report(packed, epoch.emigrants, epoch.steps, actor, caches or {})
+    return Report(epoch.island.index, packed, epoch.emigrants, epoch.steps, actor, caches or {})
 
 
 def unpacked(report: Report) -> Island:

@@ -105,7 +105,7 @@ def immigrated(
         return island
     draw = Stream(island.seed, island.index, island.generation, Purpose.IMMIGRATION)
     places = REPLACED[settings.replaced](
-        lambda: _fitness(island.population, evaluator), len(immigrants), draw
+        len(island.population), lambda: _fitness(island.population, evaluator), len(immigrants), draw
     )
     population = list(island.population)
     for place, each in zip(places, immigrants, strict=True):

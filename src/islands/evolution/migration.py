@@ -38,15 +38,15 @@ def _structures(elite: Population) -> Population:
     return tuple(first.values())
 
 
-def _worst(fitness: Callable[[], Sequence[float]], count: int, _draw: Stream) -> tuple[int, ...]:
+def _worst(_size: int, fitness: Callable[[], Sequence[float]], count: int, _draw: Stream) -> tuple[int, ...]:
     """Take the least fit; of equals the first."""
     known = fitness()
     return tuple(sorted(range(len(known)), key=lambda place: -known[place])[:count])
 
 
-def _anyone(fitness: Callable[[], Sequence[float]], count: int, draw: Stream) -> tuple[int, ...]:
+def _anyone(size: int, _fitness: Callable[[], Sequence[float]], count: int, draw: Stream) -> tuple[int, ...]:
     """Take anyone."""
-    return _drawn(range(len(fitness())), count, draw)
+    return _drawn(range(size), count, draw)
 
 
 def _drawn(pool: Sequence[T], count: int, draw: Stream) -> tuple[T, ...]:
@@ -59,7 +59,8 @@ EMIGRANTS: Mapping[str, Callable[[Population, int, Stream], Population]] = Mappi
     {"best": _best, "random": _random, "front": _front}
 )
 
-#: From the population's fitness, how many, and draws: the places that are taken.
-REPLACED: Mapping[str, Callable[[Callable[[], Sequence[float]], int, Stream], tuple[int, ...]]] = (
+#: From the population's size, its fitness for whoever asks (it takes evaluations), how many, and draws: the
+#: places that are taken.
+REPLACED: Mapping[str, Callable[[int, Callable[[], Sequence[float]], int, Stream], tuple[int, ...]]] = (
     MappingProxyType({"worst": _worst, "random": _anyone})
 )

@@ -192,7 +192,7 @@ def test_what_an_earlier_run_left_in_the_folder_is_not_taken_for_this_one_s(run,
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--force")[0] == 0
     assert not (tmp_path / "out/test.json").exists()
     code, _, error = run(
-        "r.csv", *COLUMNS, *SMALL, "--out", "out", "--force", "--seed", "9", "--wall-time", "0"
+        "r.csv", *COLUMNS, *SMALL, "--out", "out", "--force", "--seed", "9", "--wall-time", "1e-9"
     )
     assert (code, error) == (
         2,
