@@ -93,7 +93,7 @@ def killed(engine, problem: Problem) -> tuple[float, float]:
             if count == 1:
                 began = time.perf_counter()
             # When there is one who stands in; the first two are those that the islands are on.
-            if disturbed and not lost and began and time.perf_counter() - began > 13.0:
+            if disturbed and not lost and began and time.perf_counter() - began > 34.0:
                 lost.append(sorted(actors())[0])
                 kill(lost[0])
         took.append(time.perf_counter() - began)
@@ -142,7 +142,7 @@ def main() -> None:
             if count == 3:
                 found["memory of all processes, MB"] = memory(os.getpid())
                 found["processes"] = len(descendants(os.getpid())) + 1
-        undisturbed, disturbed = killed(engine, posed(22, 22))
+        undisturbed, disturbed = killed(engine, posed(22, 45))
         found["killed: seconds more"] = disturbed - undisturbed
         found["cancel, s"] = [cancelled(engine, posed(220, 2), 2.0 + 0.017 * attempt) for attempt in range(5)]
     print(json.dumps(found, indent=2))

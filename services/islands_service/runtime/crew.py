@@ -21,7 +21,7 @@ TELL_AFTER = 5.0
 
 #: The place of the actor that stands in for a lost one until that is replaced, which takes two seconds; and
 #: the seconds after which a search is long enough to have one.
-STAND_IN, STAND_IN_AFTER = -1, 10.0
+STAND_IN, STAND_IN_AFTER = -1, 30.0
 
 #: Seconds between two looks at the crew, and at the size of the cluster.
 _LOOK, _MEASURE = 0.1, 1.0
