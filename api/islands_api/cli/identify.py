@@ -18,7 +18,7 @@ from islands_api.cli.fit import check_folder
 from islands_api.cli.run import Manner, run, stored
 from islands_service.engines import ENGINES
 
-#: Options that are settings, by the name of the setting.
+#: Options that are settings, and have their names.
 SETTINGS = (
     *("population", "generations", "max_terms", "max_height", "shooting", "primitives", "constraints"),
     *("islands", "topology", "migrate_every", "migrants", "emigrants", "replaced", "characters"),
@@ -55,7 +55,9 @@ def identify(
         list[str] | None, typer.Option("--primitive", help=f"Repeat it: {', '.join(PRIMITIVES)}.")
     ] = None,
     constraints: Annotated[str | None, typer.Option("--constraints", help=" or ".join(CONSTRAINTS))] = None,
-    number: Annotated[int | None, typer.Option("--islands", help="Islands that evolve side by side.")] = None,
+    islands: Annotated[
+        int | None, typer.Option("--islands", help="Islands that evolve side by side.")
+    ] = None,
     topology: Annotated[
         str | None, typer.Option("--topology", help=f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
     ] = None,
@@ -99,6 +101,7 @@ def identify(
     verbose: Annotated[bool, typer.Option("--verbose", help="Tell what the caches take, too.")] = False,
 ) -> None:
     """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR goes on."""
+    given = locals()
     if engine is not None:
         chosen(ENGINES, engine, "engine")
     if wall_time is not None and not wall_time > 0.0:
@@ -113,12 +116,7 @@ def identify(
         if record is None or not inputs or output_column is None or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
-        given = (
-            *(population, generations, max_terms, max_height, shooting, primitives, constraints),
-            *(number, topology, migrate_every, migrants, emigrants, replaced, characters),
-            *(max_evaluations, target_error),
-        )
-        changes = {name: value for name, value in zip(SETTINGS, given, strict=True) if value is not None}
+        changes = {name: given[name] for name in SETTINGS if given[name] is not None}
         sources = {"record": str(record), "validation": validation, "test": test}
         files = {
             kind: str(Path(name).resolve())
