@@ -13,7 +13,7 @@ from islands.errors import RecordError, SettingsError, chosen
 from islands.estimation.estimation import estimate
 from islands.estimation.refinement import refine
 from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.engine import Engine, Epoch, SerialEngine, Stop
+from islands.evolution.engine import Caches, Engine, Epoch, SerialEngine, Stop
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import regressor_of
@@ -60,7 +60,7 @@ class State:
     duplicates: int = 0
     outcomes: Mapping[str, int] = field(default_factory=dict)
     history: tuple[Progress, ...] = ()
-    caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    caches: Caches = field(default_factory=dict)
 
 
 #: Called after every epoch.

@@ -30,9 +30,7 @@ _LOOK, _MEASURE = 0.1, 1.0
 _LOSSES = 5
 
 #: Ray's own restarts would lose what an actor knows without a word: recovery is ours, from values.
-_ACTOR = ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrency_groups={"watch": 1})(
-    IslandActor
-)
+_ACTOR = ray.remote(max_restarts=0, max_task_retries=0, concurrency_groups={"watch": 1})(IslandActor)
 
 
 class Crew:

@@ -57,6 +57,7 @@ def _carried_out(itinerary: Itinerary[Report], crew: Crew, stop: Stop) -> Genera
             if stop():
                 return
             crew.progressed()
+            voyage.forget()
             yield Epoch(
                 Archipelago(PackedIslands(reports)),
                 tuple(report.steps for report in reports),
@@ -111,9 +112,11 @@ class _Voyage:
         lost = [leg for reference in back if not self._taken(leg := self._out.pop(reference), reference)]
         if lost:
             self._lose(lost)
-        oldest = self._itinerary.complete
-        for key in [key for key in self._references if key[1] < oldest]:
-            del self._references[key]
+
+    def forget(self) -> None:
+        """Let go of what lies behind the last complete epoch: nothing will stand on it."""
+        complete = self._itinerary.complete
+        self._references = {key: kept for key, kept in self._references.items() if key[1] >= complete}
 
     def _taken(self, leg: Leg, reference: "ray.ObjectRef[Report]") -> bool:
         """Take in what a leg brought; return False where it was lost."""

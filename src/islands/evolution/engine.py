@@ -14,7 +14,6 @@ from islands.evolution.topology import Topology, topology
 #: Answers with true once the search is to end.
 Stop = Callable[[], bool]
 
-
 #: Takes a line for the user.
 Tell = Callable[[str], None]
 

@@ -6,9 +6,10 @@ before. So an island waits for those that it receives from, and for nobody else.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import Population, distinct
 from islands.evolution.island import Island, StepInfo, elite_of, first_generation, step
 from islands.evolution.migration import EMIGRANTS, REPLACED
 from islands.evolution.problem import Problem
@@ -96,11 +97,9 @@ def immigrated(
     Who arrives takes somebody's place in the population, and contends for the elite. A model that the elite
     has already does not arrive again.
     """
-    fresh: dict[tuple[str, ...], Individual] = {}
-    for each in (each for population in arriving for each in population):
-        fresh.setdefault(each.key, each)
     known = {each.key for each in island.elite}
-    immigrants = [each for key, each in fresh.items() if key not in known][: len(island.population)]
+    fresh = [each for each in distinct(chain(*arriving)) if each.key not in known]
+    immigrants = fresh[: len(island.population)]
     if not immigrants:
         return island
     draw = Stream(island.seed, island.index, island.generation, Purpose.IMMIGRATION)

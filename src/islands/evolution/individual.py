@@ -1,5 +1,6 @@
 """An individual: a vector of trees (genes), each the basis function of one term (equation (10))."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, isnan
 
@@ -49,6 +50,14 @@ class Individual:
 
 
 Population = tuple[Individual, ...]
+
+
+def distinct(individuals: Iterable[Individual]) -> Population:
+    """Return the first individual of every structure."""
+    first: dict[tuple[str, ...], Individual] = {}
+    for each in individuals:
+        first.setdefault(each.key, each)
+    return tuple(first.values())
 
 
 def regressor_of(gene: Expression) -> Regressor | None:

@@ -7,7 +7,7 @@ from math import inf, isfinite
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import Individual, Population, distinct
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import tournaments
 from islands.evolution.settings import Settings
@@ -193,12 +193,9 @@ def _bars(hall: HallOfFame, bar: float, most: int) -> list[float]:
     return [max(bar, last.get(size, inf)) for size in range(most + 1)]
 
 
-def elite_of(contenders: Iterable[Individual], count: int, distinct: bool) -> Population:
+def elite_of(contenders: Iterable[Individual], count: int, each_once: bool) -> Population:
     """Keep the fittest; ties go to the smaller, then to the structure's text."""
     ordered = sorted(contenders, key=lambda each: (each.fitness, each.size, each.key))
-    if distinct:
-        first: dict[tuple[str, ...], Individual] = {}
-        for each in ordered:
-            first.setdefault(each.key, each)
-        ordered = list(first.values())
+    if each_once:
+        ordered = list(distinct(ordered))
     return tuple(ordered[:count])

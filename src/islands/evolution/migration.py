@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from islands.evolution.hall_of_fame import front
-from islands.evolution.individual import Individual, Population
+from islands.evolution.individual import Population, distinct
 from islands.evolution.rng import Stream
 
 T = TypeVar("T")
@@ -31,11 +31,7 @@ def _front(elite: Population, count: int, draw: Stream) -> Population:
 
 
 def _structures(elite: Population) -> Population:
-    first: dict[tuple[str, ...], Individual] = {}
-    for each in elite:
-        if isfinite(each.fitness):
-            first.setdefault(each.key, each)
-    return tuple(first.values())
+    return distinct(each for each in elite if isfinite(each.fitness))
 
 
 def _worst(_size: int, fitness: Callable[[], Sequence[float]], count: int, _draw: Stream) -> tuple[int, ...]:
