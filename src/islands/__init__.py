@@ -6,17 +6,21 @@
 >>> result.best.equation  # doctest: +SKIP
 """
 
-from islands.data.dataset import Dataset, join
-from islands.data.split import Split, split
-from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-from islands.fit import fit
-from islands.identify import identify
-from islands.io.models import read_model, write_model
-from islands.io.records import read_record, write_record
-from islands.model.model import Model, model_of
-from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES, primitive
-from islands.result import FittedModel, Result, simulate
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from islands.data.dataset import Dataset, join
+    from islands.data.split import Split, split
+    from islands.errors import IslandsError, ModelError, RecordError, SettingsError
+    from islands.fitting import fit
+    from islands.identification import identify
+    from islands.io.models import read_model, write_model
+    from islands.io.records import read_record, write_record
+    from islands.model.model import Model, model_of
+    from islands.model.parsing import parse
+    from islands.model.primitives import PRIMITIVES, primitive
+    from islands.result import FittedModel, Result, simulate
 
 __all__ = [
     "PRIMITIVES",
@@ -42,3 +46,31 @@ __all__ = [
     "write_model",
     "write_record",
 ]
+
+#: Where the public names live. Each is fetched when it is asked for: a service that accepts a job, or a
+#: command that lists them, needs no kernels, whose compiler takes half a second to import.
+_HOMES = {
+    "data.dataset": ("Dataset", "join"),
+    "data.split": ("Split", "split"),
+    "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
+    "fitting": ("fit",),
+    "identification": ("identify",),
+    "io.models": ("read_model", "write_model"),
+    "io.records": ("read_record", "write_record"),
+    "model.model": ("Model", "model_of"),
+    "model.parsing": ("parse",),
+    "model.primitives": ("PRIMITIVES", "primitive"),
+    "result": ("FittedModel", "Result", "simulate"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(f"islands.{home}"), name)
+            return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

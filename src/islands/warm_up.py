@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from islands.data.dataset import Dataset
 from islands.estimation.constraints import CONSTRAINTS
-from islands.fit import fit
-from islands.identify import identify
+from islands.fitting import fit
+from islands.identification import identify
 from islands.kernels.compilation import ready
 from islands.systems.catalogue import make_record
 

@@ -1,26 +1,52 @@
 """The table of commands, and what becomes of an error: one line that says what to do, exit code 2."""
 
 import sys
+from importlib import import_module
+from typing import Any
 
 import typer
 from rich.markup import escape
+from typer.core import TyperGroup
 
 from islands.errors import IslandsError
-from islands_api.cli.bench import bench
 from islands_api.cli.console import errors
-from islands_api.cli.demo import demo
-from islands_api.cli.fit import fit
-from islands_api.cli.identify import identify
-from islands_api.cli.show import show
-from islands_api.cli.simulate import simulate
-from islands_api.cli.systems import systems
+
+#: Every command is a file of its own with a function, or a group of commands, of the command's name.
+COMMANDS = ("identify", "fit", "simulate", "show", "demo", "bench", "systems")
+
+
+class Commands(TyperGroup):
+    """Imports a command when it is called for: one that asks a service about its jobs needs no kernels."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
+        """Return the names in the table's order."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
+        """Return a command, or None where there is none of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        found = getattr(import_module(f"islands_api.cli.{cmd_name}"), cmd_name)
+        if not isinstance(found, typer.Typer):
+            alone = typer.Typer(pretty_exceptions_enable=False)
+            alone.command(name=cmd_name)(found)
+            found = alone
+        command = typer.main.get_command(found)
+        command.name = cmd_name
+        return command
+
 
 app = typer.Typer(
-    help="Find the equation behind measured data.", no_args_is_help=True, pretty_exceptions_enable=False
+    cls=Commands,
+    help="Find the equation behind measured data.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
 )
-for command in (identify, fit, simulate, show, demo, bench):
-    app.command()(command)
-app.add_typer(systems, name="systems")
+
+
+@app.callback()
+def _islands() -> None:
+    pass
 
 
 def main() -> None:

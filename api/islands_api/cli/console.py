@@ -9,8 +9,6 @@ from rich.live import Live
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from islands.warm_up import warm_up
-
 output = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -46,6 +44,9 @@ def progress(title: str) -> Iterator[Tell]:
 
 def compile_kernels() -> None:
     """Compile the kernels where that has not been done, and show that it goes on."""
+    # Most of the core: a command that needs no kernels must not wait for it.
+    from islands.warm_up import warm_up  # noqa: PLC0415
+
     with ExitStack() as stack:
 
         def tell(line: str) -> None:

@@ -5,8 +5,8 @@ from itertools import takewhile
 from math import inf
 from time import monotonic
 
+from islands.evolution.search import State
 from islands.evolution.settings import Settings
-from islands.identify import State
 from islands.validation.findings import Progress
 from islands_api.cli.console import Tell
 

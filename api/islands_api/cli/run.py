@@ -13,11 +13,12 @@ from typing import Any
 import islands
 from islands.data.dataset import SAME_DT
 from islands.errors import ModelError, RecordError, SettingsError
+from islands.evolution.presets import settings_of
+from islands.evolution.search import State
 from islands.evolution.settings import Settings
-from islands.identify import State, settings_of
 from islands.io.checkpoints import read_checkpoint, write_checkpoint, write_hall
 from islands.io.records import fingerprint, read_record
-from islands.validation.findings import Progress
+from islands.io.states import state_document, state_of
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, errors, output, progress
@@ -171,7 +172,7 @@ class _Watch:
         """Write the last epoch, unless there is none."""
         if self._state is not None:
             now = monotonic()
-            about = _about(self._state, self._job, now - self._began)
+            about = {"job": self._job, "wall_s": now - self._began, **state_document(self._state)}
             write_hall(self._state.archipelago.hall, self._folder / HALL)
             write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, about)
             took = monotonic() - now
@@ -197,25 +198,6 @@ def _stop_requests(wall_time: float | None) -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-def _about(state: State, job: dict[str, Any], spent: float) -> dict[str, Any]:
-    return {
-        "job": job,
-        "wall_s": spent,
-        "evaluations": state.evaluations,
-        "duplicates": state.duplicates,
-        "outcomes": dict(state.outcomes),
-        "history": [
-            [
-                point.generation,
-                point.evaluations,
-                dict(point.best),
-                [least if least < inf else None for least in point.islands],
-            ]
-            for point in state.history
-        ],
-    }
-
-
 def stored(folder: Path) -> tuple[dict[str, Any], State, float]:
     """Read a folder's checkpoint: its job, where the search stands, and the seconds that it has taken.
 
@@ -227,16 +209,6 @@ def stored(folder: Path) -> tuple[dict[str, Any], State, float]:
     path = folder / CHECKPOINT
     archipelago, about = read_checkpoint(path)
     try:
-        history = tuple(
-            Progress(
-                generation,
-                evaluations,
-                {int(size): error for size, error in best.items()},
-                tuple(inf if error is None else error for error in least),
-            )
-            for generation, evaluations, best, least in about["history"]
-        )
-        state = State(archipelago, about["evaluations"], about["duplicates"], about["outcomes"], history)
-        return dict(about["job"]), state, float(about["wall_s"])
+        return dict(about["job"]), state_of(archipelago, about), float(about["wall_s"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"{path} is no checkpoint of islands identify: {error!r}") from error

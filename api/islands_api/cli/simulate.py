@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from islands.errors import ModelError
-from islands.fit import SHOOTING
+from islands.fitting import SHOOTING
 from islands.io.records import read_record, write_simulation
 from islands.result import simulate as run
 from islands.validation.metrics import metrics

@@ -10,7 +10,9 @@ from islands.io.records import write_record
 from islands.systems.catalogue import SYSTEMS, make_record
 from islands_api.cli.console import output
 
-systems = typer.Typer(help="Simulated systems: list them, make records of them.", no_args_is_help=True)
+systems = typer.Typer(
+    help="Simulated systems: list them, make records of them.", no_args_is_help=True, add_completion=False
+)
 
 
 @systems.command("list")

@@ -1,9 +1,11 @@
 """The table of presets: data, not code. `paper-*` are the paper's; `hysteresis` and `narx` are ours."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
+from typing import Any
 
+from islands.errors import chosen
 from islands.evolution.settings import Settings
 
 #: Section 6.1, the theoretical piezo: shooting over 500 steps, tolerance 1e-5.
@@ -70,3 +72,22 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
         ),
     }
 )
+
+
+def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
+    """Return a preset's settings with changes.
+
+    Raises
+    ------
+    SettingsError
+        The preset or a setting is unknown, or out of range.
+    """
+    base = chosen(PRESETS, preset, "preset")
+    for name in changes:
+        chosen(asdict(base), name, "setting")
+    if "max_terms" in changes and "initial_terms" not in changes:
+        fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
+        changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}
+    if "max_height" in changes and "initial_height" not in changes:
+        changes = {**changes, "initial_height": max(0, min(base.initial_height, changes["max_height"]))}
+    return replace(base, **changes)

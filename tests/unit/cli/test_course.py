@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from islands.evolution.archipelago import Archipelago, founded
+from islands.evolution.search import State
 from islands.evolution.settings import Settings
-from islands.identify import State
 from islands.validation.findings import Progress
 from islands_api.cli import console
 from islands_api.cli import course as showing

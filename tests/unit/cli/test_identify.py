@@ -12,9 +12,11 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
-from islands.identify import State, settings_of
+from islands.evolution.presets import settings_of
+from islands.evolution.search import State
 from islands.io.checkpoints import read_checkpoint, write_checkpoint, write_hall
 from islands.io.records import write_record
+from islands.io.states import state_document
 from islands.model.model import model_of
 from islands.model.parsing import parse
 from islands.simulation.predictors import free_run
@@ -286,7 +288,7 @@ def test_an_island_without_a_model_is_kept_as_none_and_comes_back(tmp_path):
         Progress(2, 60, {1: 0.0, 2: 5e-324}, (0.0, 5e-324)),
     )
     state = State(founded(2, 5), 60, 7, {"ok": 31, "diverged": 29}, history)
-    about = command._about(state, {"seed": 5}, 12.5)
+    about = {"job": {"seed": 5}, "wall_s": 12.5, **state_document(state)}
     assert [least for *_, least in about["history"]] == [[None, None], [0.1 + 0.2, None], [0.0, 5e-324]]
     path = tmp_path / command.CHECKPOINT
     write_checkpoint(state.archipelago, path, about)
@@ -415,7 +417,7 @@ def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
     (tmp_path / "out").mkdir()
     path = tmp_path / "out/checkpoint.json"
     write_checkpoint(founded(1, 0), path, {})
-    assert "no checkpoint of islands identify: KeyError('history')" in refused(run("--resume", "out"))
+    assert "no checkpoint of islands identify: KeyError('job')" in refused(run("--resume", "out"))
 
 
 @pytest.mark.parametrize(
@@ -467,7 +469,7 @@ def test_ray_carries_out_what_it_is_of_use_for_or_asked_for(run, engines, number
 
 def test_islands_that_a_preset_brings_count_as_well(run, engines, monkeypatch):
     several = {"several": settings_of("hysteresis", {"islands": 2})}
-    monkeypatch.setattr(sys.modules["islands.identify"], "PRESETS", several)
+    monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
     asked = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--out", "out")[0] == 0
     assert run("--resume", "out")[0] == 0

@@ -1,26 +1,25 @@
 """Identify: evolution by MGGP/FROE, refinement, validation. Nobody has to guess the terms."""
 
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
-from math import inf
+from dataclasses import asdict
 from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.errors import RecordError, SettingsError, chosen
+from islands.errors import RecordError, SettingsError
 from islands.estimation.estimation import estimate
 from islands.estimation.refinement import refine
-from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.engine import Caches, Engine, Epoch, SerialEngine, Stop
+from islands.evolution.archipelago import founded
+from islands.evolution.engine import Engine, SerialEngine, Stop
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import regressor_of
-from islands.evolution.presets import PRESETS
+from islands.evolution.presets import settings_of
 from islands.evolution.problem import Problem, problem
+from islands.evolution.search import State, after, ended
 from islands.evolution.settings import Settings
-from islands.fit import parts_of
+from islands.fitting import parts_of
 from islands.io.results import record_document
 from islands.model.library import full_set
 from islands.model.model import Model, canonical_order
@@ -29,7 +28,7 @@ from islands.result import Result
 from islands.simulation.outcome import Outcome
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
-from islands.validation.findings import Assessed, Findings, Progress, Search, ranked
+from islands.validation.findings import Assessed, Findings, Search, ranked
 from islands.validation.metrics import metrics
 
 #: Outcomes of individuals that have a model.
@@ -37,31 +36,6 @@ FEASIBLE = ("ok", "abandoned")
 
 #: Predictions on the validation data that a test of the residual takes.
 _RESIDUALS = 3
-
-
-@dataclass(frozen=True, slots=True)
-class State:
-    """Where a search stands: what a watcher sees, and all that a checkpoint needs.
-
-    Attributes
-    ----------
-    archipelago : Archipelago
-    evaluations, duplicates : int
-        Since the beginning.
-    outcomes : mapping
-        Number of individuals by outcome.
-    history : tuple of Progress
-    caches : mapping
-        Bytes that every cache takes, and its limit.
-    """
-
-    archipelago: Archipelago
-    evaluations: int = 0
-    duplicates: int = 0
-    outcomes: Mapping[str, int] = field(default_factory=dict)
-    history: tuple[Progress, ...] = ()
-    caches: Caches = field(default_factory=dict)
-
 
 #: Called after every epoch.
 Watch = Callable[[State, Settings], None]
@@ -150,54 +124,6 @@ def _refuse_short(validation: Dataset, settings: Settings) -> None:
             f"the longest recording of the validation data has {max(validation.segments)} samples: with lags "
             f"down to {settings.maximum_lag} it takes {needed}; give more, or a smaller max_height"
         )
-
-
-def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
-    """Return a preset's settings with changes.
-
-    Raises
-    ------
-    SettingsError
-        The preset or a setting is unknown, or out of range.
-    """
-    base = chosen(PRESETS, preset, "preset")
-    for name in changes:
-        chosen(asdict(base), name, "setting")
-    if "max_terms" in changes and "initial_terms" not in changes:
-        fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
-        changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}
-    if "max_height" in changes and "initial_height" not in changes:
-        changes = {**changes, "initial_height": max(0, min(base.initial_height, changes["max_height"]))}
-    return replace(base, **changes)
-
-
-def after(state: State, epoch: Epoch) -> State:
-    """Return the state after one more epoch."""
-    evaluations, duplicates = state.evaluations, state.duplicates
-    outcomes, history = Counter(state.outcomes), list(state.history)
-    for generation in zip(*epoch.steps, strict=True):
-        evaluations += sum(info.evaluations for info in generation)
-        duplicates += sum(info.duplicates for info in generation)
-        best: dict[int, float] = {}
-        for info in generation:
-            outcomes.update(info.outcomes)
-            for size, fitness in info.best.items():
-                best[size] = min(fitness, best.get(size, inf))
-        least = tuple(min(info.best.values(), default=inf) for info in generation)
-        history.append(Progress(generation[0].generation, evaluations, dict(sorted(best.items())), least))
-    return State(epoch.archipelago, evaluations, duplicates, dict(outcomes), tuple(history), epoch.caches)
-
-
-def ended(state: State, settings: Settings) -> str:
-    """Return the budget that a search has used up, "" where it has to go on."""
-    reached = state.history[-1].generation if state.history else state.archipelago.generation
-    if reached >= settings.generations:
-        return "generations"
-    if 0 < settings.max_evaluations <= state.evaluations:
-        return "evaluations"
-    if state.history and min(state.history[-1].islands) ** 0.5 <= settings.target_error > 0.0:
-        return "target error"
-    return ""
 
 
 def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Assessed, ...]:

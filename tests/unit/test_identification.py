@@ -16,9 +16,10 @@ from islands.estimation.estimation import estimate
 from islands.evolution.archipelago import Archipelago, founded
 from islands.evolution.engine import Epoch, SerialEngine
 from islands.evolution.island import StepInfo
-from islands.evolution.presets import PRESETS
+from islands.evolution.presets import PRESETS, settings_of
 from islands.evolution.problem import problem
-from islands.identify import State, after, ended, identify, settings_of
+from islands.evolution.search import State, after, ended
+from islands.identification import identify
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.library import full_set
 from islands.simulation.predictors import free_run
