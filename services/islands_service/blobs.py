@@ -1,0 +1,153 @@
+"""Blobs: uploaded records, checkpoints and figures as files named by what is in them."""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from errno import EDQUOT, ENOSPC
+from pathlib import Path
+from typing import IO
+
+from islands.errors import IslandsError
+from islands_service.store.database import StoreFull
+
+#: Of a file that is being written.
+_PART = ".part"
+
+
+class NoSuchBlob(IslandsError):
+    """A blob is not there, though something names it: the data folder has lost a file."""
+
+
+class Blobs:
+    """A folder of blobs. A blob never changes: its name is the SHA-256 of its bytes.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there. In a cluster all roles see the same one.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+
+    def path(self, blob: str) -> Path:
+        """Return where a blob's bytes are.
+
+        Raises
+        ------
+        NoSuchBlob
+        """
+        path = self._at(blob)
+        if not path.is_file():
+            raise NoSuchBlob(
+                f"the blob {blob} is not in {self._folder}: restore the data folder from a backup"
+            )
+        return path
+
+    def read(self, blob: str) -> bytes:
+        """Return a blob's bytes.
+
+        Raises
+        ------
+        NoSuchBlob
+        """
+        return self.path(blob).read_bytes()
+
+    def write(self, data: bytes) -> str:
+        """Keep bytes, and return their blob once it is on the disk.
+
+        Raises
+        ------
+        StoreFull
+        """
+        with self.receiving() as stream:
+            stream.write(data)
+            return self.keep(stream)
+
+    @contextmanager
+    def receiving(self) -> Iterator[IO[bytes]]:
+        """Open a file to receive bytes; it is gone after the block, unless it was kept.
+
+        Raises
+        ------
+        StoreFull
+        """
+        with (
+            full_disk_told(),
+            tempfile.NamedTemporaryFile(dir=self._folder, suffix=_PART, delete=False) as stream,
+        ):
+            try:
+                yield stream
+            finally:
+                with suppress(FileNotFoundError):
+                    Path(stream.name).unlink()
+
+    def keep(self, stream: IO[bytes]) -> str:
+        """Make a blob of a file that has received all its bytes.
+
+        Raises
+        ------
+        StoreFull
+        """
+        with full_disk_told():
+            stream.flush()
+            os.fsync(stream.fileno())
+            with Path(stream.name).open("rb") as written:
+                blob = hashlib.file_digest(written, "sha256").hexdigest()
+            path = self._at(blob)
+            path.parent.mkdir(exist_ok=True, mode=0o700)
+            Path(stream.name).replace(path)
+            for folder in (path.parent, self._folder):
+                _sync(folder)
+        return blob
+
+    def all(self) -> Iterator[tuple[str, Path]]:
+        """Yield every blob, and files that were left half-written (without a name)."""
+        for path in self._folder.glob(f"*{_PART}"):
+            yield "", path
+        for path in self._folder.glob("??/*"):
+            yield path.name, path
+
+    def sweep(self, named: Iterable[str], before: float) -> int:
+        """Remove what nobody names and was written before a time, in seconds since 1970; return how many.
+
+        What is younger may be about to be named.
+        """
+        needed, removed = set(named), 0
+        for blob, path in self.all():
+            with suppress(FileNotFoundError):
+                if blob not in needed and path.stat().st_mtime < before:
+                    path.unlink()
+                    removed += 1
+        return removed
+
+    def _at(self, blob: str) -> Path:
+        return self._folder / blob[:2] / blob
+
+
+@contextmanager
+def full_disk_told() -> Iterator[None]:
+    """Turn a full disk into our own error.
+
+    Raises
+    ------
+    StoreFull
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (ENOSPC, EDQUOT):
+            raise
+        raise StoreFull(f"the disk of the data folder is full ({error.strerror}): make room") from error
+
+
+def _sync(folder: Path) -> None:
+    """Have a folder's entries on the disk, too."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,169 @@
+"""Data sets: what was uploaded, by owner. The bytes are blobs; here stands what they hold."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, Row, delete, func, insert, select, tuple_
+
+from islands.errors import IslandsError
+from islands_service.jobs import ACTIVE, QuotaExceeded
+from islands_service.store.clock import now
+from islands_service.store.database import Database
+from islands_service.store.tables import datasets, jobs
+
+
+class NoSuchDataset(IslandsError):
+    """There is no such data set for this owner."""
+
+
+class DatasetInUse(IslandsError):
+    """A job that is not finished needs the data set."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredDataset:
+    """An uploaded record.
+
+    Attributes
+    ----------
+    id : str
+        By content and format: the same bytes are the same data set.
+    name, suffix : str
+        Of the file; the suffix chooses its reader.
+    blob : str
+        SHA-256 of its bytes.
+    preview : mapping
+        Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`.
+    """
+
+    owner: str
+    id: str
+    name: str
+    suffix: str
+    blob: str
+    bytes: int
+    preview: Mapping[str, Any]
+    created: float
+
+
+class Datasets:
+    """The part of the store that knows data sets.
+
+    Parameters
+    ----------
+    database : Database
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(
+        self,
+        owner: str,
+        name: str,
+        suffix: str,
+        blob: str,
+        size: int,
+        preview: Mapping[str, Any],
+        most_bytes: int | None = None,
+    ) -> tuple[StoredDataset, bool]:
+        """Keep a data set; return it, and whether it is new.
+
+        Raises
+        ------
+        QuotaExceeded
+            The owner would have more than ``most_bytes``.
+        """
+        identity = dataset_id(blob, suffix)
+
+        def operation(connection: Connection) -> tuple[StoredDataset, bool]:
+            before = connection.execute(_one(owner, identity)).one_or_none()
+            if before is not None:
+                return _dataset_of(before), False
+            used = connection.execute(
+                select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
+            ).scalar_one()
+            if most_bytes is not None and used + size > most_bytes:
+                raise QuotaExceeded(
+                    f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
+                    f"{most_bytes / 1e6:.1f} MB is the most: delete some"
+                )
+            values = {
+                "owner": owner,
+                "id": identity,
+                "name": name,
+                "suffix": suffix,
+                "blob": blob,
+                "bytes": size,
+                "preview": json.dumps(preview),
+                "created": now(),
+            }
+            row = connection.execute(insert(datasets).values(values).returning(datasets)).one()
+            return _dataset_of(row), True
+
+        return self._database.write(operation)
+
+    def get(self, owner: str, dataset: str) -> StoredDataset:
+        """Return a data set.
+
+        Raises
+        ------
+        NoSuchDataset
+        """
+        with self._database.read() as connection:
+            row = connection.execute(_one(owner, dataset)).one_or_none()
+        if row is None:
+            raise NoSuchDataset(f"there is no data set {dataset!r}: upload it first, or list those there are")
+        return _dataset_of(row)
+
+    def page(
+        self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
+    ) -> tuple[tuple[StoredDataset, ...], tuple[float, str] | None]:
+        """Return the data sets of an owner, newest first, and where the next page begins."""
+        query = select(datasets).where(datasets.c.owner == owner)
+        if after is not None:
+            query = query.where(tuple_(datasets.c.created, datasets.c.id) < tuple_(*after))
+        query = query.order_by(datasets.c.created.desc(), datasets.c.id.desc()).limit(limit + 1)
+        with self._database.read() as connection:
+            found = [_dataset_of(row) for row in connection.execute(query)]
+        more, found = len(found) > limit, found[:limit]
+        return tuple(found), (found[-1].created, found[-1].id) if more else None
+
+    def delete(self, owner: str, dataset: str) -> None:
+        """Delete a data set that no unfinished job needs.
+
+        Raises
+        ------
+        NoSuchDataset, DatasetInUse
+        """
+
+        def operation(connection: Connection) -> None:
+            if connection.execute(_one(owner, dataset)).one_or_none() is None:
+                raise NoSuchDataset(f"there is no data set {dataset!r}")
+            user = connection.execute(
+                select(jobs.c.id)
+                .where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE), jobs.c.spec.contains(f'"{dataset}"'))
+                .limit(1)
+            ).scalar()
+            if user is not None:
+                raise DatasetInUse(f"job {user} needs data set {dataset!r}: wait for it, or cancel it")
+            connection.execute(delete(datasets).where(datasets.c.owner == owner, datasets.c.id == dataset))
+
+        self._database.write(operation)
+
+
+def dataset_id(blob: str, suffix: str) -> str:
+    """Return a data set's name: the same bytes in the same format are the same data set."""
+    return f"{blob[:32]}-{suffix.removeprefix('.')}"
+
+
+def _one(owner: str, dataset: str) -> Any:
+    return select(datasets).where(datasets.c.owner == owner, datasets.c.id == dataset)
+
+
+def _dataset_of(row: Row[Any]) -> StoredDataset:
+    return StoredDataset(
+        row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, json.loads(row.preview), row.created
+    )

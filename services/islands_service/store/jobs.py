@@ -1,0 +1,297 @@
+"""What owners do with jobs: submit, look, list, cancel, resume, delete. Each owner sees its own alone."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from uuid import uuid4
+
+from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_, update
+
+from islands_service.jobs import (
+    ACTIVE,
+    RESUMABLE,
+    TERMINAL,
+    Event,
+    IdempotencyConflict,
+    Job,
+    JobState,
+    NoSuchJob,
+    QuotaExceeded,
+    Submission,
+    WrongState,
+)
+from islands_service.store.clock import now
+from islands_service.store.database import Database
+from islands_service.store.tables import events, jobs
+
+#: The most jobs of a page.
+PAGE = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Jobs, newest first, and where the next page begins; None where there is none."""
+
+    jobs: tuple[Job, ...]
+    after: tuple[float, str] | None
+
+
+class Jobs:
+    """The part of the store that owners use.
+
+    Parameters
+    ----------
+    database : Database
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def submit(self, submission: Submission, most_active: int | None = None) -> tuple[Job, bool]:
+        """Accept a job: once this returns, it is not lost. Return it, and whether it is new.
+
+        Raises
+        ------
+        IdempotencyConflict
+            The key was used with another request.
+        QuotaExceeded
+            The owner has ``most_active`` jobs that are not finished.
+        StoreUnavailable, StoreFull
+            Nothing was accepted.
+        """
+        asked = hashlib.sha256(submission.request.encode()).hexdigest()
+
+        def operation(connection: Connection) -> tuple[Job, bool]:
+            if submission.idempotency_key is not None:
+                before = connection.execute(
+                    select(jobs).where(
+                        jobs.c.owner == submission.owner,
+                        jobs.c.idempotency_key == submission.idempotency_key,
+                    )
+                ).one_or_none()
+                if before is not None:
+                    if before.request_sha256 != asked:
+                        raise IdempotencyConflict(
+                            f"the idempotency key {submission.idempotency_key!r} belongs to job {before.id}, "
+                            "which was asked for with another request: take a new key"
+                        )
+                    return job_of(before), False
+            if most_active is not None:
+                _refuse_above(connection, submission.owner, most_active)
+            row = connection.execute(
+                insert(jobs)
+                .values(
+                    id=uuid4().hex,
+                    owner=submission.owner,
+                    kind=submission.kind,
+                    name=submission.name,
+                    spec=json.dumps(submission.spec),
+                    request_sha256=asked,
+                    idempotency_key=submission.idempotency_key,
+                    priority=submission.priority,
+                    state=JobState.QUEUED,
+                    created=now(),
+                    updated=now(),
+                )
+                .returning(jobs)
+            ).one()
+            record(connection, row, "queued")
+            return job_of(row), True
+
+        return self._database.write(operation)
+
+    def get(self, owner: str, job: str) -> Job:
+        """Return a job.
+
+        Raises
+        ------
+        NoSuchJob
+        """
+        with self._database.read() as connection:
+            return job_of(_own(connection, owner, job))
+
+    def page(
+        self,
+        owner: str,
+        state: JobState | None = None,
+        after: tuple[float, str] | None = None,
+        limit: int = 50,
+    ) -> Page:
+        """Return the jobs of an owner, newest first, from behind a place on."""
+        query = select(jobs).where(jobs.c.owner == owner)
+        if state is not None:
+            query = query.where(jobs.c.state == state)
+        if after is not None:
+            query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
+        query = query.order_by(jobs.c.created.desc(), jobs.c.id.desc()).limit(min(limit, PAGE) + 1)
+        with self._database.read() as connection:
+            found = [job_of(row) for row in connection.execute(query)]
+        more = len(found) > min(limit, PAGE)
+        found = found[: min(limit, PAGE)]
+        return Page(tuple(found), (found[-1].created, found[-1].id) if more else None)
+
+    def cancel(self, owner: str, job: str) -> Job:
+        """Cancel a job that is waiting, or ask whoever runs it to let go of it.
+
+        Raises
+        ------
+        NoSuchJob
+        WrongState
+            It is finished.
+        """
+
+        def operation(connection: Connection) -> Job:
+            before = _own(connection, owner, job, locked=True)
+            if before.state in TERMINAL:
+                raise WrongState(f"job {job} is {before.state}: there is nothing to cancel")
+            if before.cancel_requested:
+                return job_of(before)
+            waiting = before.state == JobState.QUEUED
+            row = change(
+                connection,
+                job,
+                cancel_requested=True,
+                state=JobState.CANCELLED if waiting else before.state,
+                finished=now() if waiting else None,
+            )
+            record(connection, row, "cancelled" if waiting else "cancelling")
+            return job_of(row)
+
+        return self._database.write(operation)
+
+    def resume(self, owner: str, job: str) -> Job:
+        """Queue a job again that failed or was cancelled: it goes on from its last checkpoint.
+
+        Raises
+        ------
+        NoSuchJob
+        WrongState
+            It is waiting, running, or has succeeded.
+        """
+
+        def operation(connection: Connection) -> Job:
+            before = _own(connection, owner, job, locked=True)
+            if before.state not in RESUMABLE:
+                raise WrongState(
+                    f"job {job} is {before.state}: only one that failed or was cancelled resumes"
+                )
+            row = change(
+                connection,
+                job,
+                state=JobState.QUEUED,
+                cancel_requested=False,
+                stalled=0,
+                problem=None,
+                finished=None,
+            )
+            record(connection, row, "queued")
+            return job_of(row)
+
+        return self._database.write(operation)
+
+    def delete(self, owner: str, job: str) -> None:
+        """Delete a finished job and all that belongs to it.
+
+        Raises
+        ------
+        NoSuchJob
+        WrongState
+            It is not finished.
+        """
+
+        def operation(connection: Connection) -> None:
+            before = _own(connection, owner, job, locked=True)
+            if before.state not in TERMINAL:
+                raise WrongState(f"job {job} is {before.state}: cancel it first")
+            connection.execute(delete(jobs).where(jobs.c.id == job))
+
+        self._database.write(operation)
+
+    def versions(self, of: Sequence[str]) -> dict[str, int]:
+        """Return the versions of jobs: what has changed is seen by one query for all who watch."""
+        with self._database.read() as connection:
+            query = select(jobs.c.id, jobs.c.version).where(jobs.c.id.in_(of))
+            return {row.id: row.version for row in connection.execute(query)}
+
+    def events(self, job: str, after: int = 0) -> tuple[Event, ...]:
+        """Return what happened to a job after an event's number, in order."""
+        with self._database.read() as connection:
+            rows = connection.execute(
+                select(events)
+                .where(events.c.job_id == job, events.c.number > after)
+                .order_by(events.c.number)
+            )
+            return tuple(
+                Event(row.job_id, row.number, row.kind, json.loads(row.data), row.at) for row in rows
+            )
+
+    def counts(self) -> dict[str, int]:
+        """Return how many jobs there are in every state, of all owners."""
+        with self._database.read() as connection:
+            found = connection.execute(select(jobs.c.state, func.count()).group_by(jobs.c.state)).all()
+        return {state: dict(map(tuple, found)).get(state, 0) for state in JobState}
+
+
+def change(connection: Connection, job: str, **values: Any) -> Row[Any]:
+    """Change a job in a way that watchers see, and return it as it is then."""
+    return connection.execute(
+        update(jobs)
+        .where(jobs.c.id == job)
+        .values(version=jobs.c.version + 1, updated=now(), **values)
+        .returning(jobs)
+    ).one()
+
+
+def record(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
+    """Write down what happened to a job as its version's event."""
+    connection.execute(
+        insert(events).values(job_id=row.id, number=row.version, kind=kind, data=data, at=row.updated)
+    )
+
+
+def job_of(row: Row[Any]) -> Job:
+    """Make a job of its row."""
+    return Job(
+        row.id,
+        row.owner,
+        row.kind,
+        row.name,
+        json.loads(row.spec),
+        row.priority,
+        JobState(row.state),
+        row.version,
+        row.attempt,
+        bool(row.cancel_requested),
+        _read(row.progress),
+        row.checkpoint,
+        _read(row.summary),
+        _read(row.problem),
+        row.created,
+        row.updated,
+        row.started,
+        row.finished,
+    )
+
+
+def _read(text: str | None) -> dict[str, Any] | None:
+    return None if text is None else dict(json.loads(text))
+
+
+def _own(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
+    query: Select[Any] = select(jobs).where(jobs.c.id == job, jobs.c.owner == owner)
+    row = connection.execute(query.with_for_update() if locked else query).one_or_none()
+    if row is None:
+        raise NoSuchJob(f"there is no job {job!r}")
+    return row
+
+
+def _refuse_above(connection: Connection, owner: str, most: int) -> None:
+    active = connection.execute(
+        select(func.count()).select_from(jobs).where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
+    ).scalar_one()
+    if active >= most:
+        raise QuotaExceeded(
+            f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"
+        )

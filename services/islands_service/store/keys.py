@@ -1,0 +1,156 @@
+"""API keys: shown once when they are made, kept as hashes, revocable, with an end."""
+
+import hashlib
+import json
+import secrets
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, Row, func, insert, or_, select, update
+
+from islands.errors import IslandsError, SettingsError
+from islands_service.store.clock import now
+from islands_service.store.database import Database
+from islands_service.store.tables import keys
+
+#: What a key may allow.
+SCOPES = {
+    "read": "look at one's own data sets, jobs and results",
+    "write": "upload data sets, submit, cancel, resume and delete jobs",
+    "metrics": "read the service's metrics",
+}
+
+#: What every key begins with, so that a scanner for leaked secrets can know it.
+PREFIX = "islands_"
+
+
+class NoSuchKey(IslandsError):
+    """There is no such key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key, without its secret.
+
+    Attributes
+    ----------
+    owner : str
+        Whose data sets and jobs it opens; several keys may have one owner.
+    expired : bool
+        By the database's clock, as it was read.
+    """
+
+    id: str
+    owner: str
+    name: str
+    scopes: frozenset[str]
+    created: float
+    expires: float | None
+    revoked: float | None
+    expired: bool
+
+
+class Keys:
+    """The part of the store that knows keys.
+
+    Parameters
+    ----------
+    database : Database
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(
+        self, name: str, scopes: frozenset[str], owner: str | None = None, seconds: float | None = None
+    ) -> tuple[Key, str]:
+        """Make a key, for an owner of its own unless one is given; return it and its secret.
+
+        Raises
+        ------
+        SettingsError
+            A scope is unknown, or there is none.
+        """
+        if not scopes or not scopes <= set(SCOPES):
+            raise SettingsError(
+                f"unknown scopes {', '.join(sorted(scopes - set(SCOPES))) or '(none)'}: take some of "
+                f"{', '.join(SCOPES)}"
+            )
+        identity = secrets.token_hex(8)
+        secret = PREFIX + secrets.token_urlsafe(32)
+
+        def operation(connection: Connection) -> Key:
+            values = {
+                "id": identity,
+                "owner": owner or f"key-{identity}",
+                "name": name,
+                "secret_sha256": _hash(secret),
+                "scopes": json.dumps(sorted(scopes)),
+                "created": now(),
+                "expires": None if seconds is None else now() + seconds,
+            }
+            connection.execute(insert(keys).values(values))
+            return _key_of(connection.execute(_query().where(keys.c.id == identity)).one())
+
+        return self._database.write(operation), secret
+
+    def find(self, secret: str) -> Key | None:
+        """Return the key of a secret, also an expired or a revoked one.
+
+        A secret has 256 random bits: a plain hash of it tells nothing, and finding it by the hash takes the
+        same time for every wrong one.
+        """
+        with self._database.read() as connection:
+            row = connection.execute(_query().where(keys.c.secret_sha256 == _hash(secret))).one_or_none()
+        return None if row is None else _key_of(row)
+
+    def all(self) -> tuple[Key, ...]:
+        """Return all keys, oldest first."""
+        with self._database.read() as connection:
+            return tuple(map(_key_of, connection.execute(_query().order_by(keys.c.created, keys.c.id))))
+
+    def revoke(self, key: str) -> Key:
+        """End a key at once.
+
+        Raises
+        ------
+        NoSuchKey
+        """
+
+        def operation(connection: Connection) -> Key:
+            connection.execute(
+                update(keys).where(keys.c.id == key).values(revoked=func.coalesce(keys.c.revoked, now()))
+            )
+            row = connection.execute(_query().where(keys.c.id == key)).one_or_none()
+            if row is None:
+                raise NoSuchKey(f"there is no key {key!r}: list them with 'islands keys list'")
+            return _key_of(row)
+
+        return self._database.write(operation)
+
+    def any_valid(self) -> bool:
+        """Tell whether there is a key that opens anything."""
+        valid = keys.c.revoked.is_(None) & or_(keys.c.expires.is_(None), keys.c.expires > now())
+        with self._database.read() as connection:
+            return connection.execute(select(keys.c.id).where(valid).limit(1)).scalar() is not None
+
+
+def _hash(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def _query() -> Any:
+    return select(keys, (keys.c.expires <= now()).label("expired"))
+
+
+def _key_of(row: Row[Any]) -> Key:
+    return Key(
+        row.id,
+        row.owner,
+        row.name,
+        frozenset(json.loads(row.scopes)),
+        row.created,
+        row.expires,
+        row.revoked,
+        bool(row.expired),
+    )

@@ -1,0 +1,60 @@
+"""The store as a whole: one database, and the parts of it that owners, coordinators and doors use."""
+
+from types import TracebackType
+
+from islands_service.store.database import Database
+from islands_service.store.datasets import Datasets
+from islands_service.store.jobs import Jobs
+from islands_service.store.keys import Keys
+from islands_service.store.leases import Leases
+from islands_service.store.results import Results
+from islands_service.store.retention import Retention
+from islands_service.store.schema import prepare
+
+
+class Store:
+    """All that the service remembers, but for blobs.
+
+    Laws, for every database (`tests/contracts/test_store.py`): what a write has returned from is durable; a
+    job belongs to one lease at a time, and a write under an older one changes nothing and raises `LeaseLost`;
+    a checkpoint, its progress and its event appear together or not at all; an idempotency key names one job;
+    events of a job are numbered without gaps in the order in which they became visible; an owner never meets
+    what belongs to another.
+
+    Parameters
+    ----------
+    url : str
+        ``sqlite:////path/islands.db`` or ``postgresql+psycopg://...``.
+
+    Raises
+    ------
+    StoreUnavailable
+        The database does not answer.
+    StoreError
+        It was made by a newer version of islands.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.database = Database(url)
+        prepare(self.database)
+        self.jobs = Jobs(self.database)
+        self.leases = Leases(self.database)
+        self.results = Results(self.database)
+        self.datasets = Datasets(self.database)
+        self.keys = Keys(self.database)
+        self.retention = Retention(self.database)
+
+    def close(self) -> None:
+        """Write what is waiting, and let go of the database."""
+        self.database.close()
+
+    def __enter__(self) -> "Store":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,134 @@
+"""The tables. A change here needs a migration beside it: a test holds the two against each other."""
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+#: Constraints have names, or a migration could not change them.
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+
+def _job() -> Column[str]:
+    """Return a column that goes with its job."""
+    return Column("job_id", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("owner", String(64), nullable=False),
+    Column("kind", String(32), nullable=False),
+    Column("name", String(200), nullable=False),
+    Column("spec", Text, nullable=False),
+    Column("request_sha256", String(64), nullable=False),
+    Column("idempotency_key", String(255)),
+    Column("priority", Integer, nullable=False),
+    Column("state", String(16), nullable=False),
+    Column("version", BigInteger, nullable=False, default=1),
+    Column("attempt", Integer, nullable=False, default=0),
+    # Attempts since the last one that brought the job on.
+    Column("stalled", Integer, nullable=False, default=0),
+    Column("lease_owner", String(128)),
+    Column("lease_epoch", BigInteger, nullable=False, default=0),
+    Column("lease_until", Float, nullable=False, default=0.0),
+    Column("cancel_requested", Boolean, nullable=False, default=False),
+    Column("progress", Text),
+    Column("checkpoint", String(64)),
+    Column("summary", Text),
+    Column("problem", Text),
+    Column("created", Float, nullable=False),
+    Column("updated", Float, nullable=False),
+    Column("started", Float),
+    Column("finished", Float),
+    UniqueConstraint("owner", "idempotency_key"),
+    Index(None, "state", "priority", "created"),
+    Index(None, "owner", "created", "id"),
+    Index(None, "owner", "state"),
+)
+
+#: Numbered by the job's version: without gaps, and in the order in which they were committed.
+events = Table(
+    "events",
+    metadata,
+    _job(),
+    Column("number", BigInteger, primary_key=True),
+    Column("kind", String(16), nullable=False),
+    Column("data", Text, nullable=False),
+    Column("at", Float, nullable=False),
+)
+
+#: The history of a search. It stands apart: a list of jobs never reads it.
+points = Table(
+    "points",
+    metadata,
+    _job(),
+    Column("generation", Integer, primary_key=True),
+    Column("evaluations", BigInteger, nullable=False),
+    Column("best", Text, nullable=False),
+    Column("islands", Text, nullable=False),
+)
+
+results = Table("results", metadata, _job(), Column("document", Text, nullable=False))
+
+models = Table(
+    "models",
+    metadata,
+    _job(),
+    Column("rank", Integer, primary_key=True),
+    Column("document", Text, nullable=False),
+    Column("file", Text, nullable=False),
+)
+
+#: What was made of a result, such as figures, by name; the bytes are a blob.
+artefacts = Table(
+    "artefacts",
+    metadata,
+    _job(),
+    Column("name", String(64), primary_key=True),
+    Column("blob", String(64), nullable=False),
+)
+
+datasets = Table(
+    "datasets",
+    metadata,
+    Column("owner", String(64), primary_key=True),
+    Column("id", String(48), primary_key=True),
+    Column("name", String(255), nullable=False),
+    Column("suffix", String(16), nullable=False),
+    Column("blob", String(64), nullable=False),
+    Column("bytes", BigInteger, nullable=False),
+    Column("preview", Text, nullable=False),
+    Column("created", Float, nullable=False),
+)
+
+keys = Table(
+    "keys",
+    metadata,
+    Column("id", String(16), primary_key=True),
+    Column("owner", String(64), nullable=False),
+    Column("name", String(200), nullable=False),
+    Column("secret_sha256", String(64), nullable=False, unique=True),
+    Column("scopes", Text, nullable=False),
+    Column("created", Float, nullable=False),
+    Column("expires", Float),
+    Column("revoked", Float),
+)
