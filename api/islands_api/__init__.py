@@ -1,1 +1,22 @@
-"""The front doors: the command line."""
+"""The front doors: HTTP, the command line, and the client that speaks REST.
+
+>>> from islands_api import Client
+>>> client = Client("http://127.0.0.1:8000")  # doctest: +SKIP
+>>> job = client.submit(client.upload("piezo.csv"), inputs=["u_V"], output="y_um")  # doctest: +SKIP
+>>> print(client.wait(job).summary["equation"])  # doctest: +SKIP
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from islands_api.client import AsyncClient, Client, ServiceError
+
+__all__ = ["AsyncClient", "Client", "ServiceError"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # The command line and the service have no use for it.
+    return getattr(import_module("islands_api.client"), name)

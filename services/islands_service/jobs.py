@@ -18,7 +18,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
@@ -203,11 +203,14 @@ class Report:
     progress : mapping
         For whoever watches.
     points : tuple
-        New points of the history: generation, evaluations, best by size, best by island.
+        Points of the history: generation, evaluations, best by size, best by island.
     checkpoint : str, optional
         A new blob to go on from; None leaves the one that is there.
+    after : int
+        The generation behind which the points take the place of those that are there.
     """
 
     progress: Mapping[str, Any]
-    points: tuple[tuple[int, int, Mapping[Any, float], tuple[float | None, ...]], ...] = field(default=())
+    points: tuple[tuple[int, int, Mapping[Any, float], tuple[float | None, ...]], ...] = ()
     checkpoint: str | None = None
+    after: int = -1

@@ -84,7 +84,7 @@ class FittedModel:
         return chosen(FIGURES, kind, "figure")(self.assessed, self.findings.split)
 
     def export(self, kind: str = "python") -> str:
-        """Return the model as text: plain, latex, python or json."""
+        """Return the model as text: plain, latex, mathml, python, c, matlab or json."""
         return export(self.model, kind)
 
     def __str__(self) -> str:

@@ -12,7 +12,7 @@ from islands.errors import IslandsError
 from islands_api.cli.console import errors
 
 #: Every command is a file of its own with a function, or a group of commands, of the command's name.
-COMMANDS = ("identify", "fit", "simulate", "show", "demo", "bench", "systems")
+COMMANDS = ("identify", "fit", "simulate", "show", "demo", "bench", "systems", "serve", "jobs", "keys")
 
 
 class Commands(TyperGroup):

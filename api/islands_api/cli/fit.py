@@ -15,6 +15,7 @@ from islands.model.library import LIBRARIES
 from islands.result import Result
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output, progress
+from islands_service.rows import rows_of
 
 
 def fit(
@@ -50,7 +51,7 @@ def fit(
     compile_kernels()
     with progress("fit") as tell:
         tell("reading", 0.0)
-        data = read_record(record, names, output_column, dt, options.rows(rows))
+        data = read_record(record, names, output_column, dt, rows_of(rows))
         held_out = options.validation(validation, record, names, output_column, dt, rows)
         began = perf_counter()
         result = islands.fit(

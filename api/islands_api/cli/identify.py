@@ -6,24 +6,12 @@ from typing import Annotated
 import typer
 
 from islands.errors import SettingsError, chosen
-from islands.estimation.constraints import CONSTRAINTS
-from islands.evolution.characters import CHARACTERS
-from islands.evolution.migration import EMIGRANTS, REPLACED
-from islands.evolution.presets import PRESETS
-from islands.evolution.topology import TOPOLOGIES
 from islands.io.records import fingerprint
-from islands.model.primitives import PRIMITIVES
 from islands_api.cli import options
+from islands_api.cli import search_options as search
 from islands_api.cli.fit import check_folder
 from islands_api.cli.run import Manner, run, stored
 from islands_service.engines import ENGINES
-
-#: Options that are settings, and have their names.
-SETTINGS = (
-    *("population", "generations", "max_terms", "max_height", "shooting", "primitives", "constraints"),
-    *("islands", "topology", "migrate_every", "migrants", "emigrants", "replaced", "characters"),
-    *("max_evaluations", "target_error"),
-)
 
 #: Options that say how to run, not what: they may differ from one resumption to the next.
 RUNNING = ("resume", "engine", "ray_address", "wall_time", "verbose")
@@ -45,46 +33,24 @@ def identify(
         str | None,
         typer.Option("--test", help="FILE, FRACTION of the end, or START:STOP: nothing touches it."),
     ] = None,
-    preset: Annotated[str, typer.Option("--preset", help=", ".join(PRESETS))] = "hysteresis",
-    population: Annotated[int | None, typer.Option("--population")] = None,
-    generations: Annotated[int | None, typer.Option("--generations")] = None,
-    max_terms: Annotated[int | None, typer.Option("--max-terms")] = None,
-    max_height: Annotated[int | None, typer.Option("--max-height")] = None,
-    shooting: Annotated[int | None, typer.Option("--shooting", help="Samples of an interval.")] = None,
-    primitives: Annotated[
-        list[str] | None, typer.Option("--primitive", help=f"Repeat it: {', '.join(PRIMITIVES)}.")
-    ] = None,
-    constraints: Annotated[str | None, typer.Option("--constraints", help=" or ".join(CONSTRAINTS))] = None,
-    islands: Annotated[
-        int | None, typer.Option("--islands", help="Islands that evolve side by side.")
-    ] = None,
-    topology: Annotated[
-        str | None, typer.Option("--topology", help=f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
-    ] = None,
-    migrate_every: Annotated[
-        str | None,
-        typer.Option("--migrate-every", help="Generations; 5,100:20 is 20 from generation 100 on."),
-    ] = None,
-    migrants: Annotated[
-        str | None, typer.Option("--migrants", help="For each neighbour; may change likewise.")
-    ] = None,
-    emigrants: Annotated[
-        str | None, typer.Option("--emigrants", help=f"Who leaves: {', '.join(EMIGRANTS)}.")
-    ] = None,
-    replaced: Annotated[
-        str | None, typer.Option("--replaced", help=f"Whose place they take: {', '.join(REPLACED)}.")
-    ] = None,
-    characters: Annotated[
-        list[str] | None,
-        typer.Option("--character", help=f"Repeat it, islands take turns: {', '.join(CHARACTERS)}."),
-    ] = None,
-    max_evaluations: Annotated[
-        int | None, typer.Option("--max-evaluations", help="End with the epoch that reaches it.")
-    ] = None,
-    target_error: Annotated[
-        float | None, typer.Option("--target-error", help="RMSE; end with the epoch that reaches it.")
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    preset: search.Preset = "hysteresis",
+    population: search.Population = None,
+    generations: search.Generations = None,
+    max_terms: search.MaxTerms = None,
+    max_height: search.MaxHeight = None,
+    shooting: search.Shooting = None,
+    primitives: search.Primitives = None,
+    constraints: search.Constraints = None,
+    islands: search.Islands = None,
+    topology: search.Topology = None,
+    migrate_every: search.MigrateEvery = None,
+    migrants: search.Migrants = None,
+    emigrants: search.Emigrants = None,
+    replaced: search.Replaced = None,
+    characters: search.Characters = None,
+    max_evaluations: search.MaxEvaluations = None,
+    target_error: search.TargetError = None,
+    seed: search.Seed = 0,
     engine: Annotated[
         str | None,
         typer.Option("--engine", help=f"{' or '.join(ENGINES)}; ray by default where there are islands."),
@@ -116,7 +82,7 @@ def identify(
         if record is None or not inputs or output_column is None or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
-        changes = {name: given[name] for name in SETTINGS if given[name] is not None}
+        changes = {name: given[name] for name in search.SETTINGS if given[name] is not None}
         sources = {"record": str(record), "validation": validation, "test": test}
         files = {
             kind: str(Path(name).resolve())

@@ -11,6 +11,7 @@ from islands.io.models import read_model
 from islands.io.records import read_record
 from islands.model.model import Model
 from islands.systems.published_models import published
+from islands_service.rows import overlap, rows_of
 
 Record = Annotated[
     Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point) or NPZ.")
@@ -33,17 +34,6 @@ PUBLISHED = "published:"
 def columns(texts: list[str]) -> list[str]:
     """Split ``--input a,b`` and join what was repeated."""
     return [name for text in texts for name in text.split(",") if name]
-
-
-def rows(text: str | None) -> slice | None:
-    """Read START:STOP."""
-    if text is None:
-        return None
-    try:
-        start, stop = (int(part) if part else None for part in text.split(":"))
-    except ValueError:
-        raise SettingsError(f"cannot read the rows {text!r}: write START:STOP, for example 0:5000") from None
-    return slice(start, stop)
 
 
 def validation(
@@ -70,23 +60,15 @@ def validation(
     if Path(text).exists():
         return read_record(text, inputs, output, dt)
     if ":" in text:
-        if used is None or _overlap(rows(used), rows(text)):
+        if used is None or overlap(rows_of(used), rows_of(text)):
             raise SettingsError(f"{option} {text}: say with --rows START:STOP which other samples estimate")
-        return read_record(record, inputs, output, dt, rows(text))
+        return read_record(record, inputs, output, dt, rows_of(text))
     try:
         return float(text)
     except ValueError:
         raise SettingsError(
             f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
         ) from None
-
-
-def _overlap(one: slice | None, other: slice | None) -> bool:
-    """Tell whether two selections share samples; an open end reaches as far as there are any."""
-    if one is None or other is None:
-        return True
-    ends = [part.stop for part in (one, other) if part.stop is not None]
-    return not ends or max(one.start or 0, other.start or 0) < min(ends)
 
 
 def model(text: str) -> Model:

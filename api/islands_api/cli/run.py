@@ -25,6 +25,7 @@ from islands_api.cli.console import Tell, compile_kernels, errors, output, progr
 from islands_api.cli.course import course
 from islands_api.cli.fit import show_result
 from islands_service.engines import ENGINES
+from islands_service.rows import rows_of
 
 CHECKPOINT = "checkpoint.json"
 HALL = "hall.json"
@@ -119,7 +120,7 @@ def _data(
             raise RecordError(f"{name} has changed since the run began: bring back the file, or start anew")
     path = Path(job["record"])
     columns = (job["inputs"], job["output"], job["dt"])
-    data = read_record(path, *columns, options.rows(job["rows"]))
+    data = read_record(path, *columns, rows_of(job["rows"]))
     held_out = options.validation(job["validation"], path, *columns, job["rows"])
     if job["test"] is None:
         return data, held_out, None

@@ -12,5 +12,5 @@ def show(
     model: Annotated[str, typer.Argument(help="A model file, or published:12, published:13, published:14.")],
     kind: Annotated[str, typer.Option("--format", help=", ".join(EXPORTS))] = "plain",
 ) -> None:
-    """Show a model as plain text, LaTeX, Python or JSON."""
+    """Show a model as an equation (plain text, LaTeX, MathML), a program (Python, C, MATLAB) or JSON."""
     typer.echo(export(options.model(model), kind).rstrip("\n"))

@@ -12,6 +12,7 @@ from islands.result import simulate as run
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
+from islands_service.rows import rows_of
 
 
 def simulate(
@@ -35,7 +36,7 @@ def simulate(
         options.columns(inputs or list(chosen.input_names)),
         output_column or chosen.output_name,
         dt,
-        options.rows(rows),
+        rows_of(rows),
         missing_output=True,
     )
     if chosen.dt is not None and abs(data.dt - chosen.dt) > 0.01 * chosen.dt:

@@ -22,10 +22,13 @@ from ray.exceptions import (
     WorkerCrashedError,
 )
 
-from islands.errors import IslandsError
+from islands_service.runtime.errors import ClusterError
 
 #: Bytes of shared memory for objects of our own Ray: the record, and what islands send to each other.
 OBJECT_STORE = 200_000_000
+
+#: Where the names of actors count.
+NAMESPACE = "islands"
 
 #: Seconds that a cluster may take to answer.
 _KNOCK = 5.0
@@ -35,10 +38,6 @@ _PREFIX, _LOCK = "islands-ray-", "lock"
 
 #: A socket's path has at most 107 characters, and Ray adds about seventy to its folder's.
 _SOCKET_ROOM = 30
-
-
-class ClusterError(IslandsError):
-    """There is no Ray to run on: the message says what to do."""
 
 
 #: What says that a machine failed rather than the search: what was asked of it is asked once more.
@@ -77,7 +76,7 @@ def cluster(address: str | None = None) -> Iterator[None]:
 def _connected(address: str) -> Iterator[None]:
     try:
         _knock(address)
-        ray.init(address=address, log_to_driver=False, configure_logging=False)
+        ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
     except (OSError, RuntimeError, ValueError, RayError) as error:
         raise ClusterError(
             f"no Ray cluster answers at {address} ({error}): start one with 'ray start --head', or run on "
@@ -128,6 +127,7 @@ def _own() -> Iterator[None]:
             # Without "local" Ray would attach to any cluster that it finds on the machine.
             ray.init(
                 address="local",
+                namespace=NAMESPACE,
                 num_cpus=_cpus(),
                 object_store_memory=OBJECT_STORE,
                 include_dashboard=False,

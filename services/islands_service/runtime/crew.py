@@ -10,7 +10,8 @@ from ray.exceptions import RayActorError, RayTaskError
 
 from islands.evolution.engine import Tell
 from islands.evolution.problem import Problem
-from islands_service.runtime.cluster import LOST, ClusterError
+from islands_service.runtime.cluster import LOST
+from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor
 
 #: Seconds that a search waits for its whole crew before it begins with those that are there.
@@ -45,11 +46,14 @@ class Crew:
     islands : int
     tell : callable
         Told when an actor is lost, and when some have to wait for a CPU.
+    title : str
+        What the actors' names begin with; "" leaves them without. Who takes over a job finds by it the
+        actors of a coordinator that hangs, and would keep their CPUs.
     """
 
-    def __init__(self, problem: Problem, islands: int, tell: Tell) -> None:
+    def __init__(self, problem: Problem, islands: int, tell: Tell, title: str = "") -> None:
         self._problem = ray.put(problem)
-        self._islands, self._tell = islands, tell
+        self._islands, self._tell, self._title, self._made = islands, tell, title, 0
         self._size = 0
         # By place; with the reference that ends when the actor is prepared, or when it dies.
         self._joining: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
@@ -136,7 +140,11 @@ class Crew:
         standing_in = [STAND_IN] if now - self._sailed > STAND_IN_AFTER else []
         for place in (*range(self._size), *standing_in):
             if place not in self._members and place not in self._joining:
-                actor = _ACTOR.options(num_cpus=0 if place == STAND_IN else 1).remote(self._problem)
+                self._made += 1
+                actor = _ACTOR.options(
+                    name=f"{self._title}.{self._made}" if self._title else None,
+                    num_cpus=0 if place == STAND_IN else 1,
+                ).remote(self._problem)
                 self._joining[place] = (actor, actor.prepare.remote())
         self._tell_of_waiting(now)
 

@@ -9,8 +9,9 @@ from ray.exceptions import RayError, RayTaskError
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import Caches, Epoch, Stop, Tell
 from islands.evolution.problem import Problem
-from islands_service.runtime.cluster import LOST, ClusterError
+from islands_service.runtime.cluster import LOST
 from islands_service.runtime.crew import Crew
+from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.itinerary import Itinerary, Leg
 from islands_service.runtime.report import PackedIslands, Report, report_of
 
@@ -28,17 +29,19 @@ class RayEngine:
     ----------
     tell : callable
         Takes a line for the user when an actor is lost, or has to wait for a CPU.
+    title : str
+        What the names of the actors begin with: ``<job>.<lease epoch>``.
     """
 
-    def __init__(self, tell: Tell = lambda _line: None) -> None:
-        self._tell = tell
+    def __init__(self, tell: Tell = lambda _line: None, title: str = "") -> None:
+        self._tell, self._title = tell, title
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
         """See `islands.evolution.engine.Engine`."""
         itinerary = Itinerary(problem, start, report_of)
         if itinerary.finished:
             return
-        crew = Crew(problem, len(start.islands), self._tell)
+        crew = Crew(problem, len(start.islands), self._tell, self._title)
         try:
             yield from _carried_out(itinerary, crew, stop)
         except RayError as error:

@@ -14,12 +14,12 @@ class now(FunctionElement[float]):  # noqa: N801 - a function of SQL
     inherit_cache = True
 
 
-@compiles(now, "sqlite")  # type: ignore[no-untyped-call, untyped-decorator]
+@compiles(now, "sqlite")
 def _sqlite(_element: now, _compiler: Any, **_: Any) -> str:
     return "((julianday('now') - 2440587.5) * 86400.0)"
 
 
-@compiles(now, "postgresql")  # type: ignore[no-untyped-call, untyped-decorator]
+@compiles(now, "postgresql")
 def _postgresql(_element: now, _compiler: Any, **_: Any) -> str:
     # Not SQL's own now(), which stands still in a transaction: a group of commits may take a while.
     return "EXTRACT(EPOCH FROM clock_timestamp())::float8"

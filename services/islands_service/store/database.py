@@ -10,34 +10,28 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, TypeVar
 
-from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy import Connection
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from islands.errors import IslandsError
+from islands_service.store.connections import engine_of
 
 T = TypeVar("T")
 
 #: The most operations of one transaction.
 GROUP = 64
 
-#: Seconds that SQLite waits for another process's transaction.
-PATIENCE = 30.0
-
-#: What a connection to SQLite is told: an acknowledged write is on the disk, and readers do not wait.
-_PRAGMAS = (
-    "journal_mode=WAL",
-    "synchronous=FULL",
-    f"busy_timeout={int(1000 * PATIENCE)}",
-    "foreign_keys=ON",
-)
-
-#: PostgreSQL's states for a full disk, and beginnings of those for a database that is going or gone.
+#: PostgreSQL's states for a full disk, and beginnings of those for a database that is going, gone, or not to
+#: be written any more, since another one has taken its place.
 _FULL_STATES = ("53100",)
-_GONE_STATES = ("08", "57P")
+_GONE_STATES = ("08", "57P", "25006")
+
+#: PostgreSQL's states for a transaction that gave way to another one.
+_COLLISION_STATES = ("40001", "40P01")
 
 
 class StoreError(IslandsError):
@@ -46,6 +40,10 @@ class StoreError(IslandsError):
 
 class StoreUnavailable(StoreError):
     """The database does not answer. Nothing was written; try again."""
+
+
+class StoreCollision(StoreUnavailable):
+    """Two transactions waited for each other, and this one gave way. Nothing was written; try again."""
 
 
 class StoreFull(StoreError):
@@ -62,17 +60,21 @@ class Database:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.engine = _engine(url)
+        self.engine = engine_of(url)
         self._writing = self.engine.execution_options(writes=True)
         self._waiting: SimpleQueue[tuple[Callable[[Connection], Any], Future[Any]] | None] = SimpleQueue()
         self._writer: Thread | None = None
+        self._closed = False
+        # One of those who come first starts the writer, and nobody comes behind the end.
+        self._lock = Lock()
 
     def close(self) -> None:
         """Write what is waiting, and let go of the database."""
-        if self._writer is not None:
+        with self._lock:
+            self._closed, writer = True, self._writer
             self._waiting.put(None)
-            self._writer.join()
-            self._writer = None
+        if writer is not None:
+            writer.join()
         self.engine.dispose()
 
     @contextmanager
@@ -82,7 +84,10 @@ class Database:
         Raises
         ------
         StoreUnavailable, StoreFull
+        StoreError
+            It is closed.
         """
+        self._refuse_closed()
         with told(), self.engine.begin() as connection:
             yield connection
 
@@ -95,12 +100,16 @@ class Database:
         ------
         StoreUnavailable, StoreFull
             Nothing was written.
+        StoreError
+            It is closed.
         """
-        if self._writer is None:
-            self._writer = Thread(target=self._write_groups, name="store writer", daemon=True)
-            self._writer.start()
         done: Future[T] = Future()
-        self._waiting.put((operation, done))
+        with self._lock:
+            self._refuse_closed()
+            if self._writer is None:
+                self._writer = Thread(target=self._write_groups, name="store writer", daemon=True)
+                self._writer.start()
+            self._waiting.put((operation, done))
         return done.result()
 
     @contextmanager
@@ -108,6 +117,10 @@ class Database:
         """Open a transaction that writes, outside of any group: for migrations."""
         with told(), self._writing.begin() as connection:
             yield connection
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StoreError("the store is closed: open it again")
 
     def _write_groups(self) -> None:
         while (first := self._waiting.get()) is not None:
@@ -125,7 +138,9 @@ class Database:
             if last:
                 return
 
-    def _write_group(self, group: list[tuple[Callable[[Connection], Any], Future[Any]]]) -> None:
+    def _write_group(
+        self, group: list[tuple[Callable[[Connection], Any], Future[Any]]], tries: int = 5
+    ) -> None:
         answers: list[tuple[Future[Any], Any, Exception | None]] = []
         try:
             with told(), self._writing.begin() as connection:
@@ -144,6 +159,13 @@ class Database:
                         answers.append((done, None, error))
                     else:
                         answers.append((done, value, None))
+        except StoreCollision as error:
+            if tries > 1:
+                # One by one they hold less at a time that others wait for.
+                for each in group:
+                    self._write_group([each], tries - 1)
+                return
+            answers = [(done, None, error) for _, done in group]
         except Exception as error:
             answers = [(done, None, error) for _, done in group]
         for done, value, failure in answers:
@@ -174,9 +196,12 @@ def _trouble(error: DBAPIError) -> StoreError | None:
     text = str(cause)
     if state in _FULL_STATES or (isinstance(cause, sqlite3.Error) and _is_full(cause)):
         return StoreFull(f"the disk of the database is full ({text}): nothing was written; make room")
+    if state in _COLLISION_STATES:
+        return StoreCollision(f"the database is used by others ({text}): nothing was written; try again")
     if error.connection_invalidated or state.startswith(_GONE_STATES):
         return StoreUnavailable(f"the database does not answer ({text}): nothing was written; try again")
-    if isinstance(error, OperationalError):
+    # SQLite calls a statement that is wrong in itself operational, too: that one alone fails.
+    if isinstance(error, OperationalError) and getattr(cause, "sqlite_errorname", "") != "SQLITE_ERROR":
         return StoreUnavailable(f"the database cannot be used now ({text}): nothing was written; try again")
     return None
 
@@ -189,25 +214,3 @@ def _is_full(error: sqlite3.Error) -> bool:
         "SQLITE_IOERR_SHMSIZE",
         "SQLITE_IOERR_FSYNC",
     )
-
-
-def _engine(url: str) -> Engine:
-    if not url.startswith("sqlite"):
-        return create_engine(url, pool_size=10, max_overflow=10, pool_pre_ping=True, pool_timeout=PATIENCE)
-    engine = create_engine(
-        url, connect_args={"timeout": PATIENCE, "check_same_thread": False}, pool_size=10, max_overflow=40
-    )
-
-    @event.listens_for(engine, "connect")
-    def _connected(connection: Any, _record: Any) -> None:
-        connection.isolation_level = None  # we say ourselves when a transaction begins
-        for pragma in _PRAGMAS:
-            connection.execute(f"PRAGMA {pragma}")
-
-    @event.listens_for(engine, "begin")
-    def _begun(connection: Connection) -> None:
-        # Who will write says so at once: a reader that turns writer may find that it has read too early.
-        writes = connection.get_execution_options().get("writes", False)
-        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
-
-    return engine

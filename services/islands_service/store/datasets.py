@@ -9,6 +9,7 @@ from sqlalchemy import Connection, Row, delete, func, insert, select, tuple_
 
 from islands.errors import IslandsError
 from islands_service.jobs import ACTIVE, QuotaExceeded
+from islands_service.store import locks
 from islands_service.store.clock import now
 from islands_service.store.database import Database
 from islands_service.store.tables import datasets, jobs
@@ -79,12 +80,14 @@ class Datasets:
         identity = dataset_id(blob, suffix)
 
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
+            locks.counting(connection, owner)
             before = connection.execute(_one(owner, identity)).one_or_none()
             if before is not None:
                 return _dataset_of(before), False
             used = connection.execute(
                 select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
             ).scalar_one()
+            used = int(used)  # PostgreSQL adds integers up to a decimal number
             if most_bytes is not None and used + size > most_bytes:
                 raise QuotaExceeded(
                     f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "

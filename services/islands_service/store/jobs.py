@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
@@ -22,6 +22,7 @@ from islands_service.jobs import (
     Submission,
     WrongState,
 )
+from islands_service.store import locks
 from islands_service.store.clock import now
 from islands_service.store.database import Database
 from islands_service.store.tables import events, jobs
@@ -36,6 +37,30 @@ class Page:
 
     jobs: tuple[Job, ...]
     after: tuple[float, str] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How all jobs stand.
+
+    Attributes
+    ----------
+    counts : mapping
+        Jobs by state.
+    oldest : float
+        Seconds that the one that waits longest has waited.
+    running : mapping
+        The progress of those under a lease that has not expired, by job.
+    """
+
+    counts: Mapping[JobState, int]
+    oldest: float
+    running: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def leases(self) -> int:
+        """How many jobs somebody works on."""
+        return len(self.running)
 
 
 class Jobs:
@@ -64,6 +89,7 @@ class Jobs:
         asked = hashlib.sha256(submission.request.encode()).hexdigest()
 
         def operation(connection: Connection) -> tuple[Job, bool]:
+            locks.counting(connection, submission.owner)
             if submission.idempotency_key is not None:
                 before = connection.execute(
                     select(jobs).where(
@@ -227,11 +253,22 @@ class Jobs:
                 Event(row.job_id, row.number, row.kind, json.loads(row.data), row.at) for row in rows
             )
 
-    def counts(self) -> dict[str, int]:
-        """Return how many jobs there are in every state, of all owners."""
+    def standing(self) -> Standing:
+        """Return how all owners' jobs stand."""
+        counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
+        waits = select(func.coalesce(now() - func.min(jobs.c.created), 0.0)).where(
+            jobs.c.state == JobState.QUEUED
+        )
+        running = select(jobs.c.id, jobs.c.progress).where(
+            jobs.c.state == JobState.RUNNING, jobs.c.lease_until > now()
+        )
         with self._database.read() as connection:
-            found = connection.execute(select(jobs.c.state, func.count()).group_by(jobs.c.state)).all()
-        return {state: dict(map(tuple, found)).get(state, 0) for state in JobState}
+            counts = {row[0]: row[1] for row in connection.execute(counted)}
+            return Standing(
+                {state: counts.get(state, 0) for state in JobState},
+                connection.execute(waits).scalar_one(),
+                {row.id: _read(row.progress) or {} for row in connection.execute(running)},
+            )
 
 
 def change(connection: Connection, job: str, **values: Any) -> Row[Any]:

@@ -8,13 +8,13 @@ and wakes up, does no harm.
 import json
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, delete, func, insert, or_, select, update
+from sqlalchemy import Connection, Row, and_, case, delete, func, insert, or_, select, update
 
 from islands_service.jobs import Job, JobState, Lease, LeaseLost, Outcome, Report
 from islands_service.store.clock import now
 from islands_service.store.database import Database
 from islands_service.store.jobs import change, job_of, record
-from islands_service.store.tables import events, jobs, models, points, results
+from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
 #: Attempts that may fail to bring a job on, one after the other, before it is given up.
 ATTEMPTS = 5
@@ -83,8 +83,15 @@ class Leases:
         """
         return self._database.write(lambda connection: _report(connection, lease, report))
 
-    def release(self, lease: Lease) -> None:
+    def release(self, lease: Lease, attempted: bool = False) -> None:
         """Give a job back to the queue: it goes on from its checkpoint, and this was no attempt.
+
+        One that is to be cancelled is cancelled instead: nobody has it any more.
+
+        Parameters
+        ----------
+        attempted : bool
+            It was one: something failed that may fail again.
 
         Raises
         ------
@@ -95,14 +102,13 @@ class Leases:
             row = _fenced(
                 connection,
                 lease,
-                state=JobState.QUEUED,
+                state=case((jobs.c.cancel_requested, JobState.CANCELLED), else_=JobState.QUEUED),
+                finished=case((jobs.c.cancel_requested, now())),
                 lease_owner=None,
-                attempt=jobs.c.attempt - 1,
-                stalled=func.max(jobs.c.stalled - 1, 0)
-                if connection.dialect.name == "sqlite"
-                else func.greatest(jobs.c.stalled - 1, 0),
+                attempt=jobs.c.attempt - int(not attempted),
+                stalled=case((jobs.c.stalled > 0, jobs.c.stalled - int(not attempted)), else_=0),
             )
-            record(connection, row, "queued")
+            record(connection, row, row.state)
 
         self._database.write(operation)
 
@@ -127,7 +133,8 @@ class Leases:
                 problem=_text(outcome.problem),
             )
             if outcome.document is not None:
-                for table in (results, models):
+                # Figures, too, are of the result before.
+                for table in (results, models, artefacts):
                     connection.execute(delete(table).where(table.c.job_id == row.id))
                 connection.execute(insert(results).values(job_id=row.id, document=_text(outcome.document)))
                 for rank, (document, file) in enumerate(outcome.models, start=1):
@@ -144,16 +151,19 @@ def _claim(connection: Connection, owner: str, seconds: float) -> Lease | None:
         and_(jobs.c.state == JobState.RUNNING, or_(jobs.c.lease_until < now(), jobs.c.lease_owner == owner)),
     )
     first = (
-        select(jobs.c.id)
+        select(jobs.c.id, jobs.c.stalled, jobs.c.cancel_requested)
         .where(takes)
         .order_by(jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
         .limit(1)
         .with_for_update(skip_locked=True)
     )
-    while (found := connection.execute(first).scalar()) is not None:
+    while (found := connection.execute(first).one_or_none()) is not None:
+        if found.stalled >= ATTEMPTS:
+            _give_up(connection, found.id, found.cancel_requested)
+            continue
         row = change(
             connection,
-            found,
+            found.id,
             state=JobState.RUNNING,
             lease_owner=owner,
             lease_epoch=jobs.c.lease_epoch + 1,
@@ -162,15 +172,22 @@ def _claim(connection: Connection, owner: str, seconds: float) -> Lease | None:
             stalled=jobs.c.stalled + 1,
             started=func.coalesce(jobs.c.started, now()),
         )
-        if row.stalled <= ATTEMPTS:
-            record(connection, row, "running", json.dumps({"attempt": row.attempt}))
-            return Lease(job_of(row), row.lease_epoch)
-        given_up = json.dumps(GIVEN_UP)
-        row = change(
-            connection, found, state=JobState.FAILED, lease_owner=None, finished=now(), problem=given_up
-        )
-        record(connection, row, "failed", given_up)
+        record(connection, row, "running", json.dumps({"attempt": row.attempt}))
+        return Lease(job_of(row), row.lease_epoch)
     return None
+
+
+def _give_up(connection: Connection, job: str, cancelled: bool) -> None:
+    """End a job that nobody could bring on; one that was to be cancelled is cancelled."""
+    row = change(
+        connection,
+        job,
+        state=JobState.CANCELLED if cancelled else JobState.FAILED,
+        lease_owner=None,
+        finished=now(),
+        problem=None if cancelled else _text(GIVEN_UP),
+    )
+    record(connection, row, row.state, row.problem or "{}")
 
 
 def _report(connection: Connection, lease: Lease, report: Report) -> Job:
@@ -180,8 +197,8 @@ def _report(connection: Connection, lease: Lease, report: Report) -> Job:
     row = _fenced(connection, lease, **values)
     if report.points:
         # After a crash the same generations come once more, and are the same.
-        first = report.points[0][0]
-        connection.execute(delete(points).where(points.c.job_id == row.id, points.c.generation >= first))
+        behind = points.c.generation > report.after
+        connection.execute(delete(points).where(points.c.job_id == row.id, behind))
         connection.execute(
             insert(points),
             [

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection, delete, insert, select
+from sqlalchemy.exc import IntegrityError
 
+from islands_service.jobs import NoSuchJob
 from islands_service.store.database import Database
 from islands_service.store.tables import artefacts, models, points, results
 
@@ -68,13 +70,22 @@ class Results:
             return connection.execute(query).scalar()
 
     def keep(self, job: str, blobs: Mapping[str, str]) -> None:
-        """Keep what was made of a result, by name: blobs."""
+        """Keep what was made of a result, by name: blobs.
+
+        Raises
+        ------
+        NoSuchJob
+            It was deleted meanwhile.
+        """
 
         def operation(connection: Connection) -> None:
             connection.execute(
                 delete(artefacts).where(artefacts.c.job_id == job, artefacts.c.name.in_(blobs))
             )
-            for name, blob in blobs.items():
-                connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
+            try:
+                for name, blob in blobs.items():
+                    connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
+            except IntegrityError as error:
+                raise NoSuchJob(f"there is no job {job!r} any more") from error
 
         self._database.write(operation)

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, inspect, text
 
+from islands_service.store import locks
 from islands_service.store.database import Database, StoreError
 
 if TYPE_CHECKING:
@@ -12,9 +13,6 @@ if TYPE_CHECKING:
 #: The revision that the code is written for. Alembic takes a quarter of a second to import, and a database
 #: that has this revision needs none of it. A test holds it against the migrations.
 HEAD = "0001"
-
-#: Of the advisory lock that lets one process at a time migrate a PostgreSQL.
-_LOCK = 7_241_563
 
 
 def prepare(database: Database) -> None:
@@ -31,8 +29,7 @@ def prepare(database: Database) -> None:
         if revision(connection) == HEAD:
             return
     with database.alone() as connection:
-        if connection.dialect.name == "postgresql":
-            connection.execute(text(f"SELECT pg_advisory_xact_lock({_LOCK})"))
+        locks.migrating(connection)
         upgrade(connection)
 
 

@@ -36,7 +36,11 @@ class Store:
 
     def __init__(self, url: str) -> None:
         self.database = Database(url)
-        prepare(self.database)
+        try:
+            prepare(self.database)
+        except BaseException:
+            self.database.close()
+            raise
         self.jobs = Jobs(self.database)
         self.leases = Leases(self.database)
         self.results = Results(self.database)

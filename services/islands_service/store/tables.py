@@ -62,7 +62,7 @@ jobs = Table(
     UniqueConstraint("owner", "idempotency_key"),
     Index(None, "state", "priority", "created"),
     Index(None, "owner", "created", "id"),
-    Index(None, "owner", "state"),
+    Index(None, "owner", "state", "created", "id"),
 )
 
 #: Numbered by the job's version: without gaps, and in the order in which they were committed.

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from islands.benchmark.compiler import compiled
 from islands.benchmark.infix import infix
 from islands.data.dataset import Dataset
+from islands.io.export.c import definition
+from islands.model.primitives import SIGN
 from islands.model.regressor import Regressor
 
 #: Intervals in a row.
@@ -31,8 +33,7 @@ _TEMPLATE = """\
 #include <string.h>
 enum {{ LANES = {lanes}, WARM_UP = {warm_up}, STEPS = {steps} }};
 
-static inline double sign(double value) {{ return (double)(value > 0.0) - (double)(value < 0.0); }}
-
+{sign}
 /* Rows [block][time][lane] of the input and of the measured output; y holds the rows of one block. */
 void simulate(const double *restrict input, const double *restrict measured, long blocks,
               const double *restrict theta, double *restrict y, double *restrict squared)
@@ -99,6 +100,7 @@ def source_of(regressors: Sequence[Regressor], warm_up: int, interval: int) -> s
         lanes=LANES,
         warm_up=warm_up,
         steps=interval,
+        sign=definition(SIGN, SIGN.name),
         weights="\n    ".join(weights),
         terms="\n                ".join(terms),
     )

@@ -1,11 +1,11 @@
-"""Expressions as infix text that Python and C read alike: what the yardsticks are compiled from."""
+"""Expressions as the yardsticks read them: the infix text of exported programs, with a sign alone."""
 
 from collections.abc import Callable
 
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Expression, Lagged
-
-_OPERATORS = {"mul": "*", "add": "+", "sub": "-"}
+from islands.io.export.infix import infix as exported
+from islands.model.expression import Expression, Primitive
+from islands.model.primitives import SIGN
 
 
 def infix(expression: Expression, signal: Callable[[int, int], str]) -> str:
@@ -23,14 +23,12 @@ def infix(expression: Expression, signal: Callable[[int, int], str]) -> str:
     ModelError
         It has a function other than products, sums, differences and signs.
     """
-    match expression:
-        case Lagged(channel, lag):
-            return signal(channel, lag)
-        case Constant(number):
-            return f"({number!r})"
-        case Apply(primitive, arguments) if primitive.name in _OPERATORS:
-            # Operators of one kind are carried out from the left in both languages, as in `value`.
-            return "(" + _OPERATORS[primitive.name].join(infix(part, signal) for part in arguments) + ")"
-        case Apply(primitive, (argument,)) if primitive.name == "sign":
-            return f"sign({infix(argument, signal)})"
-    raise ModelError(f"the benchmark measures products, sums, differences and signs, got {expression!r}")
+    return exported(expression, signal, _sign)
+
+
+def _sign(primitive: Primitive) -> str:
+    if primitive != SIGN:
+        raise ModelError(
+            f"the benchmark measures products, sums, differences and signs, got {primitive.name!r}"
+        )
+    return primitive.name

@@ -23,6 +23,8 @@ class State:
     outcomes : mapping
         Number of individuals by outcome.
     history : tuple of Progress
+        The first and the last point of every stretch in which nothing got better: a thousand islands go on
+        for a hundred thousand generations.
     caches : mapping
         Bytes that every cache takes, and its limit.
     """
@@ -48,8 +50,15 @@ def after(state: State, epoch: Epoch) -> State:
             for size, fitness in info.best.items():
                 best[size] = min(fitness, best.get(size, inf))
         least = tuple(min(info.best.values(), default=inf) for info in generation)
-        history.append(Progress(generation[0].generation, evaluations, dict(sorted(best.items())), least))
+        point = Progress(generation[0].generation, evaluations, dict(sorted(best.items())), least)
+        if all(_alike(point, before) for before in history[-2:]) and len(history) > 1:
+            history.pop()
+        history.append(point)
     return State(epoch.archipelago, evaluations, duplicates, dict(outcomes), tuple(history), epoch.caches)
+
+
+def _alike(one: Progress, other: Progress) -> bool:
+    return one.best == other.best and one.islands == other.islands
 
 
 def ended(state: State, settings: Settings) -> str:

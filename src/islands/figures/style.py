@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import IO, Any
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -100,15 +100,15 @@ def label(name: str, unit: str) -> str:
     return f"{name} ({unit})".lstrip()
 
 
-def save(figure: Figure, path: str | Path) -> None:
+def save(figure: Figure, path: str | Path | IO[bytes]) -> None:
     """Write a figure as SVG; the same content gives the same bytes.
 
     Parameters
     ----------
     figure : Figure
         Made by one of the house's functions.
-    path : str or Path
-        The file; its folder exists.
+    path : str, Path or stream
+        The file, whose folder exists, or where else its bytes go.
     """
     with house_style():
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "islands"})

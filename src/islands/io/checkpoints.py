@@ -28,23 +28,25 @@ HALL_SCHEMA = "islands.hall/1"
 
 def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, Any]) -> None:
     """Write an archipelago, and what it belongs to, in place of the file that is there."""
-    document = {
-        "schema": SCHEMA,
-        "about": dict(about),
-        "islands": [_island(island) for island in archipelago.islands],
-    }
-    _write(document, path)
+    _write(checkpoint_text(archipelago, about), path)
+
+
+def checkpoint_text(archipelago: Archipelago, about: Mapping[str, Any]) -> str:
+    """Return a checkpoint as text."""
+    islands = [_island(island) for island in archipelago.islands]
+    return json.dumps({"schema": SCHEMA, "about": dict(about), "islands": islands})
 
 
 def write_hall(hall: HallOfFame, path: Path) -> None:
     """Write a hall of fame: the same bytes wherever and however it was found."""
-    _write({"schema": HALL_SCHEMA, "hall": [_individual(each) for each in hall.entries]}, path)
+    hall_of_fame = [_individual(each) for each in hall.entries]
+    _write(json.dumps({"schema": HALL_SCHEMA, "hall": hall_of_fame}), path)
 
 
-def _write(document: Mapping[str, Any], path: Path) -> None:
+def _write(text: str, path: Path) -> None:
     beside = path.with_suffix(".part")
     with beside.open("w", encoding="utf-8") as stream:
-        json.dump(document, stream)
+        stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
     beside.replace(path)
@@ -61,18 +63,35 @@ def read_checkpoint(
         There is no checkpoint, or it is damaged or of another version.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
         raise ModelError(f"cannot read the checkpoint {path}: {error}") from error
+    return archipelago_of(text, str(path), primitives)
+
+
+def archipelago_of(
+    text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> tuple[Archipelago, dict[str, Any]]:
+    """Make an archipelago of a checkpoint's text, which messages call by a name.
+
+    Raises
+    ------
+    ModelError
+        It is damaged or of another version.
+    """
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ModelError(f"cannot read the checkpoint {name}: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA:
-        raise ModelError(f"{path} is no checkpoint of schema {SCHEMA}")
+        raise ModelError(f"{name} is no checkpoint of schema {SCHEMA}")
     try:
         islands = tuple(_read_island(island, primitives) for island in document["islands"])
         if len({island.generation for island in islands}) != 1:
             raise ModelError("its islands are not at one generation")
         return Archipelago(islands), dict(document["about"])
     except (KeyError, TypeError, ValueError, AttributeError, ModelError) as error:
-        raise ModelError(f"the checkpoint {path} is damaged: {error!r}") from error
+        raise ModelError(f"the checkpoint {name} is damaged: {error!r}") from error
 
 
 def _island(island: Island) -> dict[str, Any]:

@@ -22,7 +22,12 @@ SCHEMA = "islands.result/1"
 
 
 def result_json(findings: Findings) -> str:
-    """Write ``result.json``; numbers that JSON does not know (NaN, infinity) become null."""
+    """Write ``result.json``."""
+    return json.dumps(result_document(findings), indent=2, allow_nan=False) + "\n"
+
+
+def result_document(findings: Findings) -> dict[str, Any]:
+    """Describe a result; numbers that JSON does not know (NaN, infinity) become null."""
     search = findings.search
     document = {
         "schema": SCHEMA,
@@ -45,7 +50,8 @@ def result_json(findings: Findings) -> str:
         },
         "models": [_model_document(rank, entry) for rank, entry in enumerate(findings.models, start=1)],
     }
-    return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
+    described: dict[str, Any] = _finite(document)
+    return described
 
 
 def record_document(record: Dataset) -> dict[str, Any]:

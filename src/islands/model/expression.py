@@ -29,6 +29,9 @@ class Primitive:
         the functions of ``math``, so that it also compiles.
     latex : str
         Format with ``{0}`` and ``{1}`` for the arguments.
+    c, matlab : str
+        Body of a function of ``a`` (and ``b``): ``return a > b ? a : b;``, with the functions of math.h, and
+        in MATLAB ``r = max(a, b);``. Empty: a model with the primitive can't be exported there.
     parity : -1, 0 or 1
         1: f(-x) = f(x). -1: f(-x) = -f(x). 0: neither. Unary primitives alone.
     degree : float or None
@@ -43,6 +46,8 @@ class Primitive:
     arity: int = field(compare=False)
     scalar: Callable[..., float] = field(compare=False)
     latex: str = field(compare=False)
+    c: str = field(default="", compare=False)
+    matlab: str = field(default="", compare=False)
     parity: int = field(default=0, compare=False)
     degree: float | None = field(default=None, compare=False)
     commutative: bool = field(default=False, compare=False)

@@ -13,12 +13,10 @@ from types import MappingProxyType
 
 from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Expression, Primitive
+from islands.model.protection import check
 
 #: Names that stand for signals, time and back-shifts in text.
 SIGNALS = re.compile(r"y|u\d*|k|q\d+")
-
-#: Arguments on which a new primitive has to be finite and keep what it declares.
-_PROBES = (0.0, 1.0, -1.0, 0.3, -0.7, 2.5, -41.0, 1e3, -1e3, 1e-12, 1e6)
 
 #: Below this a divisor or a logarithm's argument counts as zero.
 TINY = 1e-9
@@ -95,6 +93,8 @@ def _smaller(a: float, b: float) -> float:
     return a if a < b else b
 
 
+# Operators of every language need no function in C and MATLAB, nor does what is written as an operator in
+# canonical form (phi1, square) or in other primitives (phi2).
 MUL = Primitive("mul", 2, _multiply, r"{0} {1}", commutative=True)
 ADD = Primitive("add", 2, _add, r"{0} + {1}", commutative=True)
 SUB = Primitive("sub", 2, _subtract, r"{0} - {1}")
@@ -105,7 +105,15 @@ def _sign_of_sign(a: Expression) -> Expression | None:
 
 
 SIGN = Primitive(
-    "sign", 1, _sign, r"\operatorname{{sign}}({0})", parity=-1, degree=0.0, simplify=_sign_of_sign
+    "sign",
+    1,
+    _sign,
+    r"\operatorname{{sign}}({0})",
+    c="return (double)(a > 0.0) - (double)(a < 0.0);",
+    matlab="r = (a > 0) - (a < 0);",
+    parity=-1,
+    degree=0.0,
+    simplify=_sign_of_sign,
 )
 
 
@@ -150,25 +158,83 @@ _BUILT_IN = (
         simplify=_sign_of_a_difference,
     ),
     ADD,
-    Primitive("div", 2, _divide, r"\frac{{{0}}}{{{1}}}", simplify=_simpler_quotient),
-    Primitive("abs", 1, _absolute, r"\left|{0}\right|", parity=1, degree=1.0),
+    Primitive(
+        "div",
+        2,
+        _divide,
+        r"\frac{{{0}}}{{{1}}}",
+        c=f"return fabs(b) < {TINY} ? 1.0 : a / b;",
+        matlab=f"if abs(b) < {TINY}, r = 1; else, r = a / b; end",
+        simplify=_simpler_quotient,
+    ),
+    Primitive(
+        "abs", 1, _absolute, r"\left|{0}\right|", "return fabs(a);", "r = abs(a);", parity=1, degree=1.0
+    ),
     Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=_second_power),
     Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=_third_power),
-    Primitive("sqrt", 1, _root, r"\sqrt{{\left|{0}\right|}}", parity=1, degree=0.5),
-    Primitive("exp", 1, _exponential, r"\exp({0})"),
-    Primitive("log", 1, _logarithm, r"\ln\left|{0}\right|", parity=1),
-    Primitive("sin", 1, _sine, r"\sin({0})", parity=-1),
-    Primitive("cos", 1, _cosine, r"\cos({0})", parity=1),
-    Primitive("tanh", 1, _hyperbolic_tangent, r"\tanh({0})", parity=-1),
-    Primitive("max", 2, _larger, r"\max({0}, {1})", commutative=True, simplify=_one_of_equals),
-    Primitive("min", 2, _smaller, r"\min({0}, {1})", commutative=True, simplify=_one_of_equals),
+    Primitive(
+        "sqrt",
+        1,
+        _root,
+        r"\sqrt{{\left|{0}\right|}}",
+        c="return sqrt(fabs(a));",
+        matlab="r = sqrt(abs(a));",
+        parity=1,
+        degree=0.5,
+    ),
+    Primitive(
+        "exp",
+        1,
+        _exponential,
+        r"\exp({0})",
+        c=f"return exp(a > {LARGEST_EXPONENT} ? {LARGEST_EXPONENT} : a);",
+        matlab=f"r = exp(min(a, {LARGEST_EXPONENT}));",
+    ),
+    Primitive(
+        "log",
+        1,
+        _logarithm,
+        r"\ln\left|{0}\right|",
+        c=f"return fabs(a) < {TINY} ? 0.0 : log(fabs(a));",
+        matlab=f"if abs(a) < {TINY}, r = 0; else, r = log(abs(a)); end",
+        parity=1,
+    ),
+    Primitive("sin", 1, _sine, r"\sin({0})", "return sin(a);", "r = sin(a);", parity=-1),
+    Primitive("cos", 1, _cosine, r"\cos({0})", "return cos(a);", "r = cos(a);", parity=1),
+    Primitive("tanh", 1, _hyperbolic_tangent, r"\tanh({0})", "return tanh(a);", "r = tanh(a);", parity=-1),
+    Primitive(
+        "max",
+        2,
+        _larger,
+        r"\max({0}, {1})",
+        c="return a > b ? a : b;",
+        matlab="if a > b, r = a; else, r = b; end",
+        commutative=True,
+        simplify=_one_of_equals,
+    ),
+    Primitive(
+        "min",
+        2,
+        _smaller,
+        r"\min({0}, {1})",
+        c="return a < b ? a : b;",
+        matlab="if a < b, r = a; else, r = b; end",
+        commutative=True,
+        simplify=_one_of_equals,
+    ),
 )
 
 PRIMITIVES: Mapping[str, Primitive] = MappingProxyType({entry.name: entry for entry in _BUILT_IN})
 
 
 def primitive(
-    name: str, scalar: Callable[..., float], latex: str = "", parity: int = 0, commutative: bool = False
+    name: str,
+    scalar: Callable[..., float],
+    latex: str = "",
+    parity: int = 0,
+    commutative: bool = False,
+    c: str = "",
+    matlab: str = "",
 ) -> Primitive:
     """Make a primitive of the user's own from a plain scalar function, and check what it declares.
 
@@ -184,6 +250,8 @@ def primitive(
         As in `Primitive`.
     commutative : bool
         As in `Primitive`.
+    c, matlab : str
+        As in `Primitive`: needed by whoever exports models as C or as MATLAB.
 
     Raises
     ------
@@ -205,6 +273,8 @@ def primitive(
         arity,
         scalar,
         latex or rf"\operatorname{{{{{upright}}}}}(" + ", ".join(f"{{{i}}}" for i in range(arity)) + ")",
+        c=c,
+        matlab=matlab,
         parity=parity,
         commutative=commutative,
     )
@@ -219,52 +289,3 @@ def _arity(name: str, scalar: Callable[..., float]) -> int:
         raise ModelError(
             f"primitive {name!r} does not tell its arguments: wrap it in a function of one or two"
         ) from error
-
-
-def check(entry: Primitive) -> None:
-    """Verify that a primitive is finite everywhere and keeps the parity, degree and symmetry it declares.
-
-    Raises
-    ------
-    ModelError
-        It does not: the message names the argument. Or its LaTeX is no format of its arguments.
-    """
-    if entry.arity == 2 and (entry.parity or entry.degree is not None):
-        raise ModelError(f"primitive {entry.name!r} has two arguments: parity and degree are for one")
-    try:
-        entry.latex.format(*"ab"[: entry.arity])
-    except (LookupError, ValueError) as error:
-        raise ModelError(
-            f"the LaTeX of primitive {entry.name!r} is no format of {{0}}: double every other brace"
-        ) from error
-    probes = [(a,) for a in _PROBES] if entry.arity == 1 else [(a, b) for a in _PROBES for b in _PROBES]
-    for arguments in probes:
-        result = _finite(entry, arguments)
-        if entry.parity and not _close(result * entry.parity, _finite(entry, tuple(-a for a in arguments))):
-            raise ModelError(
-                f"primitive {entry.name!r} declares parity {entry.parity}, not so at {arguments}"
-            )
-        if entry.commutative and result != _finite(entry, arguments[::-1]):
-            raise ModelError(f"primitive {entry.name!r} declares that it commutes, not so at {arguments}")
-        if entry.degree is not None:
-            scaled = _finite(entry, tuple(3.0 * a for a in arguments))
-            if not _close(scaled, 3.0**entry.degree * result):
-                raise ModelError(
-                    f"primitive {entry.name!r} declares degree {entry.degree}, not so at {arguments}"
-                )
-
-
-def _finite(entry: Primitive, arguments: tuple[float, ...]) -> float:
-    try:
-        result = float(entry.scalar(*arguments))
-    except (ArithmeticError, ValueError, TypeError) as error:
-        raise ModelError(
-            f"primitive {entry.name!r} fails at {arguments} ({error}): protect it there"
-        ) from error
-    if not math.isfinite(result):
-        raise ModelError(f"primitive {entry.name!r} is {result} at {arguments}: protect it there")
-    return result
-
-
-def _close(a: float, b: float) -> bool:
-    return math.isclose(a, b, rel_tol=1e-12, abs_tol=1e-300)

@@ -1,4 +1,4 @@
-"""Expressions as text: plain text that `islands.model.parsing` reads back, and LaTeX.
+"""Expressions as text: plain text that `islands.model.parsing` reads back, LaTeX and MathML.
 
 Plain text is ``u(k-1)*sign(u(k-1) - u(k-2))``: infix ``+ - * / ^`` and the primitives by name, with the
 leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. where there are several inputs) and back-shifts
@@ -6,6 +6,7 @@ leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. where there are sever
 """
 
 from collections.abc import Iterator, Sequence
+from html import escape
 from itertools import groupby
 
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
@@ -152,3 +153,86 @@ def latex_number(number: str) -> str:
     """Write a number in LaTeX, given as Python writes it."""
     mantissa, _, exponent = number.partition("e")
     return mantissa if not exponent else rf"{mantissa} \times 10^{{{int(exponent)}}}"
+
+
+#: U+2212 is the minus of mathematics, U+2062 a product and U+2061 a call, both without a sign.
+MINUS, TIMES, _OF = "<mo>&#x2212;</mo>", "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"
+
+_ABSOLUTE = "<mrow><mo>|</mo>{0}<mo>|</mo></mrow>"
+
+#: Functions that are not written by their name, and on which no exponent may stand.
+_MATHML = {
+    "div": "<mfrac>{0}{1}</mfrac>",
+    "log": f"<mrow><mi>ln</mi>{_OF}{_ABSOLUTE}</mrow>",
+    "sqrt": f"<msqrt>{_ABSOLUTE}</msqrt>",
+}
+
+
+def mathml(expression: Expression, inputs: int = 1) -> str:
+    """Write an expression as one element of presentation MathML, in ASCII."""
+    return _mathml(expression, inputs)[0]
+
+
+def _mathml(expression: Expression, inputs: int) -> tuple[str, int]:
+    match expression:
+        case Lagged(channel, lag):
+            name = _name(channel, inputs)
+            index = f"<mn>{name[1:]}</mn><mo>,</mo>" if len(name) > 1 else ""
+            past = f"{MINUS}<mn>{lag}</mn>" if lag else ""
+            return f"<msub><mi>{name[0]}</mi><mrow>{index}<mi>k</mi>{past}</mrow></msub>", _ATOM
+        case Constant(number):
+            return mathml_number(_digits(number)), _binding(number)
+        case Shift(samples, argument):
+            shift = f"<msup><mi>q</mi><mrow>{MINUS}<mn>{samples}</mn></mrow></msup>"
+            return f"<mrow>{shift}{TIMES}{_mathml_operand(argument, inputs, _ATOM)}</mrow>", _PRODUCT
+        case Apply(primitive, arguments) if primitive in (ADD, SUB):
+            parts = [_mathml_operand(argument, inputs, _PRODUCT) for argument in arguments]
+            return f"<mrow>{('<mo>+</mo>' if primitive == ADD else MINUS).join(parts)}</mrow>", _SUM
+        case Apply(primitive, arguments) if primitive == MUL:
+            return f"<mrow>{TIMES.join(_mathml_powers(arguments, inputs))}</mrow>", _PRODUCT
+        case Apply(primitive, arguments):
+            return _mathml_call(primitive.name, [mathml(argument, inputs) for argument in arguments]), _ATOM
+
+
+def _mathml_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
+    parts: list[str] = []
+    for factor, run in groupby(factors):
+        power = len(list(run))
+        text, own = _mathml(factor, inputs)
+        # As in LaTeX, no exponent stands on a number or a fraction, and no number behind another one.
+        tall = isinstance(factor, Apply) and factor.primitive.name in _MATHML and power > 1
+        if own < _ATOM or tall or (isinstance(factor, Constant) and (power > 1 or parts)):
+            text = _mathml_brackets(text)
+        parts.append(text if power == 1 else f"<msup>{text}<mn>{power}</mn></msup>")
+    return parts
+
+
+def _mathml_call(name: str, arguments: Sequence[str]) -> str:
+    if name == "abs":
+        return _ABSOLUTE.format(*arguments)
+    if name in _MATHML:
+        return _MATHML[name].format(*arguments)
+    safe = escape(name).encode("ascii", "xmlcharrefreplace").decode()
+    return f"<mrow><mi>{safe}</mi>{_OF}{_mathml_brackets('<mo>,</mo>'.join(arguments))}</mrow>"
+
+
+def _mathml_brackets(text: str) -> str:
+    return f"<mrow><mo>(</mo>{text}<mo>)</mo></mrow>"
+
+
+def _mathml_operand(expression: Expression, inputs: int, binding: int) -> str:
+    text, own = _mathml(expression, inputs)
+    return text if own >= binding else _mathml_brackets(text)
+
+
+def mathml_factor(expression: Expression, inputs: int) -> str:
+    """Write an expression in MathML as it stands inside a product."""
+    return _mathml_operand(expression, inputs, _PRODUCT)
+
+
+def mathml_number(number: str) -> str:
+    """Write a number in MathML, given as Python writes it."""
+    mantissa, _, exponent = number.removeprefix("-").partition("e")
+    sign = MINUS if number.startswith("-") else ""
+    power = f"<mo>&#xD7;</mo><msup><mn>10</mn>{mathml_number(str(int(exponent)))}</msup>" if exponent else ""
+    return f"<mrow>{sign}<mn>{mantissa}</mn>{power}</mrow>" if sign or power else f"<mn>{mantissa}</mn>"

@@ -16,6 +16,7 @@ from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
 from islands_api.cli.app import main
 from islands_api.cli.fit import check_folder
+from islands_service.rows import rows_of
 
 
 def record(samples=120, seed=0):
@@ -69,13 +70,13 @@ def test_inputs_are_repeated_or_separated_by_commas(texts, names):
     ],
 )
 def test_rows_are_start_and_stop(text, expected):
-    assert options.rows(text) == expected
+    assert rows_of(text) == expected
 
 
 @pytest.mark.parametrize("text", ["5", "a:b", "1:2:3", "", "1.5:3"])
 def test_other_rows_are_refused(text):
     with pytest.raises(SettingsError) as caught:
-        options.rows(text)
+        rows_of(text)
     assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
 
 

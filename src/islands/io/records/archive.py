@@ -1,116 +1,57 @@
 """NumPy archives (.npz): one array per column, and the sampling time as an array of one number."""
 
-import lzma
+import math
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.table import Columns, Rows, select
-
-#: Names, in lower case, under which an archive states its sampling, and the sampling time in seconds.
-SAMPLING: dict[str, Callable[[float], float]] = {
-    "dt": lambda seconds: seconds,
-    "ts": lambda seconds: seconds,
-    "fs": lambda hertz: 1.0 / hertz,
-}
+from islands.io.records.channels import Channels
+from islands.io.records.claims import check_samples, check_stored
 
 #: What NumPy and the standard library raise on damaged archives, and on Python objects in sound ones.
-UNREADABLE = (
-    ValueError,
-    OSError,
-    EOFError,
-    RuntimeError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-)
+UNREADABLE = (ValueError, OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
+
+#: An array's header by its version; the third is for names in Unicode, which no array of numbers has.
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Archive:
-    """A NumPy archive; an array is loaded when it is asked for.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    names : tuple of str
-        Names of the arrays.
-    stated : mapping of str to float
-        Sampling times in seconds that stand in the archive: ``{"array fs": 0.001}``.
-    """
-
-    path: Path
-    names: tuple[str, ...]
-    stated: Mapping[str, float]
-
-    def read(self, names: Sequence[str], rows: slice | None) -> Columns:
-        """Convert the named arrays over the selected rows; see `islands.io.records.table.Table`."""
-        file = self.path.name
-        channels = {name: _channel(self.path, name) for name in names}
-        first = names[0]
-        for name, channel in channels.items():
-            if len(channel) != len(channels[first]):
-                raise RecordError(
-                    f"{file}: column {first} has {len(channels[first])} samples, column {name} "
-                    f"{len(channel)}: channels of one record are of equal length"
-                )
-        chosen = select(rows, len(channels[first]), file)
-        return Columns(
-            Rows(file, "sample", chosen),
-            {name: channel[chosen.start : chosen.stop] for name, channel in channels.items()},
-            chosen.start,
-        )
-
-
-def read_archive(path: Path) -> Archive:
-    """Open a NumPy archive and read the sampling time that it states.
+def read_archive(path: Path) -> Channels:
+    """Open a NumPy archive.
 
     Raises
     ------
     RecordError
-        The file is no archive, or what it states as its sampling is not a positive number.
+        The file is no archive.
     """
     if path.stat().st_size == 0:
         raise RecordError(f"{path.name} is empty: write it anew with numpy.savez")
     if not zipfile.is_zipfile(path):
         raise RecordError(f"{path.name} is not a NumPy archive: write it with numpy.savez(path, u=u, y=y)")
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            names = tuple(archive.files)
+        with zipfile.ZipFile(path) as archive:
+            members = archive.namelist()
     except UNREADABLE as error:
         raise RecordError(f"{path.name} is damaged ({error}): write it anew with numpy.savez") from error
-    stated: dict[str, float] = {}
-    for name in names:
-        array = _array(path, name) if name.lower() in SAMPLING else np.empty(0)
-        if array.size == 1:
-            stated[f"array {name}"] = _sampling_time(array, name, path.name)
-    return Archive(path, names, stated)
-
-
-def _sampling_time(array: NDArray[Any], name: str, file: str) -> float:
-    value = float(array.item()) if array.dtype.kind in "fiu" else float("nan")
-    if not (np.isfinite(value) and value > 0):
-        raise RecordError(
-            f"{file}: array {name} states the sampling as {array.item()!r}: it is a positive number, "
-            "dt and Ts in seconds, fs in hertz"
-        )
-    return SAMPLING[name.lower()](value)
+    names = tuple(member.removesuffix(".npy") for member in members)
+    return Channels(path.name, names, partial(_array, path), names)
 
 
 def _array(path: Path, name: str) -> NDArray[Any]:
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            return np.asarray(archive[name])
+        with zipfile.ZipFile(path) as archive:
+            member = _member(archive, name)
+            with archive.open(member) as stream:
+                _check_claims(stream, member, name, path)
+                stream.seek(0)
+                return np.asarray(npy.read_array(stream, allow_pickle=False))
     except UNREADABLE as error:
         raise RecordError(
             f"{path.name}: column {name} cannot be read ({error}): if it holds Python objects, which may run "
@@ -118,13 +59,25 @@ def _array(path: Path, name: str) -> NDArray[Any]:
         ) from error
 
 
-def _channel(path: Path, name: str) -> NDArray[np.float64]:
-    array = _array(path, name)
-    if array.dtype.kind not in "fiub":
-        raise RecordError(f"{path.name}: column {name} holds {array.dtype} where real numbers are expected")
-    if not (array.ndim == 1 or (array.ndim == 2 and 1 in array.shape)):
-        raise RecordError(
-            f"{path.name}: column {name} has the shape {array.shape}, a channel has (samples,): save one "
-            "array per channel and recording"
-        )
-    return array.ravel().astype(np.float64)
+def _member(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo:
+    try:
+        return archive.getinfo(f"{name}.npy")
+    except KeyError:
+        return archive.getinfo(name)
+
+
+def _check_claims(stream: IO[bytes], member: zipfile.ZipInfo, name: str, path: Path) -> None:
+    """Hold the header's shape against the member's size, and that against the bytes that pack it."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError("it is packed in another way than numpy.savez and numpy.savez_compressed do")
+    version = npy.read_magic(stream)
+    if version not in _HEADERS:
+        raise ValueError(f"its format has the version {version}, which no array of numbers has")
+    shape, _, dtype = _HEADERS[version](stream)
+    if dtype.hasobject:  # refused by read_array; its bytes are pickled and tell no size
+        return
+    check_samples(math.prod(shape), name, path.name)
+    values = member.file_size - stream.tell()
+    check_stored(math.prod(shape) * dtype.itemsize, values, False, name, path.name)
+    packed = min(member.compress_size, path.stat().st_size)
+    check_stored(member.file_size, packed, member.compress_type == zipfile.ZIP_DEFLATED, name, path.name)

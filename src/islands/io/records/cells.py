@@ -40,7 +40,7 @@ def numbers_of(texts: Mapping[str, Sequence[str]], rows: Rows) -> dict[str, NDAr
     plain = {name: _converted(column) for name, column in texts.items()}
     numbers = {name: column for name, column in plain.items() if column is not None}
     if len(numbers) < len(texts):
-        mark = _decimal_mark(texts, rows)
+        mark = "," if decimal_comma(texts, rows) else "."
         numbers = {name: _mended(column, name, mark, rows) for name, column in texts.items()}
     return numbers
 
@@ -54,8 +54,14 @@ def _converted(texts: Sequence[str]) -> NDArray[np.float64] | None:
     return None if "_" in "".join(texts) else numbers  # to Python, 1_5 is fifteen
 
 
-def _decimal_mark(texts: Mapping[str, Sequence[str]], rows: Rows) -> str:
-    """Return ``","`` or ``"."``: one mark for all columns, since ``1,234`` beside ``0.5`` is a thousand."""
+def decimal_comma(texts: Mapping[str, Sequence[str]], rows: Rows) -> str | None:
+    """Return the place of the first decimal comma, None where there is none.
+
+    Raises
+    ------
+    RecordError
+        There are decimal points too: all columns share a mark, since ``1,234`` beside ``0.5`` is a thousand.
+    """
 
     def first(mark: str) -> str | None:
         for name, column in texts.items():
@@ -64,13 +70,13 @@ def _decimal_mark(texts: Mapping[str, Sequence[str]], rows: Rows) -> str:
                     return f"{rows.place(sample, name)} ({text.strip()})"
         return None
 
-    comma, point = first(","), first(".")
-    if comma and point:
+    comma = first(",")
+    if comma and (point := first(".")):
         raise RecordError(
             f"a decimal comma in {comma}, a decimal point in {point}: write all numbers with the same mark, "
             "and none with a mark for thousands"
         )
-    return "," if comma else "."
+    return comma
 
 
 def _mended(texts: Sequence[str], name: str, mark: str, rows: Rows) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """What makes a record unusable, each with the words that help to mend it."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
 import numpy as np
@@ -14,6 +14,19 @@ from islands.io.records.table import Columns
 MIN_SAMPLES = 30
 
 
+def check_unique(names: Sequence[str], file: str) -> None:
+    """Refuse a file two columns of which share a name.
+
+    Raises
+    ------
+    RecordError
+        A name stands twice.
+    """
+    twice = [name for name, count in Counter(names).items() if count > 1 and name]
+    if twice:
+        raise RecordError(f"{file} has several columns called {twice[0]}: rename them in the header")
+
+
 def check_choice(names: Sequence[str], inputs: Sequence[str], output: str, file: str) -> None:
     """Refuse a choice of columns that the file cannot serve.
 
@@ -22,9 +35,7 @@ def check_choice(names: Sequence[str], inputs: Sequence[str], output: str, file:
     RecordError
         Two columns share a name, no input is given, a column is chosen twice, or a column is not there.
     """
-    twice = [name for name, count in Counter(names).items() if count > 1 and name]
-    if twice:
-        raise RecordError(f"{file} has several columns called {twice[0]}: rename them in the header")
+    check_unique(names, file)
     if not inputs:
         raise RecordError(f"no input is given: name one or more of the columns {_listed(names)}")
     if output in inputs:
@@ -37,6 +48,28 @@ def check_choice(names: Sequence[str], inputs: Sequence[str], output: str, file:
             raise RecordError(f"{file} has no column {name}; it has {_listed(names)}{_guess(name, names)}")
 
 
+def check_equal_length(lengths: Mapping[str, int], file: str) -> None:
+    """Refuse channels of unequal lengths.
+
+    Parameters
+    ----------
+    lengths : mapping of str to int
+        Samples of every channel; the first is the one that the others are held against.
+
+    Raises
+    ------
+    RecordError
+        A channel is shorter or longer than the first.
+    """
+    (first, samples), *others = lengths.items()
+    for name, length in others:
+        if length != samples:
+            raise RecordError(
+                f"{file}: column {first} has {samples} samples, column {name} {length}: channels of one "
+                "record are of equal length"
+            )
+
+
 def check_length(columns: Columns) -> None:
     """Refuse a record that is too short to identify anything.
 
@@ -46,6 +79,8 @@ def check_length(columns: Columns) -> None:
         There are fewer than `MIN_SAMPLES` samples.
     """
     rows = columns.rows
+    if not len(rows):
+        raise RecordError(f"{rows.file} has not a single sample: take another record")
     if len(rows) < MIN_SAMPLES:
         raise RecordError(
             f"{rows.file}: {len(rows)} samples, from {rows.row(0)} to {rows.row(-1)}, are too few: at least "

@@ -5,14 +5,14 @@ The separator and a decimal comma are inferred, since half of the world's instru
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import StringIO
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 
 from islands.errors import RecordError
-from islands.io.records.cells import is_number, numbers_of
+from islands.io.records.cells import decimal_comma, is_number, numbers_of
 from islands.io.records.table import Columns, Rows, select
 
 #: A comma stands behind the others, as it may be a decimal mark; blanks, in runs, come last.
@@ -39,7 +39,10 @@ class DelimitedText:
     separator: str
     cells: Sequence[list[str]]
     rows: Rows
-    stated: Mapping[str, float] = field(default_factory=dict)
+
+    def stated(self, structure: str) -> Mapping[str, float]:  # noqa: ARG002
+        """Return nothing: a text table has no place for a sampling time."""
+        return {}
 
     def read(self, names: Sequence[str], rows: slice | None) -> Columns:
         """Convert the named columns over the selected rows; see `islands.io.records.table.Table`."""
@@ -49,6 +52,15 @@ class DelimitedText:
         self._refuse_ragged(cells, where)
         texts = {name: list(map(itemgetter(self.names.index(name)), cells)) for name in names}
         return Columns(where, numbers_of(texts, where), chosen.start)
+
+    def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Say where a comma is taken for a decimal mark, or that points stand beside it."""
+        texts = {name: [row[self.names.index(name)] for row in self.cells] for name in names}
+        try:
+            comma = decimal_comma(texts, self.rows)
+        except RecordError as error:
+            return (str(error),)
+        return (f"the comma in {comma} is read as a decimal mark",) if comma else ()
 
     def _refuse_ragged(self, cells: Sequence[list[str]], rows: Rows) -> None:
         width = len(self.names)

@@ -1,7 +1,8 @@
 """What a column's name says: its unit, and whether the column is time."""
 
 import re
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Collection, Iterable
 
 from islands.errors import RecordError
 
@@ -29,6 +30,16 @@ def unit_of(name: str) -> str:
     return "" if suffix.isdigit() else suffix
 
 
+def structures_of(names: Iterable[str]) -> dict[str, str]:
+    """Return the structure in which each column is a field: ``run_1.`` of ``run_1.u_V``, ``""`` at the top.
+
+    It takes two fields to make a structure: a point alone may belong to a unit (``k_N.m``).
+    """
+    before = {name: name[: name.rfind(".") + 1] for name in names}
+    fields = Counter(before.values())
+    return {name: structure if fields[structure] > 1 else "" for name, structure in before.items()}
+
+
 def column_of(name: str, columns: Iterable[str]) -> str:
     """Return the column that an input names: ``u_V`` of ``u_V+1``, unless a column has the very name."""
     return name if name in tuple(columns) else name.removesuffix(AT_ONCE)
@@ -44,19 +55,46 @@ def seconds_per_unit(name: str) -> float | None:
     return TIME_UNITS.get(unit_of(name).lower())
 
 
-def time_column(names: Iterable[str], file: str) -> str | None:
-    """Choose the time column among columns that are neither input nor output; None where there is none.
+def time_column(
+    names: Collection[str], file: str, taken: Collection[str] = (), structure: str = ""
+) -> str | None:
+    """Choose the time column; None where there is none.
 
     ``t``, ``time`` and names with a unit of time go before other words that begin with ``time``, so that a
     ``timestamp`` beside ``t_s`` does no harm.
+
+    Parameters
+    ----------
+    names : collection of str
+        All columns of the file.
+    file : str
+        Its name, for the message.
+    taken : collection of str
+        Inputs and output, which are not the time.
+    structure : str
+        The structure of the output (see `structures_of`): a time among its fields goes before one at the top,
+        and the fields of other structures are none of its business.
 
     Raises
     ------
     RecordError
         Several columns may be the time.
     """
-    candidates = [name for name in names if looks_like_time(name) and seconds_per_unit(name) is not None]
-    plain = [name for name in candidates if name.lower() in {"t", "time"} or unit_of(name)] or candidates
-    if len(plain) > 1:
-        raise RecordError(f"{file}: columns {' and '.join(plain)} may all be the time: rename all but one")
-    return plain[0] if plain else None
+    structures = structures_of(names)
+    for home in dict.fromkeys((structure, "")):
+        own = {
+            name: name.removeprefix(home) for name in names if structures[name] == home and name not in taken
+        }
+        candidates = [
+            name for name, word in own.items() if looks_like_time(word) and seconds_per_unit(word) is not None
+        ]
+        plain = [
+            name for name in candidates if own[name].lower() in {"t", "time"} or unit_of(own[name])
+        ] or candidates
+        if len(plain) > 1:
+            raise RecordError(
+                f"{file}: columns {' and '.join(plain)} may all be the time: rename all but one"
+            )
+        if plain:
+            return plain[0]
+    return None

@@ -12,7 +12,9 @@ from islands.errors import RecordError
 from islands.io.records.archive import read_archive
 from islands.io.records.checks import check_choice, check_length, check_values, check_varies
 from islands.io.records.delimited import read_delimited
-from islands.io.records.names import column_of, time_column, unit_of
+from islands.io.records.matlab import read_matlab
+from islands.io.records.names import column_of, structures_of, time_column, unit_of
+from islands.io.records.parquet import read_parquet
 from islands.io.records.sampling import sampling_of
 from islands.io.records.table import Table
 
@@ -23,6 +25,8 @@ READERS: dict[str, Callable[[Path], Table]] = {
     ".tsv": read_delimited,
     ".dat": read_delimited,
     ".npz": read_archive,
+    ".mat": read_matlab,
+    ".parquet": read_parquet,
 }
 
 
@@ -34,11 +38,12 @@ def read_record(
     rows: slice | None = None,
     missing_output: bool = False,
 ) -> Dataset:
-    """Read inputs and an output from a CSV or NPZ file and check them.
+    """Read inputs and an output from a file (CSV, NPZ, MAT or Parquet) and check them.
 
     A column called ``t``, ``t_*`` or ``time*`` that is neither input nor output is time, in the unit at the
     end of its name (s, ms, us, ns, min, h; without one: s). What follows the last underscore of a name is the
-    unit: ``u_V``. The separator and a decimal comma of a text file are inferred.
+    unit: ``u_V``. The separator and a decimal comma of a text file are inferred. Of a MAT-file a field of a
+    structure is ``run.u``, its time ``run.t``, and a matrix ``x`` of a few channels is ``x_1, x_2 ...``.
 
     A model reads inputs of the past alone. Where the output answers within the sample (a band-limited input
     sampled at the same instants), name the input ``u_V+1``: it is read one sample early, so that its u(k-1)
@@ -55,7 +60,7 @@ def read_record(
         Column that is the output.
     dt : float, optional
         Sampling time in seconds, for files that do not tell it; where the file does, both agree within 1 %.
-        An NPZ file may hold it as a single number ``dt`` or ``Ts`` (seconds) or ``fs`` (hertz).
+        An NPZ or MAT file may hold it as a single number ``dt`` or ``Ts`` (seconds) or ``fs`` (hertz).
     rows : slice, optional
         Samples to read, from 0, not counting a header; what lies outside is not checked.
     missing_output : bool
@@ -73,16 +78,17 @@ def read_record(
         The record cannot be used as it is. The message names row and column and says what to do.
     """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    table = _opened(path)
+    table = opened(path)
     file = Path(path).name
     sources = [column_of(name, table.names) for name in inputs]
     check_choice(table.names, sources, output, file)
-    time = time_column((name for name in table.names if name not in (*sources, output)), file)
+    structures = structures_of(table.names)
+    time = time_column(table.names, file, (*sources, output), structures[output])
     columns = table.read((*sources, output, *([time] if time else [])), rows)
     check_length(columns)
     for name in columns.numbers:
         check_values(columns, name, missing=missing_output and name == output)
-    step, start = sampling_of(table, columns, time, dt)
+    step, start = sampling_of(table, columns, time, dt, structures[output])
     for name in () if missing_output else (*sources, output):
         check_varies(columns, name)
     return Dataset(
@@ -96,8 +102,8 @@ def read_record(
         dt=step,
         input_names=inputs,
         output_name=output,
-        input_units=tuple(unit_of(source) for source in sources),
-        output_unit=unit_of(output),
+        input_units=tuple(unit_of(source.removeprefix(structures[source])) for source in sources),
+        output_unit=unit_of(output.removeprefix(structures[output])),
         start=step * columns.first if start is None else start,
         sha256=fingerprint(path),
     )
@@ -109,14 +115,14 @@ def _early(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
-    """Return the names of a file's columns (of an NPZ file: of its arrays), in the file's order.
+    """Return the names of a file's columns (of an NPZ or MAT file: of its arrays), in the file's order.
 
     Raises
     ------
     RecordError
         The file is not there or cannot be read.
     """
-    return _opened(path).names
+    return opened(path).names
 
 
 def fingerprint(path: str | Path) -> str:
@@ -131,7 +137,14 @@ def fingerprint(path: str | Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _opened(path: str | Path) -> Table:
+def opened(path: str | Path) -> Table:
+    """Open a file by the reader of its suffix.
+
+    Raises
+    ------
+    RecordError
+        The file is not there, cannot be read, or its suffix is not one of `READERS`.
+    """
     file = _existing(path)
     reader = READERS.get(file.suffix.lower())
     if reader is None:

@@ -20,9 +20,20 @@ ROUNDING = 0.25
 
 
 def sampling_of(
-    table: Table, columns: Columns, time: str | None, dt: float | None
+    table: Table, columns: Columns, time: str | None, dt: float | None, structure: str = ""
 ) -> tuple[float, float | None]:
     """Return the sampling time and the first sample's time in seconds, None where no column tells it.
+
+    Parameters
+    ----------
+    table, columns
+        The file, and its columns that were read.
+    time : str or None
+        The time column.
+    dt : float or None
+        The sampling time that the user gives, in seconds.
+    structure : str
+        The structure of the output: what it states goes before what stands at the top.
 
     Raises
     ------
@@ -34,7 +45,7 @@ def sampling_of(
     start = None
     if time is not None:
         stamps = columns.numbers[time]
-        seconds = TIME_UNITS[unit_of(time).lower()]
+        seconds = TIME_UNITS[unit_of(time.removeprefix(structure)).lower()]
         known[f"column {time}"] = uniform_step(stamps, time, columns.rows) * seconds
         start = float(stamps[0]) * seconds
     if dt is not None:
@@ -43,9 +54,9 @@ def sampling_of(
                 f"the sampling time --dt (library: dt=) is a positive number of seconds, got {dt}"
             )
         known["--dt (library: dt=)"] = float(dt)
-    known.update(table.stated)
+    known |= {f"array {name}": seconds for name, seconds in table.stated(structure).items()}
     if not known:
-        raise RecordError(_nothing_known(table, file))
+        raise RecordError(_nothing_known(table, file, structure))
     return _agreed(known, file), start
 
 
@@ -96,7 +107,8 @@ def _rounding(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
     lowest = min(int(part.exponent) for part in parts)
     magnitude = np.floor(np.log10(np.maximum(np.abs(stamps), np.finfo(np.float64).tiny)))
     half_unit = 0.5 * np.maximum(10.0**lowest, 10.0 ** (magnitude + 1 - digits))
-    single = stamps.astype(np.float32)
+    with np.errstate(over="ignore"):
+        single = stamps.astype(np.float32)
     if np.array_equal(single, stamps):
         half_unit = np.maximum(half_unit, 0.5 * np.spacing(np.abs(single)).astype(np.float64))
     return half_unit
@@ -135,11 +147,12 @@ def _refuse_uneven(stamps: NDArray[np.float64], sample: int, name: str, rows: Ro
     )
 
 
-def _nothing_known(table: Table, file: str) -> str:
+def _nothing_known(table: Table, file: str, structure: str) -> str:
     message = (
         f"{file} has no time column (t, t_s, time_ms ...): give the sampling time by --dt (library: dt=)"
     )
-    strange = [name for name in table.names if looks_like_time(name) and seconds_per_unit(name) is None]
+    own = {name: name.removeprefix(structure) for name in table.names}
+    strange = [name for name in own if looks_like_time(own[name]) and seconds_per_unit(own[name]) is None]
     if strange:
         units = ", ".join(unit for unit in TIME_UNITS if unit)
         message += f", or, if {strange[0]} is the time, end its name in one of the units {units}"

@@ -67,9 +67,17 @@ class Table(Protocol):
         """Names of the columns in the file's order."""
         ...
 
-    @property
-    def stated(self) -> Mapping[str, float]:
-        """Sampling times in seconds that the file states besides a time column, by where they stand."""
+    def stated(self, structure: str) -> Mapping[str, float]:
+        """Return the sampling times in seconds that the file states besides a time column, by their arrays.
+
+        Those among the fields of the structure (`islands.io.records.names.structures_of`) go before those at
+        the top, and those of other structures do not count.
+
+        Raises
+        ------
+        RecordError
+            What is stated is not a positive number.
+        """
         ...
 
     def read(self, names: Sequence[str], rows: slice | None) -> Columns:
@@ -80,6 +88,10 @@ class Table(Protocol):
         RecordError
             A cell is text, the channels are of unequal lengths, or the selection does not fit the file.
         """
+        ...
+
+    def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Say what was inferred to read the named columns, whole, or what forbids to read them together."""
         ...
 
 

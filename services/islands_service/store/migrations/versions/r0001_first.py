@@ -48,7 +48,7 @@ def upgrade() -> None:
     )
     op.create_index("ix_jobs_state_priority_created", "jobs", ["state", "priority", "created"])
     op.create_index("ix_jobs_owner_created_id", "jobs", ["owner", "created", "id"])
-    op.create_index("ix_jobs_owner_state", "jobs", ["owner", "state"])
+    op.create_index("ix_jobs_owner_state_created_id", "jobs", ["owner", "state", "created", "id"])
     op.create_table(
         "events",
         _job(),

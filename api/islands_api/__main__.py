@@ -1,0 +1,65 @@
+"""``python -m islands_api``: the doors, as a child of ``islands serve`` or on their own."""
+
+import sys
+
+import uvicorn
+
+from islands.errors import IslandsError, SettingsError
+from islands_api.app import create_app
+from islands_service.logs import configure_logs
+from islands_service.settings import ServiceSettings, service_settings
+from islands_service.store import Store
+from islands_service.supervisor import MISCONFIGURED
+
+#: Seconds that open requests have to end; a stream of events would never.
+_GRACE = 2
+
+
+def main() -> int:
+    """Serve until SIGTERM or SIGINT."""
+    try:
+        settings = service_settings()
+        configure_logs(settings.log_format, "api")
+        store = Store(settings.url)
+        check_safe(settings, store)
+    except IslandsError as error:
+        print(f"islands: {error}", file=sys.stderr)
+        return MISCONFIGURED if isinstance(error, SettingsError) else 1
+    server = uvicorn.Server(
+        uvicorn.Config(
+            create_app(settings, store),
+            host=settings.host,
+            port=settings.port,
+            access_log=False,
+            log_config=None,
+            timeout_graceful_shutdown=_GRACE,
+            ssl_certfile=settings.tls_certificate,
+            ssl_keyfile=settings.tls_key,
+            server_header=False,
+        )
+    )
+    server.run()
+    return 0 if server.started else MISCONFIGURED
+
+
+def check_safe(settings: ServiceSettings, store: Store) -> None:
+    """Refuse to be reached by others without a key.
+
+    Raises
+    ------
+    SettingsError
+    """
+    if settings.keys_needed and not store.keys.any_valid():
+        raise SettingsError(
+            f"{settings.host} can be reached by others, and there is no key: make one with 'islands keys "
+            "create --scope read --scope write', or serve on 127.0.0.1"
+        )
+    if (settings.tls_certificate is None) != (settings.tls_key is None):
+        raise SettingsError("TLS needs both a certificate and a key: give --tls-certificate and --tls-key")
+    for path in (settings.tls_certificate, settings.tls_key):
+        if path is not None and not path.is_file():
+            raise SettingsError(f"there is no file {path}: check the path of the certificate and of the key")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,133 @@
+"""The application: a value built from its parts. It reaches the database and the blobs, and never Ray."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from importlib.metadata import version
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from islands_api import problems
+from islands_api.auth import KeyRing
+from islands_api.doors import DRAWINGS, INSPECTIONS, Doors
+from islands_api.hub import Hub
+from islands_api.measures import Measures
+from islands_api.middleware import Limited, SameOrigin, Watched
+from islands_api.rate import Rate
+from islands_api.routes import ROUTERS
+from islands_service.blobs import Blobs
+from islands_service.lifeline import EVERY, sign_of_life
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from islands_service.telemetry import configure_traces
+
+_DESCRIPTION = """Finds the equation behind measured data.
+
+Upload a record, submit a job, follow it, and take its models: small difference equations with their metrics.
+Every answer that is not a success is `application/problem+json`; its `detail` says what to do.
+On this machine's own address no key is needed; elsewhere send `Authorization: Bearer islands_...`."""
+
+
+def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI:
+    """Build the application.
+
+    Parameters
+    ----------
+    settings : ServiceSettings
+    store : Store, optional
+        One that is open already, and is closed with the application.
+    """
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        opened = store or Store(settings.url)
+        hub = Hub(opened)
+        app.state.doors = doors = Doors(
+            settings,
+            opened,
+            Blobs(settings.blobs),
+            hub,
+            Rate(settings.rate, settings.burst),
+            Measures(opened),
+            asyncio.Semaphore(INSPECTIONS),
+            asyncio.Semaphore(DRAWINGS),
+        )
+        app.state.keys = KeyRing(doors)
+        tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_live(settings.lifeline))]
+        try:
+            yield
+        finally:
+            hub.close()
+            for task in tasks:
+                task.cancel()
+                with suppress(asyncio.CancelledError):
+                    await task
+            await doors.do(opened.close)
+
+    app = FastAPI(
+        title="islands",
+        version=version("islands"),
+        description=_DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/openapi.json",
+    )
+    for router in ROUTERS:
+        app.include_router(router)
+    problems.install(app)
+    app.add_middleware(Limited, settings=settings)
+    app.add_middleware(SameOrigin, settings=settings)
+    app.add_middleware(Watched)
+    _trace(app, settings)
+    _describe(app)
+    return app
+
+
+def _trace(app: FastAPI, settings: ServiceSettings) -> None:
+    provider = configure_traces(settings.telemetry, "api")
+    if provider is not None:
+        from opentelemetry.instrumentation.fastapi import FastAPIInstrumentor  # noqa: PLC0415
+
+        FastAPIInstrumentor.instrument_app(
+            app, tracer_provider=provider, excluded_urls="healthz,readyz,metrics"
+        )
+
+
+async def _live(descriptor: int | None) -> None:
+    """Give signs of life from the event loop: if that hangs, nobody is answered."""
+    while True:
+        sign_of_life(descriptor)
+        await asyncio.sleep(EVERY)
+
+
+def _describe(app: FastAPI) -> None:
+    """Have the description name the document that every problem is."""
+
+    def openapi() -> dict[str, object]:
+        if app.openapi_schema is None:
+            schema = get_openapi(
+                title=app.title, version=app.version, description=app.description, routes=app.routes
+            )
+            document = problems.ProblemDocument.model_json_schema(ref_template="#/components/schemas/{model}")
+            schemas = schema["components"]["schemas"]
+            schemas.update(document.pop("$defs"))
+            schemas["ProblemDocument"] = document
+            _without_framework_answers(schema)
+            app.openapi_schema = schema
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _without_framework_answers(schema: dict[str, object]) -> None:
+    """Take out the answers to invalid requests that the framework would give, and we do not."""
+    paths = schema["paths"]
+    assert isinstance(paths, dict)
+    for operations in paths.values():
+        for operation in operations.values():
+            operation["responses"].pop("422", None)
+    schemas = schema["components"]["schemas"]  # type: ignore[index]
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)

@@ -1,0 +1,99 @@
+"""Who asks: the owner behind a key, and what the key allows."""
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from time import monotonic
+from typing import Annotated, Any
+
+from fastapi import Depends, Request, Security
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+
+from islands_api.doors import AtDoors, Doors
+from islands_api.problems import NoKey, ScopeMissing
+from islands_service.store.keys import SCOPES, Key
+
+#: Whose everything is that comes without a key, on a loopback address.
+LOCAL = "local"
+
+#: Seconds for which a key is not looked up again: so long may a revoked one still open.
+REMEMBERED = 1.0
+
+#: Tokens of the rate limit that a wrong key costs its address.
+_WRONG = 10.0
+
+_bearer = HTTPBearer(auto_error=False, description="A key of `islands keys create`.", scheme_name="key")
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who asks."""
+
+    owner: str
+    scopes: frozenset[str]
+
+
+class KeyRing:
+    """Keys that were looked up a moment ago.
+
+    Parameters
+    ----------
+    doors : Doors
+    """
+
+    def __init__(self, doors: Doors) -> None:
+        self._doors = doors
+        self._found: dict[str, tuple[float, Key | None]] = {}
+
+    async def find(self, secret: str) -> Key | None:
+        """Return a secret's key, None where it is of none."""
+        now = monotonic()
+        at, key = self._found.get(secret, (-REMEMBERED, None))
+        if now - at >= REMEMBERED:
+            key = await self._doors.do(self._doors.store.keys.find, secret)
+            if key is not None:
+                self._found = {
+                    each: entry for each, entry in self._found.items() if now - entry[0] < REMEMBERED
+                }
+                self._found[secret] = now, key
+        return key
+
+
+async def _caller(
+    request: Request,
+    doors: AtDoors,
+    given: Annotated[HTTPAuthorizationCredentials | None, Security(_bearer)] = None,
+) -> Caller:
+    address = request.client.host if request.client is not None else "?"
+    if given is None:
+        if doors.settings.keys_needed:
+            doors.rate.take(f"address {address}")
+            raise NoKey(
+                "this service needs a key: send 'Authorization: Bearer islands_...'; whoever runs it makes "
+                "one with 'islands keys create'"
+            )
+        return Caller(LOCAL, frozenset(SCOPES))
+    key = await request.app.state.keys.find(given.credentials)
+    if key is None or key.revoked is not None or key.expired:
+        doors.rate.take(f"address {address}", _WRONG)
+        what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
+        raise NoKey(f"the key {what}: ask whoever runs this service for another one")
+    doors.rate.take(f"key {key.id}")
+    return Caller(key.owner, key.scopes)
+
+
+def _allowed(scope: str) -> Callable[[Caller], Awaitable[Caller]]:
+    async def allowed(caller: Annotated[Caller, Depends(_caller)]) -> Caller:
+        if scope not in caller.scopes:
+            raise ScopeMissing(
+                f"the key has the scopes {', '.join(sorted(caller.scopes))}, this needs "
+                f"{scope}: ask for another key"
+            )
+        return caller
+
+    return allowed
+
+
+#: What a route asks for: a caller who may look, who may change, who may see the service's metrics.
+Reader = Annotated[Caller, Depends(_allowed("read"))]
+Writer = Annotated[Caller, Depends(_allowed("write"))]
+Operator = Annotated[Any, Depends(_allowed("metrics"))]

@@ -1,0 +1,85 @@
+"""Bodies of requests: what cannot be read is refused in words of our own, before the framework guesses.
+
+JSON is read strictly: of a name that stands twice the framework would take the last, and NaN for a number.
+"""
+
+import json
+from collections.abc import Callable, Coroutine
+from typing import Any, ClassVar
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from islands_api.problems import Unreadable, WrongMedia
+
+
+class BodyRoute(APIRoute):
+    """A route that takes bodies of one type alone."""
+
+    media: ClassVar[str]
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return what answers a request, behind a look at its body's type."""
+        handler = super().get_route_handler()
+        if self.body_field is None:
+            return handler
+
+        async def handle(request: Request) -> Response:
+            given = request.headers.get("content-type", "")
+            if given.partition(";")[0].strip().lower() != self.media:
+                raise WrongMedia(f"the body is {given or 'of no type'}: send it as {self.media}")
+            return await handler(_Strict(request.scope, request.receive))
+
+        return handle
+
+
+class JSONRoute(BodyRoute):
+    """A route that takes JSON."""
+
+    media = "application/json"
+
+
+class FormRoute(BodyRoute):
+    """A route that takes a form with a file in it."""
+
+    media = "multipart/form-data"
+
+
+class _Strict(Request):
+    async def json(self) -> Any:
+        if not hasattr(self, "_json"):
+            self._json = read_json(await self.body())
+        return self._json
+
+
+def read_json(body: bytes) -> Any:
+    """Read JSON as RFC 8259 has it.
+
+    Raises
+    ------
+    Unreadable
+        It is none, holds what is no number, names a thing twice, or is nested too deeply.
+    """
+    try:
+        return json.loads(body, object_pairs_hook=_once, parse_constant=_no_number)
+    except RecursionError:
+        raise Unreadable("the body is nested too deeply: a job needs three levels") from None
+    except json.JSONDecodeError as error:
+        raise Unreadable(
+            f"the body is no JSON: {error.msg} in line {error.lineno}, column {error.colno}"
+        ) from error
+    except ValueError as error:
+        raise Unreadable(f"the body is no JSON: {error}") from error
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    read = dict(pairs)
+    if len(read) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{twice!r} stands in it twice")
+    return read
+
+
+def _no_number(text: str) -> Any:
+    raise ValueError(f"{text} is no number there: leave the entry out")

@@ -1,0 +1,71 @@
+"""``islands keys``: make, list and revoke the API keys of a service, in its database."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from islands_api.cli.console import output
+from islands_service.settings import service_settings
+from islands_service.store import Store
+from islands_service.store.keys import SCOPES
+
+keys = typer.Typer(
+    help="API keys of a service: make, list, revoke.", no_args_is_help=True, add_completion=False
+)
+
+DataDir = Annotated[Path | None, typer.Option("--data-dir", help="The service's data folder.")]
+Database = Annotated[
+    str | None, typer.Option("--database", help="The service's database, if it has another.")
+]
+
+_DAY = 86_400.0
+
+
+def _store(data_dir: Path | None, database: str | None) -> Store:
+    settings = service_settings(data_dir=data_dir, database=database)
+    settings.data_dir.mkdir(parents=True, exist_ok=True, mode=0o700)
+    return Store(settings.url)
+
+
+@keys.command()
+def create(
+    scopes: Annotated[list[str], typer.Option("--scope", help=f"Repeat it: {', '.join(SCOPES)}.")],
+    name: Annotated[str, typer.Option("--name", help="For whom, or for what.")] = "",
+    owner: Annotated[
+        str | None,
+        typer.Option("--owner", help="Share this owner's data sets and jobs; a new one by default."),
+    ] = None,
+    days: Annotated[float | None, typer.Option("--days", help="Until it expires; never by default.")] = None,
+    data_dir: DataDir = None,
+    database: Database = None,
+) -> None:
+    """Make a key. It is shown once: only a hash of it is kept."""
+    with _store(data_dir, database) as store:
+        key, secret = store.keys.create(name, frozenset(scopes), owner, None if days is None else days * _DAY)
+    output.print(secret, markup=False)
+    output.print(f"key {key.id} of owner {key.owner}: {', '.join(sorted(key.scopes))}", markup=False)
+
+
+@keys.command("list")
+def list_keys(data_dir: DataDir = None, database: Database = None) -> None:
+    """List the keys, without their secrets."""
+    with _store(data_dir, database) as store:
+        table = Table("key", "name", "owner", "scopes", "state")
+        for key in store.keys.all():
+            state = "revoked" if key.revoked is not None else "expired" if key.expired else "valid"
+            table.add_row(key.id, key.name, key.owner, ", ".join(sorted(key.scopes)), state)
+    output.print(table)
+
+
+@keys.command()
+def revoke(
+    key: Annotated[str, typer.Argument(help="The key's id, from the list.")],
+    data_dir: DataDir = None,
+    database: Database = None,
+) -> None:
+    """End a key: it opens nothing any more within a second."""
+    with _store(data_dir, database) as store:
+        store.keys.revoke(key)
+    output.print(f"key {key} is revoked", markup=False)

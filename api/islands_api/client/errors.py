@@ -1,0 +1,33 @@
+"""What a client raises: the service's problems, and that it cannot be reached."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from islands.errors import IslandsError
+
+
+class ServiceError(IslandsError):
+    """The service answered with a problem; the message is its detail.
+
+    Attributes
+    ----------
+    status : int
+        Of HTTP.
+    type : str
+        ``/problems/invalid-record`` and so on: see docs/reference.md.
+    document : mapping
+        The whole problem.
+    """
+
+    def __init__(self, status: int, document: Mapping[str, Any]) -> None:
+        detail = document.get("detail") or document.get("title") or f"HTTP {status}"
+        super().__init__(str(detail))
+        self.status, self.type, self.document = status, str(document.get("type", "about:blank")), document
+
+
+class Unreachable(IslandsError):
+    """The service does not answer."""
+
+
+class JobFailed(IslandsError):
+    """A job that was waited for has failed, or was cancelled."""

@@ -1,0 +1,225 @@
+"""The client for programs that wait for each answer."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from math import inf
+from time import monotonic, sleep
+from types import TracebackType
+from typing import Any, TypeVar
+
+import httpx
+
+from islands_api.client import calls
+from islands_api.client.calls import Call, Event, EventLines, JobRef
+from islands_api.client.errors import JobFailed
+from islands_api.client.transport import PATIENCE, WAIT, delays, headers_of, unanswered, unreachable
+from islands_api.schemas import DatasetPage, DatasetView, HistoryPage, JobPage, JobView, ModelView
+from islands_service.jobs import TERMINAL, JobState
+
+T = TypeVar("T")
+
+
+class Client:
+    """Speaks to a service.
+
+    A call that got no answer is sent again, for ``retry`` seconds, where that can do no harm: a job is
+    submitted with an idempotency key, so it is one job however often it is sent.
+
+    Parameters
+    ----------
+    url : str
+        ``http://127.0.0.1:8000``.
+    key : str, optional
+        Of ``islands keys create``; on the service's own machine none is needed.
+    timeout, retry : float
+        Seconds for an answer, and for trying again.
+    verify : str or bool
+        The certificate of a private authority, as httpx takes it.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8000",
+        key: str | None = None,
+        *,
+        timeout: float = PATIENCE,
+        retry: float = 30.0,
+        verify: Any = True,
+    ) -> None:
+        self._http = httpx.Client(base_url=url, headers=headers_of(key), timeout=timeout, verify=verify)
+        self._url, self._retry = url, retry
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def call(self, call: Call[T]) -> T:
+        """Carry out a call of `islands_api.client.calls`.
+
+        Raises
+        ------
+        ServiceError
+            The service answered with a problem.
+        Unreachable
+            It did not answer.
+        """
+        until = monotonic() + self._retry
+        for delay in delays():
+            try:
+                response = self._send(call)
+            except httpx.TransportError as error:
+                if not unanswered(error, call) or monotonic() + delay > until:
+                    raise unreachable(self._url, error) from error
+            else:
+                if response.status_code not in calls.PASSING or monotonic() + delay > until:
+                    calls.refuse_problem(response)
+                    return call.read(response)
+            sleep(delay)
+        raise AssertionError("delays never end")
+
+    def _send(self, call: Call[T]) -> httpx.Response:
+        with ExitStack() as stack:
+            files = None
+            if call.file is not None:
+                files = {"file": (call.file.name, stack.enter_context(call.file.open("rb")))}
+            return self._http.request(
+                call.method,
+                call.path,
+                params=dict(call.params),
+                headers=dict(call.headers),
+                json=call.json,
+                data=call.data,
+                files=files,
+            )
+
+    def upload(self, *arguments: Any, **named: Any) -> DatasetView:
+        """Upload a record: see `islands_api.client.calls.upload`."""
+        return self.call(calls.upload(*arguments, **named))
+
+    def submit(self, *arguments: Any, **named: Any) -> JobView:
+        """Submit a job: see `islands_api.client.calls.submit`."""
+        return self.call(calls.submit(*arguments, **named))
+
+    def job(self, which: JobRef) -> JobView:
+        """Look at a job."""
+        return self.call(calls.job(which))
+
+    def jobs(self, state: str | None = None, cursor: str | None = None, limit: int = 50) -> JobPage:
+        """List a page of jobs, newest first."""
+        return self.call(calls.jobs(state, cursor, limit))
+
+    def datasets(self, cursor: str | None = None, limit: int = 50) -> DatasetPage:
+        """List a page of data sets, newest first."""
+        return self.call(calls.datasets(cursor, limit))
+
+    def cancel(self, which: JobRef) -> JobView:
+        """Cancel a job."""
+        return self.call(calls.cancel(which))
+
+    def resume(self, which: JobRef) -> JobView:
+        """Have a job go on that failed or was cancelled."""
+        return self.call(calls.resume(which))
+
+    def delete(self, which: JobRef) -> None:
+        """Delete a finished job."""
+        self.call(calls.delete(which))
+
+    def delete_dataset(self, which: calls.DatasetRef) -> None:
+        """Delete a data set that no unfinished job needs."""
+        self.call(calls.delete_dataset(which))
+
+    def models(self, which: JobRef) -> tuple[ModelView, ...]:
+        """Take the models of a job, best first."""
+        return self.call(calls.models(which))
+
+    def result(self, which: JobRef) -> dict[str, Any]:
+        """Take the whole result, in the form of ``result.json``."""
+        return self.call(calls.result(which))
+
+    def history(self, which: JobRef, after: int = -1) -> HistoryPage:
+        """Take the course of the search behind a generation."""
+        return self.call(calls.history(which, after))
+
+    def export(self, which: JobRef, rank: int = 1, form: str = "python") -> str:
+        """Take a model as text: python, c, matlab, latex, json and so on."""
+        return self.call(calls.exported(which, rank, form))
+
+    def figure(self, which: JobRef, name: str, rank: int | None = 1) -> bytes:
+        """Take a figure of a model, or without a rank of the search, as SVG."""
+        return self.call(calls.figure(which, name, rank))
+
+    def figures(self, which: JobRef) -> tuple[tuple[str, int | None], ...]:
+        """Return the figures of the search, and of the best model, as `figure` takes them."""
+        of_search = self.call(calls.figure_names(which, None))
+        of_best = self.call(calls.figure_names(which, 1))
+        return (*((name, None) for name in of_search), *((name, 1) for name in of_best))
+
+    def progress(self, which: JobRef, seconds: float = inf) -> Iterator[JobView]:
+        """Yield a job as it is now, and after every change, until it has ended.
+
+        A service that is started again meanwhile is waited for.
+
+        Raises
+        ------
+        TimeoutError
+            It has not ended within so many seconds.
+        """
+        until = monotonic() + seconds
+        job = self.job(which)
+        yield job
+        while job.state not in TERMINAL:
+            after = self.call(calls.changed(job, min(WAIT, max(0.0, until - monotonic()))))
+            if after.version != job.version:
+                yield after
+            elif monotonic() > until:
+                raise TimeoutError(f"job {job.id} is still {job.state} after {seconds:g} s")
+            job = after
+
+    def wait(self, which: JobRef, seconds: float = inf) -> JobView:
+        """Wait until a job has succeeded, and return it.
+
+        Raises
+        ------
+        JobFailed
+            It failed, or was cancelled.
+        TimeoutError
+        """
+        for job in self.progress(which, seconds):  # noqa: B007 - the last one counts
+            pass
+        if job.state != JobState.SUCCEEDED:
+            detail = (job.problem or {}).get("detail", "it was cancelled")
+            raise JobFailed(f"job {job.id} {job.state}: {detail}")
+        return job
+
+    def events(self, which: JobRef, after: int = 0) -> Iterator[Event]:
+        """Yield the events of a job behind a number, until it has ended, over cut connections as well."""
+        until = monotonic() + self._retry
+        for delay in delays():
+            lines = EventLines()
+            try:
+                headers = {"Last-Event-ID": str(after)}
+                with self._http.stream("GET", calls.events_path(which), headers=headers) as response:
+                    if not response.is_success:
+                        response.read()
+                    calls.refuse_problem(response)
+                    for line in response.iter_lines():
+                        for event in lines.take(line):
+                            after, until = event.number, monotonic() + self._retry
+                            yield event
+                if self.job(which).state in TERMINAL:
+                    return
+            except httpx.TransportError as error:
+                if monotonic() + delay > until:
+                    raise unreachable(self._url, error) from error
+            sleep(delay)

@@ -1,0 +1,28 @@
+/** Asks before something is done that cannot be undone. */
+
+import { el } from "./dom.js";
+
+/** Ask; resolve to whether the answer was yes. Escape says no. */
+export function confirmed(title, text, action) {
+  return new Promise((resolve) => {
+    const close = (value) => ({ click: () => dialog.close(value) });
+    const dialog = el(
+      "dialog",
+      { "aria-labelledby": "question" },
+      el("h2", { id: "question" }, title),
+      el("p", {}, text),
+      el(
+        "div",
+        { class: "row end" },
+        el("button", { type: "button", autofocus: true, on: close("no") }, "Keep it"),
+        el("button", { type: "button", class: "danger", on: close("yes") }, action),
+      ),
+    );
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      resolve(dialog.returnValue === "yes");
+    });
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}

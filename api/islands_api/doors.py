@@ -1,0 +1,48 @@
+"""What the doors of one application share: settings, store, blobs, who watches, who asks how much."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, ParamSpec, TypeVar
+
+from fastapi import Depends, Request
+from starlette.concurrency import run_in_threadpool
+
+from islands_api.hub import Hub
+from islands_api.measures import Measures
+from islands_api.rate import Rate
+from islands_service.blobs import Blobs
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+#: Files that are inspected at once, and figures that are drawn at once: each takes a core.
+INSPECTIONS, DRAWINGS = 2, 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Doors:
+    """Made when the application starts, and closed when it ends."""
+
+    settings: ServiceSettings
+    store: Store
+    blobs: Blobs
+    hub: Hub
+    rate: Rate
+    measures: Measures
+    inspections: asyncio.Semaphore
+    drawings: asyncio.Semaphore
+
+    async def do(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
+        """Carry out what waits for the database or the disk, without holding up other requests."""
+        return await run_in_threadpool(operation, *arguments, **named)
+
+
+def _doors(request: Request) -> Any:
+    return request.app.state.doors
+
+
+#: What a route asks for to get at them.
+AtDoors = Annotated[Doors, Depends(_doors)]

@@ -1,0 +1,127 @@
+"""The hub: tells everybody who watches a job when it has changed. One query for all, ten times a second."""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+
+import structlog
+from starlette.concurrency import run_in_threadpool
+
+from islands_service.jobs import TERMINAL, Event
+from islands_service.store import Store
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+#: Seconds between two looks, and between two tries while the database is away.
+LOOK, RETRY = 0.1, 0.5
+
+#: Events that are kept of a watched job, for watchers that are a little behind.
+_KEPT = 256
+
+
+@dataclass(slots=True, eq=False)
+class Feed:
+    """What is known of a watched job."""
+
+    version: int
+    watchers: int = 0
+    gone: bool = False
+    recent: deque[Event] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def tell(self) -> None:
+        """Wake all who wait; the next change is another one."""
+        self.changed.set()
+        self.changed = asyncio.Event()
+
+
+class Hub:
+    """Feeds of all jobs that somebody watches.
+
+    Parameters
+    ----------
+    store : Store
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._feeds: dict[str, Feed] = {}
+        self._somebody = asyncio.Event()
+        self.closed = False
+
+    async def run(self) -> None:
+        """Look for changes until cancelled."""
+        while True:
+            await self._somebody.wait()
+            try:
+                await self._look()
+                await asyncio.sleep(LOOK)
+            except StoreError as error:
+                log.warning("hub cannot look", reason=str(error))
+                await asyncio.sleep(RETRY)
+
+    def close(self) -> None:
+        """End all streams: their clients come back, and go on where they were."""
+        self.closed = True
+        for feed in self._feeds.values():
+            feed.tell()
+
+    @contextmanager
+    def watching(self, job: str, version: int) -> Iterator[Feed]:
+        """Have a job's feed kept up to date in the block, from a version on that is known."""
+        feed = self._feeds.setdefault(job, Feed(version))
+        feed.watchers += 1
+        self._somebody.set()
+        try:
+            yield feed
+        finally:
+            feed.watchers -= 1
+            if feed.watchers == 0:
+                del self._feeds[job]
+                if not self._feeds:
+                    self._somebody.clear()
+
+    async def wait(self, feed: Feed, version: int, seconds: float) -> bool:
+        """Wait until a job is past a version; return whether it is."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while feed.version <= version and not (feed.gone or self.closed):
+                    await feed.changed.wait()
+        return feed.version > version
+
+    async def events(self, job: str, version: int, after: int, alive: float) -> AsyncIterator[Event | None]:
+        """Yield a job's events after a number, until it has ended; None where nothing happens for a while."""
+        with self.watching(job, version) as feed:
+            last = after
+            while not (feed.gone or self.closed):
+                for event in await self._after(job, feed, last):
+                    yield event
+                    last = event.number
+                    if event.kind in TERMINAL and event.number >= feed.version:
+                        return
+                if last >= feed.version and not await self.wait(feed, last, alive):
+                    yield None
+
+    async def _after(self, job: str, feed: Feed, last: int) -> list[Event]:
+        if last >= feed.version:
+            return []
+        if feed.recent and feed.recent[0].number <= last + 1:
+            return [event for event in feed.recent if event.number > last]
+        # These may be newer than what the feed knows; they reach it, and its other watchers, by its own look.
+        return list(await run_in_threadpool(self._store.jobs.events, job, last))
+
+    async def _look(self) -> None:
+        watched = dict(self._feeds)
+        versions = await run_in_threadpool(self._store.jobs.versions, list(watched))
+        for job, feed in watched.items():
+            if job not in versions:
+                feed.gone = True
+                feed.tell()
+            elif versions[job] > feed.version:
+                news = await run_in_threadpool(self._store.jobs.events, job, feed.version)
+                feed.recent.extend(news)
+                feed.version = max(versions[job], *(event.number for event in news))
+                feed.tell()

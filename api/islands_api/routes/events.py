@@ -1,0 +1,61 @@
+"""Events of a job as they happen: server-sent events that go on where a client was cut off."""
+
+import json
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header
+from fastapi.responses import StreamingResponse
+
+from islands_api.auth import Reader
+from islands_api.doors import AtDoors, Doors
+from islands_api.problems import RESPONSES
+from islands_api.routes.jobs import Id
+from islands_service.jobs import Event, Job
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
+
+#: Seconds of silence after which a comment is sent: a connection that says nothing is cut by some proxies.
+_ALIVE = 15.0
+
+_EVENTS: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "Events: queued, running, progress, cancelling, succeeded, failed, cancelled.",
+        "content": {
+            "text/event-stream": {
+                "schema": {"type": "string"},
+                "example": 'id: 7\nevent: progress\ndata: {"generation": 12, "best_error": 0.031}\n\n',
+            }
+        },
+    }
+}
+
+
+@router.get("/{job}/events", response_class=StreamingResponse, responses=_EVENTS)
+async def events(
+    job: Id,
+    caller: Reader,
+    doors: AtDoors,
+    last_event_id: Annotated[
+        int, Header(ge=0, le=2**62, description="The last event that was seen: what came after it is sent.")
+    ] = 0,
+) -> StreamingResponse:
+    """Follow a job until it has ended; who is cut off comes back with `Last-Event-ID`."""
+    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    # The framework's own event response makes a model of every event for every client; five hundred watch.
+    return StreamingResponse(
+        _stream(doors, found, last_event_id),
+        media_type="text/event-stream",
+        headers={"Cache-Control": "no-store"},
+    )
+
+
+async def _stream(doors: Doors, job: Job, last: int) -> AsyncIterator[bytes]:
+    with doors.measures.streams.track_inprogress():
+        async for event in doors.hub.events(job.id, job.version, last, _ALIVE):
+            yield b": alive\n\n" if event is None else _encoded(event)
+
+
+def _encoded(event: Event) -> bytes:
+    data = json.dumps({**event.data, "at": event.at})
+    return f"id: {event.number}\nevent: {event.kind}\ndata: {data}\n\n".encode()

@@ -1,0 +1,142 @@
+"""Jobs: submit, look, wait, list, cancel, resume, delete."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Path, Query, Response
+from fastapi.responses import JSONResponse
+
+from islands_api.auth import Reader, Writer
+from islands_api.bodies import JSONRoute
+from islands_api.cursors import Cursor, Limit, cursor_of, place_of
+from islands_api.doors import AtDoors, Doors
+from islands_api.problems import RESPONSES
+from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView, job_document
+from islands_service.admission import admit
+from islands_service.inspection import inspected
+from islands_service.jobs import TERMINAL, Job, JobState, Submission
+from islands_service.records import named
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
+
+#: A job's id.
+Id = Annotated[str, Path(max_length=64, examples=["0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"])]
+
+#: Points of a page of the history.
+_POINTS = 5000
+
+
+@router.post("", status_code=202, response_model=JobView)
+async def submit(
+    request: JobRequest,
+    caller: Writer,
+    doors: AtDoors,
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1, max_length=255, description="Send the same one again to be sure: it is one job."
+        ),
+    ] = None,
+) -> Any:
+    """Submit a job. Once this answers 202 the job is not lost, whatever happens to the service.
+
+    It waits until a coordinator is free; follow it by its `events`, or by `GET` with `wait`.
+    """
+    for doubt in await doors.do(admit, request, caller.owner, doors.store, doors.settings):
+        with named(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
+            async with doors.inspections:
+                await inspected(
+                    path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
+                )
+    submission = Submission(
+        caller.owner,
+        request.spec,
+        name=request.name,
+        priority=request.priority,
+        idempotency_key=idempotency_key,
+    )
+    job, new = await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
+    if new:
+        doors.measures.accepted.inc()
+    headers = {"Location": f"{router.prefix}/{job.id}", "ETag": _etag(job), "Retry-After": "1"}
+    if not new:
+        headers["Idempotent-Replayed"] = "true"
+    return JSONResponse(job_document(job), 202, headers)
+
+
+@router.get("", response_model=JobPage)
+async def jobs(
+    caller: Reader,
+    doors: AtDoors,
+    state: Annotated[JobState | None, Query(description="Of this state alone.")] = None,
+    cursor: Cursor = None,
+    limit: Limit = 50,
+) -> Any:
+    """List the jobs, newest first."""
+    page = await doors.do(doors.store.jobs.page, caller.owner, state, place_of(cursor), limit)
+    return JSONResponse({"items": [job_document(job) for job in page.jobs], "next": cursor_of(page.after)})
+
+
+@router.get("/{job}", response_model=JobView, responses={304: {"description": "As it was."}})
+async def job(
+    job: Id,
+    caller: Reader,
+    doors: AtDoors,
+    wait: Annotated[
+        float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
+    ] = 0.0,
+    if_none_match: Annotated[str | None, Header(max_length=100)] = None,
+) -> Any:
+    """Look at a job. With `If-None-Match` the answer is 304 as long as nothing has changed."""
+    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    if wait and if_none_match == _etag(found) and found.state not in TERMINAL:
+        found = await _changed(doors, found, wait)
+    headers = {"ETag": _etag(found), "Cache-Control": "private, no-cache"}
+    if found.state not in TERMINAL:
+        headers["Retry-After"] = "1"
+    if if_none_match == _etag(found):
+        return Response(status_code=304, headers=headers)
+    return JSONResponse(job_document(found), headers=headers)
+
+
+@router.post("/{job}/cancel", status_code=202, response_model=JobView)
+async def cancel(job: Id, caller: Writer, doors: AtDoors) -> Any:
+    """Cancel a job: at once if it waits; if it runs, within a second or so."""
+    return job_document(await doors.do(doors.store.jobs.cancel, caller.owner, job))
+
+
+@router.post("/{job}/resume", status_code=202, response_model=JobView)
+async def resume(job: Id, caller: Writer, doors: AtDoors) -> Any:
+    """Have a job that failed or was cancelled go on from its last checkpoint."""
+    return job_document(await doors.do(doors.store.jobs.resume, caller.owner, job))
+
+
+@router.delete("/{job}", status_code=204)
+async def delete(job: Id, caller: Writer, doors: AtDoors) -> None:
+    """Delete a finished job with its result."""
+    await doors.do(doors.store.jobs.delete, caller.owner, job)
+
+
+@router.get("/{job}/history", response_model=HistoryPage)
+async def history(
+    job: Id,
+    caller: Reader,
+    doors: AtDoors,
+    after: Annotated[
+        int, Query(ge=-1, le=2**31 - 1, description="From the generation behind this one on.")
+    ] = -1,
+) -> Any:
+    """Look at the course of a search: the error of every size and of every island over generations."""
+    await doors.do(doors.store.jobs.get, caller.owner, job)
+    points = await doors.do(doors.store.results.history, job, after, _POINTS)
+    names = ("generation", "evaluations", "best", "islands")
+    return JSONResponse({"items": [dict(zip(names, point, strict=True)) for point in points]})
+
+
+async def _changed(doors: Doors, job: Job, seconds: float) -> Job:
+    with doors.hub.watching(job.id, job.version) as feed:
+        await doors.hub.wait(feed, job.version, seconds)
+    return await doors.do(doors.store.jobs.get, job.owner, job.id)
+
+
+def _etag(job: Job) -> str:
+    return f'"{job.version}"'

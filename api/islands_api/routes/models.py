@@ -1,0 +1,105 @@
+"""Models of a job: metrics, physics checks, exports; and the result as a whole."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.responses import JSONResponse
+
+from islands.io.export import EXPORTS, export
+from islands.io.models import model_from_json
+from islands_api.auth import Caller, Reader
+from islands_api.doors import AtDoors, Doors
+from islands_api.problems import RESPONSES, NoSuchThing, NotFinished
+from islands_api.routes.jobs import Id
+from islands_api.schemas import ModelPage, ModelView
+from islands_service.jobs import JobState
+from islands_service.store.results import StoredModel
+
+router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)
+
+#: A model's place in its result.
+Rank = Annotated[int, Path(ge=1, le=10_000, description="1 is the best on the validation data.")]
+
+#: Media types of exports, where they are not plain text, and the ends of their files.
+_TYPES = {"json": "application/json", "mathml": "application/mathml+xml"}
+_ENDS = {"python": "py", "c": "c", "matlab": "m", "latex": "tex", "json": "json", "mathml": "xml"}
+
+
+@router.get("/{job}/models", response_model=ModelPage)
+async def models(job: Id, caller: Reader, doors: AtDoors) -> Any:
+    """Look at the models of a job, best first; there are none before it has succeeded."""
+    await doors.do(doors.store.jobs.get, caller.owner, job)
+    found = await doors.do(doors.store.results.models, job)
+    return JSONResponse({"items": [model.document for model in found]})
+
+
+@router.get("/{job}/models/{rank}", response_model=ModelView)
+async def model(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Any:
+    """Look at one model."""
+    return JSONResponse((await stored(doors, caller, job, rank)).document)
+
+
+@router.get(
+    "/{job}/models/{rank}/export",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+async def exported(
+    job: Id,
+    rank: Rank,
+    caller: Reader,
+    doors: AtDoors,
+    form: Annotated[
+        str, Query(alias="format", description="A kind of text.", json_schema_extra={"enum": list(EXPORTS)})
+    ] = "python",
+) -> Response:
+    """Take a model with you: as Python, C, MATLAB, an equation, or a model file."""
+    found = await stored(doors, caller, job, rank)
+    text = await doors.do(export, model_from_json(found.file, f"model {rank}"), form)
+    name = f"model-{rank:02d}.{_ENDS.get(form, 'txt')}"
+    return Response(
+        text,
+        media_type=_TYPES.get(form, "text/plain"),
+        headers={"Content-Disposition": f'inline; filename="{name}"'},
+    )
+
+
+@router.get("/{job}/result", response_model=dict[str, Any])
+async def result(job: Id, caller: Reader, doors: AtDoors) -> Any:
+    """Take the whole result, in the form of `result.json`."""
+    document = await finished(doors, caller, job)
+    found = await doors.do(doors.store.results.models, job)
+    return JSONResponse({**document, "models": [model.document for model in found]})
+
+
+async def finished(doors: Doors, caller: Caller, job: str) -> dict[str, Any]:
+    """Return a job's result without its models.
+
+    Raises
+    ------
+    NotFinished
+    """
+    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    document = await doors.do(doors.store.results.document, job)
+    if document is None:
+        hint = (
+            "wait until it has succeeded"
+            if found.state in (JobState.QUEUED, JobState.RUNNING)
+            else "resume it, or submit it again"
+        )
+        raise NotFinished(f"job {job} is {found.state} and has no result: {hint}")
+    return document
+
+
+async def stored(doors: Doors, caller: Caller, job: str, rank: int) -> StoredModel:
+    """Return a model of a finished job.
+
+    Raises
+    ------
+    NotFinished, NoSuchThing
+    """
+    await finished(doors, caller, job)
+    found = await doors.do(doors.store.results.models, job, rank)
+    if not found:
+        raise NoSuchThing(f"job {job} has no model {rank}: look at its /models")
+    return found[0]

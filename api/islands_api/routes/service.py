@@ -1,0 +1,45 @@
+"""The service itself: whether it lives and is ready, what it measures, what a problem's type means."""
+
+from typing import Any
+
+from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from islands_api.auth import Operator
+from islands_api.doors import AtDoors
+from islands_api.problems import PROBLEMS, RESPONSES, NoSuchThing
+from islands_api.schemas import Health
+
+router = APIRouter(tags=["service"], responses=RESPONSES)
+
+
+@router.get("/healthz", response_model=Health)
+async def healthz() -> Any:
+    """Say that this process lives."""
+    return {"status": "alive"}
+
+
+@router.get("/readyz", response_model=Health)
+async def readyz(doors: AtDoors) -> Any:
+    """Say that jobs are accepted: the database answers. Ray may still be starting."""
+    await doors.do(doors.store.jobs.versions, [])
+    return {"status": "ready"}
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+async def metrics(_operator: Operator, doors: AtDoors) -> Response:
+    """Measure, for Prometheus: queue, leases, evaluations a second, best error, latency."""
+    return Response(await doors.do(doors.measures.page), media_type=CONTENT_TYPE_LATEST)
+
+
+@router.get("/problems/{kind}", response_model=dict[str, Any])
+async def problem(kind: str) -> Any:
+    """Say what a problem's type means."""
+    for entry in PROBLEMS.values():
+        if entry.type == kind:
+            return {"type": f"/problems/{kind}", "status": int(entry.status), "title": entry.title}
+    raise NoSuchThing(f"there is no type of problem {kind!r}")

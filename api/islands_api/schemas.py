@@ -1,0 +1,228 @@
+"""What goes over the wire, for the doors and for the client: requests, answers, and their examples."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from islands_service.jobs import PRIORITIES, Job, JobState
+from islands_service.specification import Identification
+from islands_service.store.datasets import StoredDataset
+
+_JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
+_DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"
+_SPEC: dict[str, Any] = {
+    "dataset": _DATASET,
+    "inputs": ["u_V"],
+    "output": "y_um",
+    "preset": "hysteresis",
+    "seed": 0,
+    "settings": {"islands": 2, "generations": 40},
+}
+
+
+class Answer(BaseModel):
+    """What the service sends; what a newer service adds to it is let through."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+
+class Column(Answer):
+    """A column of a data set."""
+
+    name: str
+    unit: str
+    samples: int | None = Field(description="None where the column cannot be read.")
+    minimum: float | None = None
+    maximum: float | None = None
+    mean: float | None = None
+    deviation: float | None = Field(default=None, description="The standard deviation.")
+    problem: str = Field(default="", description="Why it can be neither input nor output; empty if it can.")
+
+
+class Preview(Answer):
+    """What a file holds."""
+
+    samples: int | None
+    columns: tuple[Column, ...]
+    time: str | None = Field(default=None, description="The column that is time.")
+    dt: float | None = Field(default=None, description="Sampling time in seconds, where the file tells it.")
+    warnings: tuple[str, ...] = ()
+
+
+class DatasetView(Answer):
+    """An uploaded record."""
+
+    id: str = Field(examples=[_DATASET])
+    name: str
+    sha256: str
+    bytes: int
+    created: datetime
+    preview: Preview
+
+
+class DatasetPage(Answer):
+    """Data sets, newest first."""
+
+    items: tuple[DatasetView, ...]
+    next: str | None = Field(default=None, description="The cursor of the next page, if there is one.")
+
+
+class JobRequest(Identification):
+    """Identify a record by evolution: what determines the result, and how the job is treated."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{**_SPEC, "name": "piezo, 2 islands"}]})
+
+    name: Annotated[str, Field(max_length=200, description="For people.")] = ""
+    priority: Annotated[
+        int,
+        Field(ge=PRIORITIES.start, le=PRIORITIES.stop - 1, description="Higher ones go first."),
+    ] = 0
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """What determines the result."""
+        return self.model_dump(mode="json", exclude_unset=True, exclude={"name", "priority"})
+
+
+class JobView(Answer):
+    """A job as it stands."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="allow",
+        json_schema_extra={
+            "examples": [
+                {
+                    "id": _JOB,
+                    "kind": "identification",
+                    "name": "piezo, 2 islands",
+                    "state": "running",
+                    "priority": 0,
+                    "version": 7,
+                    "attempt": 1,
+                    "cancel_requested": False,
+                    "created": "2026-11-20T14:00:00Z",
+                    "updated": "2026-11-20T14:00:07Z",
+                    "started": "2026-11-20T14:00:01Z",
+                    "finished": None,
+                    "spec": _SPEC,
+                    "progress": {"phase": "search", "generation": 12, "generations": 40, "best_error": 0.031},
+                    "summary": None,
+                    "problem": None,
+                }
+            ]
+        },
+    )
+
+    id: str
+    kind: str
+    name: str
+    state: JobState
+    priority: int
+    version: int = Field(description="Rises with every change; the number of the last event.")
+    attempt: int = Field(description="How often a coordinator has taken it.")
+    cancel_requested: bool
+    created: datetime
+    updated: datetime
+    started: datetime | None = None
+    finished: datetime | None = None
+    spec: dict[str, Any]
+    progress: dict[str, Any] | None = None
+    summary: dict[str, Any] | None = Field(default=None, description="The result at a glance.")
+    problem: dict[str, Any] | None = Field(default=None, description="Why it failed.")
+
+
+class JobPage(Answer):
+    """Jobs, newest first."""
+
+    items: tuple[JobView, ...]
+    next: str | None = Field(default=None, description="The cursor of the next page, if there is one.")
+
+
+class ModelView(Answer):
+    """A model with its metrics, physics checks and residual tests, as in ``result.json``."""
+
+    rank: int = Field(description="1 is the best on the validation data.")
+    size: int = Field(description="Number of terms.")
+    equation: str
+    latex: str
+    terms: list[dict[str, Any]]
+    metrics: dict[str, Any] = Field(description="metrics.validation.free_run.mape, and so on.")
+    outcomes: dict[str, Any]
+    information: dict[str, Any]
+    physics: dict[str, Any]
+    residual_tests: dict[str, Any]
+
+
+class ModelPage(Answer):
+    """All models of a job, best first."""
+
+    items: tuple[ModelView, ...]
+
+
+class HistoryPoint(Answer):
+    """The search at a generation; errors are mean squared, over intervals of multiple shooting."""
+
+    generation: int
+    evaluations: int
+    best: dict[str, float] = Field(description="By number of terms.")
+    islands: tuple[float | None, ...] = Field(description="By island; null where it has no model yet.")
+
+
+class HistoryPage(Answer):
+    """The course of a search, from a generation on."""
+
+    items: tuple[HistoryPoint, ...]
+
+
+class Names(Answer):
+    """What there is to ask for."""
+
+    items: tuple[str, ...]
+
+
+class Health(Answer):
+    """How the service is."""
+
+    status: str
+
+
+def job_document(job: Job) -> dict[str, Any]:
+    """Return a job as it goes over the wire: `JobView`, written by hand for those who ask often."""
+    return {
+        "id": job.id,
+        "kind": job.kind,
+        "name": job.name,
+        "state": job.state,
+        "priority": job.priority,
+        "version": job.version,
+        "attempt": job.attempt,
+        "cancel_requested": job.cancel_requested,
+        "created": _time(job.created),
+        "updated": _time(job.updated),
+        "started": _time(job.started),
+        "finished": _time(job.finished),
+        "spec": job.spec,
+        "progress": job.progress,
+        "summary": job.summary,
+        "problem": job.problem,
+    }
+
+
+def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
+    """Return a data set as it goes over the wire: `DatasetView`."""
+    return {
+        "id": dataset.id,
+        "name": dataset.name,
+        "sha256": dataset.blob,
+        "bytes": dataset.bytes,
+        "created": _time(dataset.created),
+        "preview": dataset.preview,
+    }
+
+
+def _time(seconds: float | None) -> str | None:
+    if seconds is None:
+        return None
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

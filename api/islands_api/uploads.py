@@ -1,0 +1,68 @@
+"""Uploads: from the bytes of a stranger to a blob and what it holds."""
+
+import gzip
+import zlib
+from pathlib import PurePosixPath, PureWindowsPath
+from typing import IO
+
+from islands.errors import RecordError
+from islands.io.records import READERS
+from islands_api.problems import TooLarge
+
+#: Bytes that are handled at once.
+CHUNK = 1 << 20
+
+#: The end of a name that says that the file is compressed.
+GZIP = ".gz"
+
+
+def name_of(given: str | None) -> tuple[str, bool]:
+    """Return a file's own name, without any folder, and whether its bytes are compressed.
+
+    Raises
+    ------
+    RecordError
+        The file has no name, or one that says nothing of a format that is known.
+    """
+    name = PurePosixPath(PureWindowsPath(given or "").name).name
+    name = "".join(each for each in name if each.isprintable()).lstrip(".")
+    compressed = name.lower().endswith(GZIP)
+    name = name[: -len(GZIP)] if compressed else name
+    suffix = PurePosixPath(name).suffix.lower()
+    if suffix not in READERS:
+        known = ", ".join(READERS)
+        raise RecordError(
+            f"{name or 'the file'}: its name has to end in one of {known}, or in that and {GZIP}: export the "
+            "record to one of these"
+        )
+    stem = name[: -len(suffix)][: 200 - len(suffix)]
+    return stem + suffix, compressed
+
+
+def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, most: int) -> int:
+    """Copy a file, unpacked, to where it is kept; return its bytes.
+
+    Raises
+    ------
+    RecordError
+        It is empty, or no gzip though its name says so.
+    TooLarge
+        It unpacks to more than ``most`` bytes: a small file may unpack to any size.
+    """
+    size = 0
+    stream = gzip.GzipFile(fileobj=source) if compressed else source
+    try:
+        while piece := stream.read(CHUNK):
+            size += len(piece)
+            if size > most:
+                raise TooLarge(
+                    f"{name} has more than {most / 1e6:.0f} MB unpacked, the most that is taken here"
+                )
+            target.write(piece)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise RecordError(
+            f"{name}{GZIP} is no gzip, or damaged ({error}): compress the record anew"
+        ) from error
+    if size == 0:
+        raise RecordError(f"{name} is empty: export the record once more")
+    return size

@@ -1,0 +1,38 @@
+"""``python -m islands_service.coordinator``: one coordinator, a child of ``islands serve`` or alone."""
+
+import argparse
+import os
+import secrets
+import socket
+import sys
+from threading import Event
+
+from islands.errors import IslandsError
+from islands_service.coordinator.loop import Coordinator
+from islands_service.lifeline import lifeline, stop_on_signals
+from islands_service.logs import configure_logs
+from islands_service.settings import service_settings
+
+
+def main() -> int:
+    """Run until SIGTERM or SIGINT."""
+    parser = argparse.ArgumentParser(prog="python -m islands_service.coordinator", description=__doc__)
+    parser.add_argument(
+        "--name", default=f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(3)}", help="unique"
+    )
+    name = parser.parse_args().name
+    stopping = Event()
+    try:
+        settings = service_settings()
+        configure_logs(settings.log_format, "coordinator")
+        stop_on_signals(stopping)
+        with lifeline(settings.lifeline):
+            Coordinator(settings, name, stopping).run()
+    except IslandsError as error:
+        print(f"coordinator: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

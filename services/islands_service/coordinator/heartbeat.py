@@ -1,0 +1,93 @@
+"""The heartbeat of a lease: says that the coordinator lives, and hears whether it is to go on."""
+
+from threading import Event, Thread
+from types import TracebackType
+
+import structlog
+
+from islands.errors import IslandsError
+from islands_service.jobs import JobState, Lease, LeaseLost, Outcome
+from islands_service.store import Store
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+#: Beats in the time of a lease: some may come late, and a wish to cancel is heard soon.
+BEATS = 10
+
+#: Seconds that a cancelled job's coordinator has to let go of it; then it is cancelled over its head.
+GRACE = 1.0
+
+
+class JobCancelled(IslandsError):
+    """The owner has cancelled the job."""
+
+
+class CoordinatorStopping(IslandsError):
+    """The coordinator is to stop: its job goes on elsewhere."""
+
+
+class Heartbeat:
+    """Beats in a thread of its own, as long as the block lasts.
+
+    Parameters
+    ----------
+    store : Store
+    lease : Lease
+    seconds : float
+        Of the lease.
+    stopping : Event
+        Set when the coordinator is to stop.
+    """
+
+    def __init__(self, store: Store, lease: Lease, seconds: float, stopping: Event) -> None:
+        self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
+        self._over = Event()
+        self._lost = self._cancelled = False
+        self._thread = Thread(target=self._beat, name="heartbeat", daemon=True)
+
+    def __enter__(self) -> "Heartbeat":
+        self._cancelled = self._lease.job.cancel_requested
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def check(self) -> None:
+        """Return if the job is to go on.
+
+        Raises
+        ------
+        LeaseLost, JobCancelled, CoordinatorStopping
+        """
+        if self._lost:
+            raise LeaseLost(f"job {self._lease.job.id} is not ours any more")
+        if self._cancelled:
+            raise JobCancelled(f"job {self._lease.job.id} is cancelled")
+        if self._stopping.is_set():
+            raise CoordinatorStopping("the coordinator is to stop")
+
+    def _beat(self) -> None:
+        waited = 0.0
+        while not self._over.wait(self._seconds / BEATS):
+            try:
+                self._cancelled = self._store.leases.beat(self._lease, self._seconds) or self._cancelled
+                waited += self._seconds / BEATS if self._cancelled else 0.0
+                if waited > GRACE:
+                    # Something long that asks nobody, a refinement perhaps: its result comes too late.
+                    self._store.leases.finish(self._lease, Outcome(JobState.CANCELLED))
+                    self._lost = True
+                    return
+            except LeaseLost:
+                self._lost = True
+                return
+            except StoreError as error:
+                # The lease may run out meanwhile: then the next beat is told so.
+                log.warning("heartbeat failed", job=self._lease.job.id, reason=str(error))

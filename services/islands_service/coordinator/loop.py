@@ -1,0 +1,252 @@
+"""The coordinator's loop: claim a job, carry it out, write down how it ended; and again."""
+
+import traceback
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from threading import Event
+from time import monotonic
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import structlog
+
+from islands.errors import IslandsError
+from islands_service.blobs import Blobs
+from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
+from islands_service.jobs import JobState, Lease, LeaseLost, Outcome, Report
+from islands_service.lifeline import stop_on_signals
+from islands_service.runtime.errors import ClusterError
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from islands_service.store.database import StoreError
+from islands_service.telemetry import configure_traces, span
+
+if TYPE_CHECKING:
+    from islands.evolution.engine import Engine
+
+log = structlog.get_logger()
+
+#: Seconds between two looks for a job, and between two tries to reach a store that is away.
+LOOK, RETRY = 0.2, 0.5
+
+#: Seconds that the Ray on this machine may take to start.
+PATIENCE = 60.0
+
+#: Seconds between two looks for what may be forgotten, and how old a blob without a name has to be.
+SWEEP_EVERY, ORPHAN = 600.0, 3600.0
+
+#: Carries out a job: lease, store, blobs, engine, a check that ends it, seconds between checkpoints.
+Work = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], Outcome]
+
+
+def _identification(*arguments: object) -> Outcome:
+    # The search's own imports take half a second: a job is claimed before that.
+    from islands_service.coordinator.identification import identification  # noqa: PLC0415
+
+    return identification(*arguments)  # type: ignore[arg-type]
+
+
+#: How every kind of job is carried out.
+WORK: Mapping[str, Work] = MappingProxyType({"identification": _identification})
+
+
+class Coordinator:
+    """Carries out jobs, one at a time, on a Ray that it stays connected to.
+
+    Parameters
+    ----------
+    settings : ServiceSettings
+    name : str
+        No two living coordinators have the same.
+    stopping : Event
+        Set to have it stop: its job goes back to the queue, with its last checkpoint.
+    """
+
+    def __init__(self, settings: ServiceSettings, name: str, stopping: Event) -> None:
+        self._settings, self._name, self._stopping = settings, name, stopping
+        self._store = Store(settings.url)
+        self._blobs = Blobs(settings.blobs)
+        self._traces = configure_traces(settings.telemetry, "coordinator")
+        self._ray = ExitStack()
+        self._connected = False
+        self._sweep_at = monotonic() + LOOK
+
+    def run(self) -> None:
+        """Go on until told to stop.
+
+        Raises
+        ------
+        ClusterError
+            The cluster is lost: a new process finds the next one.
+        """
+        log.info("coordinator started", name=self._name)
+        with self._store, self._ray:
+            while not self._stopping.is_set():
+                if self._ready():
+                    self._next()
+
+    def _ready(self) -> bool:
+        """Tell whether jobs may be claimed: not while a cluster of somebody else's does not answer."""
+        if self._settings.ray_address is not None and not self._connected:
+            try:
+                self._connect()
+            except ClusterError as error:
+                log.warning("no cluster", reason=str(error))
+                self._stopping.wait(10 * RETRY)
+        return self._connected or self._settings.ray_address is None
+
+    def _next(self) -> None:
+        try:
+            if monotonic() > self._sweep_at:
+                self._sweep_at = monotonic() + SWEEP_EVERY
+                self._sweep()
+            lease = self._store.leases.claim(self._name, self._settings.lease)
+            if lease is None:
+                self._idle()
+        except StoreError as error:
+            log.warning("store unavailable", reason=str(error))
+            self._stopping.wait(RETRY)
+        else:
+            if lease is not None:
+                self._carry_out(lease)
+
+    def _idle(self) -> None:
+        if not self._connected and self._address() is not None:
+            self._connect()
+        self._stopping.wait(LOOK)
+
+    def _carry_out(self, lease: Lease) -> None:
+        attributes = {"job": lease.job.id, "attempt": lease.job.attempt}
+        with (
+            structlog.contextvars.bound_contextvars(**attributes),
+            span(self._traces, lease.job.kind, **attributes),
+        ):
+            log.info("job claimed", kind=lease.job.kind)
+            began = monotonic()
+            try:
+                with Heartbeat(self._store, lease, self._settings.lease, self._stopping) as heartbeat:
+                    outcome = self._outcome(lease, heartbeat)
+                    self._finish(lease, outcome, heartbeat)
+                log.info("job finished", state=outcome.state, seconds=round(monotonic() - began, 3))
+            except LeaseLost as error:
+                log.warning("lease lost", reason=str(error))
+            except CoordinatorStopping:
+                self._release(lease)
+            except ClusterError as error:
+                log.error("cluster lost", reason=str(error))
+                self._release(lease, attempted=self._connected)
+                raise
+
+    def _outcome(self, lease: Lease, heartbeat: Heartbeat) -> Outcome:
+        try:
+            heartbeat.check()
+            self._wait_for_ray(lease, heartbeat)
+            return WORK[lease.job.kind](
+                lease,
+                self._store,
+                self._blobs,
+                self._engine(lease),
+                heartbeat.check,
+                self._settings.checkpoint_every,
+            )
+        except JobCancelled:
+            return Outcome(JobState.CANCELLED)
+        except (LeaseLost, CoordinatorStopping, ClusterError, StoreError):
+            raise
+        except IslandsError as error:
+            return Outcome(JobState.FAILED, problem=problem_of(error))
+        except Exception as error:
+            log.error("job failed", trace=traceback.format_exc())
+            return Outcome(
+                JobState.FAILED,
+                problem={
+                    "type": "defect",
+                    "title": "The job met a defect of the service",
+                    "detail": f"{type(error).__name__}: {error}. Please report it with the job's id.",
+                },
+            )
+
+    def _finish(self, lease: Lease, outcome: Outcome, heartbeat: Heartbeat) -> None:
+        """Write down how a job ended; a store that is away or full is waited for: the work is done."""
+        while True:
+            try:
+                return self._store.leases.finish(lease, outcome)
+            except StoreError as error:
+                log.warning("cannot finish yet", reason=str(error))
+                heartbeat.check()
+                self._stopping.wait(RETRY)
+
+    def _release(self, lease: Lease, attempted: bool = False) -> None:
+        try:
+            self._store.leases.release(lease, attempted)
+            log.info("job released")
+        except (LeaseLost, StoreError) as error:
+            # It is taken over when its lease has run out.
+            log.warning("job not released", reason=str(error))
+
+    def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
+        if self._connected:
+            return
+        self._store.leases.report(lease, Report({"phase": "starting", "note": "waiting for Ray"}))
+        until = monotonic() + PATIENCE
+        while self._address() is None:
+            heartbeat.check()
+            if monotonic() > until:
+                raise ClusterError(f"Ray has not started within {PATIENCE:.0f} s")
+            self._stopping.wait(LOOK)
+        self._connect()
+
+    def _address(self) -> str | None:
+        if self._settings.ray_address is not None:
+            return self._settings.ray_address
+        try:
+            return self._settings.ray_address_file.read_text() or None
+        except FileNotFoundError:
+            return None
+
+    def _connect(self) -> None:
+        from islands.warm_up import warm_up  # noqa: PLC0415
+        from islands_service.runtime.cluster import cluster  # noqa: PLC0415
+
+        self._ray.enter_context(cluster(self._address()))
+        stop_on_signals(self._stopping)
+        self._connected = True
+        log.info("connected to Ray", address=self._address())
+        warm_up(lambda line: log.info("kernels", note=line))
+
+    def _engine(self, lease: Lease) -> "Engine":
+        from islands_service.runtime.leftovers import end_leftovers  # noqa: PLC0415
+        from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
+
+        if ended := end_leftovers(lease.job.id, lease.epoch):
+            log.warning("actors of a lost lease ended", actors=ended)
+        return RayEngine(lambda line: log.warning("islands", note=line), f"{lease.job.id}.{lease.epoch}")
+
+    def _sweep(self) -> None:
+        if self._settings.retention:
+            self._store.retention.forget(self._settings.retention)
+        # Read before looking: what is named after this is younger than an hour.
+        named = self._store.retention.named_blobs()
+        removed = self._blobs.sweep(named, ORPHAN)
+        log.info("swept", blobs=removed)
+
+
+def problem_of(error: IslandsError) -> dict[str, str]:
+    """Describe why a job failed, as whoever submitted it is told."""
+    return {
+        "type": PROBLEMS.get(type(error).__name__, "job-failed"),
+        "title": "The job failed",
+        "detail": str(error),
+    }
+
+
+#: The types of problems that a job's own input can cause.
+PROBLEMS: Mapping[str, str] = MappingProxyType(
+    {
+        "RecordError": "invalid-record",
+        "SettingsError": "invalid-settings",
+        "ModelError": "invalid-model",
+        "NoSuchDataset": "no-such-dataset",
+        "NoSuchBlob": "no-such-blob",
+    }
+)

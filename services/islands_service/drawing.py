@@ -1,0 +1,134 @@
+"""``python -m islands_service.drawing JOB``: draws a finished job's figures and keeps them beside its result.
+
+A process of its own: drawing takes seconds, and whoever answers requests has none.
+"""
+
+import argparse
+import io
+import json
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from islands.errors import IslandsError, SettingsError
+from islands.evolution.presets import settings_of
+from islands.figures.gallery import FIGURES, SEARCH_FIGURES, search_figures
+from islands.figures.style import save
+from islands.fitting import parts_of
+from islands.io.models import model_from_json
+from islands.io.states import history_of
+from islands.simulation.predictors import free_run
+from islands.validation.assessment import assess
+from islands.validation.findings import Assessed, Findings, Search
+from islands_service.blobs import Blobs
+from islands_service.jobs import Job
+from islands_service.records import record_and_validation
+from islands_service.settings import service_settings
+from islands_service.specification import identification_of
+from islands_service.store import Store
+
+#: Samples of a simulation that are handed out as numbers: a screen shows no more.
+POINTS = 4000
+
+
+def main() -> int:
+    """Draw what is asked for, all figures of a model or all of the search, and keep it."""
+    parser = argparse.ArgumentParser(prog="python -m islands_service.drawing", description=__doc__)
+    parser.add_argument("job")
+    parser.add_argument("--owner", required=True)
+    parser.add_argument("--rank", type=int, help="a model's; without it, the figures of the search")
+    asked = parser.parse_args()
+    settings = service_settings()
+    blobs = Blobs(settings.blobs)
+    try:
+        with Store(settings.url) as store:
+            findings = findings_of(store.jobs.get(asked.owner, asked.job), store, blobs, asked.rank)
+            made = drawn(findings) if asked.rank is None else drawn_model(findings, asked.rank)
+            store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
+    except IslandsError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def findings_of(job: Job, store: Store, blobs: Blobs, rank: int | None) -> Findings:
+    """Put a finished job's findings together again, with the model of a rank or with all.
+
+    Raises
+    ------
+    IslandsError
+        The job, its data or the model is not there any more.
+    """
+    spec = identification_of(job.spec)
+    datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
+    record, validation = record_and_validation(spec, datasets, blobs)
+    split = parts_of(record, validation)
+    settings = settings_of(spec.preset, spec.changes)
+    document = store.results.document(job.id)
+    stored = store.results.models(job.id, rank)
+    if document is None or not stored:
+        raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
+    models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
+    assessed = tuple(
+        Assessed(model, assess(model, split, settings.shooting, settings.maximum_lag)) for model in models
+    )
+    search = _search(document["search"], store.results.history(job.id))
+    return Findings(record, split, spec.seed, document["settings"], search, assessed)
+
+
+def _search(document: Mapping[str, Any], history: list[list[Any]]) -> Search:
+    return Search(
+        document["evaluations"],
+        document["outcomes"],
+        document["full_set"],
+        document["wall_s"],
+        document["generations"],
+        document["duplicates"],
+        document["feasible_share"],
+        history_of(history),
+        {},
+        document["ended_by"],
+    )
+
+
+def drawn(findings: Findings) -> dict[str, bytes]:
+    """Draw the figures of a search, by the names of their artefacts."""
+    return {f"{name}.svg": _svg(SEARCH_FIGURES[name](findings)) for name in search_figures(findings)}
+
+
+def drawn_model(findings: Findings, rank: int) -> dict[str, bytes]:
+    """Draw a model's figures, and simulate it, by the names of their artefacts."""
+    entry = findings.models[0]
+    made = {f"{rank}/{name}.svg": _svg(draw(entry, findings.split)) for name, draw in FIGURES.items()}
+    made[f"{rank}/free-run.json"] = _simulated(entry, findings)
+    return made
+
+
+def _svg(figure: Any) -> bytes:
+    stream = io.BytesIO()
+    save(figure, stream)
+    return stream.getvalue()
+
+
+def _simulated(entry: Assessed, findings: Findings) -> bytes:
+    """Return the validation data and the model's free run over it, thinned for a screen."""
+    data = findings.split.validation
+    simulated = free_run(entry.model, data)
+    every = max(1, -(-data.samples // POINTS))
+    kept = slice(None, None, every)
+    time = data.start + data.dt * np.arange(data.samples)
+    document = {
+        "outcome": str(simulated.outcome),
+        "every": every,
+        "time_s": time[kept].tolist(),
+        "inputs": {name: data.u[kept, index].tolist() for index, name in enumerate(data.input_names)},
+        "measured": data.y[kept].tolist(),
+        "free_run": [value if np.isfinite(value) else None for value in simulated.y[kept].tolist()],
+    }
+    return json.dumps(document).encode()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,43 @@
+"""The lifeline between the supervisor and a child: the child says that it lives, and ends when told to."""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from threading import Event, Thread
+
+#: Seconds between two signs of life.
+EVERY = 0.5
+
+
+def sign_of_life(descriptor: int | None) -> None:
+    """Tell the supervisor that this process lives; without a descriptor there is none to tell."""
+    if descriptor is not None:
+        # A pipe that is full has been told often enough; a supervisor that is gone has taken us with it.
+        with suppress(BlockingIOError, BrokenPipeError):
+            os.write(descriptor, b".")
+
+
+@contextmanager
+def lifeline(descriptor: int | None) -> Iterator[None]:
+    """Give signs of life from a thread of its own, as long as the block lasts."""
+    over = Event()
+
+    def beat() -> None:
+        sign_of_life(descriptor)
+        while not over.wait(EVERY):
+            sign_of_life(descriptor)
+
+    thread = Thread(target=beat, name="lifeline", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def stop_on_signals(stopping: Event) -> None:
+    """Turn SIGTERM and Ctrl-C into a wish to stop. Ray takes SIGTERM for itself: call it again after Ray."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopping.set())

@@ -1,0 +1,59 @@
+"""``python -m islands_service.runtime.head``: the Ray on this machine, as a process of its own.
+
+Coordinators connect to it by its address, as they do to a cluster: there is one path.
+"""
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+
+import ray
+
+from islands.errors import IslandsError
+from islands_service.lifeline import lifeline, stop_on_signals
+from islands_service.runtime.cluster import cluster
+from islands_service.settings import service_settings
+
+#: Seconds between two looks at whether Ray still answers.
+_LOOK = 1.0
+
+
+def main() -> int:
+    """Start Ray, say where it is, and stay until SIGTERM, or until Ray is lost."""
+    settings = service_settings()
+    stopping = Event()
+    stop_on_signals(stopping)
+    try:
+        with cluster(None):
+            stop_on_signals(stopping)
+            with _found_at(settings.ray_address_file), lifeline(settings.lifeline):
+                while not stopping.wait(_LOOK):
+                    # Raises, or ends this process, when Ray's own processes are lost.
+                    ray.cluster_resources()
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    except IslandsError as error:
+        print(f"Ray: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+@contextmanager
+def _found_at(path: Path) -> Iterator[None]:
+    """Say in a file where Ray is, as long as the block lasts."""
+    address = ray.get_runtime_context().gcs_address
+    part = path.with_suffix(".part")
+    part.write_text(address)
+    part.replace(path)
+    try:
+        yield
+    finally:
+        # The next service on the same folder may have another Ray by now, and say where that is.
+        if path.exists() and path.read_text() == address:
+            path.unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

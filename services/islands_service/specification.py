@@ -1,0 +1,156 @@
+"""What a job says: everything that determines its result, checked as far as it can be without the data."""
+
+import inspect
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, create_model
+
+from islands.errors import SettingsError
+from islands.evolution.presets import PRESETS, settings_of
+from islands.evolution.settings import Settings
+
+#: ``START:STOP``; either may be left out, and a negative one counts from the end.
+Rows = Annotated[str, Field(pattern=r"^(-?\d{1,12})?:(-?\d{1,12})?$", examples=["0:5000"])]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+DatasetId = Annotated[
+    str, Field(min_length=1, max_length=48, examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
+]
+
+#: The most that a setting may be over REST, where it would take memory rather than time: what it is for.
+LIMITS = {
+    "population": 100_000,
+    "generations": 1_000_000,
+    "max_terms": 100,
+    "max_height": 12,
+    "library_degree": 8,
+    "library_lags": 30,
+    "initial_height": 12,
+    "tournament": 10_000,
+}
+
+#: The most entries of a list, the deepest back-shift, and the longest text.
+_ENTRIES, _SHIFT, _TEXT = 64, 1000, 20_000
+
+
+def _described() -> dict[str, str]:
+    """Take the meaning of every setting from where it stands: the docstring of `Settings`."""
+    text = inspect.cleandoc(Settings.__doc__ or "").partition("----------\n")[2]
+    found = {}
+    for names, meaning in re.findall(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)+)", text, re.MULTILINE):
+        for name in names.split(", "):
+            found[name] = " ".join(meaning.split())
+    return found
+
+
+def _changes() -> type[BaseModel]:
+    described = _described()
+    types: dict[str, Any] = {
+        each.name: (
+            each.type | None,  # type: ignore[operator]
+            Field(default=None, description=described[each.name]),
+        )
+        for each in fields(Settings)
+    }
+    return create_model(
+        "SettingsChanges",
+        __config__=ConfigDict(extra="forbid", frozen=True, title="Settings that differ from the preset's"),
+        **types,
+    )
+
+
+SettingsChanges = _changes()
+
+
+class Part(BaseModel):
+    """A data set of its own, or rows of one."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    dataset: DatasetId
+    rows: Rows | None = None
+
+
+class Identification(BaseModel):
+    """Identify a record by evolution."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    dataset: DatasetId = Field(description="The record: the id of an uploaded data set.")
+    inputs: Annotated[tuple[Name, ...], Field(min_length=1, max_length=16, examples=[["u_V"]])] = Field(
+        description="Columns that are inputs; u_V+1 for the column u_V one sample early."
+    )
+    output: Name = Field(description="Column that is the output.", examples=["y_um"])
+    dt: Annotated[FiniteFloat, Field(gt=0.0)] | None = Field(
+        default=None, description="Sampling time in seconds, where the record does not tell it."
+    )
+    rows: Rows | None = Field(default=None, description="Samples that estimate; all by default.")
+    validation: Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)] | Part = Field(
+        default=0.25, description="The share of the record's end that selects among models, or a data set."
+    )
+    preset: str = Field(default="hysteresis", json_schema_extra={"enum": list(PRESETS)})
+    seed: int = Field(
+        default=0, ge=0, lt=2**63, description="The same seed gives the same result, bit for bit."
+    )
+    settings: SettingsChanges = Field(default_factory=SettingsChanges)  # type: ignore[valid-type]
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """The settings that differ from the preset's."""
+        given: Mapping[str, Any] = self.settings.model_dump(exclude_none=True)  # type: ignore[attr-defined]
+        return dict(given)
+
+    @property
+    def datasets(self) -> tuple[str, ...]:
+        """The data sets that the job reads."""
+        return (self.dataset, *([self.validation.dataset] if isinstance(self.validation, Part) else []))
+
+
+def identification_of(document: Mapping[str, Any]) -> Identification:
+    """Read a job's specification as it is stored.
+
+    Raises
+    ------
+    SettingsError
+        It was written by another version of islands.
+    """
+    try:
+        return Identification.model_validate(document)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise SettingsError(
+            f"this version of islands cannot read the job ({where}: {first['msg']}): submit it again"
+        ) from error
+
+
+def checked(spec: Identification, max_islands: int, max_evaluations: int) -> Settings:
+    """Return the settings of a job that a stranger may ask for.
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown or out of range, or asks for more than this service gives.
+    """
+    changes = spec.changes
+    for name, most in {**LIMITS, "islands": max_islands}.items():
+        # Before anything is made of them: a million islands would take the memory of this process.
+        if changes.get(name, 0) > most:
+            raise SettingsError(f"{name} is at most {most} on this service, got {changes[name]}")
+    for name, value in changes.items():
+        if isinstance(value, str) and len(value) > _TEXT:
+            raise SettingsError(f"{name} has {len(value)} characters, and {_TEXT} is the most")
+        if isinstance(value, tuple) and len(value) > _ENTRIES:
+            raise SettingsError(f"{name} has {len(value)} entries, and {_ENTRIES} is the most")
+    if any(shift > _SHIFT for shift in changes.get("shifts", ())):
+        raise SettingsError(f"back-shifts are at most {_SHIFT} on this service, got {changes['shifts']}")
+    settings = settings_of(spec.preset, changes)
+    asked = settings.population * (settings.generations + 1) * settings.islands
+    if asked > max_evaluations:
+        raise SettingsError(
+            f"population x generations x islands is {asked:.3g} individuals, and this service evaluates at "
+            f"most {max_evaluations:.3g} for a job: fewer generations, islands or individuals are needed"
+        )
+    return settings

@@ -1,0 +1,35 @@
+"""Models as text of other kinds: one entry in the table, and a model can be exported that way."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from islands.errors import chosen
+from islands.io.export.c import c_source
+from islands.io.export.matlab import matlab_source
+from islands.io.export.python import python_source
+from islands.io.models import model_json
+from islands.model.equations import equation, latex_equation, mathml_equation
+from islands.model.model import Model
+
+EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
+    {
+        "plain": equation,
+        "latex": latex_equation,
+        "mathml": mathml_equation,
+        "python": python_source,
+        "c": c_source,
+        "matlab": matlab_source,
+        "json": model_json,
+    }
+)
+
+
+def export(model: Model, kind: str) -> str:
+    """Return a model as text of a kind in ``EXPORTS``.
+
+    Raises
+    ------
+    SettingsError
+        There is no such kind.
+    """
+    return chosen(EXPORTS, kind, "format")(model)

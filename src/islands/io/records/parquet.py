@@ -1,0 +1,112 @@
+"""Parquet files (.parquet), by pyarrow, which the extra `parquet` brings."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+from islands.io.records.channels import Channels
+from islands.io.records.claims import check_samples
+from islands.io.records.names import seconds_per_unit
+
+#: Rows that are decoded at a time. Memory then follows what the pages hold, never what the file claims.
+_BATCH = 2**16
+
+#: Seconds of a tick of Arrow's times.
+_TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def read_parquet(path: Path) -> Channels:
+    """Open a Parquet file; a column is read when it is asked for.
+
+    Numbers of all kinds and booleans become float64, nulls NaN. Dates and times become numbers in the unit of
+    the column's name, points in time counted from the earliest: nanoseconds since 1970 are no float64.
+
+    Raises
+    ------
+    RecordError
+        The file is no Parquet file or damaged, or pyarrow is not installed.
+    """
+    file = path.name
+    if path.stat().st_size == 0:
+        raise RecordError(f"{file} is empty: write it anew")
+    with _opened(path) as parquet:
+        names = tuple(parquet.schema_arrow.names)
+        rows = parquet.metadata.num_rows
+        groups = [parquet.metadata.row_group(index) for index in range(parquet.metadata.num_row_groups)]
+    if sum(group.num_rows for group in groups) != rows:
+        raise _disagreement(file, rows, sum(group.num_rows for group in groups))
+    return Channels(file, names, partial(_column, path, rows))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    try:
+        import pyarrow  # noqa: PLC0415
+        from pyarrow.parquet import ParquetFile  # noqa: PLC0415
+    except ImportError as error:
+        raise RecordError(
+            f"{path.name}: Parquet is read by pyarrow, which is not installed: "
+            "pip install 'islands[parquet]', or export the record to .csv"
+        ) from error
+    try:
+        # Not mapped into memory: a file that is cut while it is mapped ends the process without a word.
+        with ParquetFile(path, memory_map=False, pre_buffer=False) as parquet:
+            yield parquet
+    except (pyarrow.ArrowException, OSError) as error:
+        raise RecordError(f"{path.name} is damaged or no Parquet file ({error}): write it anew") from error
+
+
+def _column(path: Path, rows: int, name: str) -> NDArray[np.float64]:
+    import pyarrow  # noqa: PLC0415
+
+    check_samples(rows, name, path.name)
+    with _opened(path) as parquet:
+        batches = parquet.iter_batches(_BATCH, columns=[name], use_threads=False)
+        chunks = [batch.column(batch.schema.names.index(name)) for batch in batches]
+        if sum(map(len, chunks)) != rows:
+            raise _disagreement(path.name, rows, sum(map(len, chunks)))
+        schema = parquet.schema_arrow
+        kind = schema.field(schema.names.index(name)).type
+        if pyarrow.types.is_dictionary(kind):
+            chunks, kind = [chunk.dictionary_decode() for chunk in chunks], kind.value_type
+        return _numbers(pyarrow.chunked_array(chunks, kind), name, path.name)
+
+
+def _numbers(column: Any, name: str, file: str) -> NDArray[np.float64]:
+    """Convert an Arrow column to float64, NaN where it is null."""
+    from pyarrow import compute, float64, types  # noqa: PLC0415
+
+    kind = column.type
+    if types.is_temporal(kind):
+        return _elapsed(column, name)
+    numeric = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
+    if not any(test(kind) for test in numeric):
+        raise RecordError(f"{file}: column {name} holds {kind} where real numbers are expected")
+    numbers: NDArray[np.float64] = compute.cast(column, float64(), safe=False).to_numpy()
+    return numbers
+
+
+def _elapsed(column: Any, name: str) -> NDArray[np.float64]:
+    """Return times as numbers in the unit of the column's name, points in time from the earliest."""
+    from pyarrow import chunked_array, compute, int32, int64, types  # noqa: PLC0415
+
+    kind = column.type
+    ticks = [
+        chunk.view(int32() if kind.bit_width == 32 else int64()).cast(int64()) for chunk in column.chunks
+    ]
+    counted = chunked_array(ticks, int64())
+    tick = 86_400.0 if types.is_date32(kind) else _TICKS[getattr(kind, "unit", "ms")]
+    if types.is_timestamp(kind) or types.is_date(kind):
+        counted = compute.subtract(counted, compute.min(counted))
+    numbers: NDArray[np.float64] = compute.cast(counted, "float64", safe=False).to_numpy()
+    return numbers * (tick / (seconds_per_unit(name) or 1.0))
+
+
+def _disagreement(file: str, claimed: int, stored: int) -> RecordError:
+    return RecordError(f"{file} claims {claimed} rows and stores {stored}: it is damaged, write it anew")
