@@ -20,7 +20,7 @@ test: setup
 	$(BIN)/pytest -n 2 --dist loadgroup
 
 slow: setup
-	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or measured"
+	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or measured or browser"
 
 lint: setup
 	$(BIN)/ruff format --check .

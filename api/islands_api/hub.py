@@ -62,6 +62,10 @@ class Hub:
             except StoreError as error:
                 log.warning("hub cannot look", reason=str(error))
                 await asyncio.sleep(RETRY)
+            except Exception as error:
+                # Whoever watches any job would wait for ever.
+                log.error("defect", exc_info=error)
+                await asyncio.sleep(RETRY)
 
     def close(self) -> None:
         """End all streams: their clients come back, and go on where they were."""
@@ -97,10 +101,12 @@ class Hub:
         with self.watching(job, version) as feed:
             last = after
             while not (feed.gone or self.closed):
-                for event in await self._after(job, feed, last):
+                found = await self._after(job, feed, last)
+                newest = max((feed.version, *(event.number for event in found)))
+                for event in found:
                     yield event
                     last = event.number
-                    if event.kind in TERMINAL and event.number >= feed.version:
+                    if event.kind in TERMINAL and last >= newest:
                         return
                 if last >= feed.version and not await self.wait(feed, last, alive):
                     yield None
@@ -123,5 +129,5 @@ class Hub:
             elif versions[job] > feed.version:
                 news = await run_in_threadpool(self._store.jobs.events, job, feed.version)
                 feed.recent.extend(news)
-                feed.version = max(versions[job], *(event.number for event in news))
+                feed.version = max((versions[job], *(event.number for event in news)))
                 feed.tell()

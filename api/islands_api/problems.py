@@ -140,7 +140,8 @@ PROBLEMS: Mapping[type[Exception], Problem] = MappingProxyType(
 
 #: What the framework itself raises, by status: it has no classes for it.
 _FRAMEWORK = {
-    PROBLEMS[kind].status: PROBLEMS[kind] for kind in (Unreadable, NoSuchThing, WrongMethod, WrongMedia, TooLarge)
+    PROBLEMS[kind].status: PROBLEMS[kind]
+    for kind in (Unreadable, NoSuchThing, WrongMethod, WrongMedia, TooLarge)
 }
 
 #: What may be asked of a path.

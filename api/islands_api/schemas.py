@@ -1,13 +1,12 @@
 """What goes over the wire, for the doors and for the client: requests, answers, and their examples."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from islands_service.jobs import PRIORITIES, Job, JobState
+from islands_service.jobs import PRIORITIES, JobState
 from islands_service.specification import Identification
-from islands_service.store.datasets import StoredDataset
 
 _JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
 _DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"
@@ -186,43 +185,3 @@ class Health(Answer):
     """How the service is."""
 
     status: str
-
-
-def job_document(job: Job) -> dict[str, Any]:
-    """Return a job as it goes over the wire: `JobView`, written by hand for those who ask often."""
-    return {
-        "id": job.id,
-        "kind": job.kind,
-        "name": job.name,
-        "state": job.state,
-        "priority": job.priority,
-        "version": job.version,
-        "attempt": job.attempt,
-        "cancel_requested": job.cancel_requested,
-        "created": _time(job.created),
-        "updated": _time(job.updated),
-        "started": _time(job.started),
-        "finished": _time(job.finished),
-        "spec": job.spec,
-        "progress": job.progress,
-        "summary": job.summary,
-        "problem": job.problem,
-    }
-
-
-def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
-    """Return a data set as it goes over the wire: `DatasetView`."""
-    return {
-        "id": dataset.id,
-        "name": dataset.name,
-        "sha256": dataset.blob,
-        "bytes": dataset.bytes,
-        "created": _time(dataset.created),
-        "preview": dataset.preview,
-    }
-
-
-def _time(seconds: float | None) -> str | None:
-    if seconds is None:
-        return None
-    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

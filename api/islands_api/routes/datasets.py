@@ -8,9 +8,10 @@ from fastapi import APIRouter, File, Form, Response, UploadFile
 
 from islands_api.auth import Reader, Writer
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
+from islands_api.documents import dataset_document
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
-from islands_api.schemas import DatasetPage, DatasetView, dataset_document
+from islands_api.schemas import DatasetPage, DatasetView
 from islands_api.uploads import name_of, receive
 from islands_service.inspection import Asked, inspected
 from islands_service.records import named

@@ -1,17 +1,17 @@
 """Events of a job as they happen: server-sent events that go on where a client was cut off."""
 
-import json
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header
+from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
 from islands_api.auth import Reader
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
 from islands_api.routes.jobs import Id
-from islands_service.jobs import Event, Job
+from islands_api.schemas import json_text
+from islands_service.jobs import TERMINAL, Event, Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 
@@ -27,7 +27,8 @@ _EVENTS: dict[int | str, dict[str, Any]] = {
                 "example": 'id: 7\nevent: progress\ndata: {"generation": 12, "best_error": 0.031}\n\n',
             }
         },
-    }
+    },
+    204: {"description": "The job has ended, and its last event was seen: do not come back."},
 }
 
 
@@ -39,9 +40,12 @@ async def events(
     last_event_id: Annotated[
         int, Header(ge=0, le=2**62, description="The last event that was seen: what came after it is sent.")
     ] = 0,
-) -> StreamingResponse:
+) -> Response:
     """Follow a job until it has ended; who is cut off comes back with `Last-Event-ID`."""
     found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    if found.state in TERMINAL and last_event_id >= found.version:
+        # A browser's event source comes back after every end but this one.
+        return Response(status_code=204)
     # The framework's own event response makes a model of every event for every client; five hundred watch.
     return StreamingResponse(
         _stream(doors, found, last_event_id),
@@ -57,5 +61,5 @@ async def _stream(doors: Doors, job: Job, last: int) -> AsyncIterator[bytes]:
 
 
 def _encoded(event: Event) -> bytes:
-    data = json.dumps({**event.data, "at": event.at})
+    data = json_text({**event.data, "at": event.at})
     return f"id: {event.number}\nevent: {event.kind}\ndata: {data}\n\n".encode()

@@ -8,9 +8,10 @@ from fastapi.responses import JSONResponse
 from islands_api.auth import Reader, Writer
 from islands_api.bodies import JSONRoute
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
+from islands_api.documents import job_document
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
-from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView, job_document
+from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
 from islands_service.admission import admit
 from islands_service.inspection import inspected
 from islands_service.jobs import TERMINAL, Job, JobState, Submission

@@ -1,0 +1,47 @@
+"""From what the store knows to what goes over the wire, by hand: some ask a thousand times a second."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from islands_service.jobs import Job
+from islands_service.store.datasets import StoredDataset
+
+
+def job_document(job: Job) -> dict[str, Any]:
+    """Return a job as it goes over the wire: `islands_api.schemas.JobView`."""
+    return {
+        "id": job.id,
+        "kind": job.kind,
+        "name": job.name,
+        "state": job.state,
+        "priority": job.priority,
+        "version": job.version,
+        "attempt": job.attempt,
+        "cancel_requested": job.cancel_requested,
+        "created": _time(job.created),
+        "updated": _time(job.updated),
+        "started": _time(job.started),
+        "finished": _time(job.finished),
+        "spec": job.spec,
+        "progress": job.progress,
+        "summary": job.summary,
+        "problem": job.problem,
+    }
+
+
+def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
+    """Return a data set as it goes over the wire: `islands_api.schemas.DatasetView`."""
+    return {
+        "id": dataset.id,
+        "name": dataset.name,
+        "sha256": dataset.blob,
+        "bytes": dataset.bytes,
+        "created": _time(dataset.created),
+        "preview": dataset.preview,
+    }
+
+
+def _time(seconds: float | None) -> str | None:
+    if seconds is None:
+        return None
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
