@@ -1,7 +1,11 @@
 """From what the store knows to what goes over the wire, by hand: some ask a thousand times a second."""
 
+import json
 from datetime import UTC, datetime
+from math import isfinite
 from typing import Any
+
+from starlette.responses import JSONResponse
 
 from islands_service.jobs import Job
 from islands_service.store.datasets import StoredDataset
@@ -39,6 +43,30 @@ def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
         "created": _time(dataset.created),
         "preview": dataset.preview,
     }
+
+
+class Document(JSONResponse):
+    """An answer that is made by hand."""
+
+    def render(self, content: Any) -> bytes:
+        """Write it as JSON."""
+        return json_text(content).encode()
+
+
+def json_text(content: Any) -> str:
+    """Write JSON; a number that JSON does not have, such as an infinite error, is null."""
+    try:
+        return json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    except ValueError:
+        return json_text(_finite(content))
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {name: _finite(value) for name, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not isfinite(content) else content
 
 
 def _time(seconds: float | None) -> str | None:

@@ -12,6 +12,9 @@ from islands_api.problems import TooLarge
 #: Bytes that are handled at once.
 CHUNK = 1 << 20
 
+#: The most bytes of a file's name.
+NAME = 200
+
 #: The end of a name that says that the file is compressed.
 GZIP = ".gz"
 
@@ -35,7 +38,8 @@ def name_of(given: str | None) -> tuple[str, bool]:
             f"{name or 'the file'}: its name has to end in one of {known}, or in that and {GZIP}: export the "
             "record to one of these"
         )
-    stem = name[: -len(suffix)][: 200 - len(suffix)]
+    # A file's name has at most 255 bytes on Linux, and the table of data sets no more characters.
+    stem = name[: -len(suffix)].encode()[: NAME - len(suffix)].decode(errors="ignore")
     return stem + suffix, compressed
 
 
@@ -50,7 +54,7 @@ def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, m
         It unpacks to more than ``most`` bytes: a small file may unpack to any size.
     """
     size = 0
-    stream = gzip.GzipFile(fileobj=source) if compressed else source
+    stream = gzip.GzipFile(fileobj=source, mode="rb") if compressed else source
     try:
         while piece := stream.read(CHUNK):
             size += len(piece)

@@ -25,9 +25,13 @@ from islands.validation.findings import Assessed, Findings, Search
 from islands_service.blobs import Blobs
 from islands_service.jobs import Job
 from islands_service.records import record_and_validation
+from islands_service.report import report
 from islands_service.settings import service_settings
 from islands_service.specification import identification_of
 from islands_service.store import Store
+
+#: The artefact that is a job's report.
+REPORT = "report.html"
 
 #: Samples of a simulation that are handed out as numbers: a screen shows no more.
 POINTS = 4000
@@ -44,8 +48,9 @@ def main() -> int:
     blobs = Blobs(settings.blobs)
     try:
         with Store(settings.url) as store:
-            findings = findings_of(store.jobs.get(asked.owner, asked.job), store, blobs, asked.rank)
-            made = drawn(findings) if asked.rank is None else drawn_model(findings, asked.rank)
+            job = store.jobs.get(asked.owner, asked.job)
+            findings = findings_of(job, store, blobs, asked.rank)
+            made = drawn(job, findings) if asked.rank is None else drawn_model(findings, asked.rank)
             store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
     except IslandsError as error:
         print(error, file=sys.stderr)
@@ -93,9 +98,11 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> Search:
     )
 
 
-def drawn(findings: Findings) -> dict[str, bytes]:
-    """Draw the figures of a search, by the names of their artefacts."""
-    return {f"{name}.svg": _svg(SEARCH_FIGURES[name](findings)) for name in search_figures(findings)}
+def drawn(job: Job, findings: Findings) -> dict[str, bytes]:
+    """Draw the figures of a search and write its report, by the names of their artefacts."""
+    made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](findings)) for name in search_figures(findings)}
+    best = {f"{name}.svg": _svg(draw(findings.models[0], findings.split)) for name, draw in FIGURES.items()}
+    return {**made, REPORT: report(job.name or job.id, findings, {**best, **made})}
 
 
 def drawn_model(findings: Findings, rank: int) -> dict[str, bytes]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from islands.data.dataset import Dataset
 from islands.io.records import read_record
-from islands_service.blobs import Blobs
+from islands_service.blobs import Blobs, full_disk_told
 from islands_service.rows import rows_of
 from islands_service.specification import Identification, Part
 from islands_service.store.datasets import StoredDataset
@@ -15,8 +15,13 @@ from islands_service.store.datasets import StoredDataset
 
 @contextmanager
 def named(blob: Path, name: str) -> Iterator[Path]:
-    """Give a blob its owner's name for it: messages speak of that, and its suffix chooses the reader."""
-    with tempfile.TemporaryDirectory(prefix="islands-record-") as folder:
+    """Give a blob its owner's name for it: messages speak of that, and its suffix chooses the reader.
+
+    Raises
+    ------
+    StoreFull
+    """
+    with full_disk_told(), tempfile.TemporaryDirectory(prefix="islands-record-") as folder:
         link = Path(folder) / name
         link.symlink_to(blob.absolute())
         yield link

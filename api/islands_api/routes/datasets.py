@@ -7,6 +7,7 @@ import fastapi
 from fastapi import APIRouter, File, Form, Response, UploadFile
 
 from islands_api.auth import Reader, Writer
+from islands_api.bodies import FormRoute
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
 from islands_api.documents import dataset_document
 from islands_api.doors import AtDoors, Doors
@@ -17,7 +18,7 @@ from islands_service.inspection import Asked, inspected
 from islands_service.records import named
 from islands_service.store.datasets import StoredDataset
 
-router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES)
+router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
 
 Id = Annotated[str, fastapi.Path(max_length=48, examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])]
 

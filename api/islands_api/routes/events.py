@@ -7,10 +7,10 @@ from fastapi import APIRouter, Header, Response
 from fastapi.responses import StreamingResponse
 
 from islands_api.auth import Reader
+from islands_api.documents import json_text
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
 from islands_api.routes.jobs import Id
-from islands_api.schemas import json_text
 from islands_service.jobs import TERMINAL, Event, Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)

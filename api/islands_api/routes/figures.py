@@ -30,6 +30,12 @@ SIMULATION = "free-run.json"
 
 _SVG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}}
 
+_HTML: dict[int | str, dict[str, Any]] = {200: {"content": {"text/html": {"schema": {"type": "string"}}}}}
+
+#: A report brings its own style and figures, and needs nothing else.
+REPORT = "report.html"
+_REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+
 ModelFigure = Annotated[str, Path(pattern=r"^[a-z-]{1,20}$", json_schema_extra={"enum": list(MODEL_FIGURES)})]
 SearchFigure = Annotated[
     str, Path(pattern=r"^[a-z-]{1,20}$", json_schema_extra={"enum": list(SEARCH_FIGURES)})
@@ -52,6 +58,7 @@ async def search_figures(job: Id, caller: Reader, doors: AtDoors) -> Any:
 async def search_figure(job: Id, figure: SearchFigure, caller: Reader, doors: AtDoors) -> Response:
     """See a figure of the search: the record, error against size, convergence, the islands' course."""
     await finished(doors, caller, job)
+    _known(figure, SEARCH_FIGURES)
     return await _figure(doors, caller, job, f"{figure}.svg", None)
 
 
@@ -66,6 +73,7 @@ async def model_figures(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> 
 async def model_figure(job: Id, rank: Rank, figure: ModelFigure, caller: Reader, doors: AtDoors) -> Response:
     """See a figure of a model: free run, hysteresis loop, holds, residual correlations."""
     await stored(doors, caller, job, rank)
+    _known(figure, MODEL_FIGURES)
     return await _figure(doors, caller, job, f"{rank}/{figure}.svg", rank)
 
 
@@ -74,6 +82,20 @@ async def simulation(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Res
     """Take a model's free run over the validation data as numbers, thinned for a screen."""
     await stored(doors, caller, job, rank)
     return await _figure(doors, caller, job, f"{rank}/{SIMULATION}", rank, "application/json")
+
+
+@router.get("/{job}/report", response_class=Response, responses=_HTML)
+async def report(job: Id, caller: Reader, doors: AtDoors) -> Response:
+    """Take the report of a job: one HTML file with its models and figures, to be kept or sent."""
+    await finished(doors, caller, job)
+    answer = await _figure(doors, caller, job, REPORT, None, "text/html; charset=utf-8")
+    answer.headers["Content-Security-Policy"] = _REPORT_POLICY
+    return answer
+
+
+def _known(figure: str, figures: tuple[str, ...]) -> None:
+    if figure not in figures:
+        raise NoSuchThing(f"there is no figure {figure!r}: take one of {', '.join(figures)}")
 
 
 async def _figure(

@@ -3,12 +3,11 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Response
-from fastapi.responses import JSONResponse
 
 from islands_api.auth import Reader, Writer
 from islands_api.bodies import JSONRoute
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
-from islands_api.documents import job_document
+from islands_api.documents import Document, job_document
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
 from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
@@ -61,7 +60,7 @@ async def submit(
     headers = {"Location": f"{router.prefix}/{job.id}", "ETag": _etag(job), "Retry-After": "1"}
     if not new:
         headers["Idempotent-Replayed"] = "true"
-    return JSONResponse(job_document(job), 202, headers)
+    return Document(job_document(job), 202, headers)
 
 
 @router.get("", response_model=JobPage)
@@ -74,7 +73,7 @@ async def jobs(
 ) -> Any:
     """List the jobs, newest first."""
     page = await doors.do(doors.store.jobs.page, caller.owner, state, place_of(cursor), limit)
-    return JSONResponse({"items": [job_document(job) for job in page.jobs], "next": cursor_of(page.after)})
+    return Document({"items": [job_document(job) for job in page.jobs], "next": cursor_of(page.after)})
 
 
 @router.get("/{job}", response_model=JobView, responses={304: {"description": "As it was."}})
@@ -96,7 +95,7 @@ async def job(
         headers["Retry-After"] = "1"
     if if_none_match == _etag(found):
         return Response(status_code=304, headers=headers)
-    return JSONResponse(job_document(found), headers=headers)
+    return Document(job_document(found), headers=headers)
 
 
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
@@ -130,7 +129,7 @@ async def history(
     await doors.do(doors.store.jobs.get, caller.owner, job)
     points = await doors.do(doors.store.results.history, job, after, _POINTS)
     names = ("generation", "evaluations", "best", "islands")
-    return JSONResponse({"items": [dict(zip(names, point, strict=True)) for point in points]})
+    return Document({"items": [dict(zip(names, point, strict=True)) for point in points]})
 
 
 async def _changed(doors: Doors, job: Job, seconds: float) -> Job:

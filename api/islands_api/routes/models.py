@@ -3,11 +3,11 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
-from fastapi.responses import JSONResponse
 
 from islands.io.export import EXPORTS, export
 from islands.io.models import model_from_json
 from islands_api.auth import Caller, Reader
+from islands_api.documents import Document
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES, NoSuchThing, NotFinished
 from islands_api.routes.jobs import Id
@@ -30,13 +30,13 @@ async def models(job: Id, caller: Reader, doors: AtDoors) -> Any:
     """Look at the models of a job, best first; there are none before it has succeeded."""
     await doors.do(doors.store.jobs.get, caller.owner, job)
     found = await doors.do(doors.store.results.models, job)
-    return JSONResponse({"items": [model.document for model in found]})
+    return Document({"items": [model.document for model in found]})
 
 
 @router.get("/{job}/models/{rank}", response_model=ModelView)
 async def model(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Any:
     """Look at one model."""
-    return JSONResponse((await stored(doors, caller, job, rank)).document)
+    return Document((await stored(doors, caller, job, rank)).document)
 
 
 @router.get(
@@ -69,7 +69,7 @@ async def result(job: Id, caller: Reader, doors: AtDoors) -> Any:
     """Take the whole result, in the form of `result.json`."""
     document = await finished(doors, caller, job)
     found = await doors.do(doors.store.results.models, job)
-    return JSONResponse({**document, "models": [model.document for model in found]})
+    return Document({**document, "models": [model.document for model in found]})
 
 
 async def finished(doors: Doors, caller: Caller, job: str) -> dict[str, Any]:

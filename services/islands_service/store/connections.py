@@ -64,7 +64,7 @@ def _write_ahead(connection: sqlite3.Connection) -> None:
         try:
             connection.execute("PRAGMA journal_mode=WAL")
         except sqlite3.OperationalError as error:
-            if error.sqlite_errorname != "SQLITE_BUSY" or left == 0:
+            if not error.sqlite_errorname.startswith("SQLITE_BUSY") or left == 0:
                 raise
             sleep(PAUSE)
         else:

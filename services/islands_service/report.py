@@ -1,0 +1,65 @@
+"""The report of a job: one HTML file with everything in it, to be kept, printed or sent."""
+
+import base64
+from collections.abc import Mapping
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, select_autoescape
+from markupsafe import Markup
+
+from islands.io.results import COLUMNS, row
+from islands.model.equations import mathml_equation
+from islands.validation.findings import Findings
+
+_TEMPLATES = Environment(
+    loader=PackageLoader("islands_service", "templates"), autoescape=select_autoescape(), trim_blocks=True
+)
+
+#: What figures show, in the order of a report.
+CAPTIONS = {
+    "free-run.svg": "Free run of the best model over the validation data",
+    "loop.svg": "Output over input",
+    "hold.svg": "Holds: where the output stays when the input rests",
+    "residuals.svg": "Correlations of the one-step-ahead residual",
+    "record.svg": "The record",
+    "front.svg": "Error against size",
+    "convergence.svg": "Error over generations, by size",
+    "islands.svg": "Error over generations, by island",
+}
+
+
+def report(name: str, findings: Findings, figures: Mapping[str, bytes]) -> bytes:
+    """Write the report of a result.
+
+    Parameters
+    ----------
+    name : str
+        Of the job.
+    findings : Findings
+    figures : mapping
+        SVG by name; those that `CAPTIONS` knows are shown.
+    """
+    models = [
+        # MathML of our own making, from numbers and names of ours: the only text that is not escaped.
+        {"cells": row(rank, entry), "equation": Markup(mathml_equation(entry.model))}
+        for rank, entry in enumerate(findings.models, start=1)
+    ]
+    shown = [(caption, _inline(figures[each])) for each, caption in CAPTIONS.items() if each in figures]
+    text = _TEMPLATES.get_template("report.html").render(
+        name=name,
+        record=findings.record,
+        findings=findings,
+        settings=_settings(findings),
+        columns=COLUMNS,
+        models=models,
+        figures=shown,
+    )
+    return text.encode()
+
+
+def _settings(findings: Findings) -> list[tuple[str, Any]]:
+    return [(name, value) for name, value in findings.settings.items() if not isinstance(value, Mapping)]
+
+
+def _inline(svg: bytes) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
