@@ -1,6 +1,10 @@
 """``python -m islands_api``: the doors, as a child of ``islands serve`` or on their own."""
 
+import socket
+import ssl
 import sys
+from errno import EADDRINUSE
+from time import monotonic, sleep
 
 import uvicorn
 
@@ -14,6 +18,12 @@ from islands_service.supervisor import MISCONFIGURED
 #: Seconds that open requests have to end; a stream of events would never.
 _GRACE = 2
 
+#: Seconds that a port may be taken: who was there before us may be ending.
+_TAKEN = 2.0
+
+#: Connections that may wait to be accepted.
+_WAITING = 2048
+
 
 def main() -> int:
     """Serve until SIGTERM or SIGINT."""
@@ -22,14 +32,13 @@ def main() -> int:
         configure_logs(settings.log_format, "api")
         store = Store(settings.url)
         check_safe(settings, store)
+        listener = listening(settings.host, settings.port)
     except IslandsError as error:
         print(f"islands: {error}", file=sys.stderr)
         return MISCONFIGURED if isinstance(error, SettingsError) else 1
     server = uvicorn.Server(
         uvicorn.Config(
             create_app(settings, store),
-            host=settings.host,
-            port=settings.port,
             access_log=False,
             log_config=None,
             timeout_graceful_shutdown=_GRACE,
@@ -38,7 +47,7 @@ def main() -> int:
             server_header=False,
         )
     )
-    server.run()
+    server.run([listener])
     return 0 if server.started else MISCONFIGURED
 
 
@@ -59,6 +68,40 @@ def check_safe(settings: ServiceSettings, store: Store) -> None:
     for path in (settings.tls_certificate, settings.tls_key):
         if path is not None and not path.is_file():
             raise SettingsError(f"there is no file {path}: check the path of the certificate and of the key")
+    if settings.tls_certificate is not None:
+        try:
+            ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(
+                settings.tls_certificate, settings.tls_key
+            )
+        except (OSError, ssl.SSLError) as error:
+            raise SettingsError(
+                f"{settings.tls_certificate} and {settings.tls_key} are no certificate with its key "
+                f"({error}): give two PEM files that belong together"
+            ) from error
+
+
+def listening(host: str, port: int) -> socket.socket:
+    """Return a socket that accepts connections.
+
+    Raises
+    ------
+    SettingsError
+        The address is not this machine's, or another program has the port.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    until = monotonic() + _TAKEN
+    while True:
+        try:
+            return socket.create_server((host, port), family=family, backlog=_WAITING)
+        except OSError as error:
+            if error.errno == EADDRINUSE and monotonic() < until:
+                sleep(0.05)
+                continue
+            why = "another program has it" if error.errno == EADDRINUSE else error.strerror
+            raise SettingsError(
+                f"cannot listen at {host}, port {port} ({why}): give another --port, or an address of this "
+                "machine as --host"
+            ) from error
 
 
 if __name__ == "__main__":

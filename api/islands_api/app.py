@@ -8,19 +8,20 @@ from importlib.metadata import version
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from islands_api import problems
+from islands_api import answers
 from islands_api.auth import KeyRing
 from islands_api.doors import DRAWINGS, INSPECTIONS, Doors
 from islands_api.hub import Hub
 from islands_api.measures import Measures
 from islands_api.middleware import Limited, SameOrigin, Watched
+from islands_api.problems import ProblemDocument
 from islands_api.rate import Rate
 from islands_api.routes import ROUTERS
 from islands_service.blobs import Blobs
 from islands_service.lifeline import EVERY, sign_of_life
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.telemetry import configure_traces
+from islands_service.telemetry import Traces
 
 _DESCRIPTION = """Finds the equation behind measured data.
 
@@ -38,6 +39,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     store : Store, optional
         One that is open already, and is closed with the application.
     """
+
+    traces = Traces(settings.telemetry, "api")
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -64,6 +67,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
                 with suppress(asyncio.CancelledError):
                     await task
             await doors.do(opened.close)
+            await doors.do(traces.close)
 
     app = FastAPI(
         title="islands",
@@ -72,26 +76,26 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,  # a path has one name
         openapi_url="/openapi.json",
     )
     for router in ROUTERS:
         app.include_router(router)
-    problems.install(app)
+    answers.install(app)
     app.add_middleware(Limited, settings=settings)
     app.add_middleware(SameOrigin, settings=settings)
     app.add_middleware(Watched)
-    _trace(app, settings)
+    _trace(app, traces)
     _describe(app)
     return app
 
 
-def _trace(app: FastAPI, settings: ServiceSettings) -> None:
-    provider = configure_traces(settings.telemetry, "api")
-    if provider is not None:
+def _trace(app: FastAPI, traces: Traces) -> None:
+    if traces.provider is not None:
         from opentelemetry.instrumentation.fastapi import FastAPIInstrumentor  # noqa: PLC0415
 
         FastAPIInstrumentor.instrument_app(
-            app, tracer_provider=provider, excluded_urls="healthz,readyz,metrics"
+            app, tracer_provider=traces.provider, excluded_urls="healthz,readyz,metrics"
         )
 
 
@@ -110,7 +114,7 @@ def _describe(app: FastAPI) -> None:
             schema = get_openapi(
                 title=app.title, version=app.version, description=app.description, routes=app.routes
             )
-            document = problems.ProblemDocument.model_json_schema(ref_template="#/components/schemas/{model}")
+            document = ProblemDocument.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas = schema["components"]["schemas"]
             schemas.update(document.pop("$defs"))
             schemas["ProblemDocument"] = document

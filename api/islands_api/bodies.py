@@ -5,18 +5,24 @@ JSON is read strictly: of a name that stands twice the framework would take the 
 
 import json
 from collections.abc import Callable, Coroutine
+from http import HTTPStatus
 from typing import Any, ClassVar
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
 
 from islands_api.problems import Unreadable, WrongMedia
+
+#: The most digits of a whole number: reading one takes the square of their count.
+_DIGITS = 400
 
 
 class BodyRoute(APIRoute):
     """A route that takes bodies of one type alone."""
 
     media: ClassVar[str]
+    advice: ClassVar[str] = "send it anew"
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return what answers a request, behind a look at its body's type."""
@@ -28,7 +34,14 @@ class BodyRoute(APIRoute):
             given = request.headers.get("content-type", "")
             if given.partition(";")[0].strip().lower() != self.media:
                 raise WrongMedia(f"the body is {given or 'of no type'}: send it as {self.media}")
-            return await handler(_Strict(request.scope, request.receive))
+            try:
+                return await handler(_Strict(request.scope, request.receive))
+            except HTTPException as error:
+                if error.status_code != HTTPStatus.BAD_REQUEST or isinstance(error, Unreadable):
+                    raise
+                if isinstance(error.__cause__, OSError):  # a full disk, say
+                    raise
+                raise Unreadable(f"the body cannot be read ({error.detail}): {self.advice}") from error
 
         return handle
 
@@ -43,6 +56,7 @@ class FormRoute(BodyRoute):
     """A route that takes a form with a file in it."""
 
     media = "multipart/form-data"
+    advice = "send the record as the part 'file' of a form, under a name of at most 200 characters"
 
 
 class _Strict(Request):
@@ -61,7 +75,7 @@ def read_json(body: bytes) -> Any:
         It is none, holds what is no number, names a thing twice, or is nested too deeply.
     """
     try:
-        return json.loads(body, object_pairs_hook=_once, parse_constant=_no_number)
+        return json.loads(body, object_pairs_hook=_once, parse_int=_whole, parse_constant=_no_number)
     except RecursionError:
         raise Unreadable("the body is nested too deeply: a job needs three levels") from None
     except json.JSONDecodeError as error:
@@ -79,6 +93,12 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"{twice!r} stands in it twice")
     return read
+
+
+def _whole(text: str) -> int:
+    if len(text) > _DIGITS:
+        raise ValueError(f"a number in it has {len(text)} digits")
+    return int(text)
 
 
 def _no_number(text: str) -> Any:

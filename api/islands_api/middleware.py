@@ -10,7 +10,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from islands_api.problems import METHODS, CrossOrigin, TooLarge, answer, defect, problem_of
+from islands_api.answers import METHODS, answer, defect
+from islands_api.problems import CrossOrigin, TooLarge, problem_of
 from islands_service.settings import LOOPBACK, ServiceSettings
 
 log = structlog.get_logger()

@@ -72,7 +72,9 @@ class JobRequest(Identification):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{**_SPEC, "name": "piezo, 2 islands"}]})
 
-    name: Annotated[str, Field(max_length=200, description="For people.")] = ""
+    name: Annotated[
+        str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="For people; one line.")
+    ] = ""
     priority: Annotated[
         int,
         Field(ge=PRIORITIES.start, le=PRIORITIES.stop - 1, description="Higher ones go first."),

@@ -53,9 +53,17 @@ def admit(spec: Identification, owner: str, store: Store, settings: ServiceSetti
 
 
 def _plain(spec: Identification, part: Part, preview: Mapping[str, Any], name: str) -> bool:
-    """Tell whether a preview alone says that a record can be read: all of it, with its own sampling time."""
+    """Tell whether a preview alone says that a record can be read: all of it, with its own sampling time.
+
+    A preview looks at each column by itself: what speaks against using them together leaves a doubt.
+    """
     columns = {column["name"]: column for column in preview["columns"]}
     sources = [column_of(given, tuple(columns)) for given in spec.inputs]
     check_choice(tuple(columns), sources, spec.output, name)
-    clean = not any(columns[source]["problem"] for source in (*sources, spec.output))
-    return clean and part.rows is None and spec.dt is None and preview["dt"] is not None
+    chosen = (*sources, spec.output)
+    clean = not any(columns[name]["problem"] for name in chosen)
+    alike = len({columns[name]["samples"] for name in chosen}) == 1 and not any(
+        "." in name for name in chosen
+    )
+    sampled = preview["dt"] is not None and preview["time"] not in chosen and not preview["warnings"]
+    return clean and alike and sampled and part.rows is None and spec.dt is None

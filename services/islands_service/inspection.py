@@ -11,12 +11,18 @@ from asyncio.subprocess import PIPE
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from islands.errors import RecordError
 
+if TYPE_CHECKING:
+    from islands.io.records import Preview
+
 #: What the process sees of the environment: nothing that could be worth stealing.
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+
+#: The most columns of a record: what is said of them is kept, and shown in every list.
+_COLUMNS = 1000
 
 #: Files that it may have open at once.
 _FILES = 64
@@ -99,20 +105,46 @@ def main() -> None:
     request = json.load(sys.stdin)
     _limit(request["memory"], request["seconds"])
     # After the limits: whatever these do, they do it within them.
-    from islands.io.records.preview import preview  # noqa: PLC0415
-
     from islands.io.records import read_record  # noqa: PLC0415
+    from islands.io.records.preview import preview  # noqa: PLC0415
     from islands_service.rows import rows_of  # noqa: PLC0415
 
     asked = Asked(**request["asked"])
     try:
         found = preview(request["path"])
-        if asked.output is not None:
+        if asked.inputs and asked.output is not None:
             read_record(request["path"], asked.inputs, asked.output, asked.dt, rows_of(asked.rows))
+        else:
+            _refuse_unusable({column.name: column.problem for column in found.columns}, asked)
+        _refuse_unreadable(found, request["path"])
     except RecordError as error:
         json.dump({"error": str(error)}, sys.stdout)
         sys.exit(_REFUSED)
     json.dump(asdict(found), sys.stdout)
+
+
+def _refuse_unreadable(found: "Preview", path: str) -> None:
+    """Refuse a file that no job could ever read anything from, or that nobody could look through."""
+    if len(found.columns) > _COLUMNS:
+        raise RecordError(
+            f"{Path(path).name} has {len(found.columns)} columns, and {_COLUMNS} is the most: leave out what "
+            "is not needed"
+        )
+    if not found.samples:
+        problems = [column.problem for column in found.columns if column.problem]
+        raise RecordError(problems[0] if problems else f"{Path(path).name} holds no column: export it anew")
+
+
+def _refuse_unusable(problems: Mapping[str, str], asked: Asked) -> None:
+    """Refuse columns by what a preview says of each: a job that would read them is not known yet."""
+    from islands.io.records.names import column_of  # noqa: PLC0415
+
+    for name in (*asked.inputs, *([] if asked.output is None else [asked.output])):
+        source = column_of(name, problems)
+        if source not in problems:
+            raise RecordError(f"the record has no column {name}; it has {', '.join(problems)}")
+        if problems[source]:
+            raise RecordError(problems[source])
 
 
 def _limit(memory: int, seconds: float) -> None:

@@ -4,19 +4,30 @@ import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import lru_cache
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, create_model
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, create_model
 
 from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS, settings_of
 from islands.evolution.settings import Settings
+from islands.model.library import candidates
+
+
+def _rows(text: str) -> str:
+    if not re.fullmatch(_ROWS, text):
+        raise ValueError(f"cannot read the rows {text[:40]!r}: write START:STOP, for example 0:5000")
+    return text
+
+
+_ROWS = r"^(-?[0-9]{1,12})?:(-?[0-9]{1,12})?$"
 
 #: ``START:STOP``; either may be left out, and a negative one counts from the end.
-Rows = Annotated[str, Field(pattern=r"^(-?\d{1,12})?:(-?\d{1,12})?$", examples=["0:5000"])]
+Rows = Annotated[str, AfterValidator(_rows), Field(json_schema_extra={"pattern": _ROWS}, examples=["0:5000"])]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 DatasetId = Annotated[
-    str, Field(min_length=1, max_length=48, examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
+    str, Field(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
 ]
 
 #: The most that a setting may be over REST, where it would take memory rather than time: what it is for.
@@ -29,6 +40,8 @@ LIMITS = {
     "library_lags": 30,
     "initial_height": 12,
     "tournament": 10_000,
+    "shooting": 10**9,
+    "max_evaluations": 10**15,
 }
 
 #: The most entries of a list, the deepest back-shift, and the longest text.
@@ -56,7 +69,12 @@ def _changes() -> type[BaseModel]:
     }
     return create_model(
         "SettingsChanges",
-        __config__=ConfigDict(extra="forbid", frozen=True, title="Settings that differ from the preset's"),
+        __config__=ConfigDict(
+            extra="forbid",
+            frozen=True,
+            allow_inf_nan=False,  # JSON has none, and no answer could show the job
+            title="Settings that differ from the preset's",
+        ),
         **types,
     )
 
@@ -153,4 +171,12 @@ def checked(spec: Identification, max_islands: int, max_evaluations: int) -> Set
             f"population x generations x islands is {asked:.3g} individuals, and this service evaluates at "
             f"most {max_evaluations:.3g} for a job: fewer generations, islands or individuals are needed"
         )
+    if settings.library:
+        _check_library(settings.library, settings.library_degree, settings.library_lags, len(spec.inputs))
     return settings
+
+
+@lru_cache
+def _check_library(name: str, degree: int, lags: int, inputs: int) -> None:
+    """Refuse what the search would refuse when it poses its problem."""
+    candidates(name, degree, lags, inputs)

@@ -8,21 +8,42 @@ from typing import Any
 from islands.errors import SettingsError
 
 
-def configure_traces(endpoint: str, role: str) -> Any:
-    """Send traces to a collector; return where spans are made.
+class Traces:
+    """Sends spans to a collector, or nowhere.
 
     Parameters
     ----------
     endpoint : str
-        Of OTLP over HTTP, ``http://collector:4318/v1/traces``; "" sends none.
+        Of OTLP over HTTP, ``http://collector:4318/v1/traces``; "" for none.
+    role : str
+        Who sends.
 
     Raises
     ------
     SettingsError
-        The extra is not installed.
+        Traces are wanted, and their extra is not installed.
     """
-    if not endpoint:
-        return None
+
+    def __init__(self, endpoint: str, role: str) -> None:
+        #: OpenTelemetry's provider of tracers; None where no traces are wanted.
+        self.provider: Any = _provider(endpoint, role) if endpoint else None
+
+    @contextmanager
+    def span(self, name: str, **attributes: Any) -> Iterator[None]:
+        """Trace what happens in the block."""
+        if self.provider is None:
+            yield
+            return
+        with self.provider.get_tracer("islands").start_as_current_span(name, attributes=attributes):
+            yield
+
+    def close(self) -> None:
+        """Send what has not been sent yet."""
+        if self.provider is not None:
+            self.provider.shutdown()
+
+
+def _provider(endpoint: str, role: str) -> Any:
     if find_spec("opentelemetry") is None or find_spec("opentelemetry.sdk") is None:
         raise SettingsError(
             "traces (ISLANDS_TELEMETRY) need an extra: install it with pip install 'islands[telemetry]'"
@@ -36,13 +57,3 @@ def configure_traces(endpoint: str, role: str) -> Any:
     provider = TracerProvider(resource=Resource.create({"service.name": f"islands-{role}"}))
     provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter(endpoint)))
     return provider
-
-
-@contextmanager
-def span(provider: Any, name: str, **attributes: Any) -> Iterator[None]:
-    """Trace what happens in the block, if traces are wanted."""
-    if provider is None:
-        yield
-        return
-    with provider.get_tracer("islands").start_as_current_span(name, attributes=attributes):
-        yield

@@ -1,11 +1,13 @@
 """``islands keys``: make, list and revoke the API keys of a service, in its database."""
 
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from islands.errors import SettingsError
 from islands_api.cli.console import output
 from islands_service.settings import service_settings
 from islands_service.store import Store
@@ -42,6 +44,8 @@ def create(
     database: Database = None,
 ) -> None:
     """Make a key. It is shown once: only a hash of it is kept."""
+    if days is not None and not 0.0 < days < inf:
+        raise SettingsError(f"--days is a number of days above 0, got {days:g}")
     with _store(data_dir, database) as store:
         key, secret = store.keys.create(name, frozenset(scopes), owner, None if days is None else days * _DAY)
     output.print(secret, markup=False)

@@ -45,7 +45,8 @@ def serve(
     with folder_lock(settings.data_dir):
         scheme = "http" if settings.tls_key is None else "https"
         errors.print(
-            f"islands serve: {scheme}://{settings.host}:{settings.port}, data in {settings.data_dir}"
+            f"islands serve: {scheme}://{settings.host}:{settings.port}, data in {settings.data_dir}",
+            markup=False,
         )
         # What an earlier run said of its Ray holds no more.
         settings.ray_address_file.unlink(missing_ok=True)

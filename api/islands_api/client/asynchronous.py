@@ -3,6 +3,7 @@
 from asyncio import sleep
 from collections.abc import AsyncIterator
 from contextlib import ExitStack
+from http import HTTPStatus
 from math import inf
 from time import monotonic
 from types import TracebackType
@@ -11,9 +12,20 @@ from typing import Any, TypeVar
 import httpx
 
 from islands_api.client import calls
-from islands_api.client.calls import Call, Event, EventLines, JobRef
-from islands_api.client.errors import JobFailed
-from islands_api.client.transport import PATIENCE, WAIT, delays, headers_of, unanswered, unreachable
+from islands_api.client.answers import Event, EventLines, refuse_problem
+from islands_api.client.calls import Call, JobRef
+from islands_api.client.errors import JobFailed, ServiceError
+from islands_api.client.transport import (
+    DELAYS,
+    PATIENCE,
+    Tries,
+    address_of,
+    headers_of,
+    held_back,
+    in_time,
+    timeout_of,
+    trust_of,
+)
 from islands_api.schemas import DatasetPage, DatasetView, HistoryPage, JobPage, JobView, ModelView
 from islands_service.jobs import TERMINAL, JobState
 
@@ -35,8 +47,13 @@ class AsyncClient:
         retry: float = 30.0,
         verify: Any = True,
     ) -> None:
-        self._http = httpx.AsyncClient(base_url=url, headers=headers_of(key), timeout=timeout, verify=verify)
-        self._url, self._retry = url, retry
+        self._http = httpx.AsyncClient(
+            base_url=address_of(url),
+            headers=headers_of(key),
+            timeout=timeout_of(timeout),
+            verify=trust_of(verify),
+        )
+        self._url, self._timeout, self._retry = url, timeout, retry
 
     async def close(self) -> None:
         """Close the connections."""
@@ -53,8 +70,13 @@ class AsyncClient:
     ) -> None:
         await self.close()
 
-    async def call(self, call: Call[T]) -> T:
+    async def call(self, call: Call[T], until: float = inf) -> T:
         """Carry out a call of `islands_api.client.calls`.
+
+        Parameters
+        ----------
+        until : float
+            The time of `time.monotonic` by which it has to be done.
 
         Raises
         ------
@@ -63,21 +85,21 @@ class AsyncClient:
         Unreachable
             It did not answer.
         """
-        until = monotonic() + self._retry
-        for delay in delays():
+        tries = Tries(self._url, self._retry, until)
+        while True:
             try:
-                response = await self._send(call)
+                response = await self._send(call, until)
             except httpx.TransportError as error:
-                if not unanswered(error, call) or monotonic() + delay > until:
-                    raise unreachable(self._url, error) from error
+                pause = tries.failed(error, call.repeatable)
             else:
-                if response.status_code not in calls.PASSING or monotonic() + delay > until:
-                    calls.refuse_problem(response)
+                again = tries.answered(response, call.repeatable)
+                if again is None:
+                    refuse_problem(response)
                     return call.read(response)
-            await sleep(delay)
-        raise AssertionError("delays never end")
+                pause = again
+            await sleep(pause)
 
-    async def _send(self, call: Call[T]) -> httpx.Response:
+    async def _send(self, call: Call[T], until: float) -> httpx.Response:
         with ExitStack() as stack:
             files = None
             if call.file is not None:
@@ -90,6 +112,7 @@ class AsyncClient:
                 json=call.json,
                 data=call.data,
                 files=files,
+                timeout=timeout_of(self._timeout, until),
             )
 
     async def upload(self, *arguments: Any, **named: Any) -> DatasetView:
@@ -113,8 +136,17 @@ class AsyncClient:
         return await self.call(calls.datasets(cursor, limit))
 
     async def cancel(self, which: JobRef) -> JobView:
-        """Cancel a job."""
-        return await self.call(calls.cancel(which))
+        """Cancel a job; one that is cancelled already is returned as it is."""
+        try:
+            return await self.call(calls.cancel(which))
+        except ServiceError as error:
+            # The first try may have done it, and its answer may have been lost.
+            if error.status != HTTPStatus.CONFLICT:
+                raise
+            job = await self.job(which)
+            if job.state != JobState.CANCELLED:
+                raise
+            return job
 
     async def resume(self, which: JobRef) -> JobView:
         """Have a job go on that failed or was cancelled."""
@@ -165,10 +197,12 @@ class AsyncClient:
             It has not ended within so many seconds.
         """
         until = monotonic() + seconds
-        job = await self.job(which)
+        with in_time(calls.id_of(which), seconds, until):
+            job = await self.call(calls.job(which), until)
         yield job
         while job.state not in TERMINAL:
-            after = await self.call(calls.changed(job, min(WAIT, max(0.0, until - monotonic()))))
+            with in_time(job.id, seconds, until):
+                after = await self.call(calls.changed(job, held_back(self._timeout, until)), until)
             if after.version != job.version:
                 yield after
             elif monotonic() > until:
@@ -193,22 +227,26 @@ class AsyncClient:
 
     async def events(self, which: JobRef, after: int = 0) -> AsyncIterator[Event]:
         """Yield the events of a job behind a number, until it has ended, over cut connections as well."""
-        until = monotonic() + self._retry
-        for delay in delays():
+        tries = Tries(self._url, self._retry)
+        while True:
             lines = EventLines()
             try:
                 headers = {"Last-Event-ID": str(after)}
                 async with self._http.stream("GET", calls.events_path(which), headers=headers) as response:
+                    if response.status_code == HTTPStatus.NO_CONTENT:
+                        return
                     if not response.is_success:
                         await response.aread()
-                    calls.refuse_problem(response)
-                    async for line in response.aiter_lines():
-                        for event in lines.take(line):
-                            after, until = event.number, monotonic() + self._retry
-                            yield event
-                if (await self.job(which)).state in TERMINAL:
-                    return
+                    pause = tries.answered(response)
+                    if pause is None:
+                        refuse_problem(response)
+                        async for piece in response.aiter_bytes():
+                            tries.succeeded()
+                            for event in lines.take(piece):
+                                after = event.number
+                                yield event
+                        # A service that ends lets its streams end; one whose job has ended says so, by 204.
+                        pause = DELAYS[0]
             except httpx.TransportError as error:
-                if monotonic() + delay > until:
-                    raise unreachable(self._url, error) from error
-            await sleep(delay)
+                pause = tries.failed(error)
+            await sleep(pause)

@@ -1,16 +1,18 @@
-"""Calls: what is sent for each thing that a client can do, and what is made of the answer. No transport."""
+"""Calls: what is sent for each thing that a client can do. No transport."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Generic, TypeVar
+from urllib.parse import quote
 from uuid import uuid4
 
 import httpx
 
-from islands_api.client.errors import ServiceError
+from islands.errors import SettingsError
+from islands_api.client.answers import document_of, read_as
 from islands_api.schemas import (
     DatasetPage,
     DatasetView,
@@ -29,14 +31,6 @@ JobRef = JobView | str
 
 #: A data set, or its id.
 DatasetRef = DatasetView | str
-
-#: Answers after which the same call may succeed.
-PASSING = (
-    HTTPStatus.TOO_MANY_REQUESTS,
-    HTTPStatus.BAD_GATEWAY,
-    HTTPStatus.SERVICE_UNAVAILABLE,
-    HTTPStatus.GATEWAY_TIMEOUT,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,35 +54,21 @@ class Call(Generic[T]):
     repeatable: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened to a job.
-
-    Attributes
-    ----------
-    number : int
-        The job's version after it.
-    kind : str
-        queued, running, progress, cancelling, succeeded, failed, cancelled.
-    """
-
-    number: int
-    kind: str
-    data: Mapping[str, Any]
-
-
 def upload(
-    path: str | Path, inputs: Sequence[str] = (), output: str | None = None, dt: float | None = None
+    path: str | Path,
+    inputs: str | Sequence[str] = (),
+    output: str | None = None,
+    dt: float | None = None,
 ) -> Call[DatasetView]:
     """Upload a record; with columns it is checked as a job would."""
-    given: dict[str, Any] = {"inputs": list(inputs), "output": output, "dt": dt}
-    form = {name: value for name, value in given.items() if value}
-    return Call("POST", "/v1/datasets", _as(DatasetView), data=form, file=Path(path))
+    given: dict[str, Any] = {"inputs": _names(inputs) or None, "output": output, "dt": dt}
+    form = {name: value for name, value in given.items() if value is not None}
+    return Call("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
 
 
 def submit(
     dataset: DatasetRef,
-    inputs: Sequence[str],
+    inputs: str | Sequence[str],
     output: str,
     *,
     preset: str = "hysteresis",
@@ -101,12 +81,27 @@ def submit(
     idempotency_key: str | None = None,
     **settings: Any,
 ) -> Call[JobView]:
-    """Submit a job; it has an idempotency key in any case, so that a lost answer makes no second job."""
+    """Submit a job; it has an idempotency key in any case, so that a lost answer makes no second job.
+
+    Parameters
+    ----------
+    rows : str, optional
+        ``START:STOP``, the samples that estimate.
+    validation : float or data set or mapping, optional
+        The share of the record's end, a data set, or ``{"dataset": ID, "rows": "START:STOP"}``.
+    settings
+        Those that differ from the preset's: `islands.evolution.settings.Settings`.
+
+    Raises
+    ------
+    SettingsError
+        A number is NaN or infinite, or the idempotency key has letters that no header may have.
+    """
     if isinstance(validation, str | DatasetView):
-        validation = {"dataset": _id(validation)}
+        validation = {"dataset": id_of(validation)}
     given: dict[str, Any] = {
-        "dataset": _id(dataset),
-        "inputs": [inputs] if isinstance(inputs, str) else list(inputs),
+        "dataset": id_of(dataset),
+        "inputs": _names(inputs),
         "output": output,
         "preset": preset,
         "seed": seed,
@@ -118,141 +113,121 @@ def submit(
         "settings": settings or None,
     }
     body = {key: value for key, value in given.items() if value is not None}
-    key = idempotency_key or uuid4().hex
-    return Call("POST", "/v1/jobs", _as(JobView), headers={"Idempotency-Key": key}, json=body)
+    _refuse_no_numbers(body)
+    key = uuid4().hex if idempotency_key is None else idempotency_key
+    if not (key.isascii() and key.isprintable()):
+        raise SettingsError(f"an idempotency key is a line of ASCII, got {key!r}")
+    return Call("POST", "/v1/jobs", read_as(JobView), headers={"Idempotency-Key": key}, json=body)
 
 
 def job(which: JobRef) -> Call[JobView]:
     """Look at a job."""
-    return Call("GET", f"/v1/jobs/{_id(which)}", _as(JobView))
+    return Call("GET", f"/v1/jobs/{_part(which)}", read_as(JobView))
 
 
 def changed(which: JobView, seconds: float) -> Call[JobView]:
     """Wait until a job is not as it was."""
 
     def read(response: httpx.Response) -> JobView:
-        return which if response.status_code == HTTPStatus.NOT_MODIFIED else _as(JobView)(response)
+        return which if response.status_code == HTTPStatus.NOT_MODIFIED else read_as(JobView)(response)
 
     headers = {"If-None-Match": f'"{which.version}"'}
-    return Call("GET", f"/v1/jobs/{which.id}", read, params={"wait": seconds}, headers=headers)
+    return Call("GET", f"/v1/jobs/{_part(which)}", read, params={"wait": seconds}, headers=headers)
 
 
 def jobs(state: str | None = None, cursor: str | None = None, limit: int = 50) -> Call[JobPage]:
     """List jobs."""
     given = {"state": state, "cursor": cursor, "limit": limit}
     params = {key: value for key, value in given.items() if value is not None}
-    return Call("GET", "/v1/jobs", _as(JobPage), params=params)
+    return Call("GET", "/v1/jobs", read_as(JobPage), params=params)
 
 
 def datasets(cursor: str | None = None, limit: int = 50) -> Call[DatasetPage]:
     """List data sets."""
     params = {"limit": limit, **({} if cursor is None else {"cursor": cursor})}
-    return Call("GET", "/v1/datasets", _as(DatasetPage), params=params)
+    return Call("GET", "/v1/datasets", read_as(DatasetPage), params=params)
 
 
 def cancel(which: JobRef) -> Call[JobView]:
     """Cancel a job."""
-    return Call("POST", f"/v1/jobs/{_id(which)}/cancel", _as(JobView))
+    return Call("POST", f"/v1/jobs/{_part(which)}/cancel", read_as(JobView))
 
 
 def resume(which: JobRef) -> Call[JobView]:
     """Have a job go on that failed or was cancelled."""
-    return Call("POST", f"/v1/jobs/{_id(which)}/resume", _as(JobView), repeatable=False)
+    return Call("POST", f"/v1/jobs/{_part(which)}/resume", read_as(JobView), repeatable=False)
 
 
 def delete(which: JobRef) -> Call[None]:
     """Delete a finished job."""
-    return Call("DELETE", f"/v1/jobs/{_id(which)}", lambda _: None, repeatable=False)
+    return Call("DELETE", f"/v1/jobs/{_part(which)}", lambda _: None, repeatable=False)
 
 
 def delete_dataset(which: DatasetRef) -> Call[None]:
     """Delete a data set."""
-    return Call("DELETE", f"/v1/datasets/{_id(which)}", lambda _: None, repeatable=False)
+    return Call("DELETE", f"/v1/datasets/{_part(which)}", lambda _: None, repeatable=False)
 
 
 def models(which: JobRef) -> Call[tuple[ModelView, ...]]:
     """Take the models of a job."""
-    page = _as(ModelPage)
-    return Call("GET", f"/v1/jobs/{_id(which)}/models", lambda response: page(response).items)
+    page = read_as(ModelPage)
+    return Call("GET", f"/v1/jobs/{_part(which)}/models", lambda response: page(response).items)
 
 
 def result(which: JobRef) -> Call[dict[str, Any]]:
     """Take the whole result."""
-    return Call("GET", f"/v1/jobs/{_id(which)}/result", lambda response: dict(response.json()))
+    return Call("GET", f"/v1/jobs/{_part(which)}/result", document_of)
 
 
 def history(which: JobRef, after: int = -1) -> Call[HistoryPage]:
     """Take the course of the search."""
-    return Call("GET", f"/v1/jobs/{_id(which)}/history", _as(HistoryPage), params={"after": after})
+    return Call("GET", f"/v1/jobs/{_part(which)}/history", read_as(HistoryPage), params={"after": after})
 
 
 def exported(which: JobRef, rank: int = 1, form: str = "python") -> Call[str]:
     """Take a model as text of a kind."""
-    path = f"/v1/jobs/{_id(which)}/models/{rank}/export"
+    path = f"/v1/jobs/{_part(which)}/models/{rank}/export"
     return Call("GET", path, lambda response: response.text, params={"format": form})
 
 
 def figure(which: JobRef, name: str, rank: int | None = 1) -> Call[bytes]:
     """Take a figure of a model, or without a rank of the search, as SVG."""
     of = "" if rank is None else f"/models/{rank}"
-    return Call("GET", f"/v1/jobs/{_id(which)}{of}/figures/{name}.svg", lambda response: response.content)
+    return Call(
+        "GET", f"/v1/jobs/{_part(which)}{of}/figures/{_part(name)}.svg", lambda response: response.content
+    )
 
 
 def figure_names(which: JobRef, rank: int | None) -> Call[tuple[str, ...]]:
     """Ask which figures there are, of a model or of the search."""
     of = "" if rank is None else f"/models/{rank}"
-    names = _as(Names)
-    return Call("GET", f"/v1/jobs/{_id(which)}{of}/figures", lambda response: names(response).items)
+    names = read_as(Names)
+    return Call("GET", f"/v1/jobs/{_part(which)}{of}/figures", lambda response: names(response).items)
 
 
 def events_path(which: JobRef) -> str:
     """Return where a job's events come from."""
-    return f"/v1/jobs/{_id(which)}/events"
+    return f"/v1/jobs/{_part(which)}/events"
 
 
-def event_of(lines: Sequence[str]) -> Event | None:
-    """Read the lines of one server-sent event; None of a comment."""
-    fields = dict(line.split(": ", 1) for line in lines if ": " in line and not line.startswith(":"))
-    if "event" not in fields:
-        return None
-    return Event(int(fields["id"]), fields["event"], json.loads(fields["data"]))
-
-
-class EventLines:
-    """Gathers lines until an event is complete."""
-
-    def __init__(self) -> None:
-        self._lines: list[str] = []
-
-    def take(self, line: str) -> Iterator[Event]:
-        """Take a line; yield the event that it completes."""
-        if line:
-            self._lines.append(line)
-            return
-        found, self._lines = event_of(self._lines), []
-        if found is not None:
-            yield found
-
-
-def refuse_problem(response: httpx.Response) -> None:
-    """Raise what the service says is wrong.
-
-    Raises
-    ------
-    ServiceError
-    """
-    if response.is_success or response.status_code == HTTPStatus.NOT_MODIFIED:
-        return
-    try:
-        document = response.json()
-    except ValueError:
-        document = {"detail": f"HTTP {response.status_code}: {response.text[:200]}"}
-    raise ServiceError(response.status_code, document)
-
-
-def _as(form: type[T]) -> Callable[[httpx.Response], T]:
-    return lambda response: form.model_validate_json(response.content)  # type: ignore[attr-defined]
-
-
-def _id(which: JobView | DatasetView | str) -> str:
+def id_of(which: JobView | DatasetView | str) -> str:
+    """Return the id of what is given as a value or by its id."""
     return which if isinstance(which, str) else which.id
+
+
+def _part(which: JobView | DatasetView | str) -> str:
+    """Return a part of a path, whatever somebody takes for an id."""
+    return quote(id_of(which), safe="")
+
+
+def _refuse_no_numbers(body: Mapping[str, Any]) -> None:
+    try:
+        json.dumps(body, allow_nan=False)
+    except ValueError as error:
+        raise SettingsError(
+            "a number of the job is NaN or infinite: leave it out, or give another"
+        ) from error
+
+
+def _names(given: str | Sequence[str]) -> list[str]:
+    return [given] if isinstance(given, str) else list(given)

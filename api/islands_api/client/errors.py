@@ -14,7 +14,9 @@ class ServiceError(IslandsError):
     status : int
         Of HTTP.
     type : str
-        ``/problems/invalid-record`` and so on: see docs/reference.md.
+        ``/problems/invalid-record`` and so on: see docs/service.md.
+    detail : str
+        What is wrong, and what to do.
     document : mapping
         The whole problem.
     """
@@ -22,7 +24,8 @@ class ServiceError(IslandsError):
     def __init__(self, status: int, document: Mapping[str, Any]) -> None:
         detail = document.get("detail") or document.get("title") or f"HTTP {status}"
         super().__init__(str(detail))
-        self.status, self.type, self.document = status, str(document.get("type", "about:blank")), document
+        self.status, self.detail, self.document = status, str(detail), document
+        self.type = str(document.get("type", "about:blank"))
 
 
 class Unreachable(IslandsError):

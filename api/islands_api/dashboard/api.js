@@ -1,4 +1,4 @@
-/** Speaks to the service: requests with the key, problems as errors, streams that go on where they were cut. */
+/** Speaks to the service: requests with the key, problems as errors, streams that are taken up again. */
 
 import { synchronise } from "./clock.js";
 
@@ -181,7 +181,8 @@ export async function* parsed(source) {
   let event = {};
   for await (const line of source) {
     if (line === "") {
-      if (event.data !== undefined) yield { id: Number(event.id), kind: event.event, data: JSON.parse(event.data) };
+      const { id, event: kind, data } = event;
+      if (data !== undefined) yield { id: Number(id), kind, data: JSON.parse(data) };
       event = {};
     } else if (!line.startsWith(":")) {
       const [, name, value] = /^([^:]*):? ?(.*)$/.exec(line);

@@ -21,7 +21,8 @@ function put(kind, ...content) {
 
 /** Show a problem: its title, what to do, and the request's id for whoever reads the logs. */
 export function complain(error, kind = "problem") {
-  const dismiss = el("button", { type: "button", class: "quiet", on: { click: () => clear(kind) } }, "Dismiss");
+  const click = () => clear(kind);
+  const dismiss = el("button", { type: "button", class: "quiet", on: { click } }, "Dismiss");
   put(
     kind,
     el(

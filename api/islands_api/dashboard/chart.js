@@ -1,5 +1,5 @@
 /**
- * Line charts in SVG: several series, a linear or logarithmic axis, read by eye, by mouse, by arrow keys or aloud.
+ * Line charts in SVG: several series, a linear or logarithmic axis, read by eye, mouse, arrow keys or aloud.
  * Styles are classes (job.css): the service's policy allows none in the markup.
  */
 
@@ -61,6 +61,8 @@ export function pathOf(points, x, y) {
 
 /** What cannot be drawn is missing: nothing, infinity, and on a logarithmic axis what is not above zero. */
 const drawable = (log) => ([x, y]) => [x, Number.isFinite(y) && (!log || y > 0) ? y : null];
+
+const circle = (kind, r, cx, cy) => svg("circle", { class: kind, r, cx, cy });
 
 /**
  * Make a chart.
@@ -130,9 +132,10 @@ export function lineChart({ title, x: across, y: up, marks = false }) {
     return series.flatMap(({ points, faint, name }) => {
       const kind = faint ? "faint" : `line s${at % COLOURS}${at >= COLOURS ? " dashed" : ""}`;
       if (!faint) at += 1;
-      const path = svg("path", { class: kind, "data-name": name, d: pathOf(thinned(points, most), scales.x, scales.y) });
-      const dots = marks ? points.filter((point) => point[1] !== null) : [];
-      return [path, ...dots.map(([px, py]) => svg("circle", { class: kind, r: 3.5, cx: scales.x.at(px), cy: scales.y.at(py) }))];
+      const d = pathOf(thinned(points, most), scales.x, scales.y);
+      const seen = marks ? points.filter((point) => point[1] !== null) : [];
+      const dot = ([px, py]) => circle(kind, 3.5, scales.x.at(px), scales.y.at(py));
+      return [svg("path", { class: kind, "data-name": name, d }), ...seen.map(dot)];
     });
   }
 
@@ -151,7 +154,7 @@ export function lineChart({ title, x: across, y: up, marks = false }) {
   function point() {
     const points = axis();
     if (!points.length || scales === null) return;
-    const [x] = nearest(points, pointed ?? Infinity) ?? points.at(-1);
+    const [x] = pointed === null ? points.at(-1) : nearest(points, pointed);
     const found = named().map((each) => nearest(each.points, x));
     say(place, `${across.label} ${short(x)}`);
     const values = [...legend.querySelectorAll("data")];
@@ -160,13 +163,14 @@ export function lineChart({ title, x: across, y: up, marks = false }) {
       say(values[at], number(value?.[1]));
     });
     const spoken = named().map((each, at) => `${each.name} ${number(found[at]?.[1])}`);
-    const told = { min: points[0][0], max: points.at(-1)[0], now: x, text: `${across.label} ${short(x)}: ${spoken.join(", ")}` };
+    const text = `${across.label} ${short(x)}: ${spoken.join(", ")}`;
+    const told = { min: points[0][0], max: points.at(-1)[0], now: x, text };
     for (const [name, value] of Object.entries(told)) plot.setAttribute(`aria-value${name}`, value);
     const at = scales.x.at(x);
     const rule = svg("line", { class: "rule", x1: at, x2: at, y1: MARGIN.top, y2: HEIGHT - MARGIN.bottom });
     const dots = found.flatMap((each, index) =>
       each && each[1] !== null
-        ? [svg("circle", { class: `dot s${index % COLOURS}`, r: 4, cx: at, cy: scales.y.at(each[1]) })]
+        ? [circle(`dot s${index % COLOURS}`, 4, at, scales.y.at(each[1]))]
         : []);
     picture.querySelector(".pointer").replaceChildren(...(pointed === null ? [] : [rule, ...dots]));
   }

@@ -56,6 +56,7 @@ export function course(id, unit, signal) {
     y: { label, log: true },
     marks: true,
   });
+  const waiting = el("p", { class: "soft" }, "There is nothing to see before the first generation.");
   let points = [];
   let wanted = -1;
   let hurry = null;
@@ -67,6 +68,7 @@ export function course(id, unit, signal) {
       if (items.length === 0) break;
       points = points.concat(items);
       while (points.length > MOST) points = halved(points);
+      waiting.hidden = true;
       islands.draw(islandSeries(points));
       sizes.draw(sizeSeries(points));
     }
@@ -74,7 +76,13 @@ export function course(id, unit, signal) {
   }
 
   return {
-    node: el("div", { class: "course" }, islands.node, sizes.node),
+    node: el(
+      "section",
+      { class: "card" },
+      el("h2", {}, "Course of the search"),
+      waiting,
+      el("div", { class: "course" }, islands.node, sizes.node),
+    ),
     advance(job) {
       wanted = job.progress?.generation ?? -1;
       if (wanted < 0) return;

@@ -5,7 +5,10 @@ import { el, facts, scrolled, table } from "./dom.js";
 import { bytes, count, number, short } from "./numbers.js";
 import { repeat } from "./watch.js";
 
+const STATISTICS = ["Least", "Greatest", "Mean", "Deviation"];
+
 function columns({ preview }, spec) {
+  const remarks = preview.columns.some((column) => column.problem);
   const role = (name) => {
     if (name === preview.time) return "time";
     if (name === spec.output) return "output";
@@ -14,7 +17,7 @@ function columns({ preview }, spec) {
   };
   return table(
     "Columns of the data set",
-    ["Column", "Unit", "Role", ["Least", "figure"], ["Greatest", "figure"], ["Mean", "figure"], ["Deviation", "figure"], "Remark"],
+    ["Column", "Unit", "Role", ...STATISTICS.map((name) => [name, "figure"]), ...(remarks ? ["Remark"] : [])],
     preview.columns.map((column) => [
       el("code", {}, column.name),
       column.unit,
@@ -23,7 +26,7 @@ function columns({ preview }, spec) {
       number(column.maximum),
       number(column.mean),
       number(column.deviation),
-      column.problem,
+      ...(remarks ? [column.problem] : []),
     ]),
   );
 }
@@ -61,7 +64,7 @@ export function datasetPanel(spec, known, signal) {
 }
 
 function validation({ validation: given }) {
-  if (given === undefined) return "as the service has it by default";
+  if (given === undefined) return "default";
   if (typeof given === "number") return `the last ${short(100 * given)} %`;
   return [`data set ${given.dataset}`, given.rows && `rows ${given.rows}`].filter(Boolean).join(", ");
 }

@@ -10,7 +10,7 @@ function filled(node, attributes, children) {
       node.setAttribute(name, value === true ? "" : value);
     }
   }
-  node.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  node.append(...children.flat().filter((child) => ![null, undefined, false, ""].includes(child)));
   return node;
 }
 

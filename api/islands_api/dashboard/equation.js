@@ -1,13 +1,14 @@
-/** Equations: the service's MathML, taken over element by element, so that nothing but mathematics comes in. */
+/** Equations: the service's MathML, copied element by element, so that nothing but mathematics comes in. */
 
 import { text } from "./api.js";
 
 const MATHML = "http://www.w3.org/1998/Math/MathML";
 
 /** What an equation is made of. Attributes that could load, run or style something are not among them. */
-const ELEMENTS = new Set(
-  "math mrow mi mn mo ms mtext mspace msup msub msubsup mover munder munderover mfrac msqrt mroot mtable mtr mtd".split(" "),
-);
+const ELEMENTS = new Set([
+  ...["math", "mrow", "mi", "mn", "mo", "mtext", "mspace", "mfrac", "msqrt", "mroot"],
+  ...["msup", "msub", "msubsup", "mover", "munder", "munderover", "mtable", "mtr", "mtd"],
+]);
 const ATTRIBUTES = new Set(["display", "form", "stretchy", "mathvariant", "lspace", "rspace", "width"]);
 
 /**
@@ -30,7 +31,9 @@ function copied(source) {
  * @throws {Error} it is no MathML
  */
 export function mathOf(source) {
-  const read = new DOMParser().parseFromString(source, "application/xml");
+  // Without its namespace it is plain XML, of which the browser neither styles nor runs anything.
+  const plain = source.replace(/\sxmlns="[^"]*"/, "");
+  const read = new DOMParser().parseFromString(plain, "application/xml");
   if (read.querySelector("parsererror") || read.documentElement.localName !== "math")
     throw new Error("the equation is no MathML");
   return copied(read.documentElement);

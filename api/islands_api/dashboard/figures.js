@@ -1,4 +1,4 @@
-/** Figures of the service: asked for when they come into sight, one after the other, and shown as pictures. */
+/** Figures of the service: asked for when they come into sight, one after the other, shown as pictures. */
 
 import { blob } from "./api.js";
 import { el } from "./dom.js";
@@ -17,7 +17,7 @@ const TITLES = {
 /** How far below the screen a figure is asked for, in pixels. */
 const AHEAD = "150px";
 
-// The first figure of a model has all of them drawn: to ask for the others meanwhile would only take connections.
+// The first figure of a model has all of them drawn: to ask for the others meanwhile only takes connections.
 let last = Promise.resolve();
 
 function queued(what) {

@@ -57,7 +57,12 @@ function actions(take, heading) {
     button.disabled = false;
   };
   const buttons = ACTIONS.map((action) =>
-    el("button", { type: "button", hidden: true, class: action.danger ? "danger" : null, on: { click: press(action) } }, action.name));
+    el(
+      "button",
+      { type: "button", hidden: true, class: action.danger ? "danger" : null, on: { click: press(action) } },
+      action.name,
+    ),
+  );
   return {
     node: el("div", { class: "row actions" }, buttons),
     show(now) {
@@ -75,13 +80,13 @@ const seconds = (job) => (Date.parse(job.finished ?? job.updated) - Date.parse(j
 
 function told(job, unit) {
   const progress = job.progress ?? {};
-  const best = progress.best_error;
+  const { best_error: best, seconds_left: left, evaluations_per_second: rate } = progress;
   const running = job.state === "running";
   return facts([
     ["Best error", Number.isFinite(best) ? el("data", { value: best }, `${number(best)} ${unit}`) : null],
     ["Evaluations", progress.evaluations === undefined ? null : count(progress.evaluations)],
-    ["Per second", running && progress.evaluations_per_second ? count(progress.evaluations_per_second) : null],
-    ["Time left", running && Number.isFinite(progress.seconds_left) ? `about ${duration(progress.seconds_left)}` : null],
+    ["Per second", running && rate ? count(rate) : null],
+    ["Time left", running && Number.isFinite(left) ? `about ${duration(left)}` : null],
     ["Took", job.finished && job.started ? duration(seconds(job)) : null],
     ["Ended by", job.summary?.ended_by],
     ["Attempt", job.attempt > 1 ? String(job.attempt) : null],
@@ -95,7 +100,8 @@ function told(job, unit) {
 function failure(job) {
   if (job.state !== "failed" || !job.problem) return null;
   const { title, detail } = job.problem;
-  return el("section", { class: "card failure" }, el("h2", {}, title ?? "The job failed"), el("p", {}, detail ?? ""));
+  const heading = el("h2", {}, title ?? "The job failed");
+  return el("section", { class: "card failure" }, heading, el("p", {}, detail ?? ""));
 }
 
 /** Show a job in a host until the signal aborts; `update({rank})` shows another of its models. */
@@ -106,7 +112,12 @@ export function mountJob(host, { id, rank }, signal) {
   const standingFacts = el("div");
   const trouble = el("div");
   const [courseHost, modelsHost, about] = [el("div"), el("div"), el("div", { class: "about" })];
-  const head = el("div", { class: "heading" }, el("div", { class: "title" }, heading, state.node), el("code", { class: "soft small" }, id));
+  const head = el(
+    "div",
+    { class: "heading" },
+    el("div", { class: "title" }, heading, state.node),
+    el("code", { class: "soft small" }, id),
+  );
   let [shown, unit, search, models] = [null, "", null, null];
 
   function build(job) {

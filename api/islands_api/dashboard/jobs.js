@@ -1,6 +1,6 @@
 /**
  * The list of jobs: newest first, by state, page by page, kept up to date.
- * To submit from the page belongs beside this: a module `submit.js`, its route in islands.js, a link by the heading.
+ * To submit from the page belongs beside this: a module `submit.js`, its route in islands.js, a link here.
  */
 
 import { json } from "./api.js";
@@ -12,7 +12,7 @@ import { repeat } from "./watch.js";
 
 /** Jobs of a page, and seconds between two looks: while one of them goes on, and otherwise. */
 const PAGE = 25;
-const [BUSY, QUIET] = [2, 5];
+const [BUSY, QUIET] = [2, 4];
 
 const address = (state, cursor) => {
   const query = new URLSearchParams(Object.entries({ state, cursor }).filter(([, value]) => value));
@@ -30,7 +30,7 @@ function filters(state) {
 function row(job) {
   const state = badge();
   const bar = progressBar();
-  const best = el("td", { class: "figure", "data-label": "best error" });
+  const best = el("td", { class: "figure", "data-label": "best" });
   const attempt = el("td", { class: "figure", "data-label": "attempt" });
   const link = el("a", { href: `#/jobs/${job.id}` });
   let before = null;
@@ -38,10 +38,10 @@ function row(job) {
     "tr",
     { "data-job": job.id },
     el("td", {}, state.node),
-    el("th", { scope: "row" }, link, el("code", { class: "soft small" }, job.id.slice(0, 8))),
+    el("th", { scope: "row" }, link, job.name && el("code", { class: "soft small" }, job.id.slice(0, 8))),
     el("td", { class: "wide" }, bar.node),
     best,
-    el("td", { class: "figure", "data-label": "submitted" }, age(job.created)),
+    el("td", { class: "figure" }, age(job.created)),
     attempt,
   );
   function show(now) {
@@ -57,7 +57,7 @@ function row(job) {
   return { node, show };
 }
 
-/** Make the table's body hold the rows of these jobs. Rows that stay are not touched: one may have the focus. */
+/** Have the table's body hold these jobs. Rows that stay are not moved: one may have the focus. */
 function arrange(body, rows, jobs) {
   const wanted = new Set(jobs.map((job) => job.id));
   for (const [id, { node }] of rows) {
@@ -100,8 +100,8 @@ function welcome() {
     el(
       "p",
       {},
-      "Submit a record of an input and an output, a CSV with a header or NPZ, MAT, Parquet; the search for its ",
-      "equation shows up here at once. Three ways, the columns called ",
+      "Submit a record of an input and an output, a CSV with a header or NPZ, MAT, Parquet; the search for ",
+      "its equation shows up here at once. Three ways, the columns called ",
       el("code", {}, "u_V"),
       " and ",
       el("code", {}, "y_um"),
@@ -110,8 +110,17 @@ function welcome() {
     command("Command line", line.join("\n")),
     command("Python", python.join("\n")),
     command("curl", curl.join("\n")),
-    el("p", { class: "soft small" }, "Where the service asks for a key, give it by ", el("code", {}, "--key"), ", ",
-      el("code", {}, "Client(url, key)"), " or ", el("code", {}, "-H 'Authorization: Bearer …'"), "."),
+    el(
+      "p",
+      { class: "soft small" },
+      "Where the service asks for a key, give it by ",
+      el("code", {}, "--key"),
+      ", ",
+      el("code", {}, "Client(url, key)"),
+      " or ",
+      el("code", {}, "-H 'Authorization: Bearer …'"),
+      ".",
+    ),
   );
 }
 

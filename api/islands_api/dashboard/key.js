@@ -1,4 +1,4 @@
-/** Asks for a key when the service wants one. It is kept until the tab is closed, and stands in no address. */
+/** Asks for a key when the service wants one. It is kept until the tab is closed, in no address. */
 
 import { Away, ask, key } from "./api.js";
 import { el, say } from "./dom.js";

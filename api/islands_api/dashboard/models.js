@@ -5,17 +5,26 @@ import { complain } from "./banner.js";
 import { el, facts, scrolled, table } from "./dom.js";
 import { equationOf } from "./equation.js";
 import { figure } from "./figures.js";
-import { NONE, number } from "./numbers.js";
+import { NONE, number, percent, short } from "./numbers.js";
 import { repeat } from "./watch.js";
 
 /** Kinds of export, as people call them. */
-const EXPORTS = { python: "Python", c: "C", matlab: "MATLAB", latex: "LaTeX", mathml: "MathML", plain: "Text", json: "JSON" };
+const EXPORTS = {
+  python: "Python",
+  c: "C",
+  matlab: "MATLAB",
+  latex: "LaTeX",
+  mathml: "MathML",
+  plain: "Text",
+  json: "JSON",
+};
 
 const PARTS = ["estimation", "validation"];
 
 /** Write a number that can be had in full: the value of the element is as the service gave it. */
 function exact(value, written) {
-  return typeof value === "number" ? el("data", { value: String(value), title: String(value) }, written(value)) : NONE;
+  if (typeof value !== "number") return NONE;
+  return el("data", { value: String(value), title: String(value) }, written(value));
 }
 
 const r2 = (value) => (Math.abs(value) < 100 ? value.toFixed(5).replace("-", "−") : number(value));
@@ -27,25 +36,31 @@ function metric(model, part, name, written) {
   return value === null && outcome !== "ok" ? el("span", { class: "no" }, outcome) : exact(value, written);
 }
 
+const HEADINGS = [
+  ...["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val."],
+  ...["Hold drift %", "Property 1", "Residuals"],
+];
+
 const verdict = (good, yes, no) => el("span", { class: good ? "yes" : "no" }, good ? yes : no);
 
 function row(job, model) {
-  const { physics, residual_tests: residuals } = model;
+  const { rank, physics, residual_tests: residuals } = model;
+  const drift = physics.hold_drift_percent;
   const passed = residuals.tests.filter((test) => test.passed).length;
   return [
-    el("a", { href: `#/jobs/${job}/models/${model.rank}`, "aria-label": `Model ${model.rank}` }, String(model.rank)),
+    el("a", { href: `#/jobs/${job}/models/${rank}`, "aria-label": `Model ${rank}` }, String(rank)),
     String(model.size),
     ...PARTS.flatMap((part) => [metric(model, part, "mape", number), metric(model, part, "r2", r2)]),
-    physics.hold_drift_percent === null ? el("span", { class: "no" }, "diverged") : exact(physics.hold_drift_percent, number),
+    drift === null ? el("span", { class: "no" }, "diverged") : exact(drift, number),
     verdict(physics.property_1, "holds", "fails"),
     verdict(residuals.passed, "pass", `${passed} of ${residuals.tests.length}`),
   ];
 }
 
 function overview(job, models) {
-  const headings = ["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val.", "Hold drift %", "Property 1", "Residuals"];
-  const named = headings.map((name, at) => [name, at === 0 ? null : "figure"]);
-  const made = table("Models, best on the validation data first", named, models.map((model) => row(job, model)));
+  const named = HEADINGS.map((name, at) => [name, at === 0 ? null : "figure"]);
+  const rows = models.map((model) => row(job, model));
+  const made = table("Models, best on the validation data first", named, rows);
   made.classList.add("models");
   return made;
 }
@@ -71,13 +86,25 @@ function residuals({ residual_tests: { tests } }) {
     ["Correlation", ["Inside its limits", "figure"], ["Largest", "figure"], ["Limit", "figure"], "Verdict"],
     tests.map((test) => [
       test.input === null ? greek(test.name) : `${greek(test.name)}, input ${test.input + 1}`,
-      `${number(test.inside_percent)} %`,
+      percent(test.inside_percent),
       number(test.largest),
       number(test.limit),
       test.note || verdict(test.passed, "pass", "fail"),
     ]),
   );
 }
+
+const wanted = (target) => (typeof target === "number" ? `, wanted ${short(target)}` : "");
+
+const sum = ({ cluster, sum: found, target }) => [
+  `Sum of cluster ${cluster}`,
+  `${short(found)}${wanted(target)}`,
+];
+
+const excursion = ({ name, bounded, range_percent: range }) => [
+  `Range, ${name}`,
+  bounded ? percent(range) : el("span", { class: "no" }, "diverges"),
+];
 
 function exportButtons(path, rank) {
   const save = (form) => async ({ currentTarget: button }) => {
@@ -108,7 +135,8 @@ function gallery(path, signal, skip = () => false) {
   const host = el("div", { class: "gallery" });
   repeat(async () => {
     const { items } = await json(`${path}/figures`, { signal });
-    host.replaceChildren(...items.filter((name) => !skip(name)).map((name) => figure(`${path}/figures`, name, signal)));
+    const names = items.filter((name) => !skip(name));
+    host.replaceChildren(...names.map((name) => figure(`${path}/figures`, name, signal)));
     return Infinity;
   }, signal);
   return host;
@@ -120,14 +148,21 @@ function detail(job, model, signal) {
   return [
     el("h3", { id: "model" }, `Model ${model.rank}`),
     equation(path, model, signal),
-    el("div", { class: "row take", role: "group", "aria-label": "Take the model with you as" },
-      el("span", { class: "soft", "aria-hidden": "true" }, "Take it with you as"), exportButtons(path, model.rank)),
-    el("div", { class: "pair" },
+    el(
+      "div",
+      { class: "row take", role: "group", "aria-label": "Take the model with you as" },
+      el("span", { class: "soft", "aria-hidden": "true" }, "Take it with you as"),
+      exportButtons(path, model.rank),
+    ),
+    el(
+      "div",
+      { class: "pair" },
       el("div", {}, el("h4", {}, "Terms"), scrolled("Terms", terms(model))),
-      el("div", {}, el("h4", {}, "Residual tests"), scrolled("Residual tests", residuals(model)))),
+      el("div", {}, el("h4", {}, "Residual tests"), scrolled("Residual tests", residuals(model))),
+    ),
     facts([
-      ...physics.clusters.map(({ cluster, sum, target }) => [`Sum over cluster ${cluster}`, `${number(sum, 6)}${target === null || target === undefined ? "" : `, wanted ${number(target, 6)}`}`]),
-      ...physics.excursions.map(({ name, bounded, range_percent: range }) => [name, bounded ? `range ${number(range)} %` : "diverges"]),
+      ...physics.clusters.map(sum),
+      ...physics.excursions.map(excursion),
       ["AIC", number(information.aic, 6)],
       ["BIC", number(information.bic, 6)],
     ]),
@@ -138,7 +173,8 @@ function detail(job, model, signal) {
 /** The figures of the search as a whole, drawn once they are wanted. */
 function searchFigures(job, islands, signal) {
   const path = `v1/jobs/${encodeURIComponent(job)}`;
-  const node = el("details", { class: "search" }, el("summary", {}, "Record, front and convergence, as figures for a report"));
+  const title = el("summary", {}, "Record, front and convergence, as figures for a report");
+  const node = el("details", { class: "search" }, title);
   // A single island has no course beside others.
   const open = () => node.append(gallery(path, signal, (name) => name === "islands" && islands < 2));
   node.addEventListener("toggle", open, { once: true });
@@ -170,9 +206,14 @@ export function modelsPanel(job, rank, signal) {
 
   repeat(async () => {
     models = (await json(`v1/jobs/${encodeURIComponent(job.id)}/models`, { signal })).items;
-    const note = el("p", { class: "soft small" }, "Errors are those of the free run; the validation data chose the order, so they are no test.");
+    const note = el(
+      "p",
+      { class: "soft small" },
+      "Errors are those of the free run; the validation data chose the order, so they are no test.",
+    );
     const table = scrolled("Models", overview(job.id, models));
-    body.replaceChildren(table, note, shown, searchFigures(job.id, job.progress?.islands?.length ?? 0, signal));
+    const islands = job.progress?.islands?.length ?? 0;
+    body.replaceChildren(table, note, shown, searchFigures(job.id, islands, signal));
     select(rank);
     return Infinity;
   }, signal);

@@ -2,14 +2,15 @@
 
 export const NONE = "–";
 
-const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+const RAISED = { "-": "⁻", ...[..."⁰¹²³⁴⁵⁶⁷⁸⁹"] };
 
 /** Write a number with so many significant digits; a dash where there is none. */
 export function number(value, digits = 3) {
   if (typeof value !== "number" || !Number.isFinite(value)) return NONE;
+  if (value === 0) return "0";
   const size = Math.abs(value);
   let text;
-  if (size !== 0 && (size < 1e-3 || size >= 1e6)) {
+  if (size < 1e-3 || size >= 1e6) {
     const [mantissa, power] = value.toExponential(digits - 1).split("e");
     text = `${mantissa}×10${[...String(Number(power))].map((sign) => RAISED[sign]).join("")}`;
   } else {
@@ -49,7 +50,8 @@ export function duration(seconds) {
   const at = UNITS.findIndex(([size]) => whole >= size);
   const [[size, unit], [minor, name] = [1, ""]] = UNITS.slice(at, at + 2);
   const rest = Math.floor((whole % size) / minor);
-  return rest && name ? `${Math.floor(whole / size)} ${unit} ${rest} ${name}` : `${Math.floor(whole / size)} ${unit}`;
+  const first = `${Math.floor(whole / size)} ${unit}`;
+  return rest && name ? `${first} ${rest} ${name}` : first;
 }
 
 /** Write a file's size. */

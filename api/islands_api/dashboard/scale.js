@@ -1,4 +1,4 @@
-/** Scales of an axis: where a value lies, and which values are marked. Pure numbers, linear or logarithmic. */
+/** Scales of an axis: where a value lies, and which values are marked; linear or logarithmic. */
 
 /** Steps of marks, as multiples of a power of ten; of a whole axis those that are whole. */
 const STEPS = [1, 2, 2.5, 5, 10];
@@ -7,6 +7,9 @@ const STEPS = [1, 2, 2.5, 5, 10];
 const MANTISSAS = [[1], [1, 3], [1, 2, 5], [1, 2, 3, 4, 5, 6, 7, 8, 9]];
 
 const FEWEST = 3;
+
+/** Within less than this factor powers of ten say nothing, and round values lie evenly enough. */
+const NARROW = 5;
 
 /** What rounding may move a mark at the end of an axis by. */
 const SLACK = 1e-9;
@@ -24,8 +27,9 @@ export function roundTicks(low, high, most, whole = false) {
   return ticks;
 }
 
-/** Return the marks of a logarithmic axis: powers of ten, what lies between them, or round values at worst. */
+/** Return the marks of a logarithmic axis: powers of ten, what lies between, or round values at worst. */
 export function logTicks(low, high, most) {
+  if (high / low < NARROW) return roundTicks(low, high, Math.min(5, most));
   const [first, last] = [Math.floor(Math.log10(low) + SLACK), Math.ceil(Math.log10(high) - SLACK)];
   for (const mantissas of MANTISSAS) {
     const ticks = [];
@@ -61,7 +65,8 @@ export function scale(values, [from, to], { log = false, whole = false, share = 
     if (at > high) high = at;
   }
   if (low > high) [low, high] = [0, 1];
-  if (share || low === high) [low, high] = log && low === high ? [low - 0.2, high + 0.2] : widened(low, high, share || 0.5);
+  if (log && low === high) [low, high] = [low - 0.2, high + 0.2];
+  else if (share || low === high) [low, high] = widened(low, high, share || 0.5);
   const ticks = log ? logTicks(10 ** low, 10 ** high, most) : roundTicks(low, high, most, whole);
   const unit = (to - from) / (high - low);
   return {

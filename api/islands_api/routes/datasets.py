@@ -4,47 +4,54 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import fastapi
-from fastapi import APIRouter, File, Form, Response, UploadFile
+from fastapi import APIRouter, File, Form, UploadFile
+from pydantic import FiniteFloat
 
 from islands_api.auth import Reader, Writer
 from islands_api.bodies import FormRoute
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
-from islands_api.documents import dataset_document
+from islands_api.documents import Document, dataset_document
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
 from islands_api.schemas import DatasetPage, DatasetView
 from islands_api.uploads import name_of, receive
 from islands_service.inspection import Asked, inspected
 from islands_service.records import named
+from islands_service.specification import Name
 from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
 
-Id = Annotated[str, fastapi.Path(max_length=48, examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])]
+_KNOWN: dict[int | str, dict[str, Any]] = {
+    200: {"model": DatasetView, "description": "The same bytes were uploaded before."}
+}
+
+Id = Annotated[
+    str, fastapi.Path(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
+]
 
 
-@router.post("", status_code=201, response_model=DatasetView)
+@router.post("", status_code=201, response_model=DatasetView, responses=_KNOWN)
 async def upload(
     file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],
     caller: Writer,
     doors: AtDoors,
-    response: Response,
-    inputs: Annotated[list[str], Form(description="Columns to check as inputs.", max_length=16)] = [],  # noqa: B006
-    output: Annotated[str | None, Form(description="Column to check as the output.", max_length=200)] = None,
-    dt: Annotated[float | None, Form(description="Sampling time in seconds.", gt=0.0)] = None,
+    inputs: Annotated[list[Name], Form(max_length=16, description="Columns to check as inputs.")] = [],  # noqa: B006
+    output: Annotated[Name | None, Form(description="Column to check as the output.")] = None,
+    dt: Annotated[FiniteFloat | None, Form(description="Sampling time in seconds.", gt=0.0)] = None,
 ) -> Any:
     """Upload a record.
 
     It is read at once: the answer says which columns it has, with units and statistics, and what is wrong
-    with those that cannot be used. With `output` (and `inputs`) the record is checked as a job would, and
-    refused if that could not use it. The same bytes are the same data set: 200 in the place of 201.
+    with those that cannot be used. With `inputs` and `output` the record is checked as a job would, and
+    refused if that could not use it; with one of them, those columns are. The same bytes are the same data
+    set: 200 in the place of 201.
     """
     name, compressed = name_of(file.filename)
     stored, new = await _stored(doors, caller.owner, file, name, compressed, Asked(tuple(inputs), output, dt))
     doors.measures.received.inc(stored.bytes if new else 0)
-    response.status_code = 201 if new else 200
-    response.headers["Location"] = f"{router.prefix}/{stored.id}"
-    return dataset_document(stored)
+    headers = {"Location": f"{router.prefix}/{stored.id}"}
+    return Document(dataset_document(stored), 201 if new else 200, headers)
 
 
 async def _stored(
@@ -53,7 +60,7 @@ async def _stored(
     settings = doors.settings
     with doors.blobs.receiving() as stream:
         size = await doors.do(receive, file.file, stream, name, compressed, settings.max_unpacked)
-        stream.flush()
+        await doors.do(stream.flush)
         with named(Path(stream.name), name) as path:
             async with doors.inspections:
                 preview = await inspected(
@@ -71,13 +78,13 @@ async def _stored(
 async def datasets(caller: Reader, doors: AtDoors, cursor: Cursor = None, limit: Limit = 50) -> Any:
     """List the data sets, newest first."""
     found, after = await doors.do(doors.store.datasets.page, caller.owner, place_of(cursor), limit)
-    return {"items": [dataset_document(each) for each in found], "next": cursor_of(after)}
+    return Document({"items": [dataset_document(each) for each in found], "next": cursor_of(after)})
 
 
 @router.get("/{dataset}", response_model=DatasetView)
 async def dataset(dataset: Id, caller: Reader, doors: AtDoors) -> Any:
     """Look at a data set: columns, units, statistics, sampling, warnings."""
-    return dataset_document(await doors.do(doors.store.datasets.get, caller.owner, dataset))
+    return Document(dataset_document(await doors.do(doors.store.datasets.get, caller.owner, dataset)))
 
 
 @router.delete("/{dataset}", status_code=204)

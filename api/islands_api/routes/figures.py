@@ -3,6 +3,7 @@
 import asyncio
 import sys
 from asyncio.subprocess import PIPE
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
@@ -14,6 +15,7 @@ from islands_api.problems import RESPONSES, NoSuchThing
 from islands_api.routes.jobs import Id
 from islands_api.routes.models import Rank, finished, stored
 from islands_api.schemas import Names
+from islands_service.specification import Identification
 
 router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES)
 
@@ -24,6 +26,9 @@ SEARCH_FIGURES = ("record", "front", "convergence", "islands")
 
 #: The figure that a search of a single island lacks.
 _OF_SEVERAL = "islands"
+
+#: Seconds that drawing may take: until then nobody else's figures are drawn.
+_PATIENCE = 120.0
 
 #: A model's simulation, as numbers.
 SIMULATION = "free-run.json"
@@ -49,16 +54,13 @@ class DrawingFailed(IslandsError):
 @router.get("/{job}/figures", response_model=Names)
 async def search_figures(job: Id, caller: Reader, doors: AtDoors) -> Any:
     """Say which figures of the search there may be."""
-    document = await finished(doors, caller, job)
-    several = document["settings"]["islands"] > 1
-    return {"items": [name for name in SEARCH_FIGURES if several or name != _OF_SEVERAL]}
+    return {"items": _of_search(await finished(doors, caller, job))}
 
 
 @router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG)
 async def search_figure(job: Id, figure: SearchFigure, caller: Reader, doors: AtDoors) -> Response:
     """See a figure of the search: the record, error against size, convergence, the islands' course."""
-    await finished(doors, caller, job)
-    _known(figure, SEARCH_FIGURES)
+    _known(figure, _of_search(await finished(doors, caller, job)))
     return await _figure(doors, caller, job, f"{figure}.svg", None)
 
 
@@ -93,6 +95,11 @@ async def report(job: Id, caller: Reader, doors: AtDoors) -> Response:
     return answer
 
 
+def _of_search(document: Mapping[str, Any]) -> tuple[str, ...]:
+    several = document["settings"]["islands"] > 1
+    return tuple(name for name in SEARCH_FIGURES if several or name != _OF_SEVERAL)
+
+
 def _known(figure: str, figures: tuple[str, ...]) -> None:
     if figure not in figures:
         raise NoSuchThing(f"there is no figure {figure!r}: take one of {', '.join(figures)}")
@@ -116,14 +123,20 @@ async def _figure(
 
 
 async def _draw(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
+    spec = Identification.model_validate((await doors.do(doors.store.jobs.get, caller.owner, job)).spec)
+    for dataset in spec.datasets:
+        await doors.do(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
     of = () if rank is None else ("--rank", str(rank))
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "islands_service.drawing", job, "--owner", caller.owner, *of),
+        *(sys.executable, "-m", "islands_service.drawing", job, f"--owner={caller.owner}", *of),
         stderr=PIPE,
         env=doors.settings.environment(),
     )
     try:
-        _, complaint = await process.communicate()
+        async with asyncio.timeout(_PATIENCE):
+            _, complaint = await process.communicate()
+    except TimeoutError:
+        raise DrawingFailed(f"the figures of job {job} take longer than {_PATIENCE:.0f} s to draw") from None
     finally:
         if process.returncode is None:
             process.kill()

@@ -19,7 +19,7 @@ from islands_service.records import named
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 
 #: A job's id.
-Id = Annotated[str, Path(max_length=64, examples=["0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"])]
+Id = Annotated[str, Path(pattern=r"^[0-9A-Za-z_-]{1,64}$", examples=["0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"])]
 
 #: Points of a page of the history.
 _POINTS = 5000
@@ -84,16 +84,16 @@ async def job(
     wait: Annotated[
         float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
     ] = 0.0,
-    if_none_match: Annotated[str | None, Header(max_length=100)] = None,
+    if_none_match: Annotated[str | None, Header(max_length=1000)] = None,
 ) -> Any:
     """Look at a job. With `If-None-Match` the answer is 304 as long as nothing has changed."""
     found = await doors.do(doors.store.jobs.get, caller.owner, job)
-    if wait and if_none_match == _etag(found) and found.state not in TERMINAL:
+    if wait and _known(if_none_match, found) and found.state not in TERMINAL:
         found = await _changed(doors, found, wait)
     headers = {"ETag": _etag(found), "Cache-Control": "private, no-cache"}
     if found.state not in TERMINAL:
         headers["Retry-After"] = "1"
-    if if_none_match == _etag(found):
+    if _known(if_none_match, found):
         return Response(status_code=304, headers=headers)
     return Document(job_document(found), headers=headers)
 
@@ -101,13 +101,13 @@ async def job(
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
 async def cancel(job: Id, caller: Writer, doors: AtDoors) -> Any:
     """Cancel a job: at once if it waits; if it runs, within a second or so."""
-    return job_document(await doors.do(doors.store.jobs.cancel, caller.owner, job))
+    return Document(job_document(await doors.do(doors.store.jobs.cancel, caller.owner, job)), 202)
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
 async def resume(job: Id, caller: Writer, doors: AtDoors) -> Any:
     """Have a job that failed or was cancelled go on from its last checkpoint."""
-    return job_document(await doors.do(doors.store.jobs.resume, caller.owner, job))
+    return Document(job_document(await doors.do(doors.store.jobs.resume, caller.owner, job)), 202)
 
 
 @router.delete("/{job}", status_code=204)
@@ -140,3 +140,9 @@ async def _changed(doors: Doors, job: Job, seconds: float) -> Job:
 
 def _etag(job: Job) -> str:
     return f'"{job.version}"'
+
+
+def _known(given: str | None, job: Job) -> bool:
+    """Tell whether a client has a job as it is: it may send several tags, and a proxy may weaken them."""
+    tags = [tag.strip().removeprefix("W/") for tag in (given or "").split(",")]
+    return "*" in tags or _etag(job) in tags

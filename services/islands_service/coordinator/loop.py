@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from threading import Event
 from time import monotonic
 from types import MappingProxyType
@@ -19,7 +19,7 @@ from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.database import StoreError
-from islands_service.telemetry import configure_traces, span
+from islands_service.telemetry import Traces
 
 if TYPE_CHECKING:
     from islands.evolution.engine import Engine
@@ -66,7 +66,7 @@ class Coordinator:
         self._settings, self._name, self._stopping = settings, name, stopping
         self._store = Store(settings.url)
         self._blobs = Blobs(settings.blobs)
-        self._traces = configure_traces(settings.telemetry, "coordinator")
+        self._traces = Traces(settings.telemetry, "coordinator")
         self._ray = ExitStack()
         self._connected = False
         self._sweep_at = monotonic() + LOOK
@@ -80,7 +80,7 @@ class Coordinator:
             The cluster is lost: a new process finds the next one.
         """
         log.info("coordinator started", name=self._name)
-        with self._store, self._ray:
+        with self._store, self._ray, closing(self._traces):
             while not self._stopping.is_set():
                 if self._ready():
                     self._next()
@@ -119,7 +119,7 @@ class Coordinator:
         attributes = {"job": lease.job.id, "attempt": lease.job.attempt}
         with (
             structlog.contextvars.bound_contextvars(**attributes),
-            span(self._traces, lease.job.kind, **attributes),
+            self._traces.span(lease.job.kind, **attributes),
         ):
             log.info("job claimed", kind=lease.job.kind)
             began = monotonic()

@@ -13,12 +13,16 @@ from threading import Event
 import ray
 
 from islands.errors import IslandsError
-from islands_service.lifeline import lifeline, stop_on_signals
+from islands_service.lifeline import sign_of_life, stop_on_signals
 from islands_service.runtime.cluster import cluster
+from islands_service.runtime.errors import ClusterError
 from islands_service.settings import service_settings
 
 #: Seconds between two looks at whether Ray still answers.
-_LOOK = 1.0
+_LOOK = 0.5
+
+#: Processes of Ray that nothing goes on without.
+_VITAL = ("gcs_server", "raylet")
 
 
 def main() -> int:
@@ -29,15 +33,31 @@ def main() -> int:
     try:
         with cluster(None):
             stop_on_signals(stopping)
-            with _found_at(settings.ray_address_file), lifeline(settings.lifeline):
+            with _found_at(settings.ray_address_file):
                 while not stopping.wait(_LOOK):
-                    # Raises, or ends this process, when Ray's own processes are lost.
-                    ray.cluster_resources()
+                    _check()
+                    # Here and not from a thread: where Ray hangs we do, too, and are started again.
+                    sign_of_life(settings.lifeline)
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
     except IslandsError as error:
         print(f"Ray: {error}", file=sys.stderr)
         return 1
     return 0
+
+
+def _check() -> None:
+    """Return if Ray goes on.
+
+    Raises
+    ------
+    ClusterError
+    """
+    # Without its raylet Ray would answer as before, and carry out nothing.
+    node = ray._private.worker._global_node
+    if lost := [name for name, _ in node.dead_processes() if name in _VITAL]:
+        raise ClusterError(f"it has lost its {', '.join(lost)}")
+    if not any(each["Alive"] for each in ray.nodes()):
+        raise ClusterError("its raylet does not answer")
 
 
 @contextmanager

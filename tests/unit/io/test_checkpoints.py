@@ -1,6 +1,7 @@
 """Checkpoints: an archipelago comes back as it was, or not at all and with a message."""
 
 import json
+import os
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -151,19 +152,16 @@ def test_a_crash_between_writing_and_replacing_leaves_the_old_one(path, monkeypa
 def test_a_crash_while_writing_leaves_the_old_one(path, monkeypatch):
     write_checkpoint(EMPTY, path, {"epoch": "old"})
 
-    def full(document, stream):
-        stream.write('{"schema": "islands.che')
+    def full(_number):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(json, "dump", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
         write_checkpoint(archipelago(), path, {"epoch": "new"})
     assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
 
 
 def test_it_is_on_the_disk_before_it_takes_the_old_one_s_place(path, monkeypatch):
-    import os
-
     order = []
     synchronise, put = os.fsync, Path.replace
     monkeypatch.setattr(os, "fsync", lambda number: (order.append("synchronised"), synchronise(number))[1])

@@ -1,0 +1,125 @@
+"""How ``islands jobs`` shows what a service answers: as JSON, as lines, as tables, as a folder of files."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.table import Column, Table
+from rich.text import Text
+
+from islands_api.cli.console import output, progress
+from islands_api.client import Client
+from islands_api.schemas import JobView, ModelView
+from islands_service.jobs import TERMINAL
+
+#: Islands of a running job that are shown one by one.
+_SHOWN = 16
+
+
+def show_job(job: JobView, as_json: bool) -> None:
+    """Show a job as it stands."""
+    if as_json:
+        print_json(job.model_dump(mode="json"))
+        return
+    output.print(f"job {job.id}: {job.state}", markup=False)
+    told = job.progress or {}
+    if "generation" in told:
+        best = _number(told["best_error"])
+        output.print(
+            f"generation {told['generation']}/{told['generations']}, best error {best}", markup=False
+        )
+    if job.summary is not None:
+        output.print(job.summary["equation"], markup=False)
+    if job.problem is not None:
+        output.print(job.problem["detail"], markup=False)
+
+
+def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
+    """Show a list of jobs."""
+    if as_json:
+        print_json({"items": [job.model_dump(mode="json") for job in jobs]})
+        return
+    table = Table(Column("job", no_wrap=True), "name", "state", "generation", "best error", "created")
+    for job in jobs:
+        told = job.progress or {}
+        table.add_row(
+            job.id,
+            # What somebody calls a job is no markup.
+            Text(job.name),
+            job.state,
+            f"{told.get('generation', '-')}/{told.get('generations', '-')}",
+            _number(told.get("best_error")),
+            f"{job.created:%Y-%m-%d %H:%M:%S}",
+        )
+    output.print(table)
+
+
+def show_models(models: Sequence[ModelView]) -> None:
+    """Show the models of a job: errors and physics of each, and their equations."""
+    table = Table("rank", "terms", "MAPE est. %", "MAPE val. %", "hold drift %", "Property 1")
+    for model in models:
+        errors_of = [model.metrics[part]["free_run"]["mape"] for part in ("estimation", "validation")]
+        table.add_row(
+            str(model.rank),
+            str(model.size),
+            *map(_number, errors_of),
+            _number(model.physics["hold_drift_percent"]),
+            "yes" if model.physics["property_1"] else "no",
+        )
+    output.print(table)
+    for model in models:
+        output.print(f"{model.rank:2d}  {model.equation}", markup=False)
+
+
+@contextmanager
+def bar_of_job() -> Iterator[Callable[[JobView], None]]:
+    """Show how far a job is, in a moving bar."""
+    with progress("job") as show_bar:
+
+        def tell(job: JobView) -> None:
+            told = job.progress or {}
+            last = max(1, told.get("generations", 1))
+            done = told.get("generation", 0)
+            best = _number(told.get("best_error"))
+            text = f"{job.state}, generation {done}/{told.get('generations', '?')}, best error {best}"
+            islands = [
+                f"  island {index:3d}  RMSE {_number(error)}"
+                for index, error in enumerate(told.get("islands", ())[:_SHOWN])
+            ]
+            show_bar(text, done / last if job.state not in TERMINAL else 1.0, islands)
+
+        yield tell
+
+
+def download(
+    client: Client, job: str, document: dict[str, Any], models: Sequence[ModelView], folder: Path
+) -> None:
+    """Write a result, its models and its figures into a folder; nothing of an earlier result stays there."""
+    for name, kind in (("models", "[0-9][0-9]*.json"), ("figures", "*.svg")):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        for old in (folder / name).glob(kind):
+            old.unlink()
+    for model in models:
+        (folder / "models" / f"{model.rank:02d}.json").write_text(
+            client.export(job, model.rank, "json"), encoding="utf-8"
+        )
+    with progress("figures") as tell:
+        names = client.figures(job)
+        for done, (name, rank) in enumerate(names):
+            tell(name, done / len(names))
+            (folder / "figures" / f"{name}.svg").write_bytes(client.figure(job, name, rank))
+    (folder / "result.json").write_text(
+        json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+    )
+
+
+def print_json(document: Any) -> None:
+    """Print a document for programs."""
+    typer.echo(json.dumps(document, indent=2))
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"

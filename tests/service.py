@@ -1,0 +1,209 @@
+"""The service in tests: the application behind a real server in a thread, records, and jobs in every state.
+
+No process is started and no Ray: what a coordinator would do is done to the store. The server is uvicorn on a
+free port of the loopback address, so that streams, limits and headers are those of the real thing.
+"""
+
+import hashlib
+import io
+import json
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import structlog
+import uvicorn
+from fastapi import FastAPI
+
+from islands.evolution.engine import SerialEngine
+from islands_api.app import create_app
+from islands_api.auth import LOCAL
+from islands_service.blobs import Blobs
+from islands_service.coordinator.identification import identification
+from islands_service.jobs import Job, Submission
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+
+#: Seconds after which a test's request has failed.
+PATIENCE = 30.0
+
+JSON, PROBLEM = "application/json", "application/problem+json"
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A service that answers, and what stands behind its doors."""
+
+    url: str
+    client: httpx.Client
+    app: FastAPI
+    store: Store
+    settings: ServiceSettings
+    logs: list[Any]
+
+    @property
+    def port(self) -> int:
+        return int(self.url.rpartition(":")[2])
+
+    def upload(self, content: bytes, name: str = "record.csv", /, **form: Any) -> httpx.Response:
+        return self.client.post("/v1/datasets", files={"file": (name, content)}, data=form)
+
+    def submit(self, headers: dict[str, str] | None = None, /, **spec: Any) -> httpx.Response:
+        return self.client.post("/v1/jobs", json=spec, headers=headers)
+
+    def key(self, *scopes: str, **made: Any) -> dict[str, str]:
+        """Make a key; return the header that shows it."""
+        _, secret = self.store.keys.create("test", frozenset(scopes or ("read", "write")), **made)
+        return {"Authorization": f"Bearer {secret}"}
+
+
+@contextmanager
+def served(folder: Path, /, **changes: Any) -> Iterator[Service]:
+    """Serve an application of its own on a store in a folder, where ``islands.db`` may stand prepared."""
+    settings = ServiceSettings(data_dir=folder, **changes)
+    folder.mkdir(exist_ok=True)
+    store = Store(settings.url)
+    app = create_app(settings, store)
+    with (
+        structlog.testing.capture_logs([structlog.contextvars.merge_contextvars]) as logs,
+        listening(app) as url,
+        httpx.Client(base_url=url, timeout=PATIENCE) as client,
+    ):
+        yield Service(url, client, app, store, settings, logs)
+
+
+@contextmanager
+def listening(app: FastAPI) -> Iterator[str]:
+    """Have an application answer at a URL."""
+    config = uvicorn.Config(
+        app, port=0, log_level="critical", access_log=False, timeout_graceful_shutdown=1, server_header=False
+    )
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        until = time.monotonic() + PATIENCE
+        while not server.started:
+            assert thread.is_alive()
+            assert time.monotonic() < until, "the server does not start"
+            time.sleep(0.005)
+        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+def problem_of(response: httpx.Response, status: int, kind: str) -> str:
+    """Hold a refusal against the form that all have; return its detail."""
+    assert response.headers["content-type"] == PROBLEM, (response.status_code, response.text)
+    document = response.json()
+    assert (response.status_code, document["type"]) == (status, f"/problems/{kind}"), document
+    assert document["status"] == status
+    assert document["title"]
+    assert document["request_id"] == response.headers["x-request-id"]
+    return str(document["detail"])
+
+
+def nothing_stored(service: Service) -> bool:
+    """Tell that no job, no data set and no blob is there."""
+    files = [path for path in service.settings.blobs.rglob("*") if path.is_file()]
+    return not (
+        files
+        or service.client.get("/v1/datasets").json()["items"]
+        or service.client.get("/v1/jobs").json()["items"]
+    )
+
+
+def columns(samples: int = 200) -> dict[str, np.ndarray]:
+    """A record: time, an input, an output that answers to it."""
+    rng = np.random.default_rng(1)
+    u = rng.normal(size=samples)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.6 * y[k - 1] + 0.3 * u[k - 1]
+    return {"t_s": np.arange(samples) * 0.01, "u_V": u, "y_um": y}
+
+
+def csv(samples: int = 200, separator: str = ",", mark: str = ".", /, **cells: dict[int, str]) -> bytes:
+    """A record as text; ``y_um={7: "x"}`` puts a text into a cell, by the line of the file."""
+    record = columns(samples)
+    lines = [separator.join(record)]
+    lines += [
+        separator.join(f"{value:.6f}".replace(".", mark) for value in row)
+        for row in zip(*(column.tolist() for column in record.values()), strict=True)
+    ]
+    for name, changed in cells.items():
+        at = list(record).index(name)
+        for line, text in changed.items():
+            split = lines[line - 1].split(separator)
+            split[at] = text
+            lines[line - 1] = separator.join(split)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def npz(**arrays: Any) -> bytes:
+    """An archive of NumPy's."""
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    return stream.getvalue()
+
+
+def spec(dataset: str, /, **changes: Any) -> dict[str, Any]:
+    """What a job needs to say at least."""
+    return {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", **changes}
+
+
+#: A search that takes a second.
+QUICK = {"population": 20, "generations": 2, "max_terms": 3, "max_height": 2, "shooting": 20}
+
+
+def identified(service: Service, islands: int = 1) -> str:
+    """Upload a record and have a job identify it, here and now; return the job's id."""
+    dataset = service.upload(csv(400)).json()["id"]
+    settings = {**QUICK, "islands": islands}
+    job = service.submit(**spec(dataset, preset="narx", settings=settings, seed=islands)).json()
+    lease = service.store.leases.claim("test", 600.0)
+    assert lease is not None
+    assert lease.job.id == job["id"]
+    outcome = identification(
+        lease, service.store, Blobs(service.settings.blobs), SerialEngine(), lambda: None, 600.0
+    )
+    service.store.leases.finish(lease, outcome)
+    return str(job["id"])
+
+
+def kept(store: Store, owner: str = LOCAL, content: bytes = b"") -> str:
+    """Keep a clean data set without a file behind it; return its id."""
+    number = hashlib.sha256(owner.encode() + content).hexdigest()
+    column = {"minimum": -1.0, "maximum": 1.0, "mean": 0.0, "deviation": 1.0, "problem": ""}
+    preview = {
+        "samples": 200,
+        "columns": [
+            {"name": name, "unit": name.partition("_")[2], "samples": 200, **column} for name in columns(3)
+        ],
+        "time": "t_s",
+        "dt": 0.01,
+        "warnings": [],
+    }
+    return store.datasets.add(owner, "record.csv", ".csv", number, 7, preview)[0].id
+
+
+def queued(store: Store, owner: str = LOCAL, **changes: Any) -> Job:
+    """Submit a job past the doors."""
+    return store.jobs.submit(Submission(owner, spec("0-csv"), **changes))[0]
+
+
+def parsed(stream: str) -> list[tuple[int, str, dict[str, Any]]]:
+    """Read server-sent events: number, kind, data."""
+    found = []
+    for block in stream.split("\n\n"):
+        if block and not block.startswith(":"):
+            entry = dict(line.split(": ", 1) for line in block.splitlines())
+            found.append((int(entry["id"]), entry["event"], json.loads(entry["data"])))
+    return found
