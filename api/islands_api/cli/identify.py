@@ -19,7 +19,9 @@ RUNNING = ("resume", "engine", "ray_address", "wall_time", "verbose")
 
 def identify(
     context: typer.Context,
-    record: Annotated[Path | None, typer.Argument(help="The record: CSV or NPZ. Not with --resume.")] = None,
+    record: Annotated[
+        Path | None, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet. Not with --resume.")
+    ] = None,
     inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeatable.")] = None,
     output_column: Annotated[str | None, typer.Option("--output", help="Output column.")] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,

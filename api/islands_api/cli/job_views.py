@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 from islands_api.cli.console import output, progress
@@ -42,7 +42,9 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
     if as_json:
         print_json({"items": [job.model_dump(mode="json") for job in jobs]})
         return
-    table = Table(Column("job", no_wrap=True), "name", "state", "generation", "best error", "created")
+    table = Table("job", "name", "state", "generation", "best error", "created")
+    for column in (0, 2, 3):
+        table.columns[column].no_wrap = True
     for job in jobs:
         told = job.progress or {}
         table.add_row(
@@ -54,7 +56,8 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
             _number(told.get("best_error")),
             f"{job.created:%Y-%m-%d %H:%M:%S}",
         )
-    output.print(table)
+    # Where there is little room the others break their lines; an id that is cut off names nothing.
+    output.print(table, soft_wrap=False)
 
 
 def show_models(models: Sequence[ModelView]) -> None:

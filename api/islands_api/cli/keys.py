@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
+from rich.text import Text
 
 from islands.errors import SettingsError
 from islands_api.cli.console import output
@@ -56,11 +57,13 @@ def create(
 def list_keys(data_dir: DataDir = None, database: Database = None) -> None:
     """List the keys, without their secrets."""
     with _store(data_dir, database) as store:
-        table = Table("key", "name", "owner", "scopes", "state")
+        table = Table(Column("key", no_wrap=True), "name", "owner", "scopes", Column("state", no_wrap=True))
         for key in store.keys.all():
             state = "revoked" if key.revoked is not None else "expired" if key.expired else "valid"
-            table.add_row(key.id, key.name, key.owner, ", ".join(sorted(key.scopes)), state)
-    output.print(table)
+            # What somebody calls a key is no markup.
+            table.add_row(key.id, Text(key.name), Text(key.owner), ", ".join(sorted(key.scopes)), state)
+    # Where there is little room the others break their lines; an id that is cut off names nothing.
+    output.print(table, soft_wrap=False)
 
 
 @keys.command()

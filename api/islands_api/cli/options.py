@@ -14,7 +14,7 @@ from islands.systems.published_models import published
 from islands_service.rows import overlap, rows_of
 
 Record = Annotated[
-    Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point) or NPZ.")
+    Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point), NPZ, MAT or Parquet.")
 ]
 Inputs = Annotated[
     list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")

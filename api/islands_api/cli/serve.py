@@ -64,7 +64,7 @@ def roles(settings: ServiceSettings) -> list[Role]:
         Role(
             f"coordinator {index}",
             (*python, "islands_service.coordinator", "--name", f"{instance}-{index}"),
-            settings.lease + 1.0,
+            settings.lease,
             needs=needs,
         )
         for index in range(settings.coordinators)

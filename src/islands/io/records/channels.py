@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.checks import check_equal_length
-from islands.io.records.claims import check_samples
 from islands.io.records.names import structures_of
 from islands.io.records.table import Columns, Rows, select
 
@@ -90,6 +89,5 @@ def _channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
             f"{file}: column {name} has the shape {array.shape}, a channel has (samples,): save one "
             "array per channel and recording"
         )
-    check_samples(array.size, name, file)
     with np.errstate(invalid="ignore"):  # of a NaN that signals, which becomes a quiet one
         return array.ravel().astype(np.float64)

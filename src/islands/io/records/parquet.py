@@ -36,11 +36,7 @@ def read_parquet(path: Path) -> Channels:
     if path.stat().st_size == 0:
         raise RecordError(f"{file} is empty: write it anew")
     with _opened(path) as parquet:
-        names = tuple(parquet.schema_arrow.names)
-        rows = parquet.metadata.num_rows
-        groups = [parquet.metadata.row_group(index) for index in range(parquet.metadata.num_row_groups)]
-    if sum(group.num_rows for group in groups) != rows:
-        raise _disagreement(file, rows, sum(group.num_rows for group in groups))
+        names, rows = tuple(parquet.schema_arrow.names), parquet.metadata.num_rows
     return Channels(file, names, partial(_column, path, rows))
 
 
@@ -69,8 +65,11 @@ def _column(path: Path, rows: int, name: str) -> NDArray[np.float64]:
     with _opened(path) as parquet:
         batches = parquet.iter_batches(_BATCH, columns=[name], use_threads=False)
         chunks = [batch.column(batch.schema.names.index(name)) for batch in batches]
-        if sum(map(len, chunks)) != rows:
-            raise _disagreement(path.name, rows, sum(map(len, chunks)))
+        stored = sum(map(len, chunks))
+        if stored != rows:
+            raise RecordError(
+                f"{path.name} claims {rows} rows and stores {stored}: it is damaged, write it anew"
+            )
         schema = parquet.schema_arrow
         kind = schema.field(schema.names.index(name)).type
         if pyarrow.types.is_dictionary(kind):
@@ -106,7 +105,3 @@ def _elapsed(column: Any, name: str) -> NDArray[np.float64]:
         counted = compute.subtract(counted, compute.min(counted))
     numbers: NDArray[np.float64] = compute.cast(counted, "float64", safe=False).to_numpy()
     return numbers * (tick / (seconds_per_unit(name) or 1.0))
-
-
-def _disagreement(file: str, claimed: int, stored: int) -> RecordError:
-    return RecordError(f"{file} claims {claimed} rows and stores {stored}: it is damaged, write it anew")

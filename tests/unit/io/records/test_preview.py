@@ -1,0 +1,299 @@
+"""A preview describes every column of a file and says in `read_record`'s words what stands against it."""
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.io.records import READERS, columns_of, preview, read_record
+
+SAMPLES = 60
+K = np.arange(SAMPLES)
+T, U, Y = K / 100, K % 7 - 3.0, K * K % 11 + 0.5
+
+
+def table(tmp_path, separator=",", comma=False, drop=(), **columns):
+    """Write t_s, u_V and y_um and what else is given as text; return the file."""
+    columns = {
+        name: column
+        for name, column in ({"t_s": T, "u_V": U, "y_um": Y} | columns).items()
+        if name not in drop
+    }
+    rows = [columns, *zip(*columns.values(), strict=True)]
+    cells = ([str(cell).replace(".", ",") if comma else str(cell) for cell in row] for row in rows)
+    (tmp_path / "r.csv").write_text("\n".join(map(separator.join, cells)))
+    return tmp_path / "r.csv"
+
+
+def archive(tmp_path, **arrays):
+    np.savez(tmp_path / "r.npz", **arrays)
+    return tmp_path / "r.npz"
+
+
+def cells(values, **changed):
+    """Return values as cells, some of them changed: ``c5="off"``."""
+    texts = [str(value) for value in values]
+    for place, text in changed.items():
+        texts[int(place[1:])] = text
+    return texts
+
+
+def problems(file):
+    return {column.name: column.problem for column in preview(file).columns if column.problem}
+
+
+def refusal(file, inputs, output, **options):
+    with pytest.raises(RecordError) as caught:
+        read_record(file, inputs, output, **options)
+    return str(caught.value)
+
+
+def test_a_sound_file_is_described_without_a_complaint(tmp_path):
+    seen = preview(table(tmp_path))
+    assert (seen.time, seen.dt, seen.samples, seen.warnings) == ("t_s", pytest.approx(0.01), SAMPLES, ())
+    assert [column.name for column in seen.columns] == ["t_s", "u_V", "y_um"]
+    assert [column.unit for column in seen.columns] == ["s", "V", "um"]
+    assert not any(column.problem for column in seen.columns)
+
+
+def test_the_numbers_are_those_of_the_samples(tmp_path):
+    column = preview(table(tmp_path)).columns[2]
+    assert (column.samples, column.minimum, column.maximum) == (SAMPLES, Y.min(), Y.max())
+    assert column.mean == pytest.approx(Y.mean())
+    assert column.deviation == pytest.approx(Y.std())
+
+
+@pytest.mark.parametrize("suffix", READERS)
+def test_every_format_gives_the_same_preview(tmp_path, save, suffix):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    columns = {"t_s": T, "u_V": U, "y_um": Y}
+    file = tmp_path / f"r{suffix}"
+    if suffix == ".npz":
+        np.savez(file, **columns)
+    elif suffix == ".mat":
+        save("7", **columns)
+    elif suffix == ".parquet":
+        parquet.write_table(pa.table(columns), file)
+    else:
+        table(tmp_path).rename(file)
+    assert preview(file) == preview(table(tmp_path))
+
+
+def test_a_preview_is_plain_data(tmp_path):
+    assert json.loads(json.dumps(asdict(preview(table(tmp_path)))))["columns"][1]["name"] == "u_V"
+
+
+# Problems of columns
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        cells(U, c5="off"),
+        cells(U, c5=""),
+        cells(U, c5="inf"),
+        cells(U, **{f"c{k}": "" for k in range(40, SAMPLES)}),
+        [2.5] * SAMPLES,
+        cells(U, c5="1,5", c6="0.5"),
+    ],
+    ids=["text", "missing", "infinite", "short", "constant", "both marks"],
+)
+def test_a_problem_is_the_very_message_of_read_record(tmp_path, column):
+    file = table(tmp_path, separator=";", x=column)
+    message = refusal(file, ["x"], "y_um")
+    assert problems(file) == {"x": message}
+    assert preview(file).warnings == ()
+
+
+def test_a_column_with_a_bad_sample_has_no_statistics_and_a_constant_one_has(tmp_path):
+    file = table(tmp_path, a=cells(U, c5="nan"), b=cells(U, c5="inf"), c=[2.5] * SAMPLES, d=["x"] * SAMPLES)
+    *_, missing, infinite, constant, text = preview(file).columns
+    for column in (missing, infinite, text):
+        assert (column.minimum, column.maximum, column.mean, column.deviation) == (None, None, None, None)
+    assert (missing.samples, text.samples) == (SAMPLES, None)
+    assert (constant.minimum, constant.maximum, constant.mean, constant.deviation) == (2.5, 2.5, 2.5, 0.0)
+
+
+def test_numbers_too_large_for_a_mean_have_none(tmp_path):
+    column = preview(table(tmp_path, x=[1.7e308] * (SAMPLES - 1) + [1.6e308])).columns[3]
+    assert (column.mean, column.problem) == (None, "")
+
+
+def test_a_ragged_line_is_the_problem_of_every_column(tmp_path):
+    file = table(tmp_path)
+    file.write_text(file.read_text() + "\n0.6,1")
+    message = refusal(file, ["u_V"], "y_um")
+    assert problems(file) == dict.fromkeys(("t_s", "u_V", "y_um"), message)
+    assert preview(file).samples == 0
+
+
+def test_columns_of_no_name_are_left_out(tmp_path):
+    file = table(tmp_path)
+    file.write_text(file.read_text().replace("\n", ",\n") + ",")
+    assert [column.name for column in preview(file).columns] == ["t_s", "u_V", "y_um"]
+
+
+def test_an_array_that_no_other_is_as_long_as_has_a_problem(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, short=U[:50], gain=2.0 * np.ones(1), dt=0.1)
+    found = problems(file)
+    assert set(found) == {"short", "gain", "dt"}
+    assert found["short"] == refusal(file, ["u"], "short")
+    assert (
+        found["short"]
+        == "r.npz: column u has 60 samples, column short 50: channels of one record are of equal length"
+    )
+    assert preview(file).samples == SAMPLES
+
+
+def test_two_recordings_in_one_file_are_a_warning_and_no_problem(tmp_path):
+    file = archive(tmp_path, u_test=U[:50], y_test=Y[:50], u=U, y=Y, dt=0.1)
+    seen = preview(file)
+    assert "dt" in problems(file)
+    assert len(problems(file)) == 1
+    assert seen.samples == SAMPLES
+    assert seen.warnings == (refusal(file, ["u"], "u_test"),)
+    assert read_record(file, ["u_test"], "y_test").samples == 50
+
+
+def test_numbers_by_themselves_are_no_recording(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, gain=np.ones(1), offset=np.ones(1), dt=0.1)
+    assert {"gain", "offset"} <= set(problems(file))
+    assert preview(file).warnings == ()
+
+
+def test_an_array_of_another_shape_or_kind_is_a_problem(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, dt=0.1, cube=np.ones((2, 3, 4)), text=np.array(["a"] * SAMPLES))
+    assert problems(file)["cube"] == refusal(file, ["cube"], "y")
+    assert problems(file)["text"] == refusal(file, ["text"], "y")
+
+
+def test_a_file_without_a_channel_still_tells_its_sampling_time(tmp_path):
+    seen = preview(archive(tmp_path, cube=np.ones((2, 3, 4)), fs=100.0))
+    assert (seen.samples, seen.dt, seen.warnings) == (0, pytest.approx(0.01), ())
+
+
+def test_an_empty_array_is_a_problem(tmp_path):
+    seen = preview(archive(tmp_path, x=np.empty(0), u=U, y=Y))
+    assert (seen.columns[0].samples, seen.columns[0].mean) == (0, None)
+    assert "column u has 60 samples, column x 0" in seen.columns[0].problem
+    seen = preview(archive(tmp_path, x=np.empty(0), u=np.empty(0)))
+    assert seen.columns[0].problem == "r.npz has not a single sample: take another record"
+
+
+# Warnings
+
+
+def test_few_samples_are_a_warning(tmp_path):
+    file = table(tmp_path)
+    file.write_text("\n".join(file.read_text().splitlines()[:21]))
+    assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
+    assert problems(file) == {}
+
+
+def test_columns_of_one_name_are_a_warning(tmp_path):
+    file = table(tmp_path)
+    file.write_text(file.read_text().replace("t_s,", "y_um,"))
+    assert refusal(file, ["u_V"], "y_um") in preview(file).warnings
+
+
+def test_a_decimal_comma_is_a_warning_that_shows_the_first(tmp_path):
+    seen = preview(table(tmp_path, separator=";", comma=True))
+    assert seen.warnings == ("the comma in r.csv, line 2, column t_s (0,0) is read as a decimal mark",)
+    assert seen.dt == pytest.approx(0.01)
+
+
+def test_commas_in_one_column_and_points_in_another_are_a_warning(tmp_path):
+    file = table(tmp_path, separator=";", x=[f"1,{100 + k}" for k in range(SAMPLES)])
+    assert preview(file).warnings == (refusal(file, ["x"], "y_um").replace("y_um (0.5)", "t_s (0.0)"),)
+
+
+# Time
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        cells(T, c30="0.3025"),
+        cells(T, c30="0.29"),
+        cells(T, c30=""),
+        cells(T, c0="10:15:00"),
+        list(T[:30]) + list(T[30:] + 0.05),
+    ],
+    ids=["uneven", "repeated", "missing", "text", "gap"],
+)
+def test_a_time_that_cannot_be_used_is_a_warning(tmp_path, time):
+    file = table(tmp_path, t_s=time)
+    seen = preview(file)
+    assert (seen.time, seen.dt) == ("t_s", None)
+    assert seen.warnings == (refusal(file, ["u_V"], "y_um"),)
+
+
+def test_a_time_that_stands_still_is_a_warning_and_no_constant_column(tmp_path):
+    seen = preview(table(tmp_path, t_s=[1.0] * SAMPLES))
+    assert "line 3, column t_s repeats the time stamp 1" in seen.warnings[0]
+    assert seen.columns[0].problem == ""
+
+
+def test_a_time_too_large_for_single_precision_is_held_against_the_grid_like_any_other(tmp_path):
+    file = table(tmp_path, t_s=[k * 1e39 + (k == 30) * 1e38 for k in range(SAMPLES)])
+    assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
+
+
+def test_a_file_that_does_not_tell_its_sampling_time_is_a_warning(tmp_path):
+    file = table(tmp_path, drop=["t_s"])
+    seen = preview(file)
+    assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
+
+
+def test_two_columns_that_may_be_the_time_are_a_warning(tmp_path):
+    file = table(tmp_path, time_ms=T * 1000)
+    seen = preview(file)
+    assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
+
+
+def test_a_stated_sampling_time_is_told_and_held_against_the_time(tmp_path):
+    assert preview(archive(tmp_path, u=U, y=Y, fs=250.0)).dt == pytest.approx(0.004)
+    file = archive(tmp_path, u=U, y=Y, t=T, fs=250.0)
+    assert preview(file).dt is None
+    assert preview(file).warnings == (refusal(file, ["u"], "y"),)
+
+
+def test_a_stated_sampling_time_that_is_none_is_a_warning(tmp_path):
+    file = archive(tmp_path, u=U, y=Y, dt=0.0)
+    assert columns_of(file) == ("u", "y", "dt")
+    assert preview(file).dt is None
+    assert preview(file).warnings == (refusal(file, ["u"], "y"),)
+
+
+def test_of_a_structure_its_own_time_is_told(save):
+    seen = preview(save("7", a={"t": T[:50], "u": U[:50]}, b_1={"t": T * 2, "u_V": U, "y": Y}))
+    assert (seen.time, seen.dt, seen.samples) == ("b_1.t", pytest.approx(0.02), SAMPLES)
+    units = {column.name: column.unit for column in seen.columns}
+    assert (units["b_1.u_V"], units["b_1.y"]) == ("V", "")
+
+
+@pytest.mark.parametrize("content", [b"", b"t_s,u,y\n", b"t,u\n0,\xb5\n"])
+def test_a_file_that_cannot_be_read_at_all_is_refused(tmp_path, content):
+    (tmp_path / "r.csv").write_bytes(content)
+    with pytest.raises(RecordError, match=r"r\.csv"):
+        preview(tmp_path / "r.csv")
+
+
+def test_one_sample_has_no_sampling_time(tmp_path):
+    (tmp_path / "r.csv").write_text("t_s,u,y\n0,1,2")
+    seen = preview(tmp_path / "r.csv")
+    assert (seen.samples, seen.dt, seen.time) == (1, None, "t_s")
+
+
+def test_the_readers_of_rare_formats_import_their_libraries_when_they_read():
+    program = (
+        "import sys, islands.io.records; print([m for m in ('h5py', 'pyarrow', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
