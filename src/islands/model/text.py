@@ -155,8 +155,9 @@ def latex_number(number: str) -> str:
     return mantissa if not exponent else rf"{mantissa} \times 10^{{{int(exponent)}}}"
 
 
-#: U+2212 is the minus of mathematics, U+2062 a product and U+2061 a call, both without a sign.
-MINUS, TIMES, _OF = "<mo>&#x2212;</mo>", "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"
+#: U+2212 is the minus of mathematics, U+2062 a product without a sign, here a thin space (the parameter and
+#: a function's name would touch what follows), and U+2061 a call.
+MINUS, TIMES, _OF = "<mo>&#x2212;</mo>", '<mo rspace="0.17em">&#x2062;</mo>', "<mo>&#x2061;</mo>"
 
 _ABSOLUTE = "<mrow><mo>|</mo>{0}<mo>|</mo></mrow>"
 

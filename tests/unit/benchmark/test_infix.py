@@ -40,7 +40,7 @@ def test_python_reads_the_value_of_every_canonical_expression(expression, signal
 
 def test_a_negative_number_and_a_difference_keep_their_brackets():
     expression = Apply(MUL, (Constant(-0.5), Apply(SUB, (Lagged(0), Lagged(1, 2)))))
-    assert infix(expression, lambda channel, lag: f"{'yu'[channel]}{lag}") == "((-0.5)*(y1-u2))"
+    assert infix(expression, lambda channel, lag: f"{'yu'[channel]}{lag}") == "((-0.5)*(y1 - u2))"
 
 
 @pytest.mark.parametrize("text", ["tanh(y(k-1))", "y(k-1)*max(u(k-1), u(k-2))"])

@@ -100,11 +100,7 @@ def description(model: Model, quoted: Callable[[str], str]) -> str:
 def heading(model: Model, mark: str) -> str:
     """Tell equation and signals in ASCII, in a comment whose lines begin with a mark."""
     lines = textwrap.wrap(
-        f"NARX model: {equation(model)}",
-        width=100,
-        subsequent_indent="    ",
-        break_long_words=False,
-        break_on_hyphens=False,
+        f"NARX model: {equation(model)}", width=100, subsequent_indent="    ", break_long_words=False
     )
     # The names stay on one line: broken behind a backslash, they would join it to the next one in C.
     return "\n".join(f"{mark} {line}".rstrip() for line in [*lines, "", description(model, _quoted)])
