@@ -40,7 +40,8 @@ class Doors:
         return await run_in_threadpool(operation, *arguments, **named)
 
 
-def _doors(request: Request) -> Any:
+async def _doors(request: Request) -> Any:
+    # Asynchronous though it waits for nothing: the framework gives any other one a thread, for every request.
     return request.app.state.doors
 
 

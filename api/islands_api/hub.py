@@ -117,7 +117,12 @@ class Hub:
         if feed.recent and feed.recent[0].number <= last + 1:
             return [event for event in feed.recent if event.number > last]
         # These may be newer than what the feed knows; they reach it, and its other watchers, by its own look.
-        return list(await run_in_threadpool(self._store.jobs.events, job, last))
+        try:
+            return list(await run_in_threadpool(self._store.jobs.events, job, last))
+        except StoreError as error:
+            log.warning("hub cannot read", job=job, reason=str(error))
+            await asyncio.sleep(RETRY)
+            return []
 
     async def _look(self) -> None:
         watched = dict(self._feeds)

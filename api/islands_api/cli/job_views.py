@@ -8,7 +8,6 @@ from typing import Any
 
 import typer
 from rich.table import Table
-from rich.text import Text
 
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
@@ -17,6 +16,9 @@ from islands_service.jobs import TERMINAL
 
 #: Islands of a running job that are shown one by one.
 _SHOWN = 16
+
+#: A job in a list.
+_LINE = "{:32}  {:9}  {:>13}  {:>10}  {:19}  {}"
 
 
 def show_job(job: JobView, as_json: bool) -> None:
@@ -42,22 +44,13 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
     if as_json:
         print_json({"items": [job.model_dump(mode="json") for job in jobs]})
         return
-    table = Table("job", "name", "state", "generation", "best error", "created")
-    for column in (0, 2, 3):
-        table.columns[column].no_wrap = True
+    # Lines, not a table: that would cut ids off where there is little room, or nobody who reads.
+    output.print(_LINE.format("job", "state", "generation", "best error", "created", "name"), markup=False)
     for job in jobs:
         told = job.progress or {}
-        table.add_row(
-            job.id,
-            # What somebody calls a job is no markup.
-            Text(job.name),
-            job.state,
-            f"{told.get('generation', '-')}/{told.get('generations', '-')}",
-            _number(told.get("best_error")),
-            f"{job.created:%Y-%m-%d %H:%M:%S}",
-        )
-    # Where there is little room the others break their lines; an id that is cut off names nothing.
-    output.print(table, soft_wrap=False)
+        generation = f"{told.get('generation', '-')}/{told.get('generations', '-')}"
+        best, created = _number(told.get("best_error")), f"{job.created:%Y-%m-%d %H:%M:%S}"
+        output.print(_LINE.format(job.id, job.state, generation, best, created, job.name), markup=False)
 
 
 def show_models(models: Sequence[ModelView]) -> None:

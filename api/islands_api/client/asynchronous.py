@@ -16,7 +16,6 @@ from islands_api.client.answers import Event, EventLines, refuse_problem
 from islands_api.client.calls import Call, JobRef
 from islands_api.client.errors import JobFailed, ServiceError
 from islands_api.client.transport import (
-    DELAYS,
     PATIENCE,
     Tries,
     address_of,
@@ -240,13 +239,13 @@ class AsyncClient:
                     pause = tries.answered(response)
                     if pause is None:
                         refuse_problem(response)
+                        tries.succeeded()
                         async for piece in response.aiter_bytes():
-                            tries.succeeded()
                             for event in lines.take(piece):
                                 after = event.number
                                 yield event
                         # A service that ends lets its streams end; one whose job has ended says so, by 204.
-                        pause = DELAYS[0]
+                        pause = tries.ended()
             except httpx.TransportError as error:
                 pause = tries.failed(error)
             await sleep(pause)

@@ -15,7 +15,6 @@ from islands_api.client.answers import Event, EventLines, refuse_problem
 from islands_api.client.calls import Call, JobRef
 from islands_api.client.errors import JobFailed, ServiceError
 from islands_api.client.transport import (
-    DELAYS,
     PATIENCE,
     Tries,
     address_of,
@@ -45,7 +44,7 @@ class Client:
         Of ``islands keys create``; on the service's own machine none is needed.
     timeout, retry : float
         Seconds for an answer, and for trying again from the first failure on.
-    verify : str or bool or ssl.SSLContext
+    verify : str or Path or bool or ssl.SSLContext
         The file with the certificate of a private authority, or as httpx takes it.
 
     Raises
@@ -256,13 +255,13 @@ class Client:
                     pause = tries.answered(response)
                     if pause is None:
                         refuse_problem(response)
+                        tries.succeeded()
                         for piece in response.iter_bytes():
-                            tries.succeeded()
                             for event in lines.take(piece):
                                 after = event.number
                                 yield event
                         # A service that ends lets its streams end; one whose job has ended says so, by 204.
-                        pause = DELAYS[0]
+                        pause = tries.ended()
             except httpx.TransportError as error:
                 pause = tries.failed(error)
             sleep(pause)

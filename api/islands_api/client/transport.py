@@ -71,7 +71,7 @@ def address_of(url: str) -> str:
 
 def trust_of(verify: Any) -> Any:
     """Return whom to trust, as httpx takes it: a file of certificates is read."""
-    return ssl.create_default_context(cafile=verify) if isinstance(verify, str) else verify
+    return ssl.create_default_context(cafile=verify) if isinstance(verify, str | os.PathLike) else verify
 
 
 def timeout_of(patience: float, until: float = inf) -> httpx.Timeout:
@@ -106,6 +106,10 @@ class Tries:
         """Forget the failures: something has come through."""
         self._until: float | None = None
         self._delays = chain(DELAYS, repeat(LAST_DELAY))
+
+    def ended(self) -> float:
+        """Return the seconds until a stream is taken up again that has ended in good order."""
+        return DELAYS[0]
 
     def failed(self, error: httpx.TransportError, repeatable: bool = True) -> float:
         """Return the seconds until the next try, after one to which there was no answer.

@@ -22,6 +22,14 @@ export const el = (name, attributes = {}, ...children) =>
 export const svg = (name, attributes = {}, ...children) =>
   filled(document.createElementNS(SVG, name), attributes, children);
 
+/** Make a listener that does something once at a time. A button that was disabled would lose the focus. */
+export const once = (action) => async ({ currentTarget: button }) => {
+  if (button.ariaDisabled) return;
+  button.ariaDisabled = "true";
+  await action();
+  button.ariaDisabled = null;
+};
+
 /** Set an element's text where it differs: what is selected or read out stays undisturbed otherwise. */
 export function say(node, text) {
   if (node.textContent !== text) node.textContent = text;

@@ -6,7 +6,7 @@ import { age, utc } from "./clock.js";
 import { confirmed } from "./confirm.js";
 import { course } from "./course.js";
 import { datasetPanel, settingsPanel } from "./dataset.js";
-import { announce, el, facts, say } from "./dom.js";
+import { announce, el, facts, once, say } from "./dom.js";
 import { modelsPanel } from "./models.js";
 import { count, duration, number } from "./numbers.js";
 import { badge, ended, nameOf, progressBar, standing } from "./state.js";
@@ -45,17 +45,16 @@ const ACTIONS = [
 /** Make the buttons; `take(job)` hears of what an action made of the job. */
 function actions(take, heading) {
   let job = null;
-  const press = ({ act }) => async ({ currentTarget: button }) => {
-    button.disabled = true;
-    clear("problem");
-    try {
-      const changed = await act(job);
-      if (changed !== null) take(changed);
-    } catch (error) {
-      complain(error);
-    }
-    button.disabled = false;
-  };
+  const press = ({ act }) =>
+    once(async () => {
+      clear("problem");
+      try {
+        const changed = await act(job);
+        if (changed !== null) take(changed);
+      } catch (error) {
+        complain(error);
+      }
+    });
   const buttons = ACTIONS.map((action) =>
     el(
       "button",

@@ -2,7 +2,7 @@
 
 import { download, json } from "./api.js";
 import { complain } from "./banner.js";
-import { el, facts, scrolled, table } from "./dom.js";
+import { el, facts, once, scrolled, table } from "./dom.js";
 import { equationOf } from "./equation.js";
 import { figure } from "./figures.js";
 import { NONE, number, percent, short } from "./numbers.js";
@@ -107,15 +107,8 @@ const excursion = ({ name, bounded, range_percent: range }) => [
 ];
 
 function exportButtons(path, rank) {
-  const save = (form) => async ({ currentTarget: button }) => {
-    button.disabled = true;
-    try {
-      await download(`${path}/export?format=${form}`, `model-${rank}.txt`);
-    } catch (error) {
-      complain(error);
-    }
-    button.disabled = false;
-  };
+  const save = (form) =>
+    once(() => download(`${path}/export?format=${form}`, `model-${rank}.txt`).catch(complain));
   return Object.entries(EXPORTS).map(([form, name]) =>
     el("button", { type: "button", "data-format": form, on: { click: save(form) } }, name));
 }

@@ -22,16 +22,23 @@ from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
 
-_KNOWN: dict[int | str, dict[str, Any]] = {
-    200: {"model": DatasetView, "description": "The same bytes were uploaded before."}
+_AT = {"Location": {"description": "Where the data set is.", "schema": {"type": "string"}}}
+_STORED: dict[int | str, dict[str, Any]] = {
+    200: {"model": DatasetView, "description": "The same bytes were uploaded before.", "headers": _AT},
+    201: {"description": "Stored.", "headers": _AT},
 }
 
 Id = Annotated[
-    str, fastapi.Path(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
+    str,
+    fastapi.Path(
+        pattern=r"^[0-9A-Za-z_-]{1,48}$",
+        description="A data set's `id`.",
+        examples=["9f86d081884c7d659a2feaa0c55ad015-csv"],
+    ),
 ]
 
 
-@router.post("", status_code=201, response_model=DatasetView, responses=_KNOWN)
+@router.post("", status_code=201, response_model=DatasetView, responses=_STORED)
 async def upload(
     file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],
     caller: Writer,

@@ -18,12 +18,23 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 #: Seconds of silence after which a comment is sent: a connection that says nothing is cut by some proxies.
 _ALIVE = 15.0
 
+#: What may happen to a job.
+_KINDS = ("queued", "running", "progress", "cancelling", "succeeded", "failed", "cancelled")
+
 _EVENTS: dict[int | str, dict[str, Any]] = {
     200: {
-        "description": "Events: queued, running, progress, cancelling, succeeded, failed, cancelled.",
+        "description": f"Events: {', '.join(_KINDS)}.",
         "content": {
             "text/event-stream": {
-                "schema": {"type": "string"},
+                "itemSchema": {
+                    "type": "object",
+                    "required": ["id", "event", "data"],
+                    "properties": {
+                        "id": {"type": "string", "pattern": "^[0-9]+$"},
+                        "event": {"type": "string", "enum": list(_KINDS)},
+                        "data": {"type": "string", "contentMediaType": "application/json"},
+                    },
+                },
                 "example": 'id: 7\nevent: progress\ndata: {"generation": 12, "best_error": 0.031}\n\n',
             }
         },

@@ -41,9 +41,21 @@ _HTML: dict[int | str, dict[str, Any]] = {200: {"content": {"text/html": {"schem
 REPORT = "report.html"
 _REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
 
-ModelFigure = Annotated[str, Path(pattern=r"^[a-z-]{1,20}$", json_schema_extra={"enum": list(MODEL_FIGURES)})]
+ModelFigure = Annotated[
+    str,
+    Path(
+        pattern=r"^[a-z-]{1,20}$",
+        description="One of the model's `figures`.",
+        json_schema_extra={"enum": list(MODEL_FIGURES)},
+    ),
+]
 SearchFigure = Annotated[
-    str, Path(pattern=r"^[a-z-]{1,20}$", json_schema_extra={"enum": list(SEARCH_FIGURES)})
+    str,
+    Path(
+        pattern=r"^[a-z-]{1,20}$",
+        description="One of the job's `figures`.",
+        json_schema_extra={"enum": list(SEARCH_FIGURES)},
+    ),
 ]
 
 

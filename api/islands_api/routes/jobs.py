@@ -19,13 +19,37 @@ from islands_service.records import named
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 
 #: A job's id.
-Id = Annotated[str, Path(pattern=r"^[0-9A-Za-z_-]{1,64}$", examples=["0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"])]
+Id = Annotated[
+    str,
+    Path(
+        pattern=r"^[0-9A-Za-z_-]{1,64}$",
+        description="A job's `id`.",
+        examples=["0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"],
+    ),
+]
+
+#: What every answer that shows a job says beside it.
+_ETAG = {"description": "The job's version, for `If-None-Match`.", "schema": {"type": "string"}}
+_SEEN: dict[int | str, dict[str, Any]] = {
+    200: {"headers": {"ETag": _ETAG}},
+    304: {"description": "As it was.", "headers": {"ETag": _ETAG}},
+}
+_ACCEPTED: dict[int | str, dict[str, Any]] = {
+    202: {
+        "description": "Accepted. With `Idempotent-Replayed: true` it is the job that the key named before.",
+        "headers": {
+            "ETag": _ETAG,
+            "Location": {"description": "Where the job is.", "schema": {"type": "string"}},
+            "Retry-After": {"description": "Seconds after which to look.", "schema": {"type": "string"}},
+        },
+    }
+}
 
 #: Points of a page of the history.
 _POINTS = 5000
 
 
-@router.post("", status_code=202, response_model=JobView)
+@router.post("", status_code=202, response_model=JobView, responses=_ACCEPTED)
 async def submit(
     request: JobRequest,
     caller: Writer,
@@ -76,7 +100,7 @@ async def jobs(
     return Document({"items": [job_document(job) for job in page.jobs], "next": cursor_of(page.after)})
 
 
-@router.get("/{job}", response_model=JobView, responses={304: {"description": "As it was."}})
+@router.get("/{job}", response_model=JobView, responses=_SEEN)
 async def job(
     job: Id,
     caller: Reader,
@@ -84,7 +108,9 @@ async def job(
     wait: Annotated[
         float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
     ] = 0.0,
-    if_none_match: Annotated[str | None, Header(max_length=1000)] = None,
+    if_none_match: Annotated[
+        str | None, Header(max_length=1000, description="The `ETag` of what is known already.")
+    ] = None,
 ) -> Any:
     """Look at a job. With `If-None-Match` the answer is 304 as long as nothing has changed."""
     found = await doors.do(doors.store.jobs.get, caller.owner, job)

@@ -24,6 +24,17 @@ Rank = Annotated[int, Path(ge=1, le=10_000, description="1 is the best on the va
 _TYPES = {"json": "application/json", "mathml": "application/mathml+xml"}
 _ENDS = {"python": "py", "c": "c", "matlab": "m", "latex": "tex", "json": "json", "mathml": "xml"}
 
+_TEXT: dict[str, Any] = {"schema": {"type": "string"}}
+_EXPORTED: dict[int | str, dict[str, Any]] = {
+    200: {
+        "content": {
+            "text/plain": _TEXT,
+            _TYPES["mathml"]: _TEXT,
+            _TYPES["json"]: {"schema": {"type": "object"}},
+        }
+    }
+}
+
 
 @router.get("/{job}/models", response_model=ModelPage)
 async def models(job: Id, caller: Reader, doors: AtDoors) -> Any:
@@ -42,7 +53,7 @@ async def model(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Any:
 @router.get(
     "/{job}/models/{rank}/export",
     response_class=Response,
-    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+    responses=_EXPORTED,
 )
 async def exported(
     job: Id,

@@ -1,8 +1,8 @@
 """The service itself: whether it lives and is ready, what it measures, what a problem's type means."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Path, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from islands_api.auth import Operator
@@ -37,7 +37,11 @@ async def metrics(_operator: Operator, doors: AtDoors) -> Response:
 
 
 @router.get("/problems/{kind}", response_model=dict[str, Any])
-async def problem(kind: str) -> Any:
+async def problem(
+    kind: Annotated[
+        str, Path(description="The last part of a problem's `type`.", examples=["invalid-record"])
+    ],
+) -> Any:
     """Say what a problem's type means."""
     for entry in PROBLEMS.values():
         if entry.type == kind:

@@ -4,7 +4,7 @@ import gzip
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any
 
 import structlog
@@ -140,11 +140,13 @@ class _Watch:
             self._tell(state, settings)
 
     def flush(self) -> None:
-        """Tell what has not been told yet."""
-        if self._last is not None:
-            self._tell(*self._last)
+        """Tell what has not been told yet; a store that is away is waited for."""
+        while self._last is not None and not self._tell(*self._last):
+            self._check()
+            sleep(REPORT_EVERY)
 
-    def _tell(self, state: State, settings: Settings) -> None:
+    def _tell(self, state: State, settings: Settings) -> bool:
+        """Tell how far the search is; return whether that could be told."""
         began = monotonic()
         points, after = self._points(state)
         report = Report(self._progress(state, settings), points, after=after)
@@ -156,12 +158,13 @@ class _Watch:
             # The search goes on: what could not be told now is told with the next report.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
             self._report_at = monotonic() + REPORT_EVERY
-            return
+            return False
         self._told = len(state.history) - 1
         now = monotonic()
         self._report_at = now + REPORT_EVERY
         if report.checkpoint is not None:
             self._checkpoint_at = now + max(self._every, (now - began) / CHECKPOINT_SHARE)
+        return True
 
     def _progress(self, state: State, settings: Settings) -> dict[str, Any]:
         last = state.history[-1]

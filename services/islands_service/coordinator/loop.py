@@ -2,9 +2,9 @@
 
 import traceback
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from threading import Event
-from time import monotonic
+from time import monotonic, time
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -173,7 +173,9 @@ class Coordinator:
                 return self._store.leases.finish(lease, outcome)
             except StoreError as error:
                 log.warning("cannot finish yet", reason=str(error))
-                heartbeat.check()
+                # Whoever cancels it now is too late.
+                with suppress(JobCancelled):
+                    heartbeat.check()
                 self._stopping.wait(RETRY)
 
     def _release(self, lease: Lease, attempted: bool = False) -> None:
@@ -227,7 +229,7 @@ class Coordinator:
             self._store.retention.forget(self._settings.retention)
         # Read before looking: what is named after this is younger than an hour.
         named = self._store.retention.named_blobs()
-        removed = self._blobs.sweep(named, ORPHAN)
+        removed = self._blobs.sweep(named, time() - ORPHAN)
         log.info("swept", blobs=removed)
 
 

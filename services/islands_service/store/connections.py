@@ -17,11 +17,11 @@ PRAGMAS = ("synchronous=FULL", f"busy_timeout={int(1000 * PATIENCE)}", "foreign_
 
 #: What libpq is told unless the URL says otherwise: a PostgreSQL that is gone is noticed within seconds.
 CONNECTING = {
-    "connect_timeout": 10,
-    "keepalives_idle": 5,
-    "keepalives_interval": 5,
+    "connect_timeout": 5,
+    "keepalives_idle": 4,
+    "keepalives_interval": 2,
     "keepalives_count": 2,
-    "tcp_user_timeout": 15_000,
+    "tcp_user_timeout": 8_000,
 }
 
 #: What a connection to PostgreSQL is told: a process that stands still lets go of the jobs it was writing.

@@ -22,8 +22,12 @@ from islands_service.store.connections import engine_of
 
 T = TypeVar("T")
 
-#: The most operations of one transaction.
-GROUP = 64
+#: An operation, and who waits for it; and what an operation came to: what it returned, or what it raised.
+_Waiting = tuple[Callable[[Connection], Any], Future[Any]]
+_Answer = tuple[Any, Exception | None]
+
+#: The most operations of one transaction, and how often one is tried that had to give way to another one.
+GROUP, TRIES = 64, 5
 
 #: PostgreSQL's states for a full disk, and beginnings of those for a database that is going, gone, or not to
 #: be written any more, since another one has taken its place.
@@ -46,6 +50,10 @@ class StoreCollision(StoreUnavailable):
     """Two transactions waited for each other, and this one gave way. Nothing was written; try again."""
 
 
+class StoreInDoubt(StoreUnavailable):
+    """The database went away while it committed: nobody knows whether it was written."""
+
+
 class StoreFull(StoreError):
     """The disk is full. Nothing was written, and nothing that was accepted is lost; make room."""
 
@@ -62,7 +70,7 @@ class Database:
         self.url = url
         self.engine = engine_of(url)
         self._writing = self.engine.execution_options(writes=True)
-        self._waiting: SimpleQueue[tuple[Callable[[Connection], Any], Future[Any]] | None] = SimpleQueue()
+        self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._writer: Thread | None = None
         self._closed = False
         # One of those who come first starts the writer, and nobody comes behind the end.
@@ -100,6 +108,8 @@ class Database:
         ------
         StoreUnavailable, StoreFull
             Nothing was written.
+        StoreInDoubt
+            Nobody knows whether it was written.
         StoreError
             It is closed.
         """
@@ -138,41 +148,55 @@ class Database:
             if last:
                 return
 
-    def _write_group(
-        self, group: list[tuple[Callable[[Connection], Any], Future[Any]]], tries: int = 5
-    ) -> None:
-        answers: list[tuple[Future[Any], Any, Exception | None]] = []
+    def _write_group(self, group: list[_Waiting], tries: int = TRIES) -> None:
         try:
-            with told(), self._writing.begin() as connection:
-                for operation, done in group:
-                    savepoint = connection.begin_nested()
-                    try:
-                        value = operation(connection)
-                        savepoint.commit()
-                    except DBAPIError as error:
-                        if _trouble(error) is not None:
-                            raise
-                        savepoint.rollback()
-                        answers.append((done, None, error))
-                    except Exception as error:
-                        savepoint.rollback()
-                        answers.append((done, None, error))
-                    else:
-                        answers.append((done, value, None))
+            answers = self._transaction([operation for operation, _ in group])
         except StoreCollision as error:
             if tries > 1:
                 # One by one they hold less at a time that others wait for.
                 for each in group:
                     self._write_group([each], tries - 1)
                 return
-            answers = [(done, None, error) for _, done in group]
+            answers = [(None, error)] * len(group)
         except Exception as error:
-            answers = [(done, None, error) for _, done in group]
-        for done, value, failure in answers:
+            answers = [(None, error)] * len(group)
+        for (_, done), (value, failure) in zip(group, answers, strict=True):
             if failure is None:
                 done.set_result(value)
             else:
                 done.set_exception(failure)
+
+    def _transaction(self, operations: list[Callable[[Connection], Any]]) -> list[_Answer]:
+        """Carry out a group; return what each came to, once all is durable."""
+        committing = False
+        try:
+            with told(), self._writing.begin() as connection:
+                answers = [_carried_out(operation, connection) for operation in operations]
+                committing = True
+        except StoreCollision:
+            raise
+        except StoreUnavailable as error:
+            if not committing:
+                raise
+            raise StoreInDoubt(
+                "the database went away while it committed, and nobody knows whether it was written: look, "
+                "or ask again under the same idempotency key"
+            ) from error
+        return answers
+
+
+def _carried_out(operation: Callable[[Connection], Any], connection: Connection) -> _Answer:
+    """Carry out an operation in a savepoint of its own: what it raises undoes nothing else."""
+    savepoint = connection.begin_nested()
+    try:
+        value = operation(connection)
+        savepoint.commit()
+    except Exception as error:
+        if isinstance(error, DBAPIError) and _trouble(error) is not None:
+            raise
+        savepoint.rollback()
+        return None, error
+    return value, None
 
 
 @contextmanager

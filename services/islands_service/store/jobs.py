@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_, update
+from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_
 
 from islands_service.jobs import (
     ACTIVE,
@@ -23,6 +23,7 @@ from islands_service.jobs import (
     WrongState,
 )
 from islands_service.store import locks
+from islands_service.store.changes import change, job_of, read_document, record
 from islands_service.store.clock import now
 from islands_service.store.database import Database
 from islands_service.store.tables import events, jobs
@@ -267,53 +268,8 @@ class Jobs:
             return Standing(
                 {state: counts.get(state, 0) for state in JobState},
                 connection.execute(waits).scalar_one(),
-                {row.id: _read(row.progress) or {} for row in connection.execute(running)},
+                {row.id: read_document(row.progress) or {} for row in connection.execute(running)},
             )
-
-
-def change(connection: Connection, job: str, **values: Any) -> Row[Any]:
-    """Change a job in a way that watchers see, and return it as it is then."""
-    return connection.execute(
-        update(jobs)
-        .where(jobs.c.id == job)
-        .values(version=jobs.c.version + 1, updated=now(), **values)
-        .returning(jobs)
-    ).one()
-
-
-def record(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
-    """Write down what happened to a job as its version's event."""
-    connection.execute(
-        insert(events).values(job_id=row.id, number=row.version, kind=kind, data=data, at=row.updated)
-    )
-
-
-def job_of(row: Row[Any]) -> Job:
-    """Make a job of its row."""
-    return Job(
-        row.id,
-        row.owner,
-        row.kind,
-        row.name,
-        json.loads(row.spec),
-        row.priority,
-        JobState(row.state),
-        row.version,
-        row.attempt,
-        bool(row.cancel_requested),
-        _read(row.progress),
-        row.checkpoint,
-        _read(row.summary),
-        _read(row.problem),
-        row.created,
-        row.updated,
-        row.started,
-        row.finished,
-    )
-
-
-def _read(text: str | None) -> dict[str, Any] | None:
-    return None if text is None else dict(json.loads(text))
 
 
 def _own(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
