@@ -1,11 +1,14 @@
-"""What every test may use: the generators of `strategies.py`, one hypothesis profile, compiled kernels.
+"""What every test may use: generators (`strategies.py`), one hypothesis profile, compiled kernels, databases.
 
 In importlib mode pytest puts no test folder on the path, so the generators' folder is put there here.
 """
 
+import shutil
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 from islands.warm_up import warm_up
@@ -23,3 +26,79 @@ def pytest_configure(config):
     # Before the workers start: each of them would compile all kernels for itself.
     if not hasattr(config, "workerinput"):
         warm_up()
+
+
+@pytest.fixture(scope="session")
+def postgres():
+    """What makes databases on a PostgreSQL: one server for all tests of a process."""
+    from databases import databases
+
+    with databases() as maker:
+        yield maker
+
+
+@pytest.fixture(scope="session")
+def prepared_postgres(postgres):
+    """The URL of a database with our tables. To make one takes a quarter of a second: it is used again."""
+    from databases import database
+
+    from islands_service.store import Store
+
+    with database(postgres) as url:
+        Store(url).close()
+        yield url
+
+
+@pytest.fixture(scope="session")
+def prepared_sqlite(tmp_path_factory):
+    """A file with our tables, to be copied."""
+    from islands_service.store import Store
+
+    path = tmp_path_factory.mktemp("store") / "prepared.db"
+    Store(f"sqlite:///{path}").close()
+    return path
+
+
+def _sqlite(request):
+    return f"sqlite:///{request.getfixturevalue('tmp_path') / 'islands.db'}"
+
+
+def _prepared_sqlite(request):
+    path = request.getfixturevalue("tmp_path") / "islands.db"
+    shutil.copyfile(request.getfixturevalue("prepared_sqlite"), path)
+    return f"sqlite:///{path}"
+
+
+def _postgresql(request):
+    from databases import database
+
+    stack = ExitStack()
+    request.addfinalizer(stack.close)
+    return stack.enter_context(database(request.getfixturevalue("postgres")))
+
+
+def _prepared_postgresql(request):
+    from databases import emptied
+
+    return emptied(request.getfixturevalue("prepared_postgres"))
+
+
+@pytest.fixture(params=[_prepared_sqlite, _prepared_postgresql], ids=["sqlite", "postgresql"])
+def database(request):
+    """The URL of a database with our tables and nothing in them: every law holds on both kinds."""
+    return request.param(request)
+
+
+@pytest.fixture(params=[_sqlite, _postgresql], ids=["sqlite", "postgresql"])
+def empty_database(request):
+    """The URL of a new database, without tables."""
+    return request.param(request)
+
+
+@pytest.fixture
+def store(database):
+    """A store on a new database."""
+    from islands_service.store import Store
+
+    with Store(database) as opened:
+        yield opened

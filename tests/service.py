@@ -20,6 +20,7 @@ import numpy as np
 import structlog
 import uvicorn
 from fastapi import FastAPI
+from sqlalchemy import Connection
 
 from islands.evolution.engine import SerialEngine
 from islands_api.app import create_app
@@ -29,6 +30,7 @@ from islands_service.coordinator.identification import identification
 from islands_service.jobs import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.tables import metadata
 
 #: Seconds after which a test's request has failed.
 PATIENCE = 30.0
@@ -176,6 +178,17 @@ def identified(service: Service, islands: int = 1) -> str:
     )
     service.store.leases.finish(lease, outcome)
     return str(job["id"])
+
+
+def emptied(service: Service) -> Service:
+    """Forget everything that a service's store holds."""
+
+    def operation(connection: Connection) -> None:
+        for table in reversed(metadata.sorted_tables):
+            connection.execute(table.delete())
+
+    service.store.database.write(operation)
+    return service
 
 
 def kept(store: Store, owner: str = LOCAL, content: bytes = b"") -> str:

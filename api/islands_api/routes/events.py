@@ -59,7 +59,8 @@ async def events(
         return Response(status_code=204)
     # The framework's own event response makes a model of every event for every client; five hundred watch.
     return StreamingResponse(
-        _stream(doors, found, last_event_id),
+        # Nobody has seen what has not happened yet: who says so would wait for ever.
+        _stream(doors, found, min(last_event_id, found.version)),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )

@@ -1,0 +1,345 @@
+"""Bad input over REST: each kind is refused in words that say where it is wrong, and nothing is kept."""
+
+import gzip
+import io
+import struct
+import time
+import tracemalloc
+import zipfile
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+from numpy.lib import format as npy
+from service import columns, csv, kept, nothing_stored, npz, problem_of, queued, served, spec
+
+#: What the process that looks into a file may take, and what a compressed file may unpack to.
+MEMORY, UNPACKED = 1_000_000_000, 50_000_000
+
+#: A picture, as far as anybody looks.
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(256))
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("service")
+    with served(folder, inspection_memory=MEMORY, max_unpacked=UNPACKED) as service:
+        yield service
+
+
+@pytest.fixture
+def service(shared):
+    """A service that holds nothing before a test, and nothing after it."""
+    assert nothing_stored(shared)
+    yield shared
+    for job in shared.client.get("/v1/jobs").json()["items"]:
+        shared.client.post(f"/v1/jobs/{job['id']}/cancel")
+        shared.client.delete(f"/v1/jobs/{job['id']}")
+    for dataset in shared.client.get("/v1/datasets").json()["items"]:
+        assert shared.client.delete(f"/v1/datasets/{dataset['id']}").status_code == 204
+    for path in shared.settings.blobs.rglob("??/*"):
+        path.unlink()
+
+
+def header(samples):
+    """How NumPy's format announces a column."""
+    stream = io.BytesIO()
+    npy.write_array_header_1_0(stream, {"descr": "<f8", "fortran_order": False, "shape": (samples,)})
+    return stream.getvalue()
+
+
+def claiming(samples, stored=64):
+    """An archive whose columns claim samples that are not there."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name in ("u", "y"):
+            archive.writestr(f"{name}.npy", header(samples) + bytes(stored))
+    return stream.getvalue()
+
+
+def bomb(samples, members):
+    """An archive of zeros, of a thousandth of what it unpacks to; nobody gets as far as its checksum."""
+    pack = zlib.compressobj(9, zlib.DEFLATED, -15)
+    head, block = header(samples), bytes(1 << 20)
+    blocks = 8 * samples // len(block)
+    packed = pack.compress(head) + pack.flush(zlib.Z_FULL_FLUSH)
+    packed += (pack.compress(block) + pack.flush(zlib.Z_FULL_FLUSH)) * blocks + pack.flush()
+    files, directory = b"", b""
+    for member in range(members):
+        name = b"u%d.npy" % member
+        size = len(head) + blocks * len(block)
+        entry = struct.pack("<5H3L2H", 20, 0, 8, 0, 0x21, 0, len(packed), size, len(name), 0)
+        directory += b"PK\1\2\x14\0" + entry + struct.pack("<3H2L", 0, 0, 0, 0, len(files)) + name
+        files += b"PK\3\4" + entry + name + packed
+    sizes = (0, 0, members, members, len(directory), len(files), 0)
+    return files + directory + b"PK\5\6" + struct.pack("<4H2LH", *sizes)
+
+
+def matlab_5():
+    stream = io.BytesIO()
+    scipy.io.savemat(stream, columns())
+    return stream.getvalue()
+
+
+def matlab_73():
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, values in columns().items():
+            file[name] = values[None]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    return stream.getvalue()
+
+
+#: Files that nobody could use: content, name, what the message says.
+REFUSED = {
+    "empty": (b"", "a.csv", ("a.csv is empty", "export the record once more")),
+    "header alone": (b"t_s,u_V,y_um\n", "a.csv", ("a header in line 1 and not a single sample",)),
+    "text as archive": (csv(), "a.npz", ("a.npz is not a NumPy archive", "numpy.savez")),
+    "program": (csv(), "a.exe", ("a.exe: its name has to end in one of .csv", "export the record")),
+    "picture": (PNG, "a.csv", ("a.csv, line 1: byte 0x89", "is not UTF-8: save the file as UTF-8")),
+    "2 GB header": (claiming(2**28), "a.npz", (f"column u claims {2**28} samples", "the file is damaged")),
+    "0.8 GB header": (claiming(10**8), "a.npz", ("claims 800000000 bytes, and the file stores 64", "anew")),
+    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it anew")),
+    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it anew")),
+    "no gzip": (csv(), "a.csv.gz", ("a.csv.gz is no gzip, or damaged", "compress the record anew")),
+    "gzip cut short": (gzip.compress(csv())[:-50], "a.csv.gz", ("is no gzip, or damaged", "compress")),
+    "line cut short": (
+        csv() + b"2.0,1.0\n",
+        "a.csv",
+        ("a.csv, line 202, column y_um", "2 cells for 3 columns"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_file_that_nobody_could_use_is_refused_and_not_kept(service, case):
+    content, name, words = REFUSED[case]
+    detail = problem_of(service.upload(content, name), 422, "invalid-record")
+    for word in words:
+        assert word in detail
+    assert nothing_stored(service)
+
+
+def test_a_zip_bomb_ends_the_process_that_reads_it_and_nothing_else(service):
+    packed = bomb(samples=1 << 27, members=2)
+    assert len(packed) < 3_000_000
+    detail = problem_of(service.upload(packed, "a.npz"), 422, "invalid-record")
+    assert "a.npz cannot be read within 1.0 GB of memory and 120 s" in detail
+    assert "unpacks to more than this service takes" in detail
+    assert nothing_stored(service)
+
+
+def test_a_gzip_bomb_is_cut_off_at_the_limit(service):
+    packed = gzip.compress(b"t_s,u_V,y_um\n" + b"0" * 10_000_000) * 400
+    began = time.monotonic()
+    detail = problem_of(service.upload(packed, "a.csv.gz"), 413, "too-large")
+    assert detail == "a.csv has more than 50 MB unpacked, the most that is taken here"
+    assert time.monotonic() - began < 5.0
+    assert nothing_stored(service)
+
+
+def test_a_sound_gzip_is_unpacked(service):
+    answer = service.upload(gzip.compress(csv()), "a.csv.gz")
+    assert (answer.status_code, answer.json()["name"]) == (201, "a.csv")
+    assert answer.json() == {**service.upload(csv(), "a.csv").json(), "created": answer.json()["created"]}
+
+
+def test_a_decimal_comma_is_read_and_the_preview_says_so(service):
+    stored = service.upload(csv(200, ";", ","), "a.csv").json()
+    assert stored["preview"]["warnings"] == [
+        "the comma in a.csv, line 2, column t_s (0,000000) is read as a decimal mark"
+    ]
+    mean = next(each["mean"] for each in stored["preview"]["columns"] if each["name"] == "u_V")
+    assert mean == pytest.approx(columns()["u_V"].mean(), abs=1e-6)
+    assert service.submit(**spec(stored["id"])).status_code == 202
+
+
+#: Records of which a part cannot be used: content, name, the column's problem or a warning.
+DOUBTFUL = {
+    "mixed marks": (
+        csv(200, ";", ",", y_um={9: "0.5"}),
+        (
+            "a decimal comma in a.csv, line 2",
+            "a decimal point in a.csv, line 9, column y_um (0.5)",
+            "same mark",
+        ),
+    ),
+    "text": (
+        csv(y_um={7: "oops"}),
+        ("a.csv, line 7, column y_um: 'oops' is not a number", "mend the cell or leave its row out"),
+    ),
+    "NaN": (
+        csv(y_um={7: "NaN"}),
+        ("a.csv, line 7, column y_um is empty or NaN", "interpolation, or select rows without it"),
+    ),
+    "infinite": (csv(y_um={7: "inf"}), ("a.csv, line 7, column y_um is infinite", "repair it")),
+    "constant": (
+        csv(y_um=dict.fromkeys(range(2, 202), "4")),
+        ("column y_um is constant, 4 from line 2 to line 201", "choose a column, or rows"),
+    ),
+    "two lengths": (
+        npz(u_V=np.arange(100) % 7, y_um=np.arange(90) % 5, dt=0.1),
+        ("column u_V has 100 samples, column y_um 90", "channels of one record are of equal length"),
+    ),
+    "uneven time": (
+        csv(t_s={50: "0.4812"}),
+        ("a.csv, line 50, column t_s is off the uniform grid", "from 0.47 to 0.4812", "usual step is 0.01"),
+    ),
+    "time stands still": (
+        csv(t_s={50: "0.47"}),
+        ("a.csv, line 50, column t_s repeats the time stamp 0.47", "resample to a uniform grid"),
+    ),
+    "too short": (csv(20), ("a.csv: 20 samples, from line 2 to line 21, are too few", "at least 30")),
+}
+
+
+@pytest.mark.parametrize("case", DOUBTFUL)
+def test_what_spoils_a_record_is_said_at_the_upload_and_refuses_the_job_that_needs_it(service, case):
+    content, words = DOUBTFUL[case]
+    name = "a.npz" if content.startswith(b"PK") else "a.csv"
+    checked = service.upload(content, name, inputs=["u_V"], output="y_um")
+    refusal = problem_of(checked, 422, "invalid-record")
+    assert nothing_stored(service)
+    stored = service.upload(content, name)
+    assert stored.status_code == 201
+    preview = stored.json()["preview"]
+    said = {each["name"]: each["problem"] for each in preview["columns"]}
+    assert [name for name, problem in said.items() if problem and name != "dt"] in ([], ["y_um"])
+    told = said["y_um"] or " ".join(preview["warnings"])
+    job = problem_of(service.submit(**spec(stored.json()["id"])), 422, "invalid-record")
+    for word in words:
+        assert word in refusal
+        assert word in told
+        assert word in job
+    assert service.client.get("/v1/jobs").json()["items"] == []
+
+
+def test_an_output_alone_is_checked_too(service):
+    detail = problem_of(service.upload(csv(y_um={7: "NaN"}), "a.csv", output="y_um"), 422, "invalid-record")
+    assert "a.csv, line 7, column y_um is empty or NaN" in detail
+    detail = problem_of(service.upload(csv(), "a.csv", output="force"), 422, "invalid-record")
+    assert detail == "the record has no column force; it has t_s, u_V, y_um"
+    assert nothing_stored(service)
+
+
+#: Orders that no service carries out: what is changed, the type, what the message says.
+ORDERS = {
+    "unknown preset": ({"preset": "magic"}, "invalid-settings", ("magic", "hysteresis", "narx")),
+    "no islands": ({"settings": {"islands": 0}}, "invalid-settings", ("islands is at least 1, got 0",)),
+    "unknown primitive": (
+        {"settings": {"primitives": ["mul", "sinh"]}},
+        "invalid-settings",
+        ("primitive", "sinh", "mul"),
+    ),
+    "generations": (
+        {"settings": {"generations": 1e12}},
+        "invalid-settings",
+        ("generations is at most 1000000 on this service, got 1000000000000",),
+    ),
+    "budget": (
+        {"settings": {"generations": 1_000_000, "population": 10_000, "islands": 100}},
+        "invalid-settings",
+        ("1e+12 individuals", "at most 1e+10 for a job", "fewer generations, islands or individuals"),
+    ),
+    "fraction": ({"validation": 1.5}, "invalid-request", ("/validation", "less than 1")),
+    "no fraction": ({"validation": 0}, "invalid-request", ("/validation", "greater than 0")),
+    "no column": (
+        {"output": "y_m"},
+        "invalid-record",
+        ("record.csv has no column y_m; it has t_s, u_V, y_um", "Did you mean y_um?"),
+    ),
+    "unknown setting": (
+        {"settings": {"islnds": 2}},
+        "invalid-request",
+        ("/settings/islnds", "not permitted"),
+    ),
+    "unknown field": ({"presset": "narx"}, "invalid-request", ("/presset", "not permitted")),
+}
+
+
+@pytest.mark.parametrize("case", ORDERS)
+def test_an_order_that_no_service_carries_out_is_refused(service, case):
+    changes, kind, words = ORDERS[case]
+    detail = problem_of(service.submit(**spec(kept(service.store), **changes)), 422, kind)
+    for word in words:
+        assert word in detail
+    assert service.client.get("/v1/jobs").json()["items"] == []
+
+
+def test_a_million_islands_are_refused_before_memory_is_taken_for_them(service):
+    order = spec(kept(service.store), settings={"islands": 1_000_000, "topology": "fully-connected"})
+    service.submit(**order)
+    tracemalloc.start()
+    began = time.monotonic()
+    detail = problem_of(service.submit(**order), 422, "invalid-settings")
+    taken, seconds = tracemalloc.get_traced_memory()[1], time.monotonic() - began
+    tracemalloc.stop()
+    assert detail == "islands is at most 256 on this service, got 1000000"
+    assert taken < 2_000_000
+    assert seconds < 0.5
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/v1/jobs/{}"),
+        ("GET", "/v1/jobs/{}/events"),
+        ("GET", "/v1/jobs/{}/models"),
+        ("GET", "/v1/jobs/{}/history"),
+        ("GET", "/v1/jobs/{}/result"),
+        ("GET", "/v1/jobs/{}/models/1/figures/loop.svg"),
+        ("POST", "/v1/jobs/{}/cancel"),
+        ("POST", "/v1/jobs/{}/resume"),
+        ("DELETE", "/v1/jobs/{}"),
+    ],
+)
+def test_anothers_job_is_as_if_it_were_not_there(service, method, path):
+    theirs, nobodys = queued(service.store, "somebody else").id, "0" * 32
+    headers = {**service.key(), "X-Request-ID": "same"}
+    answers = [service.client.request(method, path.format(job), headers=headers) for job in (theirs, nobodys)]
+    assert problem_of(answers[0], 404, "no-such-job") == f"there is no job {theirs!r}"
+    assert answers[0].content.replace(theirs.encode(), nobodys.encode()) == answers[1].content
+    dates = {"date"}
+    assert {k: v for k, v in answers[0].headers.items() if k not in dates} == {
+        k: v for k, v in answers[1].headers.items() if k not in dates
+    }
+    assert service.store.jobs.get("somebody else", theirs).version == 1
+
+
+def test_anothers_data_set_is_as_if_it_were_not_there(service):
+    theirs = kept(service.store, "somebody else")
+    nobodys = "0" * 32 + "-csv"
+    headers = {**service.key(), "X-Request-ID": "same"}
+    for method, path in (("GET", "/v1/datasets/{}"), ("DELETE", "/v1/datasets/{}"), ("POST", "/v1/jobs")):
+        answers = [
+            service.client.request(
+                method,
+                path.format(dataset),
+                json=spec(dataset) if method == "POST" else None,
+                headers=headers,
+            )
+            for dataset in (theirs, nobodys)
+        ]
+        assert theirs in problem_of(answers[0], 404, "no-such-dataset")
+        assert answers[0].content.replace(theirs.encode(), nobodys.encode()) == answers[1].content
+    assert service.store.datasets.get("somebody else", theirs)
+
+
+def test_an_expired_key_opens_nothing(service):
+    answer = service.client.get("/v1/jobs", headers=service.key(seconds=0.0))
+    assert problem_of(answer, 401, "no-key") == (
+        "the key has expired: ask whoever runs this service for another one"
+    )
+    assert answer.headers["www-authenticate"] == 'Bearer realm="islands"'
+
+
+def test_a_revoked_key_opens_nothing_a_second_later(service):
+    header = service.key()
+    assert service.client.get("/v1/jobs", headers=header).status_code == 200
+    (key,) = [key for key in service.store.keys.all() if key.revoked is None and not key.expired][-1:]
+    service.store.keys.revoke(key.id)
+    time.sleep(1.0)
+    answer = service.client.get("/v1/jobs", headers=header)
+    assert "the key was revoked" in problem_of(answer, 401, "no-key")

@@ -1,0 +1,87 @@
+"""One reader of the environment: what can be set stands in one place, and nothing else is a hidden switch.
+
+To write into it is another thing: it tells libraries, and processes that are started, how to behave.
+"""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+READER = "services/islands_service/settings.py"
+
+#: Names of `os` that are the environment.
+NAMES = {"environ", "environb", "getenv", "getenvb"}
+
+SOURCES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for folder in ("services", "api")
+    for path in (ROOT / folder).rglob("*.py")
+)
+
+
+def reads(text):
+    """Lines in which a module reads the environment, by whatever name it knows `os`."""
+    tree = ast.parse(text)
+    written = {id(node) for statement in ast.walk(tree) for node in _written(statement)}
+    return sorted(node.lineno for node in ast.walk(tree) if _is_environment(node) and id(node) not in written)
+
+
+def _is_environment(node):
+    match node:
+        case ast.Attribute(attr=name) | ast.Constant(value=name):
+            return isinstance(name, str) and name in NAMES
+        case ast.ImportFrom(names=names):
+            return bool({alias.name for alias in names} & NAMES)
+    return False
+
+
+def _written(statement):
+    """Return where a statement writes into the environment, and takes nothing out of it."""
+    match statement:
+        case ast.Expr(value=ast.Call(func=ast.Attribute(value=environment, attr="setdefault" | "update"))):
+            return [environment]
+        case ast.Assign(targets=targets):
+            return [target.value for target in targets if isinstance(target, ast.Subscript)]
+    return []
+
+
+@pytest.mark.parametrize("path", [path for path in SOURCES if path != READER])
+def test_nothing_else_reads_the_environment(path):
+    assert reads((ROOT / path).read_text()) == []
+
+
+def test_the_one_reader_does():
+    assert reads((ROOT / READER).read_text())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import os\nos.environ['A']",
+        "import os\nx = os.environ.get('A')",
+        "import os\nx = os.environ.setdefault('A', 'b')",
+        "import os\nx = {**os.environ}",
+        "import os\ny['A'] = os.environ['A']",
+        "import os as o\no.getenv('A')",
+        "from os import environ",
+        "from os import getenv as get",
+        "import os\ngetattr(os, 'environ')",
+    ],
+)
+def test_a_reader_is_found_out(text):
+    assert reads(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import os\nos.environ['A'] = 'b'",
+        "import os\nos.environ.setdefault('A', 'b')",
+        "import os\nos.getpid()",
+    ],
+)
+def test_a_writer_is_none(text):
+    assert not reads(text)

@@ -1,0 +1,251 @@
+"""One job's page, while a coordinator that the test plays carries it out."""
+
+from collections.abc import Callable
+from math import sqrt
+from typing import Any
+
+import pytest
+from played import advance, claimed, squared_error, stored
+from processes import eventually
+from screen import Screen
+from service_processes import Service
+
+from islands_service.jobs import JobState, Outcome
+
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+
+PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7 <b>column y</b> is empty"}
+
+
+def legend(page: Any) -> list[float]:
+    """The values of the islands' chart, in full."""
+    chart = page.locator("figure.chart").first
+    return [float(each) for each in chart.locator("data").evaluate_all("all => all.map((one) => one.value)")]
+
+
+def island_errors(generation: int, islands: int = 2) -> list[float]:
+    return [sqrt(squared_error(generation, island)) for island in range(islands)]
+
+
+def test_the_course_grows_with_the_events_and_is_the_history(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500, name="piezo")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".title .state")).to_have_text("queued")
+    with stored(desk) as store:
+        lease = claimed(store, job)
+        expect(page.locator(".title .state")).to_have_text("running")
+        for first, last in ((0, 40), (41, 90), (91, 200)):
+            advance(store, lease, first, last)
+            expect(page.locator(".stand .words")).to_have_text(f"{last} / 500")
+            expect(page.locator("figure.chart .place").first).to_have_text(f"generation {last}")
+            assert legend(page) == pytest.approx(island_errors(last))
+    expect(page.get_by_text("about 6.0 s")).to_be_visible()
+    lines = page.locator("figure.chart").first.locator("path.line[data-name]")
+    # One point for each generation that was reported, none twice, none left out.
+    assert [line.get_attribute("d").count("L") for line in lines.all()] == [200, 200]
+    sizes = page.locator("figure.chart").last
+    expect(sizes.locator("circle.line")).to_have_count(5)
+    expect(sizes.locator(".place")).to_have_text("terms 5")
+
+
+def test_a_failure_is_told_in_the_services_words(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    with stored(desk) as store:
+        store.leases.finish(claimed(store, job), Outcome(JobState.FAILED, problem=PROBLEM))
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".failure")).to_have_text("The job failed" + PROBLEM["detail"])
+    assert page.locator(".failure b").count() == 0
+    names = [each.text_content() for each in page.locator(".actions button:visible").all()]
+    assert names == ["Resume", "Delete"]
+
+
+def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500, name="piezo")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    state, dialog = page.locator(".title .state"), page.get_by_role("dialog")
+    page.get_by_role("button", name="Cancel").focus()
+    page.keyboard.press("Enter")
+    expect(state).to_have_text("cancelled")
+    # The button is gone; whoever works by keyboard is not thrown back to the page's beginning.
+    expect(page.get_by_role("heading", level=1)).to_be_focused()
+    assert desk.job(job)["state"] == "cancelled"
+    expect(page.get_by_role("status")).to_have_text("piezo: cancelled")
+    page.get_by_role("button", name="Resume").click()
+    expect(state).to_have_text("queued")
+    page.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Delete").click()
+    expect(dialog).to_contain_text("piezo goes with its models")
+    page.keyboard.press("Enter")
+    expect(dialog).to_have_count(0)
+    page.get_by_role("button", name="Delete").click()
+    page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+    assert desk.job(job)["state"] == "cancelled"
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("button", name="Delete it").click()
+    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+    assert desk.ask("GET", f"/v1/jobs/{job}").status_code == 404
+
+
+def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    with stored(desk) as store:
+        lease = claimed(store, job)
+        advance(store, lease, 0, 10)
+        page.get_by_role("button", name="Cancel").click()
+        expect(page.locator(".title .state")).to_have_text("cancelling")
+        expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
+        store.leases.finish(lease, Outcome(JobState.CANCELLED))
+    expect(page.locator(".title .state")).to_have_text("cancelled")
+    expect(page.locator(".stand .words")).to_have_text("10 / 500")
+
+
+def test_what_somebody_else_resumes_is_seen(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+    job = desk.submit(500)
+    desk.ask("POST", f"/v1/jobs/{job}/cancel")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".title .state")).to_have_text("cancelled")
+    desk.ask("POST", f"/v1/jobs/{job}/resume")
+    expect(page.locator(".title .state")).to_have_text("queued")
+    with stored(desk) as store:
+        advance(store, claimed(store, job), 0, 5)
+    expect(page.locator(".stand .words")).to_have_text("5 / 500")
+
+
+def test_an_answer_that_comes_late_does_not_bring_back_what_was(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    held: list[Any] = []
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    page.route("**/cancel", lambda route: held.append((route, route.fetch())))
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator(".title .state")).to_have_text("cancelled")
+    assert desk.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
+    expect(page.locator(".title .state")).to_have_text("queued")
+    (route, answer) = held[0]
+    with page.expect_response("**/cancel"):
+        route.fulfill(response=answer)
+    page.wait_for_timeout(300)
+    assert page.locator(".title .state").text_content() == "queued"
+
+
+def test_a_reload_keeps_the_place(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+    job = desk.submit(500)
+    with stored(desk) as store:
+        advance(store, claimed(store, job), 0, 30)
+    page = quiet(desk.url, height=500).go(f"#/jobs/{job}")
+    expect(page.locator("figure.chart").first).to_be_visible()
+    page.locator("table code", has_text="y_um").wait_for()
+    page.evaluate("scrollTo(0, 320)")
+    page.reload()
+    expect(page.locator("figure.chart").first).to_be_visible()
+    # The policy lets no text become code, so that playwright itself cannot wait for an expression.
+    eventually(lambda: page.evaluate("scrollY") == 320)
+    assert page.url.endswith(f"#/jobs/{job}")
+
+
+def test_every_island_has_a_line_however_many_there_are(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500, settings={"islands": 20})
+    with stored(desk) as store:
+        advance(store, claimed(store, job), 0, 30, islands=20)
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    chart = page.locator("figure.chart").first
+    expect(chart.locator("path.faint")).to_have_count(20)
+    expect(chart.locator(".legend li")).to_have_count(2)
+    assert legend(page) == pytest.approx([island_errors(30, 20)[0], island_errors(30, 20)[19]])
+
+
+def test_a_job_that_is_not_there_is_said_not_to_be(
+    screens: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    page = screens(desk.url).go("#/jobs/nope")
+    expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
+    expect(page.locator("main")).to_contain_text("there is no job 'nope'")
+    page.get_by_role("link", name="Show all jobs").click()
+    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+
+
+def test_a_job_that_is_deleted_while_it_is_looked_at_is_gone(
+    screens: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = desk.submit(500)
+    page = screens(desk.url).go(f"#/jobs/{job}")
+    expect(page.locator(".title .state")).to_have_text("queued")
+    desk.ask("POST", f"/v1/jobs/{job}/cancel")
+    assert desk.ask("DELETE", f"/v1/jobs/{job}").status_code == 204
+    expect(page.get_by_role("heading", name="There is no such job")).to_be_visible(timeout=10_000)
+
+
+def test_the_settings_and_the_data_are_those_of_the_job(quiet: Callable[..., Screen], desk: Service) -> None:
+    page = quiet(desk.url).go(f"#/jobs/{desk.submit(321, rows='0:3500')}")
+    page.locator("table code", has_text="y_um").wait_for()
+    shown = dict(
+        zip(
+            page.locator(".about dt").all_text_contents(),
+            page.locator(".about dd").all_text_contents(),
+            strict=True,
+        )
+    )
+    wanted = {"Inputs": "u_V", "Output": "y_um", "Seed": "2", "Rows": "0:3500", "generations": "321"}
+    wanted |= {"Samples": "4\u202f000", "Sampling time": "0.01 s", "File": "data.csv"}
+    assert wanted.items() <= shown.items()
+    roles = page.locator(".about tbody tr td:nth-child(3)").all_text_contents()
+    assert roles == ["time", "input", "output"]
+
+
+STYLED = (
+    '<math xmlns="http://www.w3.org/1998/Math/MathML" style="top: 0"><mi style="color: red">y</mi></math>'
+)
+
+EQUATIONS = {
+    STYLED: "y",
+    "<math><mi>y</mi></math>": "y",
+    '<math xmlns="http://www.w3.org/1998/Math/MathML"><mrow><mi>a</mi><mo>+</mo></mrow></math>': "a+",
+    "<math><mtext>&lt;b&gt;</mtext><!-- remark --></math>": "<b>",
+    "<math><mi>y</mi><script>document.title='taken'</script></math>": None,
+    '<math><mi href="javascript:alert(1)" onclick="alert(1)" style="color:red">y</mi></math>': "y",
+    "<math><annotation-xml encoding='text/html'><img src='x'/></annotation-xml></math>": None,
+    '<html xmlns="http://www.w3.org/1999/xhtml"><script>1</script></html>': None,
+    "<math><mi>y</math>": None,
+    "": None,
+}
+
+
+@pytest.mark.parametrize("source", EQUATIONS)
+def test_nothing_but_mathematics_comes_in_with_an_equation(
+    screens: Callable[..., Screen], desk: Service, source: str
+) -> None:
+    screen = screens(desk.url)
+    page = screen.go()
+    found = page.evaluate(
+        """async (source) => {
+          const { mathOf } = await import("/dashboard/equation.js");
+          try {
+            const math = mathOf(source);
+            const all = [math, ...math.querySelectorAll("*")];
+            const names = all.flatMap((node) => [...node.attributes].map((each) => each.name));
+            return { text: math.textContent, names, own: all.every((node) => node instanceof MathMLElement) };
+          } catch (error) {
+            return null;
+          }
+        }""",
+        source,
+    )
+    expected = EQUATIONS[source]
+    if expected is None:
+        assert found is None
+    else:
+        assert found == {"text": expected, "names": [], "own": True}
+        assert screen.complaints == []

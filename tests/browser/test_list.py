@@ -1,0 +1,158 @@
+"""The list of jobs, as somebody sees it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from played import advance, claimed, stored
+from screen import Screen
+from service_processes import Service
+
+from islands_service.jobs import JobState, Outcome
+
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+
+HOSTILE = "<script>document.title='taken'</script><img src=x onerror=\"document.title='taken'\">"
+
+
+def row(page: Any, job: str) -> Any:
+    return page.locator(f"tr[data-job='{job}']")
+
+
+def test_a_job_shows_up_and_passes_through_its_states(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    page = quiet(desk.url).go()
+    job = desk.submit(500, name="tank, level 3")
+    state, bar = row(page, job).locator(".state"), row(page, job).locator("progress")
+    expect(state).to_have_text("queued")
+    expect(row(page, job)).to_contain_text("waits for its turn")
+    with stored(desk) as store:
+        lease = claimed(store, job)
+        advance(store, lease, 0, 125)
+        expect(state).to_have_text("running")
+        expect(row(page, job)).to_contain_text("125 / 500")
+        assert bar.evaluate("bar => bar.value") == pytest.approx(0.25)
+        best = desk.job(job)["progress"]["best_error"]
+        assert row(page, job).locator("td").nth(2).text_content() == f"{best:#.3g}"
+        store.leases.finish(lease, Outcome(JobState.FAILED, problem={"title": "t", "detail": "d"}))
+    expect(state).to_have_text("failed")
+    expect(page.get_by_role("status")).to_have_text("tank, level 3: failed")
+    assert row(page, job).locator("td").last.text_content() == "1"
+
+
+def test_a_strangers_markup_is_text(quiet: Callable[..., Screen], desk: Service) -> None:
+    job = desk.submit(500, name=HOSTILE)
+    page = quiet(desk.url).go()
+    link = row(page, job).get_by_role("link")
+    assert link.text_content() == HOSTILE
+    link.click()
+    page.get_by_role("heading", level=1, name=HOSTILE, exact=True).wait_for()
+    page.get_by_role("heading", name="Data set").wait_for()
+    assert page.title() == f"{HOSTILE} · islands"
+    assert page.locator("main script, main img").count() == 0
+
+
+def test_a_filter_shows_the_jobs_of_its_state(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    waiting, other = desk.submit(500), desk.submit(500)
+    assert desk.ask("POST", f"/v1/jobs/{other}/cancel").status_code == 202
+    page = quiet(desk.url).go()
+    page.get_by_role("link", name="cancelled", exact=True).click()
+    expect(row(page, other)).to_be_visible()
+    expect(page.locator(".state").first).to_have_text("cancelled")
+    assert set(page.locator("tbody .state").all_text_contents()) == {"cancelled"}
+    assert row(page, waiting).count() == 0
+    assert page.locator("[aria-current=page]").text_content() == "cancelled"
+    page.reload()
+    expect(row(page, other)).to_be_visible()
+    assert page.url.endswith("#/jobs?state=cancelled")
+    page.get_by_role("link", name="succeeded", exact=True).click()
+    expect(page.get_by_text("No job is succeeded.")).to_be_visible()
+
+
+def test_pages_hold_every_job_once_while_others_come_in(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    jobs = [desk.submit(500) for _ in range(55)]
+    page = quiet(desk.url).go()
+    expect(row(page, jobs[-1])).to_be_visible()
+    seen = page.locator("tbody tr").evaluate_all("rows => rows.map((row) => row.dataset.job)")
+    late = desk.submit(500)
+    for first in (jobs[-26], jobs[-51]):
+        page.get_by_role("link", name="Older").click()
+        expect(row(page, first)).to_be_visible()
+        seen += page.locator("tbody tr").evaluate_all("rows => rows.map((row) => row.dataset.job)")
+    assert set(jobs) <= set(seen)
+    assert len(seen) == len(set(seen))
+    page.get_by_role("link", name="Newest").click()
+    expect(row(page, late)).to_be_visible()
+
+
+def test_what_is_focused_stays_focused_while_the_list_changes(
+    quiet: Callable[..., Screen], desk: Service
+) -> None:
+    job = desk.submit(500)
+    page = quiet(desk.url).go()
+    link = row(page, job).get_by_role("link")
+    link.focus()
+    new = desk.submit(500)
+    row(page, new).wait_for()
+    assert link.evaluate("link => link === document.activeElement")
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Settings").wait_for()
+    assert page.url.endswith(f"#/jobs/{job}")
+
+
+def test_nothing_is_asked_for_while_nobody_looks(quiet: Callable[..., Screen], desk: Service) -> None:
+    desk.submit(500)
+    screen = quiet(desk.url)
+    asked: list[str] = []
+    screen.page.on("request", lambda request: asked.append(request.url))
+    screen.page.clock.install()
+    page = screen.go()
+    page.locator("tbody tr").first.wait_for()
+
+    def looked_at(hidden: bool) -> int:
+        """Ask for the list for half a minute; return how often it was."""
+        page.evaluate(
+            "hidden => { Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });"
+            "document.dispatchEvent(new Event('visibilitychange')) }",
+            hidden,
+        )
+        before = len(asked)
+        for _ in range(10):
+            page.clock.run_for(3000)
+            page.wait_for_timeout(50)
+        return len(asked) - before
+
+    assert looked_at(hidden=False) >= 5
+    assert looked_at(hidden=True) <= 1
+    assert looked_at(hidden=False) >= 5
+
+
+def test_a_refusal_is_told_in_the_services_words(
+    screens: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    desk.submit(500)
+    page = screens(desk.url).go("#/jobs?cursor=garbage")
+    banner = page.locator(".banner")
+    expect(banner).to_contain_text("'garbage' is no cursor: give `next` of the page before as it is")
+    expect(banner.locator("code")).to_have_text(pattern(r"[0-9a-f]{16}"))
+    page.get_by_role("link", name="all", exact=True).click()
+    expect(page.locator("tbody tr").first).to_be_visible()
+    expect(banner).to_have_count(0)
+
+
+def test_an_unknown_address_leads_to_the_list(quiet: Callable[..., Screen], desk: Service) -> None:
+    for place in ("#/nonsense", "#/jobs/", "#/jobs/a/b", "#%zz"):
+        page = quiet(desk.url).go(place)
+        page.get_by_role("heading", name="Jobs", exact=True).wait_for()
+        assert page.url.endswith("#/jobs")
+
+
+def pattern(text: str) -> Any:
+    import re
+
+    return re.compile(text)

@@ -1,0 +1,112 @@
+"""Whether everybody can read the page: small and large, light and dark, by eye, by keyboard and aloud."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from played import advance, claimed, stored
+from reading import unreadable
+from screen import Screen
+from service_processes import Service
+
+from islands_service.jobs import JobState, Outcome
+
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+
+SIZES = ((1280, 800), (360, 800))
+
+
+@pytest.fixture(scope="module")
+def places(desk: Service) -> dict[str, str]:
+    """Addresses of everything that can be seen without a result."""
+    problem = {"title": "The job failed", "detail": "data.csv, line 8, column y_um is empty: " + "x" * 200}
+    failed = desk.submit(500, name="a-name-without-a-space-" * 8)
+    cancelled = desk.submit(500, name="cancelled")
+    running = desk.submit(500, name="running", settings={"islands": 8})
+    with stored(desk) as store:
+        lease = claimed(store, failed)
+        advance(store, lease, 0, 100)
+        store.leases.finish(lease, Outcome(JobState.FAILED, problem=problem))
+        store.leases.finish(claimed(store, cancelled), Outcome(JobState.CANCELLED))
+        advance(store, claimed(store, running), 0, 212, islands=8)
+    desk.submit(500, name="queued")
+    return {"list": "#/jobs", "nothing": "#/jobs?state=succeeded", "failed": failed, "running": running}
+
+
+def opened(screen: Screen, place: str) -> Any:
+    page = screen.go(place if place.startswith("#") else f"#/jobs/{place}")
+    ready = "tbody tr, .nothing" if place.startswith("#") else "figure.chart, .failure"
+    page.locator(ready).first.wait_for()
+    if not place.startswith("#"):
+        page.locator("table code", has_text="y_um").wait_for()
+    return page
+
+
+@pytest.mark.parametrize("name", ["list", "nothing", "failed", "running"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_everything_fits_and_stands_out(
+    quiet: Callable[..., Screen],
+    desk: Service,
+    places: dict[str, str],
+    name: str,
+    scheme: str,
+    width: int,
+    height: int,
+) -> None:
+    page = opened(quiet(desk.url, width, height, color_scheme=scheme), places[name])
+    assert unreadable(page) == []
+
+
+def test_figures_stand_in_columns(
+    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+) -> None:
+    page = opened(quiet(desk.url), places["list"])
+    style = page.locator("td.figure").first.evaluate("cell => getComputedStyle(cell).fontVariantNumeric")
+    assert "tabular-nums" in style
+
+
+def test_a_state_is_told_by_more_than_its_colour(
+    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+) -> None:
+    page = opened(quiet(desk.url), places["list"])
+    told = page.locator("tbody .state").evaluate_all(
+        "all => all.map((one) => [one.textContent, getComputedStyle(one, '::before').content])"
+    )
+    assert {word for word, _ in told} == {"queued", "running", "cancelled", "failed"}
+    assert len({sign for _, sign in told}) == 4
+
+
+def test_whoever_has_no_mouse_gets_everywhere(
+    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+) -> None:
+    page = opened(quiet(desk.url), places["running"])
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "Skip to the content"
+    reached = set()
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        reached.add(
+            page.evaluate("document.activeElement.ariaLabel ?? document.activeElement.textContent.trim()")
+        )
+    assert {
+        "islands",
+        "← Jobs",
+        "Cancel",
+        "Error of every island",
+        "Best error by number of terms",
+    } <= reached
+    assert "Columns of the data set" in reached
+
+
+def test_moments_are_told_in_universal_time(
+    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
+) -> None:
+    """Whatever time zone, and whatever time, the machine of whoever looks has."""
+    screen = quiet(desk.url, timezone_id="Asia/Tokyo")
+    screen.page.clock.install(time="2031-01-01T00:00:00Z")
+    page = opened(screen, places["running"])
+    submitted = page.locator("time").first
+    created = desk.job(places["running"])["created"]
+    assert submitted.get_attribute("title") == created[:19].replace("T", " ") + " UTC"
+    assert submitted.text_content().removesuffix(" ago").split()[-1] in ("now", "s", "min")

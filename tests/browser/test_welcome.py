@@ -1,0 +1,117 @@
+"""What a newcomer is told: three commands, which do what they say, word for word."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from front_door import ISLANDS, write_hysteresis
+from played import claimed, stored
+from processes import eventually
+from reading import unreadable
+from screen import Screen
+from service_processes import Service
+
+from islands_service.jobs import JobState, Outcome
+
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+
+
+@pytest.fixture(scope="module")
+def commands(chromium: Any, desk: Service) -> dict[str, str]:
+    """The commands by their headings, as they stand on the page of a service without jobs."""
+    screen = Screen(chromium.new_page(), desk.url)
+    page = screen.go()
+    page.get_by_role("heading", name="No jobs yet").wait_for()
+    for width in (1280, 360):
+        page.set_viewport_size({"width": width, "height": 800})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            assert unreadable(page) == [], (width, scheme)
+    names = page.locator(".welcome h3").all_text_contents()
+    found = dict(zip(names, page.locator(".welcome pre").all_text_contents(), strict=True))
+    page.close()
+    assert screen.complaints == []
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_hysteresis(tmp_path / "piezo.csv")
+    return tmp_path
+
+
+def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    path = f"{ISLANDS.parent}{os.pathsep}{os.environ['PATH']}"
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
+
+
+def jobs(desk: Service) -> list[str]:
+    return [job["id"] for job in desk.ask("GET", "/v1/jobs").json()["items"]]
+
+
+@pytest.fixture
+def carried_out(desk: Service) -> Iterator[Any]:
+    """Runs a command that waits for its job, and meanwhile carries that out."""
+    with ThreadPoolExecutor(1) as pool, stored(desk) as store:
+
+        def carry_out(*command: Any) -> subprocess.CompletedProcess[str]:
+            before = set(jobs(desk))
+            done = pool.submit(run, *command)
+            new = eventually(lambda: set(jobs(desk)) - before or done.done())
+            assert new is not True, done.result()
+            lease = claimed(store, new.pop())
+            store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {}, summary={"equation": "y(k) = 42"}))
+            return done.result()
+
+        yield carry_out
+
+
+def test_the_command_line_submits_and_watches(
+    commands: dict[str, str], folder: Path, carried_out: Any
+) -> None:
+    done = carried_out(folder, "sh", "-ec", commands["Command line"])
+    assert done.returncode == 0, done.stderr
+    assert "rank" in done.stdout
+
+
+def test_the_client_submits_and_waits(commands: dict[str, str], folder: Path, carried_out: Any) -> None:
+    done = carried_out(folder, sys.executable, "-c", commands["Python"])
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "y(k) = 42\n"
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
+def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: Service) -> None:
+    upload, submit = commands["curl"].split("\n", 1)
+    uploaded = run(folder, "sh", "-ec", f"{upload} --silent --show-error --fail")
+    assert uploaded.returncode == 0, uploaded.stderr
+    dataset = uploaded.stdout.partition('"id":"')[2].partition('"')[0]
+    submitted = run(folder, "sh", "-ec", submit.replace("THE ID IN THE ANSWER", dataset) + " -sSf")
+    assert submitted.returncode == 0, submitted.stderr
+    assert submitted.stdout.partition('"id":"')[2].partition('"')[0] in jobs(desk)
+
+
+def test_the_welcome_makes_room_for_the_first_job(
+    chromium: Any, commands: dict[str, str], desk: Service, expect: Any
+) -> None:
+    assert list(commands) == ["Command line", "Python", "curl"]
+    assert all(desk.url in text for text in commands.values())
+    job = desk.submit(500)
+    page = Screen(chromium.new_page(), desk.url).go()
+    expect(page.locator(f"tr[data-job='{job}']")).to_be_visible()
+    expect(page.get_by_role("heading", name="No jobs yet")).to_have_count(0)
+    page.close()

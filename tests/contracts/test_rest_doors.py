@@ -1,0 +1,207 @@
+"""Doors: who may knock at all, what Prometheus reads, and what the service says of itself."""
+
+import json
+import shutil
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+from service import emptied, kept, problem_of, queued, served, spec
+from stores import FOUND, claimed
+
+from islands_service.jobs import JobState, Report
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory, prepared_sqlite):
+    folder = tmp_path_factory.mktemp("service")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    with served(folder) as running:
+        yield running
+
+
+@pytest.fixture
+def service(shared):
+    return emptied(shared)
+
+
+@pytest.fixture
+def far(tmp_path, prepared_sqlite):
+    """A service that others can reach, and that needs keys."""
+    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
+    with served(tmp_path, host="0.0.0.0") as running:
+        yield running
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "https://evil.example",
+        "http://localhost:1",
+        "http://127.0.0.1",
+        "null",
+        "http://[",
+        "file://",
+        "http://127.0.0.1:{port}.evil.example",
+        "http://evil.example/127.0.0.1:{port}",
+        "",
+    ],
+)
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_another_sites_page_gets_nothing(service, method, origin):
+    headers = {"Origin": origin.format(port=service.port)}
+    body = json.dumps(spec(kept(service.store))).encode()
+    answer = service.client.request(
+        method, "/v1/jobs", headers={**headers, "Content-Type": "application/json"}, content=body
+    )
+    assert "open the service's own page" in problem_of(answer, 403, "cross-origin")
+    assert not service.store.jobs.page("local").jobs
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+def test_our_own_page_gets_everything(service):
+    headers = {"Origin": service.url}
+    answer = service.submit(headers, **spec(kept(service.store)))
+    assert answer.status_code == 202
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+@pytest.mark.parametrize("asks", ["GET", "POST", "DELETE"])
+def test_a_browser_that_asks_for_another_site_is_refused(service, asks):
+    headers = {"Origin": "https://evil.example", "Access-Control-Request-Method": asks}
+    answer = service.client.options("/v1/jobs", headers=headers)
+    problem_of(answer, 403, "cross-origin")
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:8000",
+        "127.0.0.1.evil.example",
+        "[::2]",
+        "[",
+        "testserver",
+        "0.0.0.0",
+        "",
+    ],
+)
+def test_a_name_that_another_site_lets_point_to_us_is_refused(service, host):
+    answer = service.client.get("/v1/jobs", headers={"Host": host})
+    assert "it answers to this machine's own names" in problem_of(answer, 403, "cross-origin")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:{port}", "LOCALHOST", "[::1]:{port}", "[::1]"])
+def test_this_machines_own_names_are_answered(service, host):
+    headers = {"Host": host.format(port=service.port)}
+    assert service.client.get("/v1/jobs", headers=headers).status_code == 200
+
+
+def test_where_keys_are_needed_any_name_will_do(far):
+    headers = {**far.key(), "Host": "islands.example.org"}
+    assert far.client.get("/v1/jobs", headers=headers).status_code == 200
+    headers["Origin"] = "https://islands.example.org"
+    assert far.client.get("/v1/jobs", headers=headers).status_code == 200
+    headers["Origin"] = "https://evil.example"
+    problem_of(far.client.get("/v1/jobs", headers=headers), 403, "cross-origin")
+
+
+def measured(service):
+    """Read the metrics: values by name and labels."""
+    answer = service.client.get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain; version=")
+    return {
+        (sample.name, tuple(sorted(sample.labels.items()))): sample.value
+        for family in text_string_to_metric_families(answer.text)
+        for sample in family.samples
+    }
+
+
+def jobs_by_state(service):
+    found = measured(service)
+    return {state: found["islands_jobs", (("state", state),)] for state in JobState}
+
+
+def test_metrics_count_jobs_as_they_stand(service):
+    assert set(jobs_by_state(service).values()) == {0.0}
+    for _ in range(3):
+        queued(service.store)
+    lease = claimed(service.store)
+    service.store.leases.report(
+        lease, Report({"evaluations_per_second": 120.5, "best_error": 0.25, "generation": 7})
+    )
+    found = measured(service)
+    label = (("job", lease.job.id),)
+    assert found["islands_evaluations_per_second", label] == 120.5
+    assert found["islands_best_error", label] == 0.25
+    assert found["islands_generation", label] == 7.0
+    assert found["islands_leases", ()] == 1.0
+    assert 0.0 <= found["islands_queue_oldest_seconds", ()] < 60.0
+    service.store.leases.finish(lease, FOUND)
+    assert jobs_by_state(service) == {"queued": 2, "running": 0, "succeeded": 1, "failed": 0, "cancelled": 0}
+    assert ("islands_best_error", label) not in measured(service)
+
+
+def test_metrics_count_requests_by_route_and_not_by_path(service):
+    def counts(route, method, status):
+        label = (("method", method), ("route", route), ("status", status))
+        return measured(service).get(("islands_request_seconds_count", label), 0.0)
+
+    jobs = [queued(service.store).id for _ in range(3)]
+    before = (
+        counts("/v1/jobs/{job}", "GET", "200"),
+        counts("none", "GET", "404"),
+        counts("none", "POST", "404"),
+    )
+    for job in jobs:
+        service.client.get(f"/v1/jobs/{job}")
+        service.client.get(f"/nothing/{job}")
+    assert counts("/v1/jobs/{job}", "GET", "200") == before[0] + 3
+    assert counts("none", "GET", "404") == before[1] + 3
+    assert counts("none", "POST", "404") == before[2]
+    routes = {
+        dict(labels)["route"] for name, labels in measured(service) if name == "islands_request_seconds_count"
+    }
+    paths = set(service.client.get("/openapi.json").json()["paths"])
+    assert routes <= paths | {"none", "/", "/dashboard/{name}", "/openapi.json"}
+
+
+def test_metrics_count_what_was_accepted_once(service):
+    def accepted():
+        return measured(service)["islands_jobs_accepted_total", ()]
+
+    before, order = accepted(), spec(kept(service.store))
+    for _ in range(3):
+        service.submit({"Idempotency-Key": "k"}, **order)
+    service.submit(**{**order, "seed": -1})
+    assert accepted() == before + 1
+
+
+def test_no_stranger_makes_metrics_grow(service):
+    size = len(measured(service))
+    for method in ("PROPFIND", "MKCOL", "SEARCH", "LOCK"):
+        service.client.request(method, "/v1/jobs")
+    labels = [dict(labels) for _, labels in measured(service)]
+    assert {label["method"] for label in labels if "method" in label} <= {"GET", "POST", "OPTIONS", "other"}
+    assert len(labels) - size < 40
+
+
+def test_the_service_is_alive_and_ready(service):
+    assert service.client.get("/healthz").json() == {"status": "alive"}
+    assert service.client.get("/readyz").json() == {"status": "ready"}
+
+
+def test_the_log_names_every_request_and_not_those_of_probes(service):
+    service.logs.clear()
+    service.client.get("/v1/jobs?state=queued", headers={"X-Request-ID": "abc"})
+    service.client.get("/healthz")
+    service.client.get("/readyz")
+    (line,) = service.logs
+    assert line["ms"] >= 0.0
+    assert {name: line[name] for name in ("event", "method", "path", "status", "request_id")} == {
+        "event": "request",
+        "method": "GET",
+        "path": "/v1/jobs",
+        "status": 200,
+        "request_id": "abc",
+    }

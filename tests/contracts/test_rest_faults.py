@@ -1,0 +1,170 @@
+"""Faults behind the doors: a full disk and a lost database are told as such, and what was accepted stays."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+
+import httpx
+import pytest
+from databases import server
+from processes import eventually
+from service import PATIENCE, csv, parsed, problem_of, queued, served, spec
+from stores import FOUND, claimed
+
+#: Bytes of a small disk.
+DISK = 6_000_000
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """A disk of a few megabytes."""
+    if os.getuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("a small disk takes root, to mount one: run these tests as root")
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "islands-test", folder],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if mounted.returncode != 0:
+        pytest.skip(f"no small disk can be mounted here: {mounted.stderr.strip()}")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+def fill(folder):
+    """Leave no byte free; return what to delete to make room."""
+    path = folder / "filler"
+    with path.open("wb", buffering=0) as stream:
+        try:
+            while True:
+                stream.write(bytes(4096))
+        except OSError:
+            pass
+    return path
+
+
+def wordy(word):
+    """A record of half a megabyte."""
+    return csv(400).replace(b"y_um", word) + b"\n" * 500_000
+
+
+def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, prepared_sqlite):
+    shutil.copyfile(prepared_sqlite, disk / "islands.db")
+    with served(disk) as service:
+        dataset = service.upload(csv()).json()["id"]
+        job = service.submit(**spec(dataset)).json()
+        filler = fill(disk)
+        refused = [
+            service.upload(wordy(b"y_mm")),
+            *(service.submit(**spec(dataset, name="x" * 200, seed=seed)) for seed in range(300)),
+        ]
+        full = [answer for answer in refused if answer.status_code != 202]
+        assert full[0] is refused[0]
+        assert len(full) > 1
+        for answer in full:
+            assert "is full" in problem_of(answer, 507, "storage-full")
+            assert "make room" in answer.json()["detail"]
+            assert answer.headers["retry-after"] == "30"
+        assert service.client.get(f"/v1/jobs/{job['id']}").json() == job
+        assert service.client.get(f"/v1/datasets/{dataset}").status_code == 200
+        assert service.client.get("/readyz").status_code == 200
+        accepted = {answer.json()["id"] for answer in refused if answer.status_code == 202} | {job["id"]}
+        filler.unlink()
+        assert service.upload(wordy(b"y_mm")).status_code == 201
+        answer = service.submit(**spec(dataset, seed=7))
+        assert answer.status_code == 202
+        listed = service.client.get("/v1/jobs", params={"limit": 200}).json()["items"]
+        assert {each["id"] for each in listed} == accepted | {answer.json()["id"]}
+        assert not list(service.settings.blobs.glob("*.part"))
+
+
+def test_no_room_to_receive_an_upload_is_told_as_such(disk, tmp_path, prepared_sqlite, monkeypatch):
+    """The framework keeps what is more than a megabyte in the system's temporary folder."""
+    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
+    with served(tmp_path) as service:
+        monkeypatch.setattr(tempfile, "tempdir", str(disk))
+        filler = fill(disk)
+        detail = problem_of(service.upload(csv() + b"\n" * 2_000_000), 507, "storage-full")
+        assert "make room" in detail
+        filler.unlink()
+        assert service.upload(csv()).status_code == 201
+
+
+@pytest.fixture
+def postgres_of_our_own():
+    with server() as own:
+        yield own
+
+
+def test_a_database_that_goes_away_and_comes_back(tmp_path, postgres_of_our_own):
+    own = postgres_of_our_own
+    with served(tmp_path, database=own.url) as service:
+        dataset = service.upload(csv()).json()["id"]
+        job = service.submit({"Idempotency-Key": "k"}, **spec(dataset)).json()
+        events = []
+        watcher = threading.Thread(target=lambda: events.extend(_followed(service, job["id"])))
+        watcher.start()
+        eventually(lambda: "islands_event_streams 1.0" in service.client.get("/metrics").text)
+        assert service.client.get("/readyz").status_code == 200
+        own.stop()
+        for method, path, body in (
+            ("GET", "/readyz", {}),
+            ("GET", f"/v1/jobs/{job['id']}", {}),
+            ("GET", "/v1/jobs", {}),
+            ("GET", "/metrics", {}),
+            ("POST", "/v1/jobs", {"json": spec(dataset)}),
+            ("POST", f"/v1/jobs/{job['id']}/cancel", {}),
+            ("DELETE", f"/v1/datasets/{dataset}", {}),
+            ("POST", "/v1/datasets", {"files": {"file": ("a.csv", csv(100))}}),
+        ):
+            began = time.monotonic()
+            answer = service.client.request(method, path, **body)
+            assert time.monotonic() - began < 10.0
+            assert "try again" in problem_of(answer, 503, "store-unavailable"), (method, path)
+            assert answer.headers["retry-after"] == "1"
+        assert service.client.get("/healthz").status_code == 200
+        own.start()
+        eventually(lambda: service.client.get("/readyz").status_code == 200, PATIENCE)
+        assert service.client.get(f"/v1/jobs/{job['id']}").json() == job
+        again = service.submit({"Idempotency-Key": "k"}, **spec(dataset))
+        assert (again.json()["id"], again.headers["idempotent-replayed"]) == (job["id"], "true")
+        assert len(service.client.get("/v1/jobs").json()["items"]) == 1
+        service.store.leases.finish(claimed(service.store), FOUND)
+        watcher.join(PATIENCE)
+        assert [(number, kind) for number, kind, _ in events] == [
+            (1, "queued"),
+            (2, "running"),
+            (3, "succeeded"),
+        ]
+
+
+def _followed(service, job):
+    """Follow a job through the outage: a stream that was open stays open."""
+    with httpx.Client(base_url=service.url, timeout=PATIENCE) as client:
+        return parsed(client.get(f"/v1/jobs/{job}/events").text)
+
+
+@pytest.mark.parametrize(
+    "path", ["/v1/jobs/%00", "/v1/datasets/%00", "/v1/jobs?cursor=WzEuMCwgImFcdTAwMDBiIl0"]
+)
+def test_postgresql_is_never_asked_for_what_it_cannot_hold(tmp_path, prepared_postgres, path):
+    """A zero byte is an error of the database there, and a defect of ours if it gets through."""
+    with served(tmp_path, database=prepared_postgres) as service:
+        assert service.client.get(path).status_code == 422
+
+
+def test_text_of_strangers_is_kept_by_postgresql_as_by_sqlite(tmp_path, prepared_postgres):
+    with served(tmp_path, database=prepared_postgres) as service:
+        name = "Größe 😀 'quoted' \"twice\" \\ % _"
+        job = queued(service.store, name=name)
+        assert service.client.get(f"/v1/jobs/{job.id}").json()["name"] == name
+        dataset = service.upload(csv(), "größe😀' ;%_.csv").json()
+        assert dataset["name"] == "größe😀' ;%_.csv"
+        for changes in ({"inputs": ["u\0V"]}, {"name": "a\0b"}, {"dataset": "a\0b"}):
+            assert service.submit(**spec(dataset["id"], **changes)).status_code == 422

@@ -1,0 +1,265 @@
+"""Jobs over REST: accepted once, waited for, listed whole, and changed as their state allows."""
+
+import shutil
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from service import emptied, kept, problem_of, queued, served, spec
+from stores import brought_on, claimed, job_in
+
+from islands_api.auth import LOCAL
+from islands_service.jobs import JobState
+
+MANY = 16
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory, prepared_sqlite):
+    folder = tmp_path_factory.mktemp("service")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    with served(folder) as running:
+        yield running
+
+
+@pytest.fixture
+def service(shared):
+    return emptied(shared)
+
+
+@pytest.fixture
+def order(service):
+    return spec(kept(service.store), name="first")
+
+
+def ids(answer):
+    return [job["id"] for job in answer.json()["items"]]
+
+
+def in_state(service, state):
+    """Bring a job to a state; no other may be waiting."""
+    return job_in(service.store, state, LOCAL).id
+
+
+def test_an_accepted_job_is_where_the_answer_says(service, order):
+    answer = service.submit(**order, priority=5)
+    assert answer.status_code == 202
+    assert answer.headers["retry-after"] == "1"
+    assert "idempotent-replayed" not in answer.headers
+    looked = service.client.get(answer.headers["location"])
+    assert (looked.json(), looked.headers["etag"]) == (answer.json(), answer.headers["etag"])
+    job = looked.json()
+    assert (job["state"], job["name"], job["priority"], job["version"]) == ("queued", "first", 5, 1)
+    assert job["spec"] == {key: value for key, value in order.items() if key != "name"}
+
+
+def test_the_same_key_and_request_is_the_same_job(service, order):
+    first = service.submit({"Idempotency-Key": "k1"}, **order)
+    assert "idempotent-replayed" not in first.headers
+    claimed(service.store)
+    again = service.submit({"Idempotency-Key": "k1"}, **dict(reversed(order.items())))
+    assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
+    assert again.headers["location"] == first.headers["location"]
+    assert (again.json()["id"], again.json()["state"]) == (first.json()["id"], "running")
+    assert ids(service.client.get("/v1/jobs")) == [first.json()["id"]]
+
+
+@pytest.mark.parametrize("change", [{"seed": 1}, {"name": "second"}, {"priority": 1}, {"preset": "narx"}])
+def test_the_same_key_and_another_request_is_refused(service, order, change):
+    first = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]
+    answer = service.submit({"Idempotency-Key": "k1"}, **{**order, **change})
+    detail = problem_of(answer, 422, "idempotency-conflict")
+    assert detail == (
+        f"the idempotency key 'k1' belongs to job {first}, which was asked for with another request: "
+        "take a new key"
+    )
+    assert ids(service.client.get("/v1/jobs")) == [first]
+
+
+def test_a_key_is_its_owners_alone(service, order):
+    mine = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]
+    header = service.key(owner="other")
+    theirs = service.submit({"Idempotency-Key": "k1", **header}, **spec(kept(service.store, "other")))
+    assert theirs.status_code == 202
+    assert theirs.json()["id"] != mine
+
+
+@pytest.mark.parametrize("key", ["", "x" * 256])
+def test_a_key_has_up_to_255_characters(service, order, key):
+    problem_of(service.submit({"Idempotency-Key": key}, **order), 422, "invalid-request")
+
+
+def test_sixteen_at_once_with_one_key_make_one_job(service, order):
+    with ThreadPoolExecutor(MANY) as pool:
+        answers = list(pool.map(lambda _: service.submit({"Idempotency-Key": "k"}, **order), range(MANY)))
+    assert {answer.status_code for answer in answers} == {202}
+    assert len({answer.json()["id"] for answer in answers}) == 1
+    assert [answer.headers.get("idempotent-replayed") for answer in answers].count("true") == MANY - 1
+    assert len(ids(service.client.get("/v1/jobs"))) == 1
+
+
+def test_what_has_not_changed_is_not_sent_again(service):
+    path = f"/v1/jobs/{queued(service.store).id}"
+    tag = service.client.get(path).headers["etag"]
+    assert tag == '"1"'
+    for given in (tag, f"W/{tag}", f'"0", {tag}', "*"):
+        answer = service.client.get(path, headers={"If-None-Match": given})
+        assert (answer.status_code, answer.content, answer.headers["etag"]) == (304, b"", tag)
+    for given in ('"0"', '"11"', "1", ""):
+        assert service.client.get(path, headers={"If-None-Match": given}).status_code == 200
+    claimed(service.store)
+    answer = service.client.get(path, headers={"If-None-Match": tag})
+    assert (answer.status_code, answer.headers["etag"], answer.json()["version"]) == (200, '"2"', 2)
+
+
+def test_whoever_waits_is_answered_at_the_change(service):
+    path = f"/v1/jobs/{queued(service.store).id}"
+    threading.Timer(0.3, claimed, [service.store]).start()
+    began = time.monotonic()
+    answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": '"1"'})
+    assert (answer.status_code, answer.json()["state"]) == (200, "running")
+    assert 0.3 <= time.monotonic() - began < 5.0
+
+
+def test_whoever_waits_in_vain_is_told_so_in_time(service):
+    path = f"/v1/jobs/{queued(service.store).id}"
+    began = time.monotonic()
+    answer = service.client.get(path, params={"wait": 0.4}, headers={"If-None-Match": '"1"'})
+    assert answer.status_code == 304
+    assert 0.4 <= time.monotonic() - began < 3.0
+
+
+@pytest.mark.parametrize("headers", [{}, {"If-None-Match": '"0"'}])
+def test_whoever_does_not_know_the_job_does_not_wait(service, headers):
+    path = f"/v1/jobs/{queued(service.store).id}"
+    began = time.monotonic()
+    assert service.client.get(path, params={"wait": 20}, headers=headers).status_code == 200
+    assert time.monotonic() - began < 3.0
+
+
+def test_nobody_waits_for_what_has_ended(service):
+    path = f"/v1/jobs/{in_state(service, JobState.SUCCEEDED)}"
+    tag = service.client.get(path).headers["etag"]
+    began = time.monotonic()
+    answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": tag})
+    assert answer.status_code == 304
+    assert "retry-after" not in answer.headers
+    assert time.monotonic() - began < 3.0
+
+
+def walked(service, path, limit, between=lambda: None, **params):
+    """Read a list to its end, and do something between two pages."""
+    found, cursor = [], None
+    while True:
+        given = {"limit": limit, **params} | ({} if cursor is None else {"cursor": cursor})
+        answer = service.client.get(path, params=given).json()
+        assert len(answer["items"]) <= limit
+        found += [each["id"] for each in answer["items"]]
+        cursor = answer["next"]
+        if cursor is None:
+            return found
+        between()
+
+
+@pytest.mark.parametrize("limit", [1, 3, 7, 8, 200])
+def test_pages_show_every_job_once_while_others_come(service, limit):
+    before = sorted((job.created, job.id) for job in (queued(service.store) for _ in range(7)))
+    newest_first = [identity for _, identity in reversed(before)]
+    assert walked(service, "/v1/jobs", limit) == newest_first
+    assert walked(service, "/v1/jobs", limit, lambda: queued(service.store)) == newest_first
+
+
+def test_pages_show_every_data_set_once_while_others_come(service):
+    before = [kept(service.store, content=b"%d" % index) for index in range(7)]
+    more = iter(range(100))
+    found = walked(service, "/v1/datasets", 2, lambda: kept(service.store, content=b"x%d" % next(more)))
+    assert sorted(found) == sorted(before)
+
+
+def test_pages_of_a_state_show_no_other(service):
+    running = {in_state(service, JobState.RUNNING) for _ in range(3)}
+    waiting = {queued(service.store).id for _ in range(3)}
+    assert set(walked(service, "/v1/jobs", 2, state="queued")) == waiting
+    assert set(walked(service, "/v1/jobs", 2, state="running")) == running
+    assert walked(service, "/v1/jobs", 2, state="failed") == []
+
+
+@pytest.mark.parametrize("path", ["/v1/jobs", "/v1/datasets"])
+@pytest.mark.parametrize("cursor", ["x", "!!!", "bnVsbA", "WzEsMl0", "WzFlOTk5LCJhIl0"])
+def test_garbage_is_no_cursor(service, path, cursor):
+    detail = problem_of(service.client.get(path, params={"cursor": cursor}), 422, "invalid-settings")
+    assert detail == f"{cursor!r} is no cursor: give `next` of the page before as it is"
+
+
+#: What may be asked in which state, and what follows; in all others it is a conflict.
+ALLOWED = {
+    "cancel": {"queued": "cancelled", "running": "running"},
+    "resume": {"failed": "queued", "cancelled": "queued"},
+    "delete": {"succeeded": None, "failed": None, "cancelled": None},
+}
+
+
+@pytest.mark.parametrize("state", JobState)
+@pytest.mark.parametrize("ask", ALLOWED)
+def test_a_state_allows_what_it_allows(service, ask, state):
+    path = f"/v1/jobs/{in_state(service, state)}"
+    before = service.client.get(path).json()
+    answer = service.client.delete(path) if ask == "delete" else service.client.post(f"{path}/{ask}")
+    if state not in ALLOWED[ask]:
+        assert f"job {before['id']} is {state}: " in problem_of(answer, 409, "wrong-state")
+        assert service.client.get(path).json() == before
+    elif ask == "delete":
+        assert (answer.status_code, answer.content) == (204, b"")
+        problem_of(service.client.get(path), 404, "no-such-job")
+    else:
+        assert (answer.status_code, answer.json()["state"]) == (202, ALLOWED[ask][state])
+        assert answer.json() == service.client.get(path).json()
+        assert answer.json()["cancel_requested"] == (ask == "cancel")
+
+
+def test_to_cancel_twice_is_to_cancel(service):
+    path = f"/v1/jobs/{in_state(service, JobState.RUNNING)}"
+    first = service.client.post(f"{path}/cancel")
+    assert service.client.post(f"{path}/cancel").json() == first.json()
+
+
+def test_a_data_set_goes_when_no_job_needs_it(service, order):
+    path = f"/v1/datasets/{order['dataset']}"
+    job = service.submit(**order).json()["id"]
+    detail = problem_of(service.client.delete(path), 409, "dataset-in-use")
+    assert f"job {job} needs data set" in detail
+    service.client.post(f"/v1/jobs/{job}/cancel")
+    assert service.client.delete(path).status_code == 204
+    problem_of(service.client.get(path), 404, "no-such-dataset")
+    problem_of(service.client.delete(path), 404, "no-such-dataset")
+
+
+@pytest.mark.parametrize("state", ["queued", "running", "failed", "cancelled"])
+def test_a_job_without_a_result_says_so(service, state):
+    path = f"/v1/jobs/{in_state(service, JobState(state))}"
+    assert service.client.get(f"{path}/models").json() == {"items": []}
+    for of in (
+        "/result",
+        "/models/1",
+        "/models/1/export",
+        "/figures",
+        "/models/1/figures/loop.svg",
+        "/report",
+    ):
+        detail = problem_of(service.client.get(path + of), 409, "not-finished")
+        assert f"is {state} and has no result: " in detail
+        assert ("wait" in detail) == (state in ("queued", "running"))
+
+
+def test_the_course_of_a_search_is_read_from_a_generation_on(service):
+    job = queued(service.store).id
+    lease = claimed(service.store)
+    for generation in range(5):
+        service.store.leases.report(lease, brought_on(generation))
+    path = f"/v1/jobs/{job}/history"
+    points = service.client.get(path).json()["items"]
+    assert [point["generation"] for point in points] == list(range(5))
+    assert points[1] == {"generation": 1, "evaluations": 10, "best": {"3": 0.5}, "islands": [0.5, None]}
+    assert service.client.get(path, params={"after": 2}).json()["items"] == points[3:]
+    assert service.client.get(path, params={"after": 99}).json()["items"] == []

@@ -1,0 +1,195 @@
+"""Keys: without one nothing is seen, with one what is its owner's and its scopes allow, and not too fast."""
+
+import shutil
+import time
+
+import pytest
+from service import csv, emptied, kept, problem_of, queued, served, spec
+
+from islands_service.store.keys import SCOPES
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory, prepared_sqlite):
+    folder = tmp_path_factory.mktemp("service")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    with served(folder, require_keys=True, rate=0.0, max_active=3, max_stored=20_000) as running:
+        yield running
+
+
+@pytest.fixture
+def service(shared):
+    return emptied(shared)
+
+
+#: Every route that needs a key, and the scope that it needs.
+GUARDED = {
+    ("GET", "/v1/jobs"): "read",
+    ("POST", "/v1/jobs"): "write",
+    ("GET", "/v1/jobs/{job}"): "read",
+    ("DELETE", "/v1/jobs/{job}"): "write",
+    ("POST", "/v1/jobs/{job}/cancel"): "write",
+    ("POST", "/v1/jobs/{job}/resume"): "write",
+    ("GET", "/v1/jobs/{job}/history"): "read",
+    ("GET", "/v1/jobs/{job}/events"): "read",
+    ("GET", "/v1/jobs/{job}/models"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/export"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/figures"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/figures/{figure}.svg"): "read",
+    ("GET", "/v1/jobs/{job}/models/{rank}/simulation"): "read",
+    ("GET", "/v1/jobs/{job}/result"): "read",
+    ("GET", "/v1/jobs/{job}/figures"): "read",
+    ("GET", "/v1/jobs/{job}/figures/{figure}.svg"): "read",
+    ("GET", "/v1/jobs/{job}/report"): "read",
+    ("GET", "/v1/datasets"): "read",
+    ("POST", "/v1/datasets"): "write",
+    ("GET", "/v1/datasets/{dataset}"): "read",
+    ("DELETE", "/v1/datasets/{dataset}"): "write",
+    ("GET", "/metrics"): "metrics",
+}
+
+#: Routes that show nothing of anybody, and need no key.
+OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
+
+
+def asked(service, method, path, headers):
+    """Ask with a body where one is due."""
+    path = path.format(job="0" * 32, dataset="0" * 32, rank=1, figure="loop")
+    body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
+    if (method, path) == ("POST", "/v1/datasets"):
+        body = {"files": {"file": ("a.csv", b"")}}
+    return service.client.request(method, path, headers=headers, **body)
+
+
+def test_every_route_is_open_or_guarded(service):
+    document = service.client.get("/openapi.json").json()
+    routes = {(method.upper(), path) for path, entry in document["paths"].items() for method in entry}
+    assert routes == GUARDED.keys() | OPEN
+    for method, path in routes:
+        operation = document["paths"][path][method.lower()]
+        assert operation.get("security", []) == ([] if (method, path) in OPEN else [{"key": []}])
+
+
+@pytest.mark.parametrize(("method", "path"), GUARDED)
+def test_without_a_key_nothing_is_seen(service, method, path):
+    for headers in ({}, {"Authorization": "Basic aTpp"}, {"Authorization": "Bearer"}):
+        answer = asked(service, method, path, headers)
+        assert "this service needs a key" in problem_of(answer, 401, "no-key")
+        assert answer.headers["www-authenticate"].startswith("Bearer")
+    answer = asked(service, method, path, {"Authorization": "Bearer islands_wrong"})
+    assert problem_of(answer, 401, "no-key").startswith("the key is unknown")
+
+
+@pytest.mark.parametrize(("method", "path"), GUARDED)
+def test_a_key_opens_what_its_scopes_allow(service, method, path):
+    needed = GUARDED[method, path]
+    others = sorted(SCOPES.keys() - {needed})
+    answer = asked(service, method, path, service.key(*others))
+    assert problem_of(answer, 403, "scope-missing") == (
+        f"the key has the scopes {', '.join(others)}, this needs {needed}: ask for another key"
+    )
+    assert asked(service, method, path, service.key(needed)).status_code in (200, 404, 422)
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/readyz", "/problems/no-key", "/openapi.json", "/"])
+def test_what_shows_nothing_of_anybody_needs_no_key(service, path):
+    assert service.client.get(path).status_code == 200
+
+
+def test_a_key_sees_its_owners_own_alone(service):
+    mine, theirs = service.key(owner="me"), service.key(owner="them")
+    seen = {"me": queued(service.store, "me").id, "them": queued(service.store, "them").id}
+    kept(service.store, "me")
+    for header, owner in ((mine, "me"), (theirs, "them"), (service.key(owner="me"), "me")):
+        jobs = service.client.get("/v1/jobs", headers=header).json()["items"]
+        assert [job["id"] for job in jobs] == [seen[owner]]
+        datasets = service.client.get("/v1/datasets", headers=header).json()["items"]
+        assert len(datasets) == (owner == "me")
+        assert "owner" not in jobs[0]
+
+
+def test_the_same_bytes_of_two_owners_are_two_data_sets(service):
+    mine, theirs = service.key(), service.key()
+    files = {"file": ("a.csv", csv())}
+    first = service.client.post("/v1/datasets", files=files, headers=mine)
+    other = service.client.post("/v1/datasets", files=files, headers=theirs)
+    assert (first.status_code, other.status_code) == (201, 201)
+    path = first.headers["location"]
+    assert service.client.delete(path, headers=mine).status_code == 204
+    assert service.client.get(path, headers=theirs).status_code == 200
+
+
+def test_a_secret_is_kept_nowhere(service):
+    secret = service.key()["Authorization"].removeprefix("Bearer ")
+    service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {secret}"})
+    for path in service.settings.data_dir.rglob("*"):
+        assert path.is_dir() or secret.encode() not in path.read_bytes()
+    assert secret not in str(service.logs)
+
+
+def test_an_owner_has_so_many_jobs_and_no_more(service):
+    mine, theirs = service.key(owner="me"), service.key(owner="them")
+    order = spec(kept(service.store, "me"))
+    jobs = [service.submit(mine, **order, seed=seed).json()["id"] for seed in range(3)]
+    answer = service.submit(mine, **order, seed=9)
+    detail = problem_of(answer, 429, "quota-exceeded")
+    assert detail == "3 jobs are waiting or running, and 3 is the most: wait for some, or cancel some"
+    assert answer.headers["retry-after"] == "60"
+    assert service.submit(theirs, **spec(kept(service.store, "them"))).status_code == 202
+    service.client.post(f"/v1/jobs/{jobs[0]}/cancel", headers=mine)
+    assert service.submit(mine, **order, seed=9).status_code == 202
+
+
+def test_an_owner_has_so_many_bytes_and_no_more(service):
+    mine = service.key()
+
+    def upload(samples):
+        return service.client.post("/v1/datasets", files={"file": ("a.csv", csv(samples))}, headers=mine)
+
+    first = upload(400)
+    assert first.status_code == 201
+    answer = upload(401)
+    assert "MB is the most: delete some" in problem_of(answer, 429, "quota-exceeded")
+    assert upload(400).status_code == 200
+    service.client.delete(first.headers["location"], headers=mine)
+    assert upload(401).status_code == 201
+
+
+@pytest.fixture
+def strict(tmp_path, prepared_sqlite):
+    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
+    with served(tmp_path, require_keys=True, rate=2.0, burst=20) as running:
+        yield running
+
+
+def counted(service, headers, most=60):
+    """Ask until it is refused for asking; return how often it was not, and the refusal."""
+    for count in range(most):
+        answer = service.client.get("/v1/jobs", headers=headers)
+        if answer.status_code == 429:
+            return count, answer
+    return most, answer
+
+
+def test_a_key_asks_so_often_and_another_one_is_not_held_up(strict):
+    mine, theirs = strict.key(), strict.key()
+    count, answer = counted(strict, mine)
+    assert 20 <= count <= 30
+    detail = problem_of(answer, 429, "too-many-requests")
+    assert "more than 2 requests a second: wait" in detail
+    assert "?wait=30" in detail
+    assert strict.client.get("/v1/jobs", headers=theirs).status_code == 200
+    time.sleep(int(answer.headers["retry-after"]))
+    assert strict.client.get("/v1/jobs", headers=mine).status_code == 200
+
+
+@pytest.mark.parametrize(("wrong", "least"), [({"Authorization": "Bearer islands_guess"}, 2), ({}, 20)])
+def test_an_address_guesses_so_often(strict, wrong, least):
+    mine = strict.key()
+    count, answer = counted(strict, wrong)
+    assert least <= count <= least + 10
+    assert "wait" in problem_of(answer, 429, "too-many-requests")
+    assert int(answer.headers["retry-after"]) >= 1
+    assert strict.client.get("/v1/jobs", headers=mine).status_code == 200
+    assert strict.client.get("/healthz").status_code == 200

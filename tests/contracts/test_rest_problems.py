@@ -1,0 +1,198 @@
+"""Problems: what is not a success has one form, says what to do, and shows nothing of our insides."""
+
+import re
+import shutil
+
+import httpx
+import pytest
+from service import PROBLEM, problem_of, queued, served
+
+from islands_api.problems import PROBLEMS
+
+FORM = {"type", "title", "status", "detail", "request_id"}
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory, prepared_sqlite):
+    folder = tmp_path_factory.mktemp("service")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    with served(folder) as running:
+        running.app.add_api_route("/defect", defect)
+        running.app.add_api_route("/late", late, methods=["POST"])
+        yield running
+
+
+async def defect():
+    password = "secret"
+    raise ZeroDivisionError(f"the password is {password}")
+
+
+def late():
+    raise KeyError("in a thread")
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("PUT", "/v1/jobs", "GET, POST"),
+        ("DELETE", "/v1/datasets", "GET, POST"),
+        ("PATCH", "/v1/jobs/{job}", "GET, DELETE"),
+        ("GET", "/v1/jobs/{job}/cancel", "POST"),
+        ("OPTIONS", "/v1/jobs/{job}/models/1", "GET"),
+        ("TRACE", "/healthz", "GET"),
+        ("POST", "/", "GET"),
+        ("POST", "/openapi.json", "GET, HEAD"),
+    ],
+)
+def test_a_method_that_is_not_allowed_is_told_those_that_are(service, method, path, allowed):
+    path = path.format(job=queued(service.store).id)
+    answer = service.client.request(method, path)
+    assert (
+        problem_of(answer, 405, "method-not-allowed") == f"{path} does not take {method}: it takes {allowed}"
+    )
+    assert answer.headers["allow"] == allowed
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/nothing",
+        "/v1",
+        "/v2/jobs",
+        "/v1/jobs/",
+        "/v1/datasets/",
+        "/v1/jobs/a/b/c",
+        "/v1/jobs/%2e%2e/%2e%2e/etc/passwd",
+        "/dashboard/../app.py",
+        "/dashboard/..%2fapp.py",
+        "/dashboard/nothing.js",
+        "/docs",
+        "/redoc",
+        "/problems/nothing",
+        "/.git/config",
+        "//v1/jobs",
+    ],
+)
+def test_where_nothing_is_nothing_is_found(service, path):
+    url = httpx.URL(service.url).copy_with(raw_path=path.encode())
+    problem_of(service.client.get(url), 404, "not-found")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/v1/jobs/%00",
+        "/v1/jobs/a b",
+        "/v1/jobs/" + "a" * 65,
+        "/v1/jobs/ü",
+        "/v1/datasets/%00",
+        "/v1/datasets/" + "a" * 49,
+        "/v1/jobs?limit=0",
+        "/v1/jobs?limit=201",
+        "/v1/jobs?limit=many",
+        "/v1/jobs?state=sleeping",
+        "/v1/jobs?cursor=" + "x" * 201,
+        "/v1/jobs/{job}?wait=-1",
+        "/v1/jobs/{job}?wait=61",
+        "/v1/jobs/{job}?wait=nan",
+        "/v1/jobs/{job}/history?after=-2",
+        "/v1/jobs/{job}/history?after=2147483648",
+        "/v1/jobs/{job}/models/0",
+        "/v1/jobs/{job}/models/best",
+        "/v1/jobs/{job}/figures/A.svg",
+    ],
+)
+def test_a_parameter_out_of_its_range_is_named(service, path):
+    answer = service.client.get(path.format(job=queued(service.store).id))
+    detail = problem_of(answer, 422, "invalid-request")
+    (error,) = answer.json()["errors"]
+    assert error["pointer"] in {
+        "job",
+        "dataset",
+        "limit",
+        "state",
+        "cursor",
+        "wait",
+        "after",
+        "rank",
+        "figure",
+    }
+    assert detail == f"{error['pointer']}: {error['detail']}"
+
+
+@pytest.mark.parametrize("header", ["-1", "x", "1.5", str(2**63)])
+def test_a_header_out_of_its_range_is_named(service, header):
+    path = f"/v1/jobs/{queued(service.store).id}/events"
+    answer = service.client.get(path, headers={"Last-Event-ID": header})
+    assert problem_of(answer, 422, "invalid-request").startswith("last-event-id: ")
+
+
+@pytest.mark.parametrize(("method", "path"), [("GET", "/defect"), ("POST", "/late")])
+def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
+    answer = service.client.request(method, path, headers={"X-Request-ID": "find4me"})
+    assert problem_of(answer, 500, "defect") == (
+        "This is a defect of the service. Please report it with the request's id."
+    )
+    assert answer.json().keys() == FORM
+    assert answer.headers["x-request-id"] == "find4me"
+    assert not re.search(r"secret|Traceback|Error|\.py", answer.text)
+    entry = [each for each in service.logs if each.get("exc_info") and each["request_id"] == "find4me"][-1]
+    assert (entry["event"], entry["log_level"]) == ("defect", "error")
+    assert isinstance(entry["exc_info"], ZeroDivisionError | KeyError)
+
+
+def test_a_defect_ends_neither_the_connection_nor_the_service(service):
+    for _ in range(3):
+        assert service.client.get("/defect").status_code == 500
+        assert service.client.get("/healthz").status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/nothing", "/v1/jobs", "/defect", "/", "/v1/jobs?limit=0"])
+def test_every_answer_has_safe_headers(service, path):
+    headers = service.client.get(path).headers
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["x-frame-options"] == "DENY"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["cross-origin-resource-policy"] == "same-origin"
+    assert "default-src 'self'" in headers["content-security-policy"]
+    assert "server" not in headers
+    assert "strict-transport-security" not in headers
+    assert not [name for name in headers if name.startswith("access-control")]
+
+
+def test_a_request_id_is_kept_if_it_is_one(service):
+    def given(sent):
+        headers = {"X-Request-ID": sent.encode("latin-1")}
+        return service.client.get("/healthz", headers=headers).headers["x-request-id"]
+
+    assert given("abc123") == "abc123"
+    made = {given(sent) for sent in ("", "a b", "a-b", "x" * 65, "<script>", "é")}
+    assert len(made) == 6
+    assert all(re.fullmatch("[0-9a-f]{16}", each) for each in made)
+
+
+def test_every_type_of_problem_is_explained_where_it_points_to(service):
+    types = {problem.type: problem for problem in PROBLEMS.values()}
+    for kind, problem in types.items():
+        answer = service.client.get(f"/problems/{kind}")
+        assert answer.status_code == 200
+        assert answer.json() == {
+            "type": f"/problems/{kind}",
+            "status": int(problem.status),
+            "title": problem.title,
+        }
+
+
+def test_one_type_has_one_status():
+    by_type = {}
+    for problem in PROBLEMS.values():
+        by_type.setdefault(problem.type, set()).add((problem.status, problem.title))
+    assert all(len(found) == 1 for found in by_type.values())
+
+
+def test_the_form_of_a_problem_is_documented(service):
+    schema = service.client.get("/openapi.json").json()["components"]["schemas"]["ProblemDocument"]
+    assert schema["properties"].keys() == FORM | {"errors"}
+    answer = service.client.get("/nothing")
+    assert answer.headers["content-type"] == PROBLEM
+    assert answer.json().keys() == FORM

@@ -1,0 +1,213 @@
+"""What every store owes to those who submit: nothing accepted is lost, a key is one job, a quota is kept.
+
+Every law of the files `test_store*.py` holds on SQLite and on PostgreSQL.
+"""
+
+import json
+import time
+from functools import partial
+
+import pytest
+from stores import (
+    ALICE,
+    BOB,
+    FAILED,
+    MANY,
+    asked,
+    at_once,
+    child,
+    claimed,
+    contents,
+    job_in,
+    kinds,
+    several,
+    submitted,
+)
+
+from islands_service.jobs import (
+    ACTIVE,
+    TERMINAL,
+    IdempotencyConflict,
+    JobState,
+    QuotaExceeded,
+)
+from islands_service.store import Store
+
+LOOK = """
+import json, sys
+from islands_service.store import Store
+url, owner, job = sys.argv[1:]
+with Store(url) as store:
+    found = store.jobs.get(owner, job)
+    print(json.dumps([found.id, found.state, found.spec, found.created]))
+"""
+
+
+def everything(submission):
+    return {name: getattr(submission, name) for name in ("owner", "spec", "kind", "name", "priority")}
+
+
+def test_a_job_begins_in_the_queue_as_it_was_asked_for(store):
+    before = time.time()
+    submission = asked(
+        kind="discrepancy", name="Bühne 3", priority=-7, spec={"a": [1, 2.5, None, True, "ü"], "b": {}}
+    )
+    job, new = store.jobs.submit(submission)
+    assert new
+    assert everything(job) == everything(submission)
+    assert (job.state, job.version, job.attempt, job.cancel_requested) == (JobState.QUEUED, 1, 0, False)
+    assert (job.progress, job.checkpoint, job.summary, job.problem) == (None,) * 4
+    assert (job.started, job.finished) == (None, None)
+    assert job.created == pytest.approx(job.updated, abs=0.1)
+    assert before - 1 < job.created < time.time() + 1
+    assert kinds(store, job.id) == ["queued"]
+
+
+def test_what_was_accepted_is_there_when_the_store_is_opened_again(database):
+    with Store(database) as store:
+        job = submitted(store)
+    with Store(database) as store:
+        assert store.jobs.get(ALICE, job.id) == job
+
+
+def test_what_was_accepted_is_seen_at_once_by_whoever_else_has_the_store_open(database):
+    with several(database, 2) as (one, other):
+        for _ in range(20):
+            job = submitted(one)
+            assert other.jobs.get(ALICE, job.id) == job
+            assert [event.number for event in other.jobs.events(job.id)] == [1]
+
+
+def test_what_was_accepted_is_seen_by_another_process(store, database):
+    job = submitted(store)
+    with child(LOOK, database, ALICE, job.id) as other:
+        said, _ = other.communicate(timeout=60)
+    assert json.loads(said) == [job.id, "queued", job.spec, job.created]
+
+
+def test_floats_come_back_bit_for_bit(store):
+    spec = {"values": [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0]}
+    job = submitted(store, spec=spec)
+    assert repr(store.jobs.get(ALICE, job.id).spec) == repr(spec)
+
+
+def test_two_requests_without_a_key_are_two_jobs(store):
+    assert submitted(store).id != submitted(store).id
+
+
+def test_the_same_key_with_the_same_request_is_the_same_job(store):
+    job, new = store.jobs.submit(asked(spec={"a": 1, "b": 2}, idempotency_key="k"))
+    before = contents(store)
+    again, new_again = store.jobs.submit(asked(spec={"b": 2, "a": 1}, idempotency_key="k"))
+    assert (new, new_again) == (True, False)
+    assert again == job
+    assert contents(store) == before
+
+
+@pytest.mark.parametrize(
+    "change", [{"spec": {"seed": 8}}, {"kind": "other"}, {"name": "other"}, {"priority": 1}]
+)
+def test_the_same_key_with_another_request_is_refused_and_leaves_the_job(store, change):
+    job = submitted(store, idempotency_key="k")
+    before = contents(store)
+    with pytest.raises(IdempotencyConflict, match=job.id):
+        submitted(store, idempotency_key="k", **change)
+    assert contents(store) == before
+
+
+@pytest.mark.parametrize("state", JobState)
+def test_a_key_names_its_job_in_every_state(store, state):
+    job = job_in(store, state, idempotency_key="k")
+    assert store.jobs.submit(asked(idempotency_key="k")) == (job, False)
+
+
+def test_every_owner_has_keys_of_its_own(store):
+    assert submitted(store, ALICE, idempotency_key="k").id != submitted(store, BOB, idempotency_key="k").id
+
+
+def test_a_deleted_jobs_key_is_free_again(store):
+    job = submitted(store, idempotency_key="k")
+    store.jobs.cancel(ALICE, job.id)
+    store.jobs.delete(ALICE, job.id)
+    again, new = store.jobs.submit(asked(idempotency_key="k", spec={"seed": 8}))
+    assert new
+    assert again.id != job.id
+
+
+def test_many_submitters_with_the_same_key_get_one_job(database):
+    with several(database) as stores:
+        for turn in range(5):
+            submit = asked(idempotency_key=f"k{turn}")
+            answers = at_once([partial(stores[i % 4].jobs.submit, submit) for i in range(MANY)])
+            assert len({job.id for job, _ in answers}) == 1
+            assert sum(new for _, new in answers) == 1
+            assert len(stores[0].jobs.page(ALICE).jobs) == turn + 1
+
+
+def test_many_submitters_with_the_same_key_and_two_requests_get_one_job_and_conflicts(database):
+    with several(database) as stores:
+        answers = at_once(
+            [
+                lambda store=stores[i // 2 % 4], i=i: store.jobs.submit(
+                    asked(idempotency_key="k", spec={"seed": i % 2})
+                )
+                for i in range(MANY)
+            ]
+        )
+        refused = [answer for answer in answers if isinstance(answer, IdempotencyConflict)]
+        taken = [answer for answer in answers if isinstance(answer, tuple)]
+        assert (len(refused), len(taken)) == (MANY // 2, MANY // 2)
+        assert len({job.id for job, _ in taken}) == 1
+
+
+def test_jobs_that_wait_or_run_take_up_the_quota(store):
+    job_in(store, JobState.RUNNING)
+    submitted(store)
+    before = contents(store)
+    with pytest.raises(QuotaExceeded, match="2 jobs are waiting or running, and 2 is the most"):
+        store.jobs.submit(asked(), 2)
+    assert contents(store) == before
+    assert store.jobs.submit(asked(), 3)[1]
+
+
+@pytest.mark.parametrize("state", TERMINAL)
+def test_finished_jobs_take_up_no_quota(store, state):
+    assert state not in ACTIVE
+    job_in(store, state)
+    assert store.jobs.submit(asked(), 1)[1]
+
+
+def test_a_job_that_was_cancelled_or_failed_makes_room_at_once(store):
+    waiting = submitted(store)
+    with pytest.raises(QuotaExceeded):
+        store.jobs.submit(asked(), 1)
+    store.jobs.cancel(ALICE, waiting.id)
+    assert store.jobs.submit(asked(), 1)[1]
+    store.leases.finish(claimed(store), FAILED)
+    assert store.jobs.submit(asked(), 1)[1]
+
+
+def test_the_jobs_of_others_take_up_no_quota(store):
+    submitted(store, BOB)
+    assert store.jobs.submit(asked(ALICE), 1)[1]
+
+
+def test_a_quota_of_nothing_lets_nothing_in(store):
+    with pytest.raises(QuotaExceeded):
+        store.jobs.submit(asked(), 0)
+
+
+def test_a_replay_is_answered_at_a_full_quota(store):
+    job, _ = store.jobs.submit(asked(idempotency_key="k"), 1)
+    assert store.jobs.submit(asked(idempotency_key="k"), 1) == (job, False)
+
+
+@pytest.mark.parametrize("quota", [1, 7])
+def test_many_submitters_at_once_get_exactly_their_quota(database, quota):
+    with several(database) as stores:
+        answers = at_once(
+            [lambda store=stores[i % 4]: store.jobs.submit(asked(), quota) for i in range(MANY)]
+        )
+        refused = [answer for answer in answers if isinstance(answer, QuotaExceeded)]
+        assert len(refused) == MANY - quota
+        assert len(stores[0].jobs.page(ALICE).jobs) == quota

@@ -1,0 +1,272 @@
+"""What every store owes to data sets and keys, and what it forgets in time."""
+
+import time
+from functools import partial
+from hashlib import sha256
+
+import pytest
+from sqlalchemy import update
+from stores import (
+    ALICE,
+    BLOB,
+    BOB,
+    CANCELLED,
+    FAILED,
+    FOUND,
+    LONG,
+    MANY,
+    at_once,
+    brought_on,
+    claimed,
+    contents,
+    job_in,
+    several,
+    submitted,
+)
+
+from islands.errors import SettingsError
+from islands_service.jobs import TERMINAL, JobState, QuotaExceeded
+from islands_service.store.datasets import DatasetInUse, NoSuchDataset, dataset_id
+from islands_service.store.keys import PREFIX, SCOPES, NoSuchKey
+from islands_service.store.tables import datasets, jobs
+
+PREVIEW = {"columns": [{"name": "u µ", "unit": "V", "mean": 0.1}], "warnings": []}
+READ = frozenset({"read"})
+
+
+def blob(number):
+    return sha256(b"%d" % number).hexdigest()
+
+
+def added(store, owner=ALICE, number=0, size=1000, **limits):
+    return store.datasets.add(owner, f"{number}.csv", ".csv", blob(number), size, PREVIEW, **limits)
+
+
+def test_a_data_set_is_kept_as_it_was_given(store):
+    dataset, new = store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, PREVIEW)
+    assert new
+    assert (dataset.owner, dataset.name, dataset.suffix, dataset.blob, dataset.bytes, dataset.preview) == (
+        *(ALICE, "Bühne.csv", ".csv"),
+        *(BLOB, 12, PREVIEW),
+    )
+    assert abs(dataset.created - time.time()) < 60
+    assert store.datasets.get(ALICE, dataset.id) == dataset
+
+
+def test_the_same_bytes_in_the_same_format_are_the_same_data_set(store):
+    dataset, _ = store.datasets.add(ALICE, "a.csv", ".csv", BLOB, 12, PREVIEW)
+    before = contents(store)
+    assert store.datasets.add(ALICE, "other.csv", ".csv", BLOB, 12, {"other": 1}) == (dataset, False)
+    assert contents(store) == before
+    other, new = store.datasets.add(ALICE, "a.npz", ".npz", BLOB, 12, PREVIEW)
+    assert new
+    assert other.id != dataset.id
+    changed, new = store.datasets.add(ALICE, "a.csv", ".csv", "c" * 64, 12, PREVIEW)
+    assert new
+    assert changed.id != dataset.id
+
+
+def test_two_owners_of_the_same_bytes_have_a_data_set_each(store):
+    (mine, _), (theirs, new) = added(store, ALICE), added(store, BOB)
+    assert new
+    assert mine.id == theirs.id
+    store.datasets.delete(ALICE, mine.id)
+    assert store.datasets.get(BOB, theirs.id) == theirs
+
+
+def test_data_sets_may_have_so_many_bytes_and_no_more(store):
+    added(store, ALICE, 1, 600, most_bytes=1000)
+    added(store, BOB, 1, 600, most_bytes=1000)
+    before = contents(store)
+    with pytest.raises(QuotaExceeded, match=r"0\.0 MB is the most"):
+        added(store, ALICE, 2, 401, most_bytes=1000)
+    assert contents(store) == before
+    assert added(store, ALICE, 3, 400, most_bytes=1000)[1]
+    # What is there already takes no more room.
+    assert not added(store, ALICE, 3, 400, most_bytes=1000)[1]
+
+
+def test_bytes_are_counted_exactly_however_many(store):
+    huge = 2**52
+    added(store, ALICE, 1, huge)
+    added(store, ALICE, 2, huge)
+    assert added(store, ALICE, 3, 1, most_bytes=2 * huge + 1)[1]
+    with pytest.raises(QuotaExceeded):
+        added(store, ALICE, 4, 1, most_bytes=2 * huge + 1)
+
+
+def test_many_uploads_of_the_same_bytes_make_one_data_set(database):
+    with several(database) as stores:
+        answers = at_once([partial(added, stores[i % 4]) for i in range(MANY)])
+        assert sum(new for _, new in answers) == 1
+        assert len({dataset.id for dataset, _ in answers}) == 1
+
+
+def test_many_uploads_at_once_get_exactly_the_bytes_that_there_are(database):
+    with several(database) as stores:
+        answers = at_once([partial(added, stores[i % 4], ALICE, i, 100, most_bytes=550) for i in range(MANY)])
+        assert sum(isinstance(answer, QuotaExceeded) for answer in answers) == MANY - 5
+        assert len(stores[0].datasets.page(ALICE)[0]) == 5
+
+
+def test_pages_of_data_sets_are_newest_first_and_hold_each_once(store):
+    made = [added(store, number=number)[0] for number in range(7)]
+    for moment in (None, 2.5):
+        if moment is not None:
+            store.database.write(lambda connection: connection.execute(update(datasets).values(created=2.5)))
+            made = [store.datasets.get(ALICE, each.id) for each in made]
+        expected = sorted(made, key=lambda each: (each.created, each.id), reverse=True)
+        for limit in (1, 3, 7, 8):
+            found, after = [], None
+            while True:
+                page, after = store.datasets.page(ALICE, after, limit)
+                assert len(page) <= limit
+                found += page
+                if after is None:
+                    break
+            assert found == expected
+    assert store.datasets.page(BOB) == ((), None)
+
+
+@pytest.mark.parametrize("state", JobState)
+def test_a_data_set_can_be_deleted_unless_a_job_needs_it(store, state):
+    dataset, _ = added(store)
+    other, _ = added(store, number=1)
+    job_in(store, state, spec={"records": [{"dataset": dataset.id, "use": "estimation"}]})
+    before = contents(store)
+    if state in TERMINAL:
+        store.datasets.delete(ALICE, dataset.id)
+        with pytest.raises(NoSuchDataset, match=dataset.id):
+            store.datasets.get(ALICE, dataset.id)
+    else:
+        with pytest.raises(DatasetInUse, match=dataset.id):
+            store.datasets.delete(ALICE, dataset.id)
+        assert contents(store) == before
+    store.datasets.delete(ALICE, other.id)
+    assert store.datasets.page(ALICE)[0] == (() if state in TERMINAL else (dataset,))
+
+
+def test_the_job_of_another_does_not_hold_ones_data_set(store):
+    dataset, _ = added(store, ALICE)
+    added(store, BOB)
+    submitted(store, BOB, spec={"dataset": dataset.id})
+    store.datasets.delete(ALICE, dataset.id)
+
+
+def test_a_data_set_that_is_not_there_cannot_be_deleted(store):
+    with pytest.raises(NoSuchDataset):
+        store.datasets.delete(ALICE, dataset_id(BLOB, ".csv"))
+
+
+def test_a_key_opens_with_its_secret_alone(store):
+    key, secret = store.keys.create("laptop", frozenset(SCOPES), ALICE)
+    assert store.keys.find(secret) == key
+    assert (key.owner, key.name, key.scopes) == (ALICE, "laptop", frozenset(SCOPES))
+    assert (key.expires, key.revoked, key.expired) == (None, None, False)
+    for wrong in (secret[:-1], secret + "a", secret.swapcase(), "", PREFIX, key.id):
+        assert store.keys.find(wrong) is None
+
+
+def test_a_secret_is_written_nowhere(store):
+    _, secret = store.keys.create("laptop", READ)
+    assert secret.startswith(PREFIX)
+    kept = repr(contents(store))
+    assert secret not in kept
+    assert secret.removeprefix(PREFIX) not in kept
+
+
+def test_no_two_keys_are_alike(store):
+    made = [store.keys.create("same", READ) for _ in range(20)]
+    assert len({secret for _, secret in made}) == 20
+    assert len({key.id for key, _ in made}) == 20
+    # Unless an owner is given, each opens what is its own.
+    assert len({key.owner for key, _ in made}) == 20
+    assert store.keys.all() == tuple(sorted((key for key, _ in made), key=lambda key: (key.created, key.id)))
+
+
+@pytest.mark.parametrize("scopes", [frozenset(), frozenset({"read", "rule"})])
+def test_a_key_of_an_unknown_scope_is_not_made(store, scopes):
+    with pytest.raises(SettingsError, match="take some of read, write, metrics"):
+        store.keys.create("laptop", scopes)
+    assert store.keys.all() == ()
+
+
+def test_a_key_expires(store):
+    lasting, secret = store.keys.create("a", READ, seconds=LONG)
+    over, old = store.keys.create("b", READ, seconds=-1.0)
+    assert (lasting.expired, over.expired) == (False, True)
+    assert lasting.expires == pytest.approx(lasting.created + LONG, abs=0.1)
+    assert (store.keys.find(secret).expired, store.keys.find(old).expired) == (False, True)
+
+
+def test_a_revoked_key_stays_revoked_since_the_first_time(store):
+    key, secret = store.keys.create("a", READ)
+    revoked = store.keys.revoke(key.id)
+    assert revoked.revoked >= key.created
+    assert store.keys.find(secret) == revoked
+    assert store.keys.revoke(key.id) == revoked
+    with pytest.raises(NoSuchKey, match="0000"):
+        store.keys.revoke("0000")
+
+
+def test_a_key_that_opens_nothing_is_not_valid(store):
+    assert not store.keys.any_valid()
+    store.keys.create("expired", READ, seconds=-1.0)
+    key, _ = store.keys.create("revoked", READ)
+    assert store.keys.any_valid()
+    store.keys.revoke(key.id)
+    assert not store.keys.any_valid()
+    store.keys.create("lasting", READ, seconds=LONG)
+    assert store.keys.any_valid()
+
+
+def test_what_was_finished_long_ago_is_forgotten_and_nothing_else(store):
+    old = {state: job_in(store, state).id for state in TERMINAL}
+    fresh = {state: job_in(store, state).id for state in (*TERMINAL, JobState.RUNNING)}
+    waiting = submitted(store)
+    key, _ = store.keys.create("a", READ)
+    dataset, _ = added(store)
+
+    def age(connection):
+        ago = update(jobs).values(created=jobs.c.created - LONG, updated=jobs.c.updated - LONG)
+        connection.execute(ago)
+        connection.execute(
+            update(jobs).where(jobs.c.id.in_(old.values())).values(finished=jobs.c.finished - LONG)
+        )
+
+    store.database.write(age)
+    assert store.retention.forget(2 * LONG) == 0
+    assert store.retention.forget(LONG - 60) == 3
+    left = {job.id for job in store.jobs.page(ALICE).jobs}
+    assert left == {*fresh.values(), waiting.id}
+    assert not {row[0] for row in contents(store)["models"]} & set(old.values())
+    assert store.keys.all() == (key,)
+    assert store.datasets.get(ALICE, dataset.id) == dataset
+
+
+def test_a_job_that_was_resumed_is_not_forgotten(store):
+    job = job_in(store, JobState.FAILED)
+    store.jobs.resume(ALICE, job.id)
+    assert store.retention.forget(-LONG) == 0
+
+
+def test_blobs_are_named_as_long_as_something_needs_them(store):
+    assert store.retention.named_blobs() == frozenset()
+    added(store, number=1)
+    added(store, BOB, number=1)
+    ends = {}
+    for generation, outcome in enumerate((FOUND, FAILED, CANCELLED), start=10):
+        submitted(store)
+        lease = claimed(store)
+        store.leases.report(lease, brought_on(generation))
+        store.leases.finish(lease, outcome)
+        ends[outcome.state] = lease.job.id
+    store.results.keep(ends[JobState.SUCCEEDED], {"a": "a" * 64, "b": "b" * 64})
+    checkpoints = {brought_on(generation).checkpoint for generation in (11, 12)}
+    named = {blob(1), "a" * 64, "b" * 64} | checkpoints
+    assert store.retention.named_blobs() == named
+    store.datasets.delete(ALICE, dataset_id(blob(1), ".csv"))
+    assert store.retention.named_blobs() == named
+    for job in ends.values():
+        store.jobs.delete(ALICE, job)
+    assert store.retention.named_blobs() == {blob(1)}

@@ -1,0 +1,168 @@
+"""What every store owes to watchers: events are numbered without gaps, in the order they are seen in."""
+
+import threading
+
+import pytest
+from stores import (
+    ALICE,
+    EXPIRED,
+    FAILED,
+    FOUND,
+    LONG,
+    asked,
+    at_once,
+    brought_on,
+    claimed,
+    job_in,
+    kinds,
+    several,
+    submitted,
+)
+
+from islands_service.jobs import JobState, WrongState
+from islands_service.store.leases import ATTEMPTS
+
+
+def test_everything_that_happens_to_a_job_is_an_event_and_its_number_is_the_jobs_version(store):
+    job = submitted(store)
+    lease = claimed(store, EXPIRED)
+    store.leases.report(lease, brought_on(1))
+    lease = claimed(store)
+    store.leases.release(lease)
+    lease = claimed(store)
+    store.leases.finish(lease, FAILED)
+    store.jobs.resume(ALICE, job.id)
+    for _ in range(ATTEMPTS):
+        lease = claimed(store, EXPIRED)
+    assert store.leases.claim("another", LONG) is None
+    store.jobs.resume(ALICE, job.id)
+    store.jobs.cancel(ALICE, job.id)
+    store.jobs.resume(ALICE, job.id)
+    lease = claimed(store)
+    store.jobs.cancel(ALICE, job.id)
+    store.leases.finish(lease, FOUND)
+    assert kinds(store, job.id) == [
+        *("queued", "running", "progress", "running", "queued", "running", "failed"),
+        *("queued", *["running"] * ATTEMPTS, "failed", "queued", "cancelled"),
+        *("queued", "running", "cancelling", "succeeded"),
+    ]
+    times = [event.at for event in store.jobs.events(job.id)]
+    assert times == sorted(times)
+    assert times[-1] == store.jobs.get(ALICE, job.id).updated
+
+
+def test_events_are_read_from_a_number_on(store):
+    job = job_in(store, JobState.SUCCEEDED)
+    other = submitted(store)
+    assert [event.number for event in store.jobs.events(job.id)] == [1, 2, 3]
+    assert [event.number for event in store.jobs.events(job.id, after=1)] == [2, 3]
+    assert store.jobs.events(job.id, after=3) == ()
+    assert {event.job for event in store.jobs.events(other.id)} == {other.id}
+    assert store.jobs.events("0" * 32) == ()
+
+
+def test_versions_of_many_jobs_are_told_at_once(store):
+    jobs = [job_in(store, state).id for state in (JobState.SUCCEEDED, JobState.RUNNING, JobState.QUEUED)]
+    assert store.jobs.versions([*jobs, "0" * 32]) == dict(zip(jobs, (3, 2, 1), strict=True))
+    assert store.jobs.versions(jobs[:1]) == {jobs[0]: 3}
+    assert store.jobs.versions([]) == {}
+
+
+def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
+    """While the job's coordinator reports, its owner changes its mind, and both groups are committed."""
+    with several(database, 3) as (coordinator, owner, reader):
+        job = submitted(coordinator)
+        over = threading.Event()
+
+        def bring_on():
+            for turn in range(40):
+                lease = coordinator.leases.claim(f"{turn}", LONG)
+                if lease is None:
+                    continue
+                for generation in range(3):
+                    coordinator.leases.report(lease, brought_on(generation))
+                coordinator.leases.release(lease)
+
+        def change_ones_mind():
+            for turn in range(60):
+                ask = (owner.jobs.cancel, owner.jobs.resume)[turn % 2]
+                try:
+                    ask(ALICE, job.id)
+                except WrongState:
+                    continue
+
+        def read():
+            seen = []
+            while not over.is_set():
+                seen += [event.number for event in reader.jobs.events(job.id, seen[-1] if seen else 0)]
+            seen += [event.number for event in reader.jobs.events(job.id, seen[-1] if seen else 0)]
+            return seen
+
+        def write():
+            failures = [each for each in at_once([bring_on, change_ones_mind]) if each is not None]
+            over.set()
+            return failures
+
+        failures, *readers = at_once([write, read, read])
+        assert failures == []
+        last = reader.jobs.versions([job.id])[job.id]
+        assert last > 10
+        for seen in readers:
+            assert seen == list(range(1, last + 1))
+
+
+def test_a_reader_that_sees_a_version_finds_its_event(database):
+    with several(database, 2) as (writer, reader):
+        job = submitted(writer)
+        lease = claimed(writer)
+        over = threading.Event()
+
+        def write():
+            try:
+                for generation in range(100):
+                    writer.leases.report(lease, brought_on(generation))
+            finally:
+                over.set()
+
+        def read():
+            looks = 0
+            while not over.is_set():
+                version = reader.jobs.versions([job.id])[job.id]
+                assert reader.jobs.events(job.id, version - 1)[0].number == version
+                looks += 1
+            return looks
+
+        written, looks = at_once([write, read])
+        assert written is None
+        assert looks > 0
+
+
+@pytest.mark.parametrize("waiting", [0, 3])
+def test_the_standing_of_all_jobs_is_told_without_names(store, waiting):
+    before = store.jobs.standing()
+    assert before.counts == dict.fromkeys(JobState, 0)
+    assert (before.oldest, before.running, before.leases) == (0.0, {}, 0)
+    for state in (JobState.SUCCEEDED, JobState.FAILED, JobState.FAILED):
+        job_in(store, state)
+    running = job_in(store, JobState.RUNNING)
+    store.leases.report(claimed_again := claimed_as(store, asked(priority=9)), brought_on(4))
+    store.leases.beat(claimed_again, EXPIRED)
+    for _ in range(waiting):
+        submitted(store, "bob")
+    standing = store.jobs.standing()
+    assert standing.counts == {
+        JobState.QUEUED: waiting,
+        JobState.RUNNING: 2,
+        JobState.SUCCEEDED: 1,
+        JobState.FAILED: 2,
+        JobState.CANCELLED: 0,
+    }
+    # An expired lease is nobody's work.
+    assert standing.running == {running.id: {}}
+    assert standing.leases == 1
+    assert (standing.oldest > 0) == bool(waiting)
+
+
+def claimed_as(store, submission):
+    store.jobs.submit(submission)
+    return claimed(store)

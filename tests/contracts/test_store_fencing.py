@@ -1,0 +1,165 @@
+"""What every store owes to a coordinator that has lost its job: it writes nothing more, whatever it tries."""
+
+from functools import partial
+
+import pytest
+from stores import (
+    ALICE,
+    CANCELLED,
+    EXPIRED,
+    FAILED,
+    FOUND,
+    LONG,
+    at_once,
+    brought_on,
+    claimed,
+    contents,
+    kinds,
+    several,
+    submitted,
+)
+
+from islands_service.jobs import JobState, LeaseLost, Report
+
+#: All that a coordinator may do under a lease.
+WRITES = {
+    "beat": lambda leases, lease: leases.beat(lease, LONG),
+    "report": lambda leases, lease: leases.report(lease, brought_on(9)),
+    "progress alone": lambda leases, lease: leases.report(lease, Report({"phase": "search"})),
+    "release": lambda leases, lease: leases.release(lease),
+    "release of an attempt": lambda leases, lease: leases.release(lease, attempted=True),
+    "finish": lambda leases, lease: leases.finish(lease, FOUND),
+    "fail": lambda leases, lease: leases.finish(lease, FAILED),
+    "let go": lambda leases, lease: leases.finish(lease, CANCELLED),
+}
+
+
+def taken_over(store, lease):
+    claimed(store)
+
+
+def taken_over_and_brought_on(store, lease):
+    store.leases.report(claimed(store), brought_on(5))
+
+
+def given_back(store, lease):
+    store.leases.release(claimed(store))
+
+
+def given_back_by_itself(store, lease):
+    store.leases.release(lease)
+
+
+def finished_by_another(store, lease):
+    store.leases.finish(claimed(store), FOUND)
+
+
+def finished_by_itself(store, lease):
+    store.leases.finish(lease, FOUND)
+
+
+def failed_and_waiting_again(store, lease):
+    store.leases.finish(lease, FAILED)
+    store.jobs.resume(ALICE, lease.job.id)
+
+
+def failed_and_claimed_again(store, lease):
+    failed_and_waiting_again(store, lease)
+    claimed(store)
+
+
+def cancelled_and_deleted(store, lease):
+    store.leases.finish(lease, CANCELLED)
+    store.jobs.delete(ALICE, lease.job.id)
+
+
+#: Ways to lose a job whose lease has expired.
+LOSSES = [
+    taken_over,
+    taken_over_and_brought_on,
+    given_back,
+    given_back_by_itself,
+    finished_by_another,
+    finished_by_itself,
+    failed_and_waiting_again,
+    failed_and_claimed_again,
+    cancelled_and_deleted,
+]
+
+
+@pytest.mark.parametrize("loss", LOSSES, ids=lambda loss: loss.__name__)
+def test_who_has_lost_a_job_changes_nothing(store, loss):
+    job = submitted(store)
+    submitted(store, priority=-1)
+    lease = claimed(store, EXPIRED)
+    loss(store, lease)
+    before = contents(store)
+    for write in WRITES.values():
+        with pytest.raises(LeaseLost, match=job.id):
+            write(store.leases, lease)
+        assert contents(store) == before
+
+
+@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
+def test_a_lease_that_has_expired_counts_until_somebody_takes_the_job(store, write):
+    """Nobody else is there: to stop would only lose time."""
+    submitted(store)
+    lease = claimed(store, EXPIRED)
+    before = contents(store)
+    write(store.leases, lease)
+    assert contents(store) != before
+
+
+@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
+def test_a_job_under_a_lease_may_be_written_by_it_when_it_is_to_be_cancelled(store, write):
+    job = submitted(store)
+    lease = claimed(store)
+    store.jobs.cancel(ALICE, job.id)
+    write(store.leases, lease)
+
+
+def test_a_lease_is_of_one_job(store):
+    submitted(store), submitted(store)
+    leases = claimed(store), claimed(store)
+    assert [lease.epoch for lease in leases] == [1, 1]
+    store.leases.finish(leases[0], FOUND)
+    assert store.leases.beat(leases[1], LONG) is False
+
+
+def test_epochs_rise_as_long_as_a_job_lives(store):
+    job = submitted(store)
+    epochs = []
+    for end in (FAILED, CANCELLED, FAILED):
+        lease = claimed(store, EXPIRED)
+        later = claimed(store)
+        store.leases.release(later)
+        last = claimed(store)
+        store.leases.finish(last, end)
+        store.jobs.resume(ALICE, job.id)
+        epochs += [each.epoch for each in (lease, later, last)]
+    assert epochs == list(range(1, 10))
+
+
+def test_of_two_who_finish_a_job_the_owner_of_the_lease_does(database):
+    """The zombie writes just when its successor claims and finishes: one of them does, never half of each."""
+    with several(database, 2) as (one, other):
+        for turn in range(20):
+            job = submitted(one, name=f"{turn}")
+            old = claimed(one, EXPIRED)
+
+            def succeed():
+                new = other.leases.claim(f"successor {turn}", LONG)  # noqa: B023 - called in this turn
+                if new is not None:
+                    other.leases.finish(new, FAILED)
+                return new
+
+            zombie, successor = at_once([partial(one.leases.finish, old, FOUND), succeed])
+            found = one.jobs.get(ALICE, job.id)
+            models = one.results.models(job.id)
+            if isinstance(zombie, LeaseLost):
+                assert (found.state, models) == (JobState.FAILED, [])
+                assert kinds(one, job.id) == ["queued", "running", "running", "failed"]
+            else:
+                assert zombie is successor is None
+                assert (found.state, len(models)) == (JobState.SUCCEEDED, 2)
+                assert kinds(one, job.id) == ["queued", "running", "succeeded"]

@@ -1,0 +1,216 @@
+"""What every store owes to those who write at once: they share a commit, and nobody pays for another."""
+
+import threading
+from contextlib import suppress
+
+import pytest
+from sqlalchemy import insert, select, text
+from stores import (
+    ALICE,
+    MANY,
+    asked,
+    at_once,
+    commits,
+    contents,
+    kinds,
+    one_group,
+    several,
+    submitted,
+)
+
+from islands_service.jobs import NoSuchJob
+from islands_service.store import Store
+from islands_service.store import database as database_module
+from islands_service.store.changes import change, record
+from islands_service.store.database import GROUP, StoreError
+from islands_service.store.tables import keys
+
+
+class OwnFault(Exception):
+    """What an operation may raise."""
+
+
+def raised(error):
+    raise error
+
+
+def in_one_group(store, actions):
+    """Do things in threads whose writes make one group; return what each returned, or raised."""
+    answers = []
+    with one_group(store):
+        thread = threading.Thread(target=lambda: answers.extend(at_once(actions)))
+        thread.start()
+    thread.join()
+    return answers
+
+
+def touched(connection, job):
+    record(connection, change(connection, job), "touched")
+
+
+def test_who_comes_while_others_are_written_shares_their_commit(store):
+    with commits(store) as times:
+        answers = in_one_group(store, [lambda: store.jobs.submit(asked())] * MANY)
+    assert len({job.id for job, _ in answers}) == MANY
+    # That of who kept the writer busy, and that of the group; one more, should a thread have come late.
+    assert len(times) <= 3
+
+
+def test_many_who_submit_at_once_need_fewer_commits_than_jobs(store):
+    def submit():
+        return [submitted(store).id for _ in range(10)]
+
+    with commits(store) as times:
+        answers = at_once([submit] * MANY)
+    assert len({job for each in answers for job in each}) == 10 * MANY
+    assert len(times) < 10 * MANY / 2
+
+
+def test_a_group_has_a_greatest_size(store, monkeypatch):
+    assert GROUP >= MANY
+    monkeypatch.setattr(database_module, "GROUP", 4)
+    with commits(store) as times:
+        in_one_group(store, [lambda: store.jobs.submit(asked())] * MANY)
+    assert len(times) >= 1 + MANY / 4
+
+
+def test_what_fails_in_a_group_fails_alone_and_the_others_are_written(store):
+    store.keys.create("a", frozenset({"read"}))
+    job = submitted(store)
+
+    def half(connection):
+        touched(connection, job.id)
+        raise OwnFault
+
+    def twice(connection):
+        touched(connection, job.id)
+        connection.execute(insert(keys).from_select(list(keys.c), select(keys)))
+
+    def nonsense(connection):
+        touched(connection, job.id)
+        connection.execute(text("SELECT * FROM nowhere"))
+
+    before = contents(store)
+    failures = [half, twice, nonsense]
+    with commits(store) as times:
+        answers = in_one_group(
+            store,
+            [
+                *[lambda: store.jobs.submit(asked())] * 4,
+                *[lambda each=each: store.database.write(each) for each in failures],
+                lambda: store.jobs.get("nobody", job.id),
+                *[lambda: store.jobs.submit(asked())] * 4,
+            ],
+        )
+    new = [answer[0].id for answer in (*answers[:4], *answers[8:])]
+    assert len(times) <= 3
+    assert isinstance(answers[4], OwnFault)
+    assert all(isinstance(answer, Exception) for answer in answers[5:7])
+    assert isinstance(answers[7], NoSuchJob)
+    assert {each.id for each in store.jobs.page(ALICE).jobs} == {job.id, *new}
+    after = contents(store)
+    assert after["keys"] == before["keys"]
+    assert kinds(store, job.id) == ["queued"]
+
+
+def test_each_gets_the_answer_to_its_own_question(store):
+    answers = in_one_group(store, [lambda i=i: store.database.write(lambda _: i) for i in range(MANY)])
+    assert answers == list(range(MANY))
+
+
+def test_what_has_returned_is_seen_though_its_group_had_failures(database):
+    with several(database, 2) as (one, other):
+        answers = in_one_group(
+            one,
+            [lambda: one.database.write(lambda _: raised(OwnFault())), lambda: submitted(one)],
+        )
+        assert other.jobs.get(ALICE, answers[1].id) == answers[1]
+
+
+def test_nothing_is_seen_before_it_is_committed(database):
+    with several(database, 2) as (one, other):
+        job = submitted(one)
+        written, seen = threading.Event(), threading.Event()
+
+        def slow(connection):
+            touched(connection, job.id)
+            written.set()
+            seen.wait(10)
+
+        thread = threading.Thread(target=one.database.write, args=(slow,))
+        thread.start()
+        written.wait(10)
+        assert kinds(other, job.id) == ["queued"]
+        seen.set()
+        thread.join()
+        assert kinds(other, job.id) == ["queued", "touched"]
+
+
+def test_those_who_come_first_at_once_have_one_writer(database, monkeypatch):
+    class Slow(threading.Thread):
+        def __init__(self, **options):
+            threading.Event().wait(0.05)  # as long as it takes another thread to come in between
+            super().__init__(**options)
+
+    monkeypatch.setattr(database_module, "Thread", Slow)
+    with Store(database) as store:
+        before = threading.active_count()
+        assert len({job.id for job, _ in at_once([lambda: store.jobs.submit(asked())] * MANY)}) == MANY
+        assert threading.active_count() == before + 1
+    assert threading.active_count() == before
+
+
+def test_a_store_that_is_closed_has_written_what_was_waiting(database):
+    store = Store(database)
+    answers = []
+    with one_group(store):
+        thread = threading.Thread(target=lambda: answers.extend(at_once([lambda: submitted(store)] * MANY)))
+        thread.start()
+        closing = threading.Timer(0.1, store.close)
+        closing.start()
+    thread.join()
+    closing.join()
+    with Store(database) as again:
+        jobs = {job.id for job in answers if not isinstance(job, Exception)}
+        assert {job.id for job in again.jobs.page(ALICE).jobs} == jobs
+    assert all(type(each) is StoreError for each in answers if isinstance(each, Exception))
+
+
+def test_a_closed_store_says_so_and_keeps_no_thread(database):
+    before = threading.active_count()
+    store = Store(database)
+    job = submitted(store)
+    store.close()
+    assert threading.active_count() == before
+    for ask in (lambda: submitted(store), lambda: store.jobs.get(ALICE, job.id)):
+        with pytest.raises(StoreError, match="closed"):
+            ask()
+    store.close()
+    assert threading.active_count() == before
+
+
+def test_two_who_hold_what_the_other_waits_for_both_come_through(database):
+    with several(database, 2) as stores:
+        jobs = [submitted(stores[0]).id for _ in range(2)]
+        both = threading.Barrier(2)
+
+        def touch(first, second, wait):
+            def operation(connection):
+                touched(connection, first)
+                if wait.pop():
+                    # Where there is one writer at a time, there is nobody to meet.
+                    with suppress(threading.BrokenBarrierError):
+                        both.wait(0.5)
+                touched(connection, second)
+
+            return operation
+
+        answers = at_once(
+            [
+                lambda: stores[0].database.write(touch(*jobs, [False, False, True])),
+                lambda: stores[1].database.write(touch(*jobs[::-1], [False, False, True])),
+            ]
+        )
+        assert answers == [None, None]
+        for job in jobs:
+            assert kinds(stores[0], job) == ["queued", "touched", "touched"]

@@ -1,0 +1,314 @@
+"""What every store owes to coordinators: who gets which job, for how long, and how often."""
+
+import itertools
+import random
+from contextlib import ExitStack
+
+from stores import (
+    ALICE,
+    BOB,
+    EXPIRED,
+    LONG,
+    MANY,
+    at_once,
+    brought_on,
+    child,
+    claimed,
+    contents,
+    job_in,
+    kinds,
+    several,
+    submitted,
+)
+
+from islands_service.jobs import TERMINAL, JobState, Report
+from islands_service.store.leases import ATTEMPTS
+
+CLAIM = """
+import sys
+from islands_service.store import Store
+url, name = sys.argv[1:]
+with Store(url) as store:
+    print("ready", flush=True)
+    sys.stdin.readline()
+    claims = 0
+    # A new name for each: what runs under one's own name would be claimed once more.
+    while (lease := store.leases.claim(f"{name} {claims}", 3600.0)) is not None:
+        claims += 1
+        print(lease.job.id, lease.epoch)
+"""
+
+
+def in_turn(jobs):
+    return sorted(jobs, key=lambda job: (-job.priority, job.created, job.id))
+
+
+def test_where_nothing_waits_nothing_is_claimed_and_nothing_changes(store):
+    for state in (JobState.RUNNING, *TERMINAL):
+        job_in(store, state)
+    before = contents(store)
+    assert store.leases.claim("another", LONG) is None
+    assert contents(store) == before
+
+
+def test_a_claimed_job_runs(store):
+    job = submitted(store)
+    lease = store.leases.claim("first", LONG)
+    assert lease.job == store.jobs.get(ALICE, job.id)
+    assert (lease.epoch, lease.job.attempt, lease.job.version) == (1, 1, 2)
+    assert lease.job.state == JobState.RUNNING
+    assert job.created <= lease.job.started <= lease.job.updated + 0.01
+    assert kinds(store, job.id) == ["queued", "running"]
+    assert store.jobs.events(job.id)[-1].data == {"attempt": 1}
+
+
+def test_the_highest_priority_goes_first_and_of_those_the_oldest(store):
+    priorities = random.Random(4).choices([-100, -1, 0, 0, 3, 100], k=24)
+    jobs = [
+        submitted(store, owner, priority=each)
+        for each, owner in zip(priorities, itertools.cycle([ALICE, BOB]), strict=False)
+    ]
+    taken = [claimed(store).job.id for _ in jobs]
+    assert taken == [job.id for job in in_turn(jobs)]
+    assert store.leases.claim("another", LONG) is None
+
+
+def test_one_of_many_claimers_wins_every_job(database):
+    with several(database) as stores:
+        jobs = [submitted(stores[0], priority=each % 3) for each in range(24)]
+
+        def claim_all(store, name):
+            taken = []
+            while (lease := store.leases.claim(f"{name} {len(taken)}", LONG)) is not None:
+                taken.append(lease.job)
+            return taken
+
+        taken = at_once(
+            [lambda store=stores[i % 4], i=i: claim_all(store, f"thread {i}") for i in range(MANY)]
+        )
+        assert sorted(job.id for each in taken for job in each) == sorted(job.id for job in jobs)
+        for each in taken:
+            priorities = [job.priority for job in each]
+            assert priorities == sorted(priorities, reverse=True)
+        for job in jobs:
+            assert kinds(stores[0], job.id) == ["queued", "running"]
+
+
+def test_a_single_job_goes_to_one_of_many_claimers(database):
+    with several(database) as stores:
+        for turn in range(10):
+            job = submitted(stores[0])
+            answers = at_once(
+                [
+                    lambda store=stores[i % 4], name=f"{turn} {i}": store.leases.claim(name, LONG)
+                    for i in range(MANY)
+                ]
+            )
+            assert [lease.job.id for lease in answers if lease is not None] == [job.id]
+
+
+def test_no_job_goes_to_two_processes(store, database):
+    jobs = [submitted(store).id for _ in range(60)]
+    with ExitStack() as stack:
+        processes = [stack.enter_context(child(CLAIM, database, name)) for name in ("one", "two", "three")]
+        for process in processes:
+            assert process.stdout.readline() == "ready\n"
+        for process in processes:
+            process.stdin.write("\n")
+            process.stdin.flush()
+        said = [process.communicate(timeout=60)[0].split() for process in processes]
+    assert sorted(job for each in said for job in each[::2]) == sorted(jobs)
+    assert {epoch for each in said for epoch in each[1::2]} == {"1"}
+
+
+def test_a_job_is_kept_until_its_lease_has_expired(store):
+    submitted(store)
+    claimed(store, LONG, "first")
+    assert store.leases.claim("second", LONG) is None
+
+
+def test_a_job_is_taken_over_when_its_lease_has_expired(store):
+    job = submitted(store)
+    first = claimed(store, EXPIRED, "first")
+    second = claimed(store, LONG, "second")
+    assert (first.job.id, second.job.id) == (job.id, job.id)
+    assert (first.epoch, second.epoch) == (1, 2)
+    assert (first.job.attempt, second.job.attempt) == (1, 2)
+    assert second.job.started == first.job.started
+    assert kinds(store, job.id) == ["queued", "running", "running"]
+    assert store.leases.claim("third", LONG) is None
+
+
+def test_a_job_under_ones_own_name_is_taken_over_at_once(store):
+    """Whoever comes back under a name knows that its predecessor is gone."""
+    job = submitted(store)
+    claimed(store, LONG, "one")
+    assert store.leases.claim("two", LONG) is None
+    again = claimed(store, LONG, "one")
+    assert (again.job.id, again.epoch) == (job.id, 2)
+
+
+def test_what_is_taken_over_stands_in_the_same_queue_as_what_waits(store):
+    """An expired job is not put off, nor does it overtake a higher priority."""
+    for order in itertools.permutations(range(3)):
+        jobs = {priority: submitted(store, priority=priority) for priority in order}
+        for _ in order:
+            claimed(store, EXPIRED, "gone")
+            store.jobs.cancel(ALICE, submitted(store, priority=-5).id)
+        waiting = submitted(store, priority=1)
+        expected = in_turn([*jobs.values(), waiting])
+        assert [claimed(store, LONG, f"{order} {each}").job.id for each in range(4)] == [
+            job.id for job in expected
+        ]
+
+
+def test_a_beat_keeps_a_job(store):
+    submitted(store)
+    lease = claimed(store, EXPIRED, "first")
+    assert store.leases.beat(lease, LONG) is False
+    assert store.leases.claim("second", LONG) is None
+
+
+def test_a_beat_can_let_a_lease_run_out(store):
+    submitted(store)
+    store.leases.beat(claimed(store, LONG, "first"), EXPIRED)
+    assert claimed(store, LONG, "second").epoch == 2
+
+
+def test_a_beat_is_nothing_that_a_watcher_sees(store):
+    job = submitted(store)
+    lease = claimed(store)
+    before = store.jobs.get(ALICE, job.id), store.jobs.events(job.id)
+    store.leases.beat(lease, 2 * LONG)
+    assert (store.jobs.get(ALICE, job.id), store.jobs.events(job.id)) == before
+
+
+def test_a_beat_tells_that_a_job_is_to_be_cancelled(store):
+    job = submitted(store)
+    lease = claimed(store)
+    assert store.leases.beat(lease, LONG) is False
+    store.jobs.cancel(ALICE, job.id)
+    assert store.leases.beat(lease, LONG) is True
+    assert store.leases.beat(lease, LONG) is True
+
+
+def test_whoever_takes_a_job_over_learns_that_it_is_to_be_cancelled(store):
+    job = submitted(store)
+    claimed(store, EXPIRED, "first")
+    store.jobs.cancel(ALICE, job.id)
+    assert claimed(store, LONG, "second").job.cancel_requested
+
+
+def test_a_job_that_nobody_brings_on_is_given_up(store):
+    job = submitted(store)
+    for attempt in range(1, ATTEMPTS + 1):
+        assert claimed(store, EXPIRED, f"{attempt}").job.attempt == attempt
+    assert store.leases.claim("another", LONG) is None
+    job = store.jobs.get(ALICE, job.id)
+    assert (job.state, job.attempt) == (JobState.FAILED, ATTEMPTS)
+    assert job.problem["type"] == "no-progress"
+    assert job.finished >= job.started
+    assert kinds(store, job.id) == ["queued", *["running"] * ATTEMPTS, "failed"]
+    assert store.jobs.events(job.id)[-1].data == job.problem
+
+
+def test_a_job_that_is_given_up_holds_up_no_other(store):
+    hopeless = [submitted(store, priority=5), submitted(store, priority=5)]
+    for _ in range(2 * ATTEMPTS):
+        claimed(store, EXPIRED, "unlucky")
+    healthy = submitted(store)
+    assert claimed(store, LONG, "another").job.id == healthy.id
+    assert {store.jobs.get(ALICE, job.id).state for job in hopeless} == {JobState.FAILED}
+
+
+def test_a_job_that_is_given_up_while_it_is_to_be_cancelled_is_cancelled(store):
+    job = submitted(store)
+    for _ in range(ATTEMPTS):
+        claimed(store, EXPIRED)
+    store.jobs.cancel(ALICE, job.id)
+    assert store.leases.claim("another", LONG) is None
+    job = store.jobs.get(ALICE, job.id)
+    assert (job.state, job.problem) == (JobState.CANCELLED, None)
+    assert kinds(store, job.id)[-2:] == ["cancelling", "cancelled"]
+
+
+def test_a_checkpoint_is_progress_and_attempts_are_counted_anew(store):
+    job = submitted(store)
+    for generation in range(3 * ATTEMPTS):
+        store.leases.report(claimed(store, EXPIRED), brought_on(generation))
+    for _ in range(ATTEMPTS):
+        claimed(store, EXPIRED)
+    assert store.leases.claim("another", LONG) is None
+    assert store.jobs.get(ALICE, job.id).attempt == 4 * ATTEMPTS
+
+
+def test_a_report_without_a_checkpoint_is_no_progress(store):
+    submitted(store)
+    for _ in range(ATTEMPTS):
+        store.leases.report(claimed(store, EXPIRED), Report({"phase": "starting"}))
+    assert store.leases.claim("another", LONG) is None
+
+
+def test_a_resumed_job_has_all_attempts_again(store):
+    job = submitted(store)
+    for _ in range(ATTEMPTS):
+        claimed(store, EXPIRED)
+    assert store.leases.claim("another", LONG) is None
+    store.jobs.resume(ALICE, job.id)
+    for _ in range(ATTEMPTS):
+        claimed(store, EXPIRED)
+    assert store.leases.claim("another", LONG) is None
+
+
+def test_a_release_is_no_attempt(store):
+    job = submitted(store)
+    for _ in range(3 * ATTEMPTS):
+        lease = claimed(store)
+        assert lease.job.attempt == 1
+        store.leases.release(lease)
+    assert store.jobs.get(ALICE, job.id).attempt == 0
+    for attempt in range(1, ATTEMPTS + 1):
+        assert claimed(store, EXPIRED).job.attempt == attempt
+
+
+def test_a_release_after_a_checkpoint_leaves_all_attempts(store):
+    submitted(store)
+    lease = claimed(store)
+    store.leases.report(lease, brought_on(1))
+    store.leases.release(lease)
+    for _ in range(ATTEMPTS):
+        claimed(store, EXPIRED)
+    assert store.leases.claim("another", LONG) is None
+
+
+def test_a_release_of_what_may_fail_again_is_an_attempt(store):
+    job = submitted(store)
+    for _ in range(ATTEMPTS):
+        store.leases.release(claimed(store), attempted=True)
+    assert store.leases.claim("another", LONG) is None
+    job = store.jobs.get(ALICE, job.id)
+    assert (job.state, job.attempt) == (JobState.FAILED, ATTEMPTS)
+
+
+def test_a_released_job_waits_for_whoever_comes(store):
+    job = submitted(store)
+    lease = claimed(store, LONG, "first")
+    store.leases.report(lease, brought_on(3))
+    store.leases.release(lease)
+    waiting = store.jobs.get(ALICE, job.id)
+    assert (waiting.state, waiting.finished) == (JobState.QUEUED, None)
+    again = claimed(store, LONG, "second")
+    assert (again.job.id, again.epoch, again.job.checkpoint) == (job.id, 2, brought_on(3).checkpoint)
+    assert kinds(store, job.id) == ["queued", "running", "progress", "queued", "running"]
+
+
+def test_a_job_that_is_to_be_cancelled_is_cancelled_when_it_is_released(store):
+    job = submitted(store)
+    lease = claimed(store)
+    store.jobs.cancel(ALICE, job.id)
+    store.leases.release(lease)
+    job = store.jobs.get(ALICE, job.id)
+    assert job.state == JobState.CANCELLED
+    assert job.finished is not None
+    assert store.leases.claim("another", LONG) is None
+    assert kinds(store, job.id) == ["queued", "running", "cancelling", "cancelled"]

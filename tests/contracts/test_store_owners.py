@@ -1,0 +1,209 @@
+"""What every store owes to owners: a state allows what it allows, lists are whole, nobody sees another's."""
+
+import pytest
+from sqlalchemy import update
+from stores import (
+    ALICE,
+    BOB,
+    FAILED,
+    FOUND,
+    brought_on,
+    claimed,
+    contents,
+    job_in,
+    kinds,
+    submitted,
+)
+
+from islands_service.jobs import JobState, NoSuchJob, WrongState
+from islands_service.store.datasets import NoSuchDataset
+from islands_service.store.jobs import PAGE
+from islands_service.store.tables import jobs as jobs_table
+
+QUEUED, RUNNING, SUCCEEDED, FAILED_, CANCELLED = JobState
+
+#: What an owner may ask in which state, and the state that follows; in all others it is refused.
+ALLOWED = {
+    "cancel": {QUEUED: CANCELLED, RUNNING: RUNNING},
+    "resume": {FAILED_: QUEUED, CANCELLED: QUEUED},
+    "delete": {SUCCEEDED: None, FAILED_: None, CANCELLED: None},
+}
+
+NOBODYS = "0" * 32
+
+
+def pages(store, owner, limit, state=None, between=lambda: None):
+    """Read a list to its end, and do something between two pages."""
+    after, found = None, []
+    while True:
+        assert len(found) < 100, "the list has no end"
+        page = store.jobs.page(owner, state, after, limit)
+        found.append([job.id for job in page.jobs])
+        if page.after is None:
+            return found
+        after = page.after
+        between()
+
+
+@pytest.mark.parametrize("state", JobState)
+@pytest.mark.parametrize("ask", ALLOWED)
+def test_a_state_allows_what_it_allows(store, ask, state):
+    job = job_in(store, state)
+    before = contents(store)
+    if state not in ALLOWED[ask]:
+        with pytest.raises(WrongState, match=f"job {job.id} is {state}: "):
+            getattr(store.jobs, ask)(ALICE, job.id)
+        assert contents(store) == before
+        return
+    answer = getattr(store.jobs, ask)(ALICE, job.id)
+    following = ALLOWED[ask][state]
+    if following is None:
+        assert not any(contents(store).values())
+    else:
+        assert answer == store.jobs.get(ALICE, job.id)
+        assert (answer.state, answer.version) == (following, job.version + 1)
+        kinds(store, job.id)
+
+
+def test_a_waiting_job_is_cancelled_at_once(store):
+    job = submitted(store)
+    cancelled = store.jobs.cancel(ALICE, job.id)
+    assert (cancelled.state, cancelled.cancel_requested) == (CANCELLED, True)
+    assert cancelled.finished == pytest.approx(cancelled.updated, abs=0.1)
+    assert store.leases.claim("first", 1.0) is None
+    assert kinds(store, job.id) == ["queued", "cancelled"]
+
+
+def test_a_running_job_is_cancelled_when_its_coordinator_lets_go_of_it(store):
+    job = submitted(store)
+    lease = claimed(store)
+    asked_for = store.jobs.cancel(ALICE, job.id)
+    assert (asked_for.state, asked_for.cancel_requested, asked_for.finished) == (RUNNING, True, None)
+    before = contents(store)
+    assert store.jobs.cancel(ALICE, job.id) == asked_for
+    assert contents(store) == before
+    store.leases.release(lease)
+    assert store.jobs.get(ALICE, job.id).state == CANCELLED
+
+
+def test_a_wish_to_cancel_that_comes_too_late_takes_no_result_away(store):
+    job = submitted(store)
+    lease = claimed(store)
+    store.jobs.cancel(ALICE, job.id)
+    store.leases.finish(lease, FOUND)
+    assert store.jobs.get(ALICE, job.id).state == SUCCEEDED
+    assert kinds(store, job.id) == ["queued", "running", "cancelling", "succeeded"]
+
+
+def test_a_resumed_job_goes_on_from_its_checkpoint_as_if_nothing_had_happened(store):
+    job = submitted(store)
+    lease = claimed(store)
+    store.leases.report(lease, brought_on(6))
+    store.leases.finish(lease, FAILED)
+    resumed = store.jobs.resume(ALICE, job.id)
+    assert (resumed.state, resumed.problem, resumed.finished) == (QUEUED, None, None)
+    assert (resumed.cancel_requested, resumed.checkpoint) == (False, brought_on(6).checkpoint)
+    assert resumed.progress == {"generation": 6}
+    again = claimed(store)
+    assert (again.job.id, again.job.cancel_requested, again.job.attempt) == (job.id, False, 2)
+    assert store.leases.beat(again, 1.0) is False
+    assert kinds(store, job.id) == ["queued", "running", "progress", "failed", "queued", "running"]
+
+
+def test_a_deleted_job_leaves_nothing_and_no_other_job_loses_anything(store):
+    for _ in range(2):
+        submitted(store)
+        lease = claimed(store)
+        store.leases.report(lease, brought_on(1))
+        store.leases.finish(lease, FOUND)
+        store.results.keep(lease.job.id, {"a": "1" * 64})
+    before = contents(store)
+    store.jobs.delete(ALICE, lease.job.id)
+    after = contents(store)
+    tables = ("jobs", "events", "points", "results", "models", "artefacts")
+    assert all(2 * len(after[table]) == len(before[table]) for table in tables)
+    assert lease.job.id not in repr(after)
+    with pytest.raises(NoSuchJob, match=lease.job.id):
+        store.jobs.get(ALICE, lease.job.id)
+
+
+@pytest.mark.parametrize("ask", ["get", *ALLOWED])
+@pytest.mark.parametrize("state", JobState)
+def test_anothers_job_is_no_job_and_stays_as_it_is(store, ask, state):
+    job = job_in(store, state, BOB)
+    before = contents(store)
+    messages = []
+    for name in (job.id, NOBODYS):
+        with pytest.raises(NoSuchJob) as raised:
+            getattr(store.jobs, ask)(ALICE, name)
+        messages.append(str(raised.value).replace(name, "?"))
+    # It does not even say that there is one.
+    assert messages[0] == messages[1]
+    assert contents(store) == before
+
+
+def test_nobody_sees_anything_of_another(store):
+    theirs = submitted(store, BOB)
+    dataset, _ = store.datasets.add(BOB, "a.csv", ".csv", "1" * 64, 10, {})
+    assert store.jobs.page(ALICE).jobs == ()
+    assert store.jobs.page(ALICE, QUEUED, (theirs.created + 1, "f" * 32)).jobs == ()
+    assert store.datasets.page(ALICE) == ((), None)
+    for ask in ("get", "delete"):
+        with pytest.raises(NoSuchDataset, match=dataset.id):
+            getattr(store.datasets, ask)(ALICE, dataset.id)
+    assert store.datasets.get(BOB, dataset.id) == dataset
+
+
+def test_pages_are_newest_first_and_hold_every_job_once(store):
+    jobs = [submitted(store, name=f"{each}") for each in range(11)]
+    submitted(store, BOB)
+    expected = sorted(jobs, key=lambda job: (job.created, job.id), reverse=True)
+    for limit in (1, 2, 3, 5, 10, 11, 12):
+        found = pages(store, ALICE, limit)
+        assert [each for page in found for each in page] == [job.id for job in expected]
+        assert [len(page) for page in found[:-1]] == [limit] * (len(found) - 1)
+        assert 0 < len(found[-1]) <= limit
+    assert store.jobs.page(ALICE, limit=3).jobs == tuple(expected[:3])
+
+
+def test_an_owner_without_jobs_has_one_empty_page(store):
+    assert pages(store, ALICE, 5) == [[]]
+
+
+def test_jobs_of_the_same_moment_are_all_listed_once(store):
+    jobs = {submitted(store).id for _ in range(9)}
+    store.database.write(lambda connection: connection.execute(update(jobs_table).values(created=1.5)))
+    found = [each for page in pages(store, ALICE, 2) for each in page]
+    assert found == sorted(jobs, reverse=True)
+
+
+def test_a_list_that_is_read_while_jobs_come_change_and_go_holds_every_other_job_once(store):
+    jobs = [submitted(store, priority=-each) for each in range(12)]
+    goes = store.jobs.cancel(ALICE, submitted(store).id)
+    events = [
+        lambda: submitted(store, priority=-50),
+        lambda: claimed(store),
+        lambda: store.leases.finish(claimed(store), FAILED),
+        lambda: store.jobs.cancel(ALICE, jobs[5].id),
+        lambda: (store.jobs.delete(ALICE, goes.id), submitted(store, priority=-50)),
+    ]
+    found = pages(store, ALICE, 2, between=lambda: events.pop(0)() if events else None)
+    assert not events
+    listed = [each for page in found for each in page]
+    assert len(listed) == len(set(listed))
+    assert {job.id for job in jobs} <= set(listed)
+
+
+def test_a_list_may_hold_one_state_alone(store):
+    expected = {state: job_in(store, state).id for state in list(JobState)[::-1]}
+    for state in JobState:
+        assert pages(store, ALICE, 1, state) == [[expected[state]]]
+
+
+def test_a_page_has_a_greatest_size(store):
+    for _ in range(PAGE + 1):
+        submitted(store)
+    page = store.jobs.page(ALICE, limit=10 * PAGE)
+    assert len(page.jobs) == PAGE
+    assert page.after == (page.jobs[-1].created, page.jobs[-1].id)
+    assert len(store.jobs.page(ALICE, after=page.after, limit=10 * PAGE).jobs) == 1

@@ -1,0 +1,278 @@
+"""What every store owes to what jobs bring: reports, results and figures come whole, or not at all."""
+
+import threading
+
+import pytest
+from stores import (
+    ALICE,
+    BLOB,
+    CANCELLED,
+    FAILED,
+    FOUND,
+    brought_on,
+    claimed,
+    contents,
+    kinds,
+    point,
+    several,
+    submitted,
+)
+
+from islands_service.jobs import JobState, LeaseLost, NoSuchJob, Outcome, Report
+from islands_service.store import leases as leases_module
+
+
+class Unwritable:
+    """What no document can hold."""
+
+
+@pytest.fixture
+def lease(store):
+    submitted(store)
+    return claimed(store)
+
+
+def again(store, lease, ended=FAILED):
+    """End a job, resume it, and claim it."""
+    store.leases.finish(lease, ended)
+    store.jobs.resume(ALICE, lease.job.id)
+    return claimed(store)
+
+
+def generations(store, lease, **limits):
+    return [each[0] for each in store.results.history(lease.job.id, **limits)]
+
+
+def test_all_parts_of_a_report_appear_together(store, lease):
+    told = store.leases.report(lease, brought_on(7))
+    assert told == store.jobs.get(ALICE, lease.job.id)
+    assert told.version == lease.job.version + 1
+    assert (told.state, told.progress, told.checkpoint) == (
+        JobState.RUNNING,
+        {"generation": 7},
+        f"{7:064x}",
+    )
+    assert store.results.history(lease.job.id) == [[7, 70, {"3": 1 / 8}, [0.5, None]]]
+    event = store.jobs.events(lease.job.id)[-1]
+    assert (event.kind, event.number, event.data) == ("progress", told.version, told.progress)
+    assert event.at == told.updated
+
+
+def test_a_reader_never_sees_a_part_of_a_report(database):
+    with several(database, 2) as (writer, reader):
+        job = submitted(writer)
+        lease = claimed(writer)
+        over = threading.Event()
+
+        def report():
+            try:
+                for generation in range(150):
+                    writer.leases.report(lease, brought_on(generation))
+            finally:
+                over.set()
+
+        thread = threading.Thread(target=report)
+        thread.start()
+        seen = set()
+        while not over.is_set():
+            history = reader.results.history(job.id)
+            found = reader.jobs.get(ALICE, job.id)
+            if found.progress is not None:
+                generation = found.progress["generation"]
+                assert found.checkpoint == brought_on(generation).checkpoint
+                assert found.version == generation + 3
+                assert len(history) <= generation + 1
+                assert len(reader.results.history(job.id)) >= generation + 1
+                assert reader.jobs.events(job.id)[-1].number >= found.version
+                seen.add(generation)
+        thread.join()
+        assert seen
+        assert kinds(reader, job.id)[-1] == "progress"
+
+
+BROKEN = {
+    "progress": Report({"generation": Unwritable()}, (point(2),), BLOB),
+    "a point's values": Report({"generation": 2}, (point(2), (3, 30, {3: Unwritable()}, ())), BLOB),
+    "the same point twice": Report({"generation": 2}, (point(2), point(2)), BLOB),
+    "a point without a number": Report({"generation": 2}, (point(2), (None, 1, {}, ())), BLOB),
+}
+
+
+@pytest.mark.parametrize("report", BROKEN.values(), ids=BROKEN)
+def test_a_report_that_fails_midway_leaves_nothing(store, lease, report):
+    store.leases.report(lease, brought_on(1))
+    before = contents(store)
+    with pytest.raises(Exception):  # noqa: B017, PT011 - a caller's mistake, whatever it is called
+        store.leases.report(lease, report)
+    assert contents(store) == before
+    assert store.leases.report(lease, brought_on(2)).progress == {"generation": 2}
+
+
+def test_a_report_without_a_checkpoint_leaves_the_one_that_is_there(store, lease):
+    store.leases.report(lease, brought_on(4))
+    told = store.leases.report(lease, Report({"generation": 5}, (point(5),), after=4))
+    assert (told.checkpoint, told.progress) == (brought_on(4).checkpoint, {"generation": 5})
+    assert generations(store, lease) == [4, 5]
+
+
+def test_points_take_the_place_of_those_behind_the_generation_that_is_said(store, lease):
+    """After a crash the same generations come once more, from the checkpoint on."""
+    store.leases.report(lease, Report({}, tuple(map(point, range(8)))))
+    store.leases.report(lease, Report({}, ((5, 99, {2: 0.25}, (0.25,)), point(6)), after=4))
+    assert generations(store, lease) == [0, 1, 2, 3, 4, 5, 6]
+    assert store.results.history(lease.job.id, after=4, limit=1) == [[5, 99, {"2": 0.25}, [0.25]]]
+    store.leases.report(lease, Report({}, (point(6),), after=2))
+    assert generations(store, lease) == [0, 1, 2, 6]
+    store.leases.report(lease, Report({}, (point(3),)))
+    assert generations(store, lease) == [3]
+
+
+def test_a_report_without_points_leaves_the_history(store, lease):
+    store.leases.report(lease, Report({}, tuple(map(point, range(4)))))
+    store.leases.report(lease, Report({"phase": "refining"}))
+    assert generations(store, lease) == [0, 1, 2, 3]
+
+
+def test_history_is_read_from_a_generation_on_and_not_more_than_is_asked_for(store, lease):
+    store.leases.report(lease, Report({}, tuple(map(point, range(0, 20, 2)))))
+    assert generations(store, lease) == list(range(0, 20, 2))
+    assert generations(store, lease, after=4) == [6, 8, 10, 12, 14, 16, 18]
+    assert generations(store, lease, after=5, limit=2) == [6, 8]
+    assert generations(store, lease, after=18) == []
+    assert store.results.history("0" * 32) == []
+
+
+def test_what_is_infinite_in_a_history_stays_infinite(store, lease):
+    store.leases.report(lease, Report({}, ((0, 1, {1: float("inf")}, (float("-inf"),)),)))
+    assert store.results.history(lease.job.id) == [[0, 1, {"1": float("inf")}, [float("-inf")]]]
+
+
+def test_old_progress_is_forgotten_and_everything_else_is_kept(store, lease, monkeypatch):
+    monkeypatch.setattr(leases_module, "KEPT", 5)
+    for generation in range(20):
+        store.leases.report(lease, brought_on(generation))
+    events = store.jobs.events(lease.job.id)
+    assert [event.kind for event in events] == ["queued", "running", *["progress"] * 5]
+    assert [event.number for event in events] == [1, 2, 18, 19, 20, 21, 22]
+    assert store.jobs.versions([lease.job.id]) == {lease.job.id: 22}
+
+
+def test_a_success_has_its_result_its_models_and_its_summary(store, lease):
+    store.leases.report(lease, brought_on(3))
+    store.leases.finish(lease, FOUND)
+    job = store.jobs.get(ALICE, lease.job.id)
+    assert (job.state, job.summary, job.problem) == (JobState.SUCCEEDED, FOUND.summary, None)
+    assert job.started <= job.finished <= job.updated + 0.01
+    assert job.progress == {"generation": 3}
+    assert store.results.document(job.id) == FOUND.document
+    models = store.results.models(job.id)
+    assert [(each.rank, each.document, each.file) for each in models] == [
+        (1, {"fitness": 0.5}, "first"),
+        (2, {"fitness": 0.7}, "second"),
+    ]
+    assert [store.results.models(job.id, rank) for rank in (1, 2, 3)] == [models[:1], models[1:], []]
+    event = store.jobs.events(job.id)[-1]
+    assert (event.kind, event.data) == ("succeeded", FOUND.summary)
+
+
+def test_a_success_needs_no_checkpoint_and_anything_else_keeps_it(store):
+    kept = {}
+    for outcome in (FOUND, FAILED, CANCELLED):
+        submitted(store)
+        lease = claimed(store)
+        store.leases.report(lease, brought_on(3))
+        store.leases.finish(lease, outcome)
+        kept[outcome.state] = store.jobs.get(ALICE, lease.job.id).checkpoint
+    checkpoint = brought_on(3).checkpoint
+    assert kept == {"succeeded": None, "failed": checkpoint, "cancelled": checkpoint}
+
+
+def test_a_failure_says_why(store, lease):
+    store.leases.finish(lease, FAILED)
+    job = store.jobs.get(ALICE, lease.job.id)
+    assert (job.state, job.problem) == (JobState.FAILED, FAILED.problem)
+    assert store.jobs.events(job.id)[-1].data == FAILED.problem
+    assert (store.results.document(job.id), store.results.models(job.id)) == (None, [])
+
+
+def test_a_cancelled_job_may_have_a_result(store, lease):
+    store.leases.finish(lease, Outcome(JobState.CANCELLED, FOUND.document, FOUND.models))
+    assert store.jobs.get(ALICE, lease.job.id).state == JobState.CANCELLED
+    assert len(store.results.models(lease.job.id)) == 2
+
+
+HALVES = {
+    "document": Outcome(JobState.SUCCEEDED, {"a": Unwritable()}, FOUND.models),
+    "a model": Outcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({"a": Unwritable()}, ""))),
+    "a model's file": Outcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({}, None))),
+    "summary": Outcome(JobState.SUCCEEDED, {}, FOUND.models, {"a": Unwritable()}),
+}
+
+
+@pytest.mark.parametrize("outcome", HALVES.values(), ids=HALVES)
+def test_an_end_that_fails_midway_leaves_the_job_running(store, lease, outcome):
+    store.leases.report(lease, brought_on(1))
+    before = contents(store)
+    with pytest.raises(Exception):  # noqa: B017, PT011 - a caller's mistake, whatever it is called
+        store.leases.finish(lease, outcome)
+    assert contents(store) == before
+    store.leases.finish(lease, FOUND)
+
+
+def test_a_new_result_replaces_all_of_the_old_one(store, lease):
+    job = lease.job.id
+    lease = again(store, lease, Outcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
+    store.results.keep(job, {"pareto.svg": BLOB})
+    # What was found before is there to be looked at until something else has been found.
+    assert store.results.document(job) == {"old": 1}
+    store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {"new": 1}, (({"fitness": 0.1}, "only"),)))
+    assert store.results.document(job) == {"new": 1}
+    assert [each.file for each in store.results.models(job)] == ["only"]
+    assert store.results.artefact(job, "pareto.svg") is None
+
+
+def test_an_end_without_a_result_leaves_the_one_that_is_there(store, lease):
+    job = lease.job.id
+    lease = again(store, lease, Outcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
+    store.results.keep(job, {"pareto.svg": BLOB})
+    store.leases.finish(lease, FAILED)
+    assert store.results.document(job) == {"old": 1}
+    assert len(store.results.models(job)) == 2
+    assert store.results.artefact(job, "pareto.svg") == BLOB
+
+
+def test_what_is_made_of_a_result_is_kept_by_name_and_may_be_made_again(store, lease):
+    job = lease.job.id
+    assert store.results.artefact(job, "a") is None
+    store.results.keep(job, {"a": "1" * 64, "b": "2" * 64})
+    store.results.keep(job, {"b": "3" * 64, "c": "4" * 64})
+    assert [store.results.artefact(job, name) for name in "abcd"] == ["1" * 64, "3" * 64, "4" * 64, None]
+    assert store.results.artefact("0" * 32, "a") is None
+
+
+def test_nothing_is_kept_of_a_job_that_is_gone(store, lease):
+    store.leases.finish(lease, FOUND)
+    store.jobs.delete(ALICE, lease.job.id)
+    # Whoever draws a figure may find that the job was deleted meanwhile.
+    with pytest.raises(NoSuchJob, match=lease.job.id):
+        store.results.keep(lease.job.id, {"a": BLOB})
+    with pytest.raises(LeaseLost):
+        store.leases.report(lease, brought_on(1))
+    assert not any(contents(store).values())
+
+
+def test_what_jobs_bring_does_not_get_mixed_up(store):
+    for priority in (2, 1):
+        submitted(store, priority=priority)
+    first, second = claimed(store), claimed(store)
+    store.leases.report(first, Report({"of": 1}, (point(1),)))
+    store.leases.report(second, Report({"of": 2}, (point(1), point(2))))
+    store.results.keep(first.job.id, {"a": "1" * 64})
+    store.results.keep(second.job.id, {"a": "2" * 64})
+    store.leases.finish(second, FOUND)
+    assert (generations(store, first), generations(store, second)) == ([1], [1, 2])
+    assert store.results.models(first.job.id) == []
+    assert store.results.artefact(first.job.id, "a") == "1" * 64
+    store.jobs.delete(ALICE, second.job.id)
+    assert generations(store, first) == [1]
+    assert store.results.artefact(first.job.id, "a") == "1" * 64

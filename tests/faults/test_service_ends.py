@@ -1,0 +1,110 @@
+"""A service that is told to end, jobs that are cancelled and resumed, and jobs that nobody can bring on."""
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from processes import alive, descendants, eventually, kill
+from service_processes import Service, serving
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+LONG = 600
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    with serving(tmp_path_factory.mktemp("ends") / "data") as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def undisturbed(service: Service) -> bytes:
+    return service.found(service.submit(LONG))
+
+
+def test_a_cancelled_job_lets_go_of_its_islands_and_resumed_ends_the_same(
+    service: Service, undisturbed: bytes
+) -> None:
+    job = service.submit(LONG)
+    at = service.under_way(job)
+    assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
+    cancelled = service.ended(job, seconds=5.0)
+    assert cancelled["state"] == "cancelled"
+    assert at <= cancelled["progress"]["generation"] < LONG
+    eventually(lambda: not service.pids("island"), seconds=5.0)
+    assert service.models(job) == b'{"items":[]}'
+    assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
+    assert service.found(job) == undisturbed
+
+
+def test_a_waiting_job_is_cancelled_at_once_and_resumed_begins(service: Service, undisturbed: bytes) -> None:
+    first, second = service.submit(LONG), service.submit(LONG)
+    answer = service.ask("POST", f"/v1/jobs/{second}/cancel")
+    assert (answer.status_code, answer.json()["state"]) == (202, "cancelled")
+    assert service.found(first) == undisturbed
+    assert service.job(second)["attempt"] == 0
+    service.ask("POST", f"/v1/jobs/{second}/resume")
+    assert service.found(second) == undisturbed
+
+
+def test_a_job_that_ends_its_coordinator_again_and_again_is_given_up(
+    service: Service, undisturbed: bytes
+) -> None:
+    job = service.submit(LONG)
+
+    def attempt_is(number: int) -> bool:
+        found = service.job(job)
+        return found["state"] == "failed" or (found["state"] == "running" and found["attempt"] == number)
+
+    for number in range(1, 6):
+        eventually(lambda number=number: attempt_is(number))
+        assert service.job(job)["progress"] is None or service.generation(job) == 0
+        kill(service.one("coordinator"))
+    failed = service.ended(job)
+    assert (failed["state"], failed["attempt"]) == ("failed", 5)
+    assert failed["problem"]["type"] == "no-progress"
+    assert failed["problem"]["detail"].startswith("5 attempts ended without bringing the job on")
+    # Others are not held up by it, and it is not lost.
+    assert service.found(service.submit(5)) != undisturbed
+    assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
+    assert service.found(job) == undisturbed
+
+
+def test_told_to_end_a_service_keeps_what_runs_and_goes_on_at_the_next_start(
+    tmp_path: Path, undisturbed: bytes
+) -> None:
+    folder = tmp_path / "data"
+    with serving(folder) as first:
+        job, waiting = first.submit(LONG), first.submit(5)
+        at = first.under_way(job, 50)
+        children = descendants(first.process.pid)
+        assert first.stop(seconds=20.0) == 0
+        # All of them: the islands and Ray's own as well.
+        eventually(lambda: not alive(children), seconds=5.0)
+    log = first.log.read_text()
+    assert "job released" in log
+    assert "Traceback" not in log
+    with serving(folder, environment={"ISLANDS_COORDINATORS": "0"}) as doors:
+        kept = doors.job(job)
+        assert (kept["state"], kept["attempt"]) == ("queued", 0)
+        assert kept["progress"]["generation"] >= at
+        assert doors.job(waiting)["state"] == "queued"
+    with serving(folder) as second:
+        eventually(lambda: second.job(job)["state"] == "running")
+        # From the checkpoint on: its first report is past what was reached before.
+        events = second.ask("GET", f"/v1/jobs/{job}/events", params={}).text
+        assert second.found(job) == undisturbed
+        assert second.found(waiting) != undisturbed
+        assert events.count("event: running") == 2
+
+
+def test_ctrl_c_in_the_terminal_reaches_the_supervisor_alone(tmp_path: Path) -> None:
+    """Its children are told by it, each in its turn."""
+    with serving(tmp_path / "data") as service:
+        job = service.submit(LONG)
+        service.under_way(job)
+        service.process.send_signal(signal.SIGINT)
+        assert service.process.wait(20.0) == 0
+    assert "job released" in service.log.read_text()

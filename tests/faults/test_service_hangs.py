@@ -1,0 +1,124 @@
+"""Processes of a service that hang: others take over, and who wakes up again does no harm."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from processes import alive, eventually
+from service_processes import QUICK, Service, serving
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+LONG = 600
+
+#: Seconds of a lease, and what a coordinator may say nothing before the supervisor ends it.
+LEASE = {"ISLANDS_LEASE": "2"}
+
+#: What Ray asks everybody for who talks to it.
+TOKEN = "0123456789abcdef0123456789abcdef"
+
+#: A search that takes one CPU, so that two coordinators find one each.
+ALONE = {"islands": 1}
+
+
+@pytest.fixture
+def stopped() -> Iterator[list[int]]:
+    """Processes that were stopped: they are woken up, or they would never end."""
+    pids: list[int] = []
+    yield pids
+    for pid in alive(pids):
+        os.kill(pid, signal.SIGCONT)
+
+
+def stop(pid: int, stopped: list[int]) -> None:
+    stopped.append(pid)
+    os.kill(pid, signal.SIGSTOP)
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    environment = {**LEASE, "RAY_AUTH_TOKEN": TOKEN}
+    with serving(tmp_path_factory.mktemp("hangs") / "data", environment=environment) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def undisturbed(service: Service) -> bytes:
+    return service.found(service.submit(LONG, settings=ALONE))
+
+
+@pytest.mark.parametrize("role", ["coordinator", "gcs"])
+def test_who_hangs_is_ended_and_the_job_goes_on(
+    service: Service, undisturbed: bytes, stopped: list[int], role: str
+) -> None:
+    job = service.submit(LONG, settings=ALONE)
+    assert service.under_way(job) < LONG
+    coordinator = service.one("coordinator")
+    stop(service.one(role), stopped)
+    eventually(lambda: not alive([coordinator]))
+    assert service.found(job) == undisturbed
+    assert service.job(job)["attempt"] == 2
+
+
+def test_doors_that_hang_are_started_again(service: Service, undisturbed: bytes, stopped: list[int]) -> None:
+    job = service.submit(LONG, settings=ALONE)
+    victim = service.one("api")
+    stop(victim, stopped)
+    eventually(lambda: not alive([victim]))
+    assert service.found(job) == undisturbed
+
+
+@contextmanager
+def colleague(service: Service, name: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a coordinator that no supervisor looks after, as on another machine."""
+    environment = {
+        **os.environ,
+        **QUICK,
+        **LEASE,
+        "ISLANDS_DATA_DIR": str(service.folder),
+        "RAY_AUTH_TOKEN": TOKEN,
+        "RAY_AUTH_MODE": "token",
+    }
+    command = [sys.executable, "-m", "islands_service.coordinator", "--name", name]
+    with service.log.open("a") as log, subprocess.Popen(command, env=environment, stderr=log) as process:
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGCONT)
+            process.terminate()
+
+
+def owned(service: Service, name: str) -> list[str]:
+    """The jobs that a coordinator has a lease of."""
+    with sqlite3.connect(f"file:{service.folder / 'islands.db'}?mode=ro", uri=True) as database:
+        found = [row[0] for row in database.execute("SELECT id FROM jobs WHERE lease_owner = ?", (name,))]
+    database.close()
+    return found
+
+
+def test_a_coordinator_that_wakes_up_after_another_has_taken_over_writes_nothing(
+    service: Service, undisturbed: bytes
+) -> None:
+    with colleague(service, "sleepy") as sleepy:
+        jobs = [service.submit(LONG, settings=ALONE) for _ in range(2)]
+        (job,) = eventually(lambda: owned(service, "sleepy"))  # type: ignore[misc]
+        assert service.under_way(job) < LONG
+        os.kill(sleepy.pid, signal.SIGSTOP)
+        began = time.monotonic()
+        eventually(lambda: service.job(job)["attempt"] == 2)
+        assert time.monotonic() - began > 1.0  # the lease was honoured
+        os.kill(sleepy.pid, signal.SIGCONT)
+        assert {service.found(each) for each in jobs} == {undisturbed}
+        ended = service.job(job)
+        eventually(lambda: "lease lost" in service.log.read_text())
+        # It is about other jobs by now.
+        assert service.found(service.submit(5, settings=ALONE)) != undisturbed
+        assert sleepy.poll() is None
+        assert service.job(job) == ended
+        assert service.models(job) == undisturbed

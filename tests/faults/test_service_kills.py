@@ -1,0 +1,106 @@
+"""Each process of a service, killed in the middle of a job: nothing is lost, and the models are the same."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from processes import alive, descendants, eventually, kill
+from service_processes import ROLES, SPEC, Service, serving
+
+from islands.evolution.engine import SerialEngine
+from islands.identification import identify
+from islands.io.records import read_record
+from islands.io.results import result_document
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+#: Generations of the job that is disturbed, and of one that waits behind it.
+LONG, SHORT = 600, 5
+
+#: Attempts that it may take: who talks to a Ray that is lost starts anew with it, unless the job is done
+#: before that shows. The loss of the doors or of an island is no matter of the coordinator's.
+ATTEMPTS = {
+    "api": {1},
+    "coordinator": {2},
+    "head": {2},
+    "raylet": {1, 2},
+    "gcs": {1, 2},
+    "island": {1},
+}
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    with serving(tmp_path_factory.mktemp("kills") / "data") as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def undisturbed(service: Service) -> tuple[bytes, bytes]:
+    """The models of the long and of the short job when nobody disturbs them."""
+    jobs = [service.submit(generations) for generations in (LONG, SHORT)]
+    long, short = map(service.found, jobs)
+    assert long != short
+    return long, short
+
+
+def kinds(service: Service, job: str) -> list[str]:
+    """What happened to a job that has ended, after making sure that its events are in order, each once."""
+    text = service.ask("GET", f"/v1/jobs/{job}/events").text
+    events = [
+        dict(line.split(": ", 1) for line in event.splitlines()) for event in text.split("\n\n") if event
+    ]
+    numbers = [int(event["id"]) for event in events]
+    assert numbers == list(range(1, len(events) + 1))
+    return [event["event"] for event in events]
+
+
+def test_a_service_finds_what_one_process_finds_by_itself(
+    service: Service, undisturbed: tuple[bytes, bytes]
+) -> None:
+    record = read_record(service.folder.with_suffix(".csv"), SPEC["inputs"], SPEC["output"])
+    settings = {**SPEC["settings"], "generations": SHORT}
+    alone = identify(record, preset="hysteresis", seed=SPEC["seed"], engine=SerialEngine(), **settings)
+    expected = result_document(alone.findings)["models"]
+    assert json.loads(undisturbed[1])["items"] == json.loads(json.dumps(expected))
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_process_is_killed_and_nothing_is_lost(
+    service: Service, undisturbed: tuple[bytes, bytes], role: str
+) -> None:
+    job = service.submit(LONG, key=f"long {role}")
+    waiting = service.submit(SHORT, key=f"short {role}")
+    assert service.under_way(job) < LONG
+    victim = service.one(role)
+    kill(victim)
+    eventually(lambda: not alive([victim]))
+    assert service.found(job) == undisturbed[0]
+    assert service.found(waiting) == undisturbed[1]
+    assert service.submit(LONG, key=f"long {role}") == job
+    assert service.submit(SHORT, key=f"short {role}") == waiting
+    happened = kinds(service, job)
+    assert happened.count("queued") == happened.count("succeeded") == 1, happened
+    assert happened[-1] == "succeeded"
+    assert happened.count("running") in ATTEMPTS[role], happened
+
+
+def test_a_service_that_is_killed_leaves_no_process_and_goes_on_at_the_next_start(
+    tmp_path: Path, undisturbed: tuple[bytes, bytes]
+) -> None:
+    folder = tmp_path / "data"
+    with serving(folder) as first:
+        job = first.submit(LONG, key="long")
+        waiting = first.submit(SHORT, key="short")
+        first.under_way(job)
+        children = descendants(first.process.pid)
+        kill(first.process.pid)
+        first.process.wait()
+        # At once, as somebody would who does it by hand: what the first one started is still ending.
+        with serving(folder, port=first.client.base_url.port) as second:
+            assert second.job(job)["state"] in ("queued", "running")
+            assert second.found(job) == undisturbed[0]
+            assert second.found(waiting) == undisturbed[1]
+            assert second.submit(LONG, key="long") == job
+    eventually(lambda: not alive(children), seconds=120.0)

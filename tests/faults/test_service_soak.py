@@ -1,0 +1,31 @@
+"""A short soak: the long one is run by hand."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+SOAK = Path(__file__).parents[1] / "benchmarks" / "service_soak.py"
+
+KILLS = 15
+
+
+@pytest.mark.timeout(900)
+def test_nothing_is_lost_or_done_twice_or_different_while_processes_are_killed(tmp_path: Path) -> None:
+    report = tmp_path / "found.json"
+    done = subprocess.run(
+        [sys.executable, SOAK, "--kills", str(KILLS), "--json", report, "--folder", tmp_path],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads(report.read_text())
+    assert sum(found["kills"].values()) == KILLS
+    assert (found["lost"], found["duplicated"], found["different"]) == (0, 0, 0)
+    assert found["states"]["succeeded"] > 5
+    assert "defect" not in (tmp_path / "data.log").read_text()

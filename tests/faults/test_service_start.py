@@ -1,0 +1,109 @@
+"""What a service refuses to start with, and TLS: each refusal says what to do, and ends with status 2."""
+
+import socket
+import ssl
+from pathlib import Path
+from threading import Timer
+
+import pytest
+import trustme
+from front_door import succeed
+from service_processes import free_port, serving, started
+
+from islands_api.__main__ import listening
+
+pytestmark = pytest.mark.slow
+
+#: None of these is about Ray.
+DOORS = {"ISLANDS_COORDINATORS": "0"}
+
+
+def refused(*options: object, **environment: str) -> str:
+    process = started(*options, **{**DOORS, **environment})
+    try:
+        _, said = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 2, said
+    assert "Traceback" not in said
+    assert "started again" not in said
+    return " ".join(said.split())
+
+
+def test_a_second_service_on_the_same_folder_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    with serving(folder, environment=DOORS) as service:
+        said = refused("--data-dir", folder, "--port", free_port())
+        assert f"{folder} belongs to another 'islands serve' (process {service.process.pid})" in said
+        assert "give another --data-dir" in said
+        service.ready()
+
+
+def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        said = refused("--data-dir", tmp_path / "data", "--port", port)
+    assert f"cannot listen at 127.0.0.1, port {port} (another program has it): give another --port" in said
+
+
+def test_a_port_that_becomes_free_in_a_moment_is_waited_for() -> None:
+    """Who was there before us may be ending."""
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        Timer(0.3, other.close).start()
+        with listening("127.0.0.1", port) as mine:
+            assert mine.getsockname() == ("127.0.0.1", port)
+
+
+def test_an_address_that_others_reach_needs_a_key(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    said = refused("--data-dir", folder, "--host", "0.0.0.0", "--port", free_port())
+    assert "0.0.0.0 can be reached by others, and there is no key" in said
+    assert "make one with 'islands keys create --scope read --scope write'" in said
+    secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()[0]
+    with serving(folder, "--host", "0.0.0.0", environment=DOORS) as service:
+        assert service.client.get("/v1/jobs").status_code == 401
+        answer = service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {secret}"})
+        assert answer.status_code == 200
+
+
+@pytest.fixture
+def certificate(tmp_path: Path) -> tuple[Path, Path, ssl.SSLContext]:
+    """A certificate, its key, and what a client needs to trust it."""
+    authority, trusting = trustme.CA(), ssl.create_default_context()
+    authority.configure_trust(trusting)
+    issued = authority.issue_cert("127.0.0.1")
+    certificate, key = tmp_path / "certificate.pem", tmp_path / "key.pem"
+    certificate.write_bytes(b"".join(pem.bytes() for pem in issued.cert_chain_pems))
+    issued.private_key_pem.write_to_path(key)
+    return certificate, key, trusting
+
+
+def test_with_a_certificate_everything_goes_over_tls(
+    tmp_path: Path, certificate: tuple[Path, Path, ssl.SSLContext]
+) -> None:
+    files = ("--tls-certificate", certificate[0], "--tls-key", certificate[1])
+    with serving(tmp_path / "data", *files, tls=certificate[2], environment=DOORS) as service:
+        answer = service.client.get("/healthz")
+        assert answer.json() == {"status": "alive"}
+        assert answer.headers["strict-transport-security"] == "max-age=31536000"
+        job = service.submit(5)
+        assert service.job(job)["state"] == "queued"
+        port = service.client.base_url.port
+        with socket.create_connection(("127.0.0.1", port)) as plain:
+            plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            assert b"alive" not in plain.recv(1000)
+    assert "https://127.0.0.1" in service.log.read_text()
+
+
+def test_a_certificate_without_its_key_is_refused(
+    tmp_path: Path, certificate: tuple[Path, Path, ssl.SSLContext]
+) -> None:
+    options = ("--data-dir", tmp_path / "data", "--port", free_port())
+    said = refused(*options, "--tls-certificate", certificate[0])
+    assert "TLS needs both a certificate and a key" in said
+    said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", tmp_path / "none.pem")
+    assert f"there is no file {tmp_path / 'none.pem'}" in said
+    said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", certificate[0])
+    assert "are no certificate with its key" in said
+    assert "give two PEM files that belong together" in said

@@ -1,0 +1,266 @@
+"""Stores whose process is killed, whose disk is full, whose server goes away: what was accepted stays."""
+
+import os
+import sqlite3
+import subprocess
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from processes import kill
+from stores import ALICE, BLOB, LONG, asked, at_once, brought_on, child, claimed, kinds, submitted
+
+from islands_service.blobs import Blobs
+from islands_service.jobs import Report
+from islands_service.store import Store
+from islands_service.store.database import StoreFull
+
+SUBMIT = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from islands_service.jobs import Submission
+from islands_service.store import Store
+store = Store(sys.argv[1])
+def submit(thread):
+    number = 0
+    while True:
+        key = f"{thread} {number}"
+        job, _ = store.jobs.submit(Submission("alice", {"key": key}, idempotency_key=key))
+        print(f"{job.id} {key}\\n", end="", flush=True)
+        number += 1
+with ThreadPoolExecutor(4) as pool:
+    list(pool.map(submit, range(4)))
+"""
+
+REPORT = """
+import sys
+from islands_service.jobs import Report
+from islands_service.store import Store
+store = Store(sys.argv[1])
+lease = store.leases.claim("first", 3600.0)
+generation = 0
+while True:
+    point = (generation, 10 * generation, {3: 0.5}, (0.5,))
+    report = Report({"generation": generation}, (point,), f"{generation:064x}", generation - 1)
+    store.leases.report(lease, report)
+    print(generation, flush=True)
+    generation += 1
+"""
+
+#: Stands still in the middle of a transaction.
+STAND = """
+import os, signal, sys
+from islands_service.store import Store, connections
+from islands_service.store.changes import change
+connections.SETTINGS = ("idle_in_transaction_session_timeout = '1s'",)
+store = Store(sys.argv[1])
+lease = store.leases.claim("first", -1.0)
+def stand(connection):
+    change(connection, lease.job.id, progress='{"half": true}')
+    print("standing", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+try:
+    store.database.write(stand)
+except Exception as error:
+    print(type(error).__name__, flush=True)
+"""
+
+#: Of a small disk, and of what is left over on it for the tables themselves.
+DISK, TABLES = 2_000_000, 400_000
+
+
+def intact(database):
+    """Make sure that a database has no damage of its own."""
+    if database.startswith("sqlite"):
+        with closing(sqlite3.connect(database.removeprefix("sqlite:///"))) as connection:
+            assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+            assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
+
+
+def killed_after(process, lines):
+    """Let a process say so many lines, kill it, and return all whole lines it has said."""
+    said = [process.stdout.readline() for _ in range(lines)]
+    kill(process.pid)
+    said += process.stdout.readlines()
+    return [line.split() for line in said if line.endswith("\n") and line.strip()]
+
+
+@pytest.mark.parametrize("lines", [1, 40])
+def test_what_a_killed_process_has_acknowledged_is_there(database, lines):
+    with child(SUBMIT, database) as process:
+        acknowledged = killed_after(process, lines)
+    intact(database)
+    with Store(database) as store:
+        for job, *key in acknowledged:
+            found = store.jobs.get(ALICE, job)
+            assert found.spec == {"key": " ".join(key)}
+            assert kinds(store, job) == ["queued"]
+        # What was not acknowledged any more may be there or not: asked again, it is the same job.
+        for job, *key in acknowledged:
+            name = " ".join(key)
+            again, new = store.jobs.submit(asked(spec={"key": name}, idempotency_key=name))
+            assert (again.id, new) == (job, False)
+
+
+@pytest.mark.slow
+def test_a_process_that_is_killed_again_and_again_loses_nothing(database):
+    acknowledged = []
+    for turn in range(15):
+        with child(SUBMIT, database) as process:
+            acknowledged += killed_after(process, 1 + 7 * turn)
+        intact(database)
+    with Store(database) as store:
+        found = {job: " ".join(key) for job, *key in acknowledged}
+        assert all(store.jobs.get(ALICE, job).spec == {"key": key} for job, key in found.items())
+        assert len(set(found.values())) == len(found)
+
+
+@pytest.mark.parametrize("reports", [1, 2, 9, 30])
+def test_a_killed_coordinator_leaves_whole_reports(database, reports):
+    with Store(database) as store:
+        job = submitted(store)
+        with child(REPORT, database) as process:
+            told = killed_after(process, reports)
+        last = store.jobs.get(ALICE, job.id)
+        generation = last.progress["generation"]
+        assert generation in (len(told) - 1, len(told))
+        assert last.checkpoint == f"{generation:064x}"
+        assert [each[0] for each in store.results.history(job.id)] == list(range(generation + 1))
+        assert kinds(store, job.id) == ["queued", "running", *["progress"] * (generation + 1)]
+        again = claimed(store, LONG, "first")
+        assert (again.job.checkpoint, again.epoch) == (last.checkpoint, 2)
+    intact(database)
+
+
+def standing(database):
+    return child(STAND, database)
+
+
+def test_a_process_that_is_killed_in_the_middle_of_a_write_holds_nobody_up(database):
+    with Store(database) as store:
+        job = submitted(store)
+        with standing(database) as process:
+            assert process.stdout.readline() == "standing\n"
+            kill(process.pid)
+        lease = claimed(store)
+        assert (lease.job.id, lease.epoch, lease.job.progress) == (job.id, 2, None)
+        store.leases.report(lease, brought_on(1))
+        assert kinds(store, job.id) == ["queued", "running", "running", "progress"]
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """A folder on a small disk of its own."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=False) if os.getuid() == 0 else None
+    if done is None or done.returncode != 0:
+        why = "not root" if done is None else done.stderr.strip()
+        pytest.skip(f"a full disk needs a small one to be mounted ({why}): run it as root")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+def filled(disk: Path, leave: int = 0) -> Path:
+    """Fill a disk, and return the file that fills it."""
+    path = disk / "filler"
+    with path.open("wb", buffering=0) as stream:
+        free = os.statvfs(disk)
+        size = free.f_bavail * free.f_frsize - leave
+        stream.write(bytes(max(size, 0)))
+        try:
+            while leave == 0:
+                stream.write(bytes(4096))
+        except OSError:
+            pass
+    return path
+
+
+def until_full(store, jobs):
+    """Submit large jobs until there is no room; return what was raised."""
+    while True:
+        try:
+            jobs.append(submitted(store, spec={"text": "x" * 20_000}))
+        except StoreFull as error:
+            return error
+
+
+def test_on_a_full_disk_what_was_accepted_is_there_and_the_store_goes_on_when_there_is_room(disk):
+    with Store(f"sqlite:///{disk / 'islands.db'}") as store:
+        job = submitted(store, priority=1)
+        lease = claimed(store)
+        jobs = [submitted(store, name=f"{number}") for number in range(5)]
+        before = {each.id: each for each in jobs}
+        filler = filled(disk, leave=TABLES)
+        assert "make room" in str(until_full(store, jobs))
+        # All are told, also those who come at once, and nothing half is seen.
+        answered = at_once([lambda: submitted(store, spec={"text": "x" * 20_000})] * 8)
+        assert all(isinstance(each, StoreFull) for each in answered)
+        with pytest.raises(StoreFull):
+            store.leases.report(lease, Report({"text": "x" * 50_000}, (), BLOB))
+        assert store.jobs.get(ALICE, job.id) == lease.job
+        assert {each.id for each in store.jobs.page(ALICE, limit=200).jobs} == {
+            job.id,
+            *(each.id for each in jobs),
+        }
+        assert all(store.jobs.get(ALICE, name) == each for name, each in before.items())
+        filler.unlink()
+        jobs.append(submitted(store, spec={"text": "y" * 20_000}))
+        store.leases.report(lease, brought_on(1))
+        assert kinds(store, job.id) == ["queued", "running", "progress"]
+    intact(f"sqlite:///{disk / 'islands.db'}")
+    with Store(f"sqlite:///{disk / 'islands.db'}") as store:
+        assert {each.id for each in store.jobs.page(ALICE, limit=200).jobs} == {
+            job.id,
+            *(each.id for each in jobs),
+        }
+
+
+def test_on_a_disk_without_a_single_byte_left_what_was_accepted_can_be_read(disk):
+    url = f"sqlite:///{disk / 'islands.db'}"
+    with Store(url) as store:
+        job = submitted(store)
+        filler = filled(disk)
+        with pytest.raises(StoreFull):
+            submitted(store, spec={"text": "x" * 100_000})
+        assert store.jobs.get(ALICE, job.id) == job
+        filler.unlink()
+        submitted(store)
+
+
+def test_on_a_full_disk_a_store_opens_again_when_there_is_room(disk):
+    url = f"sqlite:///{disk / 'islands.db'}"
+    with Store(url) as store:
+        job = submitted(store)
+    filler = filled(disk)
+    # Its log and the memory that its readers share are files, too.
+    with pytest.raises(StoreFull, match="make room"):
+        Store(url)
+    filler.unlink()
+    with Store(url) as store:
+        assert store.jobs.get(ALICE, job.id) == job
+        submitted(store)
+
+
+def test_on_a_full_disk_blobs_are_refused_and_those_that_are_there_stay(disk):
+    blobs = Blobs(disk / "blobs")
+    kept = blobs.write(b"kept" * 1000)
+    filler = filled(disk, leave=100_000)
+    for size in (150_000, 10_000_000):
+        with pytest.raises(StoreFull, match="make room"):
+            blobs.write(bytes(size))
+
+    def receive():
+        with blobs.receiving() as stream:
+            while True:
+                stream.write(bytes(5000))
+
+    with pytest.raises(StoreFull):
+        receive()
+    assert [blob for blob, _ in blobs.all()] == [kept]
+    small = blobs.write(b"small")
+    filler.unlink()
+    large = blobs.write(bytes(150_000))
+    assert {blob for blob, _ in blobs.all()} == {kept, small, large}
+    assert blobs.read(kept) == b"kept" * 1000

@@ -1,0 +1,202 @@
+"""A PostgreSQL that goes away and comes back, and those who stand still while they hold something of it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from databases import answers, emptied, server
+from stores import ALICE, EXPIRED, LONG, brought_on, child, claimed, kinds, submitted
+
+from islands_service.jobs import JobState, LeaseLost
+from islands_service.store import Store
+from islands_service.store.changes import change, record
+from islands_service.store.database import StoreUnavailable
+
+#: Stands still in the middle of a transaction.
+STAND = """
+import os, signal, sys
+from islands_service.store import Store, connections
+from islands_service.store.changes import change
+connections.SETTINGS = ("idle_in_transaction_session_timeout = '1s'",)
+store = Store(sys.argv[1])
+lease = store.leases.claim("first", -1.0)
+def stand(connection):
+    change(connection, lease.job.id, progress='{"half": true}')
+    print("standing", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+try:
+    store.database.write(stand)
+except Exception as error:
+    print(type(error).__name__, flush=True)
+"""
+
+
+def test_on_postgresql_a_process_that_stands_still_in_the_middle_of_a_write_lets_go(prepared_postgres):
+    database = emptied(prepared_postgres)
+    with Store(database) as store, child(STAND, database) as process:
+        job = submitted(store)
+        assert process.stdout.readline() == "standing\n"
+        # Its row is locked: whoever claims passes over it, and nobody waits.
+        assert store.leases.claim("second", LONG) is None
+        other = submitted(store)
+        assert claimed(store).job.id == other.id
+        deadline = time.monotonic() + 20
+        while (lease := store.leases.claim("second", LONG)) is None or lease.job.id != job.id:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        os.kill(process.pid, signal.SIGCONT)
+        assert process.stdout.readline() == "StoreUnavailable\n"
+        assert store.jobs.get(ALICE, job.id).progress is None
+
+
+#: Runs in a network of its own, and cuts it.
+CUT = """
+import subprocess, sys, time
+sys.path.insert(0, sys.argv[1])
+from databases import server
+from stores import ALICE, submitted
+from islands_service.store import Store
+from islands_service.store.database import StoreUnavailable
+def network(state):
+    subprocess.run(["ip", "link", "set", "lo", state], check=True)
+def told(ask):
+    began = time.monotonic()
+    try:
+        ask()
+    except StoreUnavailable:
+        print(time.monotonic() - began, flush=True)
+network("up")
+with server(listen_addresses="127.0.0.1") as far:
+    with Store("postgresql+psycopg://islands@127.0.0.1/postgres") as store:
+        job = submitted(store)
+        network("down")
+        told(lambda: store.jobs.get(ALICE, job.id))
+        told(lambda: submitted(store))
+        network("up")
+        assert store.jobs.get(ALICE, job.id) == job
+        submitted(store)
+        print("back", flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def mortals():
+    """A PostgreSQL of these tests alone."""
+    with server() as own:
+        Store(own.url).close()
+        yield own
+
+
+@pytest.fixture
+def mortal(mortals):
+    """A PostgreSQL to be stopped and started."""
+    if not answers(mortals.url):
+        mortals.start()
+    emptied(mortals.url)
+    return mortals
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGQUIT], ids=["in good order", "as in a crash"])
+def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mortal, how):
+    with Store(mortal.url) as store:
+        job = submitted(store)
+        lease = claimed(store)
+        mortal.stop(how)
+        for ask in (
+            lambda: store.jobs.get(ALICE, job.id),
+            lambda: submitted(store),
+            lambda: store.leases.beat(lease, LONG),
+            lambda: store.leases.claim("another", LONG),
+        ):
+            for _ in range(2):
+                began = time.monotonic()
+                with pytest.raises(StoreUnavailable, match="try again"):
+                    ask()
+                assert time.monotonic() - began < 5
+        with pytest.raises(StoreUnavailable):
+            Store(mortal.url)
+        assert not answers(mortal.url)
+        mortal.start()
+        assert store.jobs.get(ALICE, job.id) == lease.job
+        store.leases.report(lease, brought_on(1))
+        assert kinds(store, submitted(store).id) == ["queued"]
+
+
+def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
+    over, acknowledged, failed = threading.Event(), [], []
+    with Store(mortal.url) as store:
+
+        def submit():
+            while not over.is_set():
+                try:
+                    acknowledged.append(submitted(store).id)
+                except StoreUnavailable:
+                    failed.append(1)
+                    time.sleep(0.01)
+
+        threads = [threading.Thread(target=submit) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for _ in range(3):
+            seen = len(acknowledged)
+            while len(acknowledged) < seen + 30:
+                time.sleep(0.01)
+            mortal.stop(signal.SIGQUIT)
+            time.sleep(0.05)
+            mortal.start()
+        over.set()
+        for thread in threads:
+            thread.join()
+        assert failed
+        for job in acknowledged:
+            assert kinds(store, job) == ["queued"]
+
+
+def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(mortal):
+    """After its place was taken by another one it is a copy."""
+    with Store(mortal.url) as store:
+        job = submitted(store)
+
+        def only_read(connection):
+            connection.exec_driver_sql("SET TRANSACTION READ ONLY")
+            record(connection, change(connection, job.id), "touched")
+
+        with pytest.raises(StoreUnavailable):
+            store.database.write(only_read)
+        assert store.jobs.get(ALICE, job.id).state == JobState.QUEUED
+
+
+def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebody(mortal):
+    with Store(mortal.url) as store, Store(mortal.url) as other:
+        submitted(store)
+        lease = claimed(store, EXPIRED)
+        mortal.stop(signal.SIGQUIT)
+        mortal.start()
+        assert store.leases.beat(lease, EXPIRED) is False
+        taken = claimed(other)
+        assert taken.job.id == lease.job.id
+        with pytest.raises(LeaseLost):
+            store.leases.beat(lease, LONG)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    os.getuid() != 0 or shutil.which("unshare") is None or shutil.which("ip") is None,
+    reason="a network to cut needs root, unshare and ip",
+)
+def test_a_postgresql_behind_a_cut_network_is_told_in_seconds_and_used_again_afterwards(mortals):
+    """Nothing comes back from there, not even a refusal: TCP by itself would wait for many minutes."""
+    tests = Path(__file__).parents[1]
+    command = ["unshare", "--net", sys.executable, "-c", CUT, tests]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    read, written, back = done.stdout.split()
+    assert back == "back"
+    assert float(read) < 20
+    assert float(written) < 20

@@ -1,0 +1,97 @@
+"""Settings: read from the environment in one place, held to their ranges, handed on to children unchanged."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from islands.errors import SettingsError
+from islands_service.settings import ServiceSettings, service_settings
+
+
+@pytest.fixture(autouse=True)
+def clean(monkeypatch):
+    for name in list(os.environ):
+        if name.startswith("ISLANDS_"):
+            monkeypatch.delenv(name)
+
+
+def test_what_is_given_goes_before_the_environment_and_that_before_the_default(monkeypatch, tmp_path):
+    assert service_settings(data_dir=tmp_path).port == 8000
+    monkeypatch.setenv("ISLANDS_PORT", "9000")
+    assert service_settings(data_dir=tmp_path).port == 9000
+    assert service_settings(data_dir=tmp_path, port=9001).port == 9001
+    assert service_settings(data_dir=tmp_path, port=None).port == 9000
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("port", "70000"),
+        ("port", "-1"),
+        ("port", "http"),
+        ("lease", "0"),
+        ("lease", "nan"),
+        ("checkpoint_every", "-1"),
+        ("max_upload", "0"),
+        ("max_islands", "0"),
+        ("max_active", "many"),
+        ("inspection_seconds", "0"),
+        ("rate", "-1"),
+        ("burst", "0"),
+        ("retention", "-1"),
+        ("coordinators", "65"),
+        ("log_format", "xml"),
+        ("require_keys", "perhaps"),
+    ],
+)
+def test_a_value_out_of_its_range_is_refused_by_name(monkeypatch, name, value):
+    monkeypatch.setenv(f"ISLANDS_{name.upper()}", value)
+    with pytest.raises(SettingsError, match=rf"setting {name} \(ISLANDS_{name.upper()}\): .+"):
+        service_settings()
+
+
+def test_a_child_has_the_same_settings(monkeypatch, tmp_path):
+    given = ServiceSettings(
+        data_dir=tmp_path,
+        database="postgresql+psycopg://me@host/islands",
+        port=9000,
+        lease=2.5,
+        require_keys=True,
+        tls_key=tmp_path / "key.pem",
+        log_format="json",
+        rate=0.0,
+        lifeline=7,
+    )
+    environment = given.environment()
+    assert "ISLANDS_LIFELINE" not in environment
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert service_settings() == given.model_copy(update={"lifeline": None})
+
+
+def test_a_child_inherits_the_rest_of_the_environment(monkeypatch, tmp_path):
+    monkeypatch.setenv("SOMETHING_ELSE", "kept")
+    assert ServiceSettings(data_dir=tmp_path).environment()["SOMETHING_ELSE"] == "kept"
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])
+def test_on_a_loopback_address_no_key_is_needed_unless_it_is_wished(host):
+    assert not ServiceSettings(host=host).keys_needed
+    assert ServiceSettings(host=host, require_keys=True).keys_needed
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.0.7", "islands.example.org", ""])
+def test_on_any_other_address_keys_are_needed(host):
+    assert ServiceSettings(host=host).keys_needed
+
+
+def test_the_database_stands_in_the_data_folder_unless_another_one_is_given(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert ServiceSettings(data_dir=Path("data")).url == f"sqlite:///{tmp_path}/data/islands.db"
+    assert ServiceSettings(database="postgresql://x").url == "postgresql://x"
+
+
+def test_settings_do_not_change():
+    with pytest.raises(ValueError, match="frozen"):
+        ServiceSettings().port = 1
