@@ -15,8 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import httpx
 import numpy as np
+import scipy.io
 import structlog
 import uvicorn
 from fastapi import FastAPI
@@ -153,6 +155,23 @@ def npz(**arrays: Any) -> bytes:
     """An archive of NumPy's."""
     stream = io.BytesIO()
     np.savez(stream, **arrays)
+    return stream.getvalue()
+
+
+def matlab_5() -> bytes:
+    """A record as MATLAB saves it by default."""
+    stream = io.BytesIO()
+    scipy.io.savemat(stream, columns())
+    return stream.getvalue()
+
+
+def matlab_73() -> bytes:
+    """A record as MATLAB saves what is large: HDF5."""
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, values in columns().items():
+            file[name] = values[None]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
     return stream.getvalue()
 
 

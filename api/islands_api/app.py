@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from starlette.middleware.gzip import GZipMiddleware
 
 from islands_api import answers
 from islands_api.auth import KeyRing
@@ -22,6 +23,9 @@ from islands_service.lifeline import EVERY, sign_of_life
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.telemetry import Traces
+
+#: Bytes from which on an answer is packed.
+_PACKED = 4000
 
 _DESCRIPTION = """Finds the equation behind measured data.
 
@@ -39,7 +43,6 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     store : Store, optional
         One that is open already, and is closed with the application.
     """
-
     traces = Traces(settings.telemetry, "api")
 
     @asynccontextmanager
@@ -82,6 +85,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     for router in ROUTERS:
         app.include_router(router)
     answers.install(app)
+    # Figures and the page take a third; a job on its own is too small to gain, and events are not held back.
+    app.add_middleware(GZipMiddleware, minimum_size=_PACKED, compresslevel=5)
     app.add_middleware(Limited, settings=settings)
     app.add_middleware(SameOrigin, settings=settings)
     app.add_middleware(Watched)

@@ -122,7 +122,7 @@ def _svg(figure: Any) -> bytes:
 def _simulated(entry: Assessed, findings: Findings) -> bytes:
     """Return the validation data and the model's free run over it, thinned for a screen."""
     data = findings.split.validation
-    simulated = free_run(entry.model, data)
+    simulated = free_run(entry.model, data, entry.assessment.warm_up)
     every = max(1, -(-data.samples // POINTS))
     kept = slice(None, None, every)
     time = data.start + data.dt * np.arange(data.samples)

@@ -111,8 +111,6 @@ def test_nobody_finds_an_answer_that_is_not_documented(folder, tmp_path, run):
         print(done.stdout)
         assert done.returncode == 0, done.stdout[-20_000:] + done.stderr[-5_000:]
         assert not [entry for entry in service.logs if entry["event"] in ("defect", "request failed")]
-    if run == "links":
-        return  # not every one is led to
     selected, tested = (int(re.search(rf"{word}: (\d+)", done.stdout)[1]) for word in ("Selected", "Tested"))
-    assert tested == selected
+    assert tested == selected or run == "links"  # which lead to what was made before, and not everywhere
     assert int(re.search(r"(\d+) generated, \1 passed", done.stdout)[1]) >= tested

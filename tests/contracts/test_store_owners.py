@@ -1,5 +1,7 @@
 """What every store owes to owners: a state allows what it allows, lists are whole, nobody sees another's."""
 
+import time
+
 import pytest
 from sqlalchemy import update
 from stores import (
@@ -108,6 +110,31 @@ def test_a_resumed_job_goes_on_from_its_checkpoint_as_if_nothing_had_happened(st
     assert (again.job.id, again.job.cancel_requested, again.job.attempt) == (job.id, False, 2)
     assert store.leases.beat(again, 1.0) is False
     assert kinds(store, job.id) == ["queued", "running", "progress", "failed", "queued", "running"]
+
+
+@pytest.mark.parametrize("running", [False, True])
+def test_a_job_that_was_cancelled_and_resumed_is_not_cancelled_any_more(store, running):
+    job = submitted(store)
+    lease = claimed(store) if running else None
+    store.jobs.cancel(ALICE, job.id)
+    if lease is not None:
+        store.leases.release(lease)
+    assert store.jobs.resume(ALICE, job.id).cancel_requested is False
+    again = claimed(store)
+    assert again.job.cancel_requested is False
+    assert store.leases.beat(again, 1.0) is False
+    store.leases.release(again)
+    assert store.jobs.get(ALICE, job.id).state == QUEUED
+
+
+def test_a_job_says_when_it_was_changed_last(store):
+    job = submitted(store)
+    for ask in (store.jobs.cancel, store.jobs.resume):
+        time.sleep(0.01)
+        changed = ask(ALICE, job.id)
+        assert (changed.created, changed.updated) == (job.created, store.jobs.events(job.id)[-1].at)
+        assert changed.updated >= job.updated + 0.005
+        job = changed
 
 
 def test_a_deleted_job_leaves_nothing_and_no_other_job_loses_anything(store):

@@ -1,6 +1,7 @@
 """Stores whose process is killed, whose disk is full, whose server goes away: what was accepted stays."""
 
 import os
+import shutil
 import sqlite3
 import subprocess
 from contextlib import closing
@@ -63,6 +64,24 @@ try:
     store.database.write(stand)
 except Exception as error:
     print(type(error).__name__, flush=True)
+"""
+
+#: May write no file larger than so many bytes: what a quota of a file system does, for whoever is not root.
+NARROW = """
+import resource, sys
+from islands_service.jobs import Submission
+from islands_service.store import Store
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+with Store(sys.argv[1]) as store:
+    while True:
+        try:
+            job, _ = store.jobs.submit(Submission("alice", {"text": "x" * 20_000}))
+        except Exception as error:
+            print(type(error).__name__)
+            break
+        print(job.id)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    print(store.jobs.submit(Submission("alice", {}))[0].id)
 """
 
 #: Of a small disk, and of what is left over on it for the tables themselves.
@@ -241,6 +260,17 @@ def test_on_a_full_disk_a_store_opens_again_when_there_is_room(disk):
     with Store(url) as store:
         assert store.jobs.get(ALICE, job.id) == job
         submitted(store)
+
+
+def test_where_files_may_not_grow_any_more_the_disk_is_called_full(prepared_sqlite, tmp_path):
+    path = shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
+    with child(NARROW, f"sqlite:///{path}", "500000") as process:
+        *accepted, fault, after = process.communicate(timeout=60)[0].split()
+    assert fault == "StoreFull"
+    assert len(accepted) > 5
+    intact(f"sqlite:///{path}")
+    with Store(f"sqlite:///{path}") as store:
+        assert {job.id for job in store.jobs.page(ALICE, limit=200).jobs} == {*accepted, after}
 
 
 def test_on_a_full_disk_blobs_are_refused_and_those_that_are_there_stay(disk):

@@ -1,9 +1,11 @@
 """The status page at ``/``: files of our own, which speak REST as every other client does."""
 
+import hashlib
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Header, Response
 
 from islands_api.problems import NoSuchThing
 
@@ -43,19 +45,29 @@ FILES = {
 
 
 @cache
-def _file(name: str) -> bytes:
-    return (FOLDER / name).read_bytes()
+def _file(name: str) -> tuple[bytes, str]:
+    """Return a file's bytes, and their ETag."""
+    data = (FOLDER / name).read_bytes()
+    return data, f'W/"{hashlib.sha256(data).hexdigest()[:16]}"'
 
 
 @router.get("/")
-async def index() -> Response:
+async def index(if_none_match: Annotated[str | None, Header()] = None) -> Response:
     """Show the jobs."""
-    return Response(_file("index.html"), media_type=FILES["index.html"])
+    return _given("index.html", if_none_match)
 
 
 @router.get("/dashboard/{name}")
-async def file(name: str) -> Response:
+async def file(name: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
     """Give a file of the page."""
     if name not in FILES:
         raise NoSuchThing(f"the page has no file {name!r}")
-    return Response(_file(name), media_type=FILES[name], headers={"Cache-Control": "no-cache"})
+    return _given(name, if_none_match)
+
+
+def _given(name: str, known: str | None) -> Response:
+    data, etag = _file(name)
+    headers = {"Cache-Control": "no-cache", "ETag": etag}
+    if known == etag:
+        return Response(status_code=304, headers=headers)
+    return Response(data, media_type=FILES[name], headers=headers)

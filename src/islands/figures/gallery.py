@@ -3,7 +3,9 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from islands.data.split import Split
 from islands.figures.free_run import draw_free_run
@@ -19,11 +21,16 @@ FigureOf = Callable[[Assessed, Split], Figure]
 
 
 def _free_run(entry: Assessed, split: Split) -> Figure:
-    return draw_free_run(split.validation, free_run(entry.model, split.validation).y)
+    return draw_free_run(split.validation, _simulated(entry, split))
 
 
 def _loop(entry: Assessed, split: Split) -> Figure:
-    return draw_loop(split.validation, free_run(entry.model, split.validation).y)
+    return draw_loop(split.validation, _simulated(entry, split))
+
+
+def _simulated(entry: Assessed, split: Split) -> NDArray[np.float64]:
+    """Return the free run that the model's metrics are of."""
+    return free_run(entry.model, split.validation, entry.assessment.warm_up).y
 
 
 def _hold(entry: Assessed, split: Split) -> Figure:

@@ -42,6 +42,8 @@ class Assessment:
         Of the one-step-ahead residual on the longest recording of the validation data; where it diverged
         there, no test passed and each one's note says so.
     physics : Physics
+    warm_up : int
+        Samples before the first prediction of all these simulations: another one would give other errors.
     """
 
     metrics: Mapping[str, Mapping[str, Metrics]]
@@ -49,6 +51,7 @@ class Assessment:
     information: InformationCriteria
     residual_tests: ResidualTests
     physics: Physics
+    warm_up: int
 
 
 def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None) -> Assessment:
@@ -81,6 +84,7 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
         _information(model, split.estimation, warm_up),
         _residual_tests(model, split.validation, warm_up),
         physics(model, split.estimation),
+        model.maximum_lag if warm_up is None else warm_up,
     )
 
 

@@ -5,7 +5,7 @@ import json
 import time
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from service import PROBLEM, csv, kept, problem_of, spec
 
@@ -37,6 +37,7 @@ DAMAGED = {
 }
 
 
+@settings(max_examples=20)
 @given(JSON_VALUES)
 def test_json_is_read_as_it_was_written(value):
     assert read_json(json.dumps(value).encode()) == value

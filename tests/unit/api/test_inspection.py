@@ -158,7 +158,7 @@ def test_the_process_writes_no_files(tmp_path):
 
 def test_the_service_answers_while_files_are_read(tmp_path):
     """At most two at a time are read; whoever asks for something else does not feel it."""
-    rows = "".join(f"{k * 0.01:.2f},{k % 7},{k % 5}\n" for k in range(80_000))
+    rows = "".join(f"{k * 0.01:.2f},{k % 7},{k % 5}\n" for k in range(40_000))
     content = f"t_s,u_V,y_um\n{rows}".encode()
     with served(tmp_path) as service:
         uploads = [

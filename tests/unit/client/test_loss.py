@@ -144,14 +144,19 @@ def test_a_service_that_has_no_time_is_asked_again_when_it_says(connect: Any, sc
     assert second < 0.9
 
 
-@pytest.mark.parametrize("after", ["soon", "-5", "", from_now(-3600.0), "1e9", "٣"])
+# Their moments stand in no test's name: every process that collects has its own.
+@pytest.mark.parametrize(
+    "after",
+    ["soon", "-5", "", from_now(-3600.0), "1e9", "٣"],
+    ids=["soon", "negative", "empty", "gone by", "no whole number", "foreign digit"],
+)
 def test_what_is_no_time_to_come_back_at_is_passed_over(connect: Any, scripted: Any, after: str) -> None:
     server = scripted(refused(503, after.encode().decode("latin-1")), EMPTY)
     assert connect(server.url).jobs().items == ()
     assert server.pauses[0] < 0.9
 
 
-@pytest.mark.parametrize("after", [3, from_now(3600.0)])
+@pytest.mark.parametrize("after", [3, from_now(3600.0)], ids=["seconds", "moment"])
 def test_who_cannot_wait_so_long_is_told_at_once(connect: Any, scripted: Any, after: object) -> None:
     server = scripted(refused(429, after, "quota-exceeded"), EMPTY)
     with pytest.raises(ServiceError, match="not now") as caught:

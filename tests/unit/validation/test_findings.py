@@ -21,7 +21,7 @@ def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
         },
     }
     model = islands.model_of([(islands.parse(text), theta) for text in terms])
-    return Assessed(model, Assessment(errors, {}, None, None, None))
+    return Assessed(model, Assessment(errors, {}, None, None, None, 0))
 
 
 def in_any_order(*expected):
