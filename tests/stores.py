@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 from uuid import uuid4
 
+from processes import eventually
 from sqlalchemy import event, select
 
 from islands_service.jobs import Job, JobState, Lease, Outcome, Report, Submission
@@ -138,18 +139,24 @@ def commits(store: Store) -> Iterator[list[float]]:
         event.remove(store.database.engine, "commit", committed)
 
 
+def waiting(store: Store, count: int) -> None:
+    """Wait until so many writes wait for a store's writer."""
+    eventually(lambda: store.database._waiting.qsize() >= count)
+
+
 @contextmanager
-def one_group(store: Store) -> Iterator[None]:
-    """Keep a store's writer busy, so that what is written in threads meanwhile makes one group."""
-    free = threading.Event()
-    busy = threading.Thread(target=lambda: store.database.write(lambda _: free.wait()))
-    busy.start()
+def one_group(store: Store, count: int) -> Iterator[None]:
+    """Keep a store's writer busy until so many writes wait: they make one group."""
+    busy, free = threading.Event(), threading.Event()
+    keeper = threading.Thread(target=store.database.write, args=(lambda _: (busy.set(), free.wait()),))
+    keeper.start()
+    busy.wait()
     try:
         yield
-        time.sleep(0.3)  # until all have asked
+        waiting(store, count)
     finally:
         free.set()
-        busy.join()
+        keeper.join()
 
 
 @contextmanager

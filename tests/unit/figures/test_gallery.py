@@ -20,8 +20,7 @@ MODEL = model_of([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 def test_a_free_run_s_figure_has_the_error_of_the_table(warm_up):
     split = Split(record(400), record(300, seed=1))
     assessed = Assessed(MODEL, assess(MODEL, split, 50, warm_up))
-    texts = " ".join(
-        text.get_text() for text in FIGURES["free-run"](assessed, split).findobj(match=_has_text)
-    )
-    (drawn,) = re.findall(r"RMSE ([0-9.e-]+)", texts)
+    figure = FIGURES["free-run"](assessed, split)
+    texts = [text.get_text() for text in figure.findobj(match=lambda artist: hasattr(artist, "get_text"))]
+    (drawn,) = re.findall(r"RMSE ([0-9.e-]+)", " ".join(texts))
     assert float(drawn) == pytest.approx(assessed.assessment.metrics["validation"]["free_run"].rmse, rel=5e-3)
