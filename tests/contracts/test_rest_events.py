@@ -22,6 +22,7 @@ def shared(tmp_path_factory, prepared_sqlite):
     shutil.copyfile(prepared_sqlite, folder / "islands.db")
     with served(folder) as running:
         yield running
+        assert not [entry for entry in running.logs if entry["event"] == "defect"]
 
 
 @pytest.fixture

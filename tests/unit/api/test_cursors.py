@@ -46,6 +46,7 @@ def encoded(value):
         encoded([1.0, 7]),
         encoded([1.0, ""]),
         encoded([1.0, "a\0b"]),
+        encoded([1.0, "größe"]),
         encoded([1.0, "\ud800"]),
         encoded([1.0, "a" * 65]),
         encoded([1.0, ["a"]]),

@@ -4,6 +4,7 @@ import asyncio
 from contextlib import asynccontextmanager, suppress
 
 import pytest
+import structlog
 from stores import CANCELLED, FOUND, LONG, brought_on, claimed, submitted
 
 from islands_api import hub as hubs
@@ -178,6 +179,24 @@ def test_a_job_that_vanishes_between_two_questions_does_not_blind_the_hub(store,
                 await asyncio.sleep(0.1)
                 store.jobs.cancel(other.owner, other.id)
                 return await asyncio.wait_for(watcher, 5.0)
+
+    with structlog.testing.capture_logs() as logs:
+        assert asyncio.run(scene()) == [1, 2]
+    assert logs == []
+
+
+def test_who_leaves_takes_nothing_from_those_who_stay(store):
+    async def scene():
+        first, second = submitted(store), submitted(store)
+        async with running(store) as hub:
+            staying = asyncio.create_task(told(watching(hub, store, second), []))
+            leaving = asyncio.create_task(told(watching(hub, store, first), []))
+            await asyncio.sleep(0.05)
+            store.jobs.cancel(first.owner, first.id)
+            await asyncio.wait_for(leaving, 5.0)
+            await asyncio.sleep(0.05)
+            store.jobs.cancel(second.owner, second.id)
+            return await asyncio.wait_for(staying, 5.0)
 
     assert asyncio.run(scene()) == [1, 2]
 

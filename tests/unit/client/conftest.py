@@ -184,6 +184,13 @@ class Wire:
         self.interrupt()
         for thread in self._threads:
             thread.join()
+        self._threads.clear()
+
+    def outage(self, seconds: float) -> None:
+        """Refuse connections for a while: one after the other, however late the thread that does it may be."""
+        self.tear()
+        time.sleep(seconds)
+        self.mend()
 
     def interrupt(self) -> None:
         """End the connections that there are."""

@@ -156,9 +156,8 @@ def test_waiting_survives_a_service_that_is_started_again(
 ) -> None:
     client = connect(wire.url, me.secret)
     job = client.submit(me.dataset, **SPEC)
-    later(0.1, wire.tear)
+    later(0.1, wire.outage, 0.3)
     later(0.2, carried_out, job)
-    later(0.4, wire.mend)
     assert client.wait(job).state == JobState.SUCCEEDED
 
 
@@ -207,8 +206,7 @@ def test_events_go_on_when_a_service_comes_back(
     connect: Any, me: Any, wire: Any, job: Any, carried_out: Any, later: Any
 ) -> None:
     later(0.05, carried_out, job, 0.05)
-    later(0.2, wire.tear)
-    later(0.4, wire.mend)
+    later(0.2, wire.outage, 0.2)
     assert seen(connect(wire.url, me.secret).events(job)) == happened()
 
 
