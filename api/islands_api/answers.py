@@ -27,7 +27,7 @@ from islands_api.problems import (
     problem_of,
 )
 from islands_service.jobs import QuotaExceeded
-from islands_service.store.database import StoreFull
+from islands_service.store.database import StoreError, StoreFull
 
 log = structlog.get_logger()
 
@@ -87,7 +87,9 @@ async def _deliberate(request: Request, error: Exception) -> JSONResponse:
         headers["WWW-Authenticate"] = 'Bearer realm="islands"'
     if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         log.error("request failed", type=problem.type, reason=str(error))
-    return answer(request, problem, str(error), headers=headers)
+    # Where the database is, and what its driver says, is for whoever runs the service.
+    detail = str(type(error).__doc__) if isinstance(error, StoreError) else str(error)
+    return answer(request, problem, detail, headers=headers)
 
 
 async def _invalid(request: Request, error: Exception) -> JSONResponse:

@@ -68,7 +68,7 @@ class Coordinator:
         self._blobs = Blobs(settings.blobs)
         self._traces = Traces(settings.telemetry, "coordinator")
         self._ray = ExitStack()
-        self._connected = False
+        self._connected = self._away = False
         self._sweep_at = monotonic() + LOOK
 
     def run(self) -> None:
@@ -104,9 +104,14 @@ class Coordinator:
             if lease is None:
                 self._idle()
         except StoreError as error:
-            log.warning("store unavailable", reason=str(error))
+            if not self._away:
+                log.warning("store unavailable", reason=str(error))
+            self._away = True
             self._stopping.wait(RETRY)
         else:
+            if self._away:
+                log.info("store back")
+            self._away = False
             if lease is not None:
                 self._carry_out(lease)
 
@@ -132,6 +137,10 @@ class Coordinator:
                 log.warning("lease lost", reason=str(error))
             except CoordinatorStopping:
                 self._release(lease)
+            except StoreError as error:
+                log.warning("job given back", reason=str(error))
+                self._release(lease)
+                self._stopping.wait(RETRY)
             except ClusterError as error:
                 log.error("cluster lost", reason=str(error))
                 self._release(lease, attempted=self._connected)

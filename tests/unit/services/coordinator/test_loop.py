@@ -21,7 +21,7 @@ from islands_service.jobs import Job, JobState, Lease, Outcome, Submission
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.database import StoreFull
+from islands_service.store.database import StoreFull, StoreUnavailable
 
 Found = tuple[list[Any], list[Any]]
 
@@ -188,6 +188,24 @@ def test_the_end_of_a_job_is_written_down_as_soon_as_there_is_room(
     coordinator(Full)
     ended = ends(store, job)
     assert (ended.state, ended.attempt, ended.summary) == (JobState.SUCCEEDED, 1, {"done": True})
+
+
+def test_a_store_that_is_away_in_the_middle_of_a_job_costs_no_attempt(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    away = [7]  # more often than a job may be tried in vain
+
+    def work(*_: object) -> Outcome:
+        if away[0]:
+            away[0] -= 1
+            raise StoreUnavailable("the database does not answer")
+        return DONE
+
+    monkeypatch.setattr("islands_service.coordinator.loop.RETRY", 0.01)
+    working(monkeypatch, work)
+    coordinator()
+    ended = ends(store, job)
+    assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, 1)
 
 
 def test_a_lost_cluster_ends_the_coordinator_and_gives_the_job_back_as_an_attempt(
