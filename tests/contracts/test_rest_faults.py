@@ -6,6 +6,7 @@ import subprocess
 import tempfile
 import threading
 import time
+from contextlib import suppress
 
 import httpx
 import pytest
@@ -26,7 +27,7 @@ def disk(tmp_path):
     folder = tmp_path / "disk"
     folder.mkdir()
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "islands-test", folder],
+        ["mount", "-t", "tmpfs", "-o", f"size={DISK},nr_inodes=400", "islands-test", folder],
         capture_output=True,
         text=True,
         check=False,
@@ -93,7 +94,13 @@ def test_no_room_to_receive_an_upload_is_told_as_such(disk, tmp_path, prepared_s
         detail = problem_of(service.upload(csv() + b"\n" * 2_000_000), 507, "storage-full")
         assert "make room" in detail
         filler.unlink()
-        assert service.upload(csv()).status_code == 201
+        dataset = service.upload(csv()).json()["id"]
+        with suppress(OSError):
+            for number in range(1000):
+                (disk / f"file{number}").touch()
+        problem_of(service.upload(csv(100)), 507, "storage-full")
+        problem_of(service.submit(**spec(dataset, rows="0:100")), 507, "storage-full")
+        assert service.submit(**spec(dataset)).status_code == 202
 
 
 @pytest.fixture

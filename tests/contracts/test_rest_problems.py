@@ -5,6 +5,7 @@ import shutil
 
 import httpx
 import pytest
+from fastapi.responses import StreamingResponse
 from service import PROBLEM, problem_of, queued, served
 
 from islands_api.problems import PROBLEMS
@@ -19,6 +20,7 @@ def service(tmp_path_factory, prepared_sqlite):
     with served(folder) as running:
         running.app.add_api_route("/defect", defect)
         running.app.add_api_route("/late", late, methods=["POST"])
+        running.app.add_api_route("/half", half)
         yield running
 
 
@@ -29,6 +31,14 @@ async def defect():
 
 def late():
     raise KeyError("in a thread")
+
+
+async def half():
+    async def pieces():
+        yield b"half of "
+        raise ZeroDivisionError
+
+    return StreamingResponse(pieces())
 
 
 @pytest.mark.parametrize(
@@ -139,6 +149,14 @@ def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
     entry = [each for each in service.logs if each.get("exc_info") and each["request_id"] == "find4me"][-1]
     assert (entry["event"], entry["log_level"]) == ("defect", "error")
     assert isinstance(entry["exc_info"], ZeroDivisionError | KeyError)
+
+
+def test_an_answer_that_breaks_off_is_not_taken_for_a_whole_one(service):
+    service.logs.clear()
+    with pytest.raises(httpx.RemoteProtocolError, match="incomplete"):
+        service.client.get("/half")
+    assert service.client.get("/healthz").status_code == 200
+    assert [entry["event"] for entry in service.logs] == ["request", "defect"]
 
 
 def test_a_defect_ends_neither_the_connection_nor_the_service(service):

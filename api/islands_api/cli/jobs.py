@@ -126,7 +126,7 @@ def list_jobs(
         while page.next is not None and len(found) < limit:
             page = client.jobs(state, page.next, min(limit - len(found), 200))
             found += page.items
-    views.show_jobs(found[:limit], as_json)
+    views.show_jobs(found, as_json)
 
 
 @jobs.command()

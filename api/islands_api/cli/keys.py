@@ -57,13 +57,17 @@ def create(
 def list_keys(data_dir: DataDir = None, database: Database = None) -> None:
     """List the keys, without their secrets."""
     with _store(data_dir, database) as store:
-        table = Table(Column("key", no_wrap=True), "name", "owner", "scopes", Column("state", no_wrap=True))
+        # Where there is little room lines are broken: what is cut off names nothing.
+        table = Table(
+            Column("key", no_wrap=True),
+            *(Column(name, overflow="fold") for name in ("name", "owner", "scopes")),
+            Column("state", no_wrap=True),
+        )
         for key in store.keys.all():
             state = "revoked" if key.revoked is not None else "expired" if key.expired else "valid"
             # What somebody calls a key is no markup.
             table.add_row(key.id, Text(key.name), Text(key.owner), ", ".join(sorted(key.scopes)), state)
-    # Where there is little room the others break their lines; an id that is cut off names nothing.
-    output.print(table, soft_wrap=False)
+    output.print(table)
 
 
 @keys.command()

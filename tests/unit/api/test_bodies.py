@@ -101,6 +101,18 @@ def test_a_job_of_two_megabytes_is_refused_before_it_is_read(service):
     assert time.monotonic() - began < 2.0
 
 
+def test_who_announces_too_much_need_not_send_it(service):
+    connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=10)
+    try:
+        connection.putrequest("POST", "/v1/jobs")
+        connection.putheader("Content-Type", "application/json")
+        connection.putheader("Content-Length", "2000000")
+        connection.endheaders()
+        assert connection.getresponse().status == 413
+    finally:
+        connection.close()
+
+
 def chunked(service, path, media, chunks, piece):
     """Send a body that does not say how long it is; return the status, the media type, and the document."""
     connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=20)

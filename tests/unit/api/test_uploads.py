@@ -61,10 +61,11 @@ def test_what_is_received_is_what_was_sent():
     assert target.getvalue() == sent
 
 
-def test_a_gzip_is_unpacked_from_a_file_as_the_framework_hands_it_over():
+@pytest.mark.parametrize("spooled", [1, 1_000_000])
+def test_a_gzip_is_unpacked_from_a_file_as_the_framework_hands_it_over(spooled):
     """It is open for writing too, which gzip takes for a wish to write."""
     target = io.BytesIO()
-    with tempfile.SpooledTemporaryFile(max_size=1) as source:
+    with tempfile.SpooledTemporaryFile(max_size=spooled) as source:
         source.write(gzip.compress(b"t,u\n") + gzip.compress(b"1,2\n"))
         source.seek(0)
         assert receive(source, target, "a.csv", True, 100) == 8

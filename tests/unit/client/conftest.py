@@ -22,7 +22,7 @@ import pytest
 from service import Service, kept, served
 from stores import LONG
 
-from islands_api.client import AsyncClient, Client
+from islands_api.client import AsyncClient, Client, transport
 from islands_service.jobs import Lease
 
 LOOPBACK = "127.0.0.1"
@@ -99,6 +99,13 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
             return stack.enter_context(closing(client))
 
         yield make
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the client try again sooner than it does: for tests of what it does, not when."""
+    monkeypatch.setattr(transport, "DELAYS", (0.03, 0.06))
+    monkeypatch.setattr(transport, "LAST_DELAY", 0.1)
 
 
 @pytest.fixture
@@ -187,7 +194,7 @@ class Wire:
         self._threads.clear()
 
     def outage(self, seconds: float) -> None:
-        """Refuse connections for a while: one after the other, however late the thread that does it may be."""
+        """Refuse connections for a while: one after the other, however late the thread that does it is."""
         self.tear()
         time.sleep(seconds)
         self.mend()
