@@ -98,7 +98,7 @@ def test_the_time_of_all_attempts_counts(
     interruption = Interruption(store, job, 25)
 
     def slowly() -> None:
-        time.sleep(0.02)
+        time.sleep(0.005)
         interruption()
 
     with pytest.raises(JobCancelled):
@@ -113,7 +113,7 @@ def test_the_time_of_all_attempts_counts(
     outcome = carried_out(claim(store), store, blobs, lambda: checks.append(time.monotonic()))
     last = time.monotonic() - began
     assert outcome.document is not None
-    assert before > 0.4
+    assert before > 0.2
     spent = outcome.document["search"]["wall_s"]
     assert before + checks[-1] - checks[0] <= spent <= before + last + 0.01
 
