@@ -186,6 +186,10 @@ def _listen(role: Role, now: float) -> None:
 
 
 def _ended(role: Role, now: float) -> None:
+    assert role.process is not None
+    # Whom it has left behind: Ray's processes look only once a minute whether they are still wanted.
+    with suppress(ProcessLookupError):
+        os.killpg(role.process.pid, signal.SIGKILL)
     os.close(role.signs)
     if role.address is not None:
         role.address.unlink(missing_ok=True)

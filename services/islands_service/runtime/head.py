@@ -3,6 +3,7 @@
 Coordinators connect to it by its address, as they do to a cluster: there is one path.
 """
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -15,7 +16,6 @@ import ray
 from islands.errors import IslandsError
 from islands_service.lifeline import sign_of_life, stop_on_signals
 from islands_service.runtime.cluster import cluster
-from islands_service.runtime.errors import ClusterError
 from islands_service.settings import service_settings
 
 #: Seconds between two looks at whether Ray still answers.
@@ -34,10 +34,13 @@ def main() -> int:
         with cluster(None):
             stop_on_signals(stopping)
             with _found_at(settings.ray_address_file):
-                while not stopping.wait(_LOOK):
-                    _check()
+                while not (lost := _lost()) and not stopping.wait(_LOOK):
                     # Here and not from a thread: where Ray hangs we do, too, and are started again.
                     sign_of_life(settings.lifeline)
+            if lost:
+                print(f"Ray: {lost}", file=sys.stderr, flush=True)
+                # Ray's own end would wait for who is lost; the supervisor ends whom we leave behind.
+                os._exit(1)
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
     except IslandsError as error:
         print(f"Ray: {error}", file=sys.stderr)
@@ -45,19 +48,13 @@ def main() -> int:
     return 0
 
 
-def _check() -> None:
-    """Return if Ray goes on.
-
-    Raises
-    ------
-    ClusterError
-    """
+def _lost() -> str:
+    """Say what Ray has lost; "" where it goes on."""
     # Without its raylet Ray would answer as before, and carry out nothing.
     node = ray._private.worker._global_node
     if lost := [name for name, _ in node.dead_processes() if name in _VITAL]:
-        raise ClusterError(f"it has lost its {', '.join(lost)}")
-    if not any(each["Alive"] for each in ray.nodes()):
-        raise ClusterError("its raylet does not answer")
+        return f"it has lost its {', '.join(lost)}"
+    return "" if any(each["Alive"] for each in ray.nodes()) else "its raylet does not answer"
 
 
 @contextmanager

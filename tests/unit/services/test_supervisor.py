@@ -265,6 +265,21 @@ def test_where_the_supervisor_is_killed_the_children_are_told_as_they_asked_for(
     assert running.order("told", "end") == ["work told", "work end"]
 
 
+def test_whom_a_child_leaves_behind_is_ended_with_it(supervised: Start) -> None:
+    """Ray's processes, and files that are being read: nobody is there any more who would end them."""
+    leaves = (
+        "note('start'); sign()\nif os.fork() == 0: note('left', 'grandchild')\nwhile True: time.sleep(0.05)"
+    )
+    running = supervised(role("ray", leaves), _BACKOFF=4.0)
+    for number in (signal.SIGKILL, signal.SIGTERM):
+        pids = {pid for *_, pid in eventually(lambda: running.entries("left", "grandchild"))}  # type: ignore[attr-defined]
+        os.kill(running.entries("start")[-1][3], number)
+        eventually(lambda pids=pids: not alive(pids), seconds=3.0)
+        running.started(2)
+    running.end()
+    assert not alive({pid for *_, pid in running.entries()})
+
+
 def test_a_file_that_says_how_a_child_is_reached_goes_with_the_child(
     supervised: Start, tmp_path: Path
 ) -> None:
