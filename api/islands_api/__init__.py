@@ -10,9 +10,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from islands_api.client import AsyncClient, Client, ServiceError
+    from islands_api.client import AsyncClient, Client, JobFailed, ServiceError, Unreachable
 
-__all__ = ["AsyncClient", "Client", "ServiceError"]
+__all__ = ["AsyncClient", "Client", "JobFailed", "ServiceError", "Unreachable"]
 
 
 def __getattr__(name: str) -> Any:
