@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
 
@@ -11,7 +12,7 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from islands_api import answers
 from islands_api.auth import KeyRing
-from islands_api.doors import DRAWINGS, INSPECTIONS, Doors
+from islands_api.doors import DRAWINGS, INSPECTIONS, THREADS, Doors
 from islands_api.hub import Hub
 from islands_api.measures import Measures
 from islands_api.middleware import Limited, SameOrigin, Watched
@@ -58,6 +59,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             Measures(opened),
             asyncio.Semaphore(INSPECTIONS),
             asyncio.Semaphore(DRAWINGS),
+            threads := ThreadPoolExecutor(THREADS, "doors"),
         )
         app.state.keys = KeyRing(doors)
         tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_live(settings.lifeline))]
@@ -71,6 +73,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
                     await task
             await doors.do(opened.close)
             await doors.do(traces.close)
+            threads.shutdown()
 
     app = FastAPI(
         title="islands",
