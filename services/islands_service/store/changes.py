@@ -22,9 +22,8 @@ def change(connection: Connection, job: str, **values: Any) -> Row[Any]:
 
 def record(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
     """Write down what happened to a job as its version's event."""
-    connection.execute(
-        insert(events).values(job_id=row.id, number=row.version, kind=kind, data=data, at=row.updated)
-    )
+    values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}
+    connection.execute(insert(events), values)
 
 
 def job_of(row: Row[Any]) -> Job:

@@ -31,6 +31,9 @@ from islands_service.store.tables import events, jobs
 #: The most jobs of a page.
 PAGE = 200
 
+#: Built once: to build a statement takes as long as to carry it out.
+_QUEUE = insert(jobs).values(state=JobState.QUEUED, created=now(), updated=now()).returning(jobs)
+
 
 @dataclass(frozen=True, slots=True)
 class Page:
@@ -87,7 +90,7 @@ class Jobs:
         StoreUnavailable, StoreFull
             Nothing was accepted.
         """
-        asked = hashlib.sha256(submission.request.encode()).hexdigest()
+        asked, spec = hashlib.sha256(submission.request.encode()).hexdigest(), json.dumps(submission.spec)
 
         def operation(connection: Connection) -> tuple[Job, bool]:
             locks.counting(connection, submission.owner)
@@ -107,23 +110,17 @@ class Jobs:
                     return job_of(before), False
             if most_active is not None:
                 _refuse_above(connection, submission.owner, most_active)
-            row = connection.execute(
-                insert(jobs)
-                .values(
-                    id=uuid4().hex,
-                    owner=submission.owner,
-                    kind=submission.kind,
-                    name=submission.name,
-                    spec=json.dumps(submission.spec),
-                    request_sha256=asked,
-                    idempotency_key=submission.idempotency_key,
-                    priority=submission.priority,
-                    state=JobState.QUEUED,
-                    created=now(),
-                    updated=now(),
-                )
-                .returning(jobs)
-            ).one()
+            values = {
+                "id": uuid4().hex,
+                "owner": submission.owner,
+                "kind": submission.kind,
+                "name": submission.name,
+                "spec": spec,
+                "request_sha256": asked,
+                "idempotency_key": submission.idempotency_key,
+                "priority": submission.priority,
+            }
+            row = connection.execute(_QUEUE, values).one()
             record(connection, row, "queued")
             return job_of(row), True
 
