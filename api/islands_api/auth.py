@@ -1,7 +1,7 @@
 """Who asks: the owner behind a key, and what the key allows."""
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic
 from typing import Annotated, Any
 
@@ -10,6 +10,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import NoKey, ScopeMissing
+from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
 
 #: Whose everything is that comes without a key, on a loopback address.
@@ -26,10 +27,21 @@ _bearer = HTTPBearer(auto_error=False, description="A key of `islands keys creat
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who asks."""
+    """Who asks.
+
+    Attributes
+    ----------
+    owner : str
+        Whose jobs and data sets these are.
+    scopes : frozenset of str
+        What is allowed.
+    secret : str or None
+        Of the key that was shown.
+    """
 
     owner: str
     scopes: frozenset[str]
+    secret: str | None = field(default=None, repr=False)
 
 
 class KeyRing:
@@ -57,6 +69,16 @@ class KeyRing:
                 self._found[secret] = now, key
         return key
 
+    async def still_open(self, caller: Caller) -> bool:
+        """Tell whether a caller who was let in a while ago would be let in now, as far as can be known."""
+        if caller.secret is None:
+            return True
+        try:
+            key = await self.find(caller.secret)
+        except StoreError:
+            return True
+        return key is not None and key.valid
+
 
 async def _caller(
     request: Request,
@@ -73,12 +95,12 @@ async def _caller(
             )
         return Caller(LOCAL, frozenset(SCOPES))
     key = await request.app.state.keys.find(given.credentials)
-    if key is None or key.revoked is not None or key.expired:
+    if key is None or not key.valid:
         doors.rate.take(f"address {address}", _WRONG)
         what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
         raise NoKey(f"the key {what}: ask whoever runs this service for another one")
     doors.rate.take(f"key {key.id}")
-    return Caller(key.owner, key.scopes)
+    return Caller(key.owner, key.scopes, given.credentials)
 
 
 def _allowed(scope: str) -> Callable[[Caller], Awaitable[Caller]]:

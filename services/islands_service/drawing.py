@@ -8,6 +8,7 @@ import io
 import json
 import sys
 from collections.abc import Mapping
+from errno import ENOSPC
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from islands_service.report import report
 from islands_service.settings import service_settings
 from islands_service.specification import identification_of
 from islands_service.store import Store
+from islands_service.store.database import StoreFull
 
 #: The artefact that is a job's report.
 REPORT = "report.html"
@@ -54,7 +56,7 @@ def main() -> int:
             store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
     except IslandsError as error:
         print(error, file=sys.stderr)
-        return 1
+        return ENOSPC if isinstance(error, StoreFull) else 1
     return 0
 
 

@@ -12,7 +12,7 @@ import httpx
 import pytest
 from databases import server
 from processes import eventually
-from service import PATIENCE, csv, parsed, problem_of, queued, served, spec
+from service import PATIENCE, csv, identified, parsed, problem_of, queued, served, spec
 from stores import FOUND, claimed
 
 #: Bytes of a small disk.
@@ -83,6 +83,16 @@ def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, prepa
         listed = service.client.get("/v1/jobs", params={"limit": 200}).json()["items"]
         assert {each["id"] for each in listed} == accepted | {answer.json()["id"]}
         assert not list(service.settings.blobs.glob("*.part"))
+
+
+def test_no_room_for_a_figure_is_told_as_such(disk, prepared_sqlite):
+    shutil.copyfile(prepared_sqlite, disk / "islands.db")
+    with served(disk) as service:
+        path = f"/v1/jobs/{identified(service)}/models/1/figures/loop.svg"
+        filler = fill(disk)
+        assert "make room" in problem_of(service.client.get(path), 507, "storage-full")
+        filler.unlink()
+        assert service.client.get(path).status_code == 200
 
 
 def test_no_room_to_receive_an_upload_is_told_as_such(disk, tmp_path, prepared_sqlite, monkeypatch):

@@ -65,6 +65,20 @@ def test_the_same_key_and_request_is_the_same_job(service, order):
     assert ids(service.client.get("/v1/jobs")) == [first.json()["id"]]
 
 
+def test_what_was_accepted_is_the_same_job_even_where_its_data_set_is_gone(service, order):
+    """A client that lost the first answer asks again, perhaps after somebody has tidied up."""
+    first = service.submit({"Idempotency-Key": "k1"}, **order)
+    service.client.post(f"{first.headers['location']}/cancel")
+    assert service.client.delete(f"/v1/datasets/{order['dataset']}").status_code == 204
+    again = service.submit({"Idempotency-Key": "k1"}, **order)
+    assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
+    assert (again.json()["id"], again.json()["state"]) == (first.json()["id"], "cancelled")
+    other = service.submit({"Idempotency-Key": "k1"}, **{**order, "seed": 1})
+    problem_of(other, 422, "idempotency-conflict")
+    problem_of(service.submit({"Idempotency-Key": "k2"}, **order), 404, "no-such-dataset")
+    problem_of(service.submit(**order), 404, "no-such-dataset")
+
+
 @pytest.mark.parametrize("change", [{"seed": 1}, {"name": "second"}, {"priority": 1}, {"preset": "narx"}])
 def test_the_same_key_and_another_request_is_refused(service, order, change):
     first = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]

@@ -4,8 +4,9 @@ import shutil
 import time
 
 import pytest
-from service import csv, emptied, kept, problem_of, queued, served, spec
+from service import PATIENCE, csv, emptied, kept, problem_of, queued, served, spec
 
+from islands_api.routes import events
 from islands_service.store.keys import SCOPES
 
 
@@ -126,6 +127,24 @@ def test_a_secret_is_kept_nowhere(service):
     for path in service.settings.data_dir.rglob("*"):
         assert path.is_dir() or secret.encode() not in path.read_bytes()
     assert secret not in str(service.logs)
+
+
+@pytest.mark.parametrize("end", ["revoked", "expired"])
+def test_a_stream_ends_with_its_key(service, monkeypatch, end):
+    monkeypatch.setattr(events, "_ALIVE", 0.05)
+    path = f"/v1/jobs/{queued(service.store, 'me').id}/events"
+    mine = service.key(owner="me", seconds=2.0 if end == "expired" else None)
+    with service.client.stream("GET", path, headers=mine) as answer:
+        pieces = answer.iter_text()
+        while "alive" not in next(pieces):
+            pass
+        if end == "revoked":
+            (key,) = service.store.keys.all()
+            service.store.keys.revoke(key.id)
+        began = time.monotonic()
+        for _ in pieces:
+            assert time.monotonic() - began < PATIENCE
+    problem_of(service.client.get(path, headers=mine), 401, "no-key")
 
 
 def test_an_owner_has_so_many_jobs_and_no_more(service):

@@ -197,6 +197,17 @@ def test_a_quota_of_nothing_lets_nothing_in(store):
         store.jobs.submit(asked(), 0)
 
 
+def test_what_is_resumed_takes_up_the_quota_too(store):
+    job = submitted(store)
+    store.jobs.cancel(ALICE, job.id)
+    other = submitted(store)
+    with pytest.raises(QuotaExceeded, match="1 jobs are waiting or running"):
+        store.jobs.resume(ALICE, job.id, 1)
+    assert store.jobs.get(ALICE, job.id).state == JobState.CANCELLED
+    store.jobs.cancel(ALICE, other.id)
+    assert store.jobs.resume(ALICE, job.id, 1).state == JobState.QUEUED
+
+
 def test_a_replay_is_answered_at_a_full_quota(store):
     job, _ = store.jobs.submit(asked(idempotency_key="k"), 1)
     assert store.jobs.submit(asked(idempotency_key="k"), 1) == (job, False)

@@ -1,12 +1,14 @@
 """Events of a job as they happen: server-sent events that go on where a client was cut off."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing
+from time import monotonic
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Header, Request, Response
 from fastapi.responses import StreamingResponse
 
-from islands_api.auth import Reader
+from islands_api.auth import Caller, KeyRing, Reader
 from islands_api.documents import json_text
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
@@ -16,6 +18,7 @@ from islands_service.jobs import TERMINAL, Event, Job
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 
 #: Seconds of silence after which a comment is sent: a connection that says nothing is cut by some proxies.
+#: A stream outlives its key's revocation for as long.
 _ALIVE = 15.0
 
 #: What may happen to a job.
@@ -45,6 +48,7 @@ _EVENTS: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{job}/events", response_class=StreamingResponse, responses=_EVENTS)
 async def events(
+    request: Request,
     job: Id,
     caller: Reader,
     doors: AtDoors,
@@ -60,16 +64,27 @@ async def events(
     # The framework's own event response makes a model of every event for every client; five hundred watch.
     return StreamingResponse(
         # Nobody has seen what has not happened yet: who says so would wait for ever.
-        _stream(doors, found, min(last_event_id, found.version)),
+        _while_open(request.app.state.keys, caller, _stream(doors, found, min(last_event_id, found.version))),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
 
 
-async def _stream(doors: Doors, job: Job, last: int) -> AsyncIterator[bytes]:
+async def _stream(doors: Doors, job: Job, last: int) -> AsyncGenerator[bytes]:
     with doors.measures.streams.track_inprogress():
         async for event in doors.hub.events(job.id, job.version, last, _ALIVE):
             yield b": alive\n\n" if event is None else _encoded(event)
+
+
+async def _while_open(keys: KeyRing, caller: Caller, stream: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:
+    let_in = monotonic()
+    async with aclosing(stream):
+        async for piece in stream:
+            if monotonic() - let_in >= _ALIVE:
+                if not await keys.still_open(caller):
+                    return
+                let_in = monotonic()
+            yield piece
 
 
 def _encoded(event: Event) -> bytes:

@@ -4,6 +4,7 @@ import asyncio
 import sys
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping
+from errno import ENOSPC
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Response
@@ -16,6 +17,7 @@ from islands_api.routes.jobs import Id
 from islands_api.routes.models import Rank, finished, stored
 from islands_api.schemas import Names
 from islands_service.specification import Identification
+from islands_service.store.database import StoreFull
 
 router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES)
 
@@ -153,6 +155,8 @@ async def _draw(doors: Doors, caller: Caller, job: str, rank: int | None) -> Non
         if process.returncode is None:
             process.kill()
             await process.wait()
+    if process.returncode == ENOSPC:
+        raise StoreFull(f"there is no room for the figures of job {job}: make room")
     if process.returncode != 0:
         reason = complaint.decode(errors="replace").strip().rpartition("\n")[2]
         raise DrawingFailed(f"the figures of job {job} cannot be drawn: {reason or process.returncode}")

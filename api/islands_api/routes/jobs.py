@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Response
 
+from islands.errors import IslandsError
 from islands_api.auth import Reader, Writer
 from islands_api.bodies import JSONRoute
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
@@ -65,12 +66,6 @@ async def submit(
 
     It waits until a coordinator is free; follow it by its `events`, or by `GET` with `wait`.
     """
-    for doubt in await doors.do(admit, request, caller.owner, doors.store, doors.settings):
-        with named(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
-            async with doors.inspections:
-                await inspected(
-                    path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
-                )
     submission = Submission(
         caller.owner,
         request.spec,
@@ -78,7 +73,7 @@ async def submit(
         priority=request.priority,
         idempotency_key=idempotency_key,
     )
-    job, new = await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
+    job, new = await _submitted(doors, request, submission)
     if new:
         doors.measures.accepted.inc()
     headers = {"Location": f"{router.prefix}/{job.id}", "ETag": _etag(job), "Retry-After": "1"}
@@ -133,7 +128,8 @@ async def cancel(job: Id, caller: Writer, doors: AtDoors) -> Any:
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
 async def resume(job: Id, caller: Writer, doors: AtDoors) -> Any:
     """Have a job that failed or was cancelled go on from its last checkpoint."""
-    return Document(job_document(await doors.do(doors.store.jobs.resume, caller.owner, job)), 202)
+    resumed = await doors.do(doors.store.jobs.resume, caller.owner, job, doors.settings.max_active)
+    return Document(job_document(resumed), 202)
 
 
 @router.delete("/{job}", status_code=204)
@@ -156,6 +152,27 @@ async def history(
     points = await doors.do(doors.store.results.history, job, after, _POINTS)
     names = ("generation", "evaluations", "best", "islands")
     return Document({"items": [dict(zip(names, point, strict=True)) for point in points]})
+
+
+async def _submitted(doors: Doors, request: JobRequest, submission: Submission) -> tuple[Job, bool]:
+    try:
+        await _admitted(doors, request, submission.owner)
+    except IslandsError:
+        # What was accepted once stays so, even if its data set was deleted since.
+        before = await doors.do(doors.store.jobs.accepted, submission)
+        if before is None:
+            raise
+        return before, False
+    return await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
+
+
+async def _admitted(doors: Doors, request: JobRequest, owner: str) -> None:
+    for doubt in await doors.do(admit, request, owner, doors.store, doors.settings):
+        with named(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
+            async with doors.inspections:
+                await inspected(
+                    path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
+                )
 
 
 async def _changed(doors: Doors, job: Job, seconds: float) -> Job:

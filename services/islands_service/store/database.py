@@ -87,7 +87,7 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Connection]:
-        """Open a transaction that reads.
+        """Open a connection that reads: each statement sees what was durable when it began.
 
         Raises
         ------

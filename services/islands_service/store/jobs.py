@@ -90,24 +90,12 @@ class Jobs:
         StoreUnavailable, StoreFull
             Nothing was accepted.
         """
-        asked, spec = hashlib.sha256(submission.request.encode()).hexdigest(), json.dumps(submission.spec)
+        spec = json.dumps(submission.spec)
 
         def operation(connection: Connection) -> tuple[Job, bool]:
             locks.counting(connection, submission.owner)
-            if submission.idempotency_key is not None:
-                before = connection.execute(
-                    select(jobs).where(
-                        jobs.c.owner == submission.owner,
-                        jobs.c.idempotency_key == submission.idempotency_key,
-                    )
-                ).one_or_none()
-                if before is not None:
-                    if before.request_sha256 != asked:
-                        raise IdempotencyConflict(
-                            f"the idempotency key {submission.idempotency_key!r} belongs to job {before.id}, "
-                            "which was asked for with another request: take a new key"
-                        )
-                    return job_of(before), False
+            if (before := _accepted(connection, submission)) is not None:
+                return before, False
             if most_active is not None:
                 _refuse_above(connection, submission.owner, most_active)
             values = {
@@ -116,7 +104,7 @@ class Jobs:
                 "kind": submission.kind,
                 "name": submission.name,
                 "spec": spec,
-                "request_sha256": asked,
+                "request_sha256": _digest(submission),
                 "idempotency_key": submission.idempotency_key,
                 "priority": submission.priority,
             }
@@ -125,6 +113,17 @@ class Jobs:
             return job_of(row), True
 
         return self._database.write(operation)
+
+    def accepted(self, submission: Submission) -> Job | None:
+        """Return the job that a submission's idempotency key names already, None where it names none.
+
+        Raises
+        ------
+        IdempotencyConflict
+            The key was used with another request.
+        """
+        with self._database.read() as connection:
+            return _accepted(connection, submission)
 
     def get(self, owner: str, job: str) -> Job:
         """Return a job.
@@ -185,7 +184,7 @@ class Jobs:
 
         return self._database.write(operation)
 
-    def resume(self, owner: str, job: str) -> Job:
+    def resume(self, owner: str, job: str, most_active: int | None = None) -> Job:
         """Queue a job again that failed or was cancelled: it goes on from its last checkpoint.
 
         Raises
@@ -193,14 +192,19 @@ class Jobs:
         NoSuchJob
         WrongState
             It is waiting, running, or has succeeded.
+        QuotaExceeded
+            The owner has ``most_active`` jobs that are not finished.
         """
 
         def operation(connection: Connection) -> Job:
+            locks.counting(connection, owner)
             before = _own(connection, owner, job, locked=True)
             if before.state not in RESUMABLE:
                 raise WrongState(
                     f"job {job} is {before.state}: only one that failed or was cancelled resumes"
                 )
+            if most_active is not None:
+                _refuse_above(connection, owner, most_active)
             row = change(
                 connection,
                 job,
@@ -275,6 +279,26 @@ def _own(connection: Connection, owner: str, job: str, locked: bool = False) -> 
     if row is None:
         raise NoSuchJob(f"there is no job {job!r}")
     return row
+
+
+def _digest(submission: Submission) -> str:
+    return hashlib.sha256(submission.request.encode()).hexdigest()
+
+
+def _accepted(connection: Connection, submission: Submission) -> Job | None:
+    key = submission.idempotency_key
+    if key is None:
+        return None
+    query = select(jobs).where(jobs.c.owner == submission.owner, jobs.c.idempotency_key == key)
+    before = connection.execute(query).one_or_none()
+    if before is None:
+        return None
+    if before.request_sha256 != _digest(submission):
+        raise IdempotencyConflict(
+            f"the idempotency key {key!r} belongs to job {before.id}, which was asked for with another "
+            "request: take a new key"
+        )
+    return job_of(before)
 
 
 def _refuse_above(connection: Connection, owner: str, most: int) -> None:

@@ -49,6 +49,11 @@ class Key:
     revoked: float | None
     expired: bool
 
+    @property
+    def valid(self) -> bool:
+        """Whether it opens anything."""
+        return self.revoked is None and not self.expired
+
 
 class Keys:
     """The part of the store that knows keys.

@@ -50,17 +50,20 @@ class DelimitedText:
         kept = slice(chosen.start, chosen.stop)
         cells, where = self.cells[kept], Rows(self.rows.file, "line", self.rows.numbers[kept])
         self._refuse_ragged(cells, where)
-        texts = {name: list(map(itemgetter(self.names.index(name)), cells)) for name in names}
+        texts = self._texts(names, cells)
         return Columns(where, numbers_of(texts, where), chosen.start)
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
         """Say where a comma is taken for a decimal mark, or that points stand beside it."""
-        texts = {name: [row[self.names.index(name)] for row in self.cells] for name in names}
         try:
-            comma = decimal_comma(texts, self.rows)
+            comma = decimal_comma(self._texts(names, self.cells), self.rows)
         except RecordError as error:
             return (str(error),)
         return (f"the comma in {comma} is read as a decimal mark",) if comma else ()
+
+    def _texts(self, names: Sequence[str], cells: Sequence[list[str]]) -> dict[str, list[str]]:
+        places = {name: place for place, name in enumerate(self.names)}
+        return {name: list(map(itemgetter(places[name]), cells)) for name in names}
 
     def _refuse_ragged(self, cells: Sequence[list[str]], rows: Rows) -> None:
         width = len(self.names)
