@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
 
@@ -12,13 +11,14 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from islands_api import answers
 from islands_api.auth import KeyRing
-from islands_api.doors import DRAWINGS, INSPECTIONS, THREADS, Doors
+from islands_api.doors import DRAWINGS, INSPECTIONS, Doors
 from islands_api.hub import Hub
 from islands_api.measures import Measures
 from islands_api.middleware import Limited, SameOrigin, Watched
 from islands_api.problems import ProblemDocument
 from islands_api.rate import Rate
 from islands_api.routes import ROUTERS
+from islands_api.threads import Threads
 from islands_service.blobs import Blobs
 from islands_service.lifeline import EVERY, sign_of_life
 from islands_service.settings import ServiceSettings
@@ -49,7 +49,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         opened = store or Store(settings.url)
-        hub = Hub(opened)
+        threads = Threads()
+        hub = Hub(opened, threads)
         app.state.doors = doors = Doors(
             settings,
             opened,
@@ -59,21 +60,20 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             Measures(opened),
             asyncio.Semaphore(INSPECTIONS),
             asyncio.Semaphore(DRAWINGS),
-            threads := ThreadPoolExecutor(THREADS, "doors"),
+            threads,
         )
         app.state.keys = KeyRing(doors)
         tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_live(settings.lifeline))]
         try:
             yield
         finally:
-            hub.close()
             for task in tasks:
                 task.cancel()
                 with suppress(asyncio.CancelledError):
                     await task
             await doors.do(opened.close)
             await doors.do(traces.close)
-            threads.shutdown()
+            threads.close()
 
     app = FastAPI(
         title="islands",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
-from islands_api.doors import AtDoors, Doors
+from islands_api.doors import Doors
 from islands_api.problems import NoKey, ScopeMissing
 from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
@@ -80,11 +80,22 @@ class KeyRing:
         return key is not None and key.valid
 
 
-async def _caller(
-    request: Request,
-    doors: AtDoors,
-    given: Annotated[HTTPAuthorizationCredentials | None, Security(_bearer)] = None,
-) -> Caller:
+async def caller_of(request: Request) -> Caller:
+    """Return who asks.
+
+    Raises
+    ------
+    NoKey
+    TooManyRequests
+    """
+    if not hasattr(request.state, "caller"):
+        # Once for each request: it takes a token of the rate.
+        request.state.caller = await _let_in(request, request.app.state.doors, await _bearer(request))
+    caller: Caller = request.state.caller
+    return caller
+
+
+async def _let_in(request: Request, doors: Doors, given: HTTPAuthorizationCredentials | None) -> Caller:
     address = request.client.host if request.client is not None else "?"
     if given is None:
         if doors.settings.keys_needed:
@@ -96,11 +107,18 @@ async def _caller(
         return Caller(LOCAL, frozenset(SCOPES))
     key = await request.app.state.keys.find(given.credentials)
     if key is None or not key.valid:
-        doors.rate.take(f"address {address}", _WRONG)
+        doors.rate.take(f"address {address}", min(_WRONG, doors.settings.burst))
         what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
         raise NoKey(f"the key {what}: ask whoever runs this service for another one")
     doors.rate.take(f"key {key.id}")
     return Caller(key.owner, key.scopes, given.credentials)
+
+
+async def _caller(
+    request: Request,
+    _described: Annotated[HTTPAuthorizationCredentials | None, Security(_bearer)] = None,
+) -> Caller:
+    return await caller_of(request)
 
 
 def _allowed(scope: str) -> Callable[[Caller], Awaitable[Caller]]:

@@ -4,18 +4,24 @@ JSON is read strictly: of a name that stands twice the framework would take the 
 """
 
 import json
+from collections import Counter
 from collections.abc import Callable, Coroutine
 from http import HTTPStatus
+from operator import itemgetter
 from typing import Any, ClassVar
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
+from islands_api.auth import caller_of
 from islands_api.problems import Unreadable, WrongMedia
 
 #: The most digits of a whole number: reading one takes the square of their count.
 _DIGITS = 400
+
+#: Characters of a name that are repeated to whoever sent it.
+_NAME = 40
 
 
 class BodyRoute(APIRoute):
@@ -31,6 +37,8 @@ class BodyRoute(APIRoute):
             return handler
 
         async def handle(request: Request) -> Response:
+            # Before the body is received: a stranger would have us keep what nobody will look at.
+            await caller_of(request)
             given = request.headers.get("content-type", "")
             if given.partition(";")[0].strip().lower() != self.media:
                 raise WrongMedia(f"the body is {given or 'of no type'}: send it as {self.media}")
@@ -89,9 +97,8 @@ def read_json(body: bytes) -> Any:
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     read = dict(pairs)
     if len(read) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"{twice!r} stands in it twice")
+        twice, _ = max(Counter(name for name, _ in pairs).items(), key=itemgetter(1))
+        raise ValueError(f"{twice[:_NAME]!r} stands in it twice")
     return read
 
 

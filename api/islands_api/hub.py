@@ -2,13 +2,13 @@
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncGenerator, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
 import structlog
-from starlette.concurrency import run_in_threadpool
 
+from islands_api.threads import Threads
 from islands_service.jobs import TERMINAL, Event
 from islands_service.store import Store
 from islands_service.store.database import StoreError
@@ -44,10 +44,11 @@ class Hub:
     Parameters
     ----------
     store : Store
+    threads : Threads
     """
 
-    def __init__(self, store: Store) -> None:
-        self._store = store
+    def __init__(self, store: Store, threads: Threads) -> None:
+        self._store, self._threads = store, threads
         self._feeds: dict[str, Feed] = {}
         self._somebody = asyncio.Event()
         self.closed = False
@@ -96,7 +97,7 @@ class Hub:
                     await feed.changed.wait()
         return feed.version > version
 
-    async def events(self, job: str, version: int, after: int, alive: float) -> AsyncIterator[Event | None]:
+    async def events(self, job: str, version: int, after: int, alive: float) -> AsyncGenerator[Event | None]:
         """Yield a job's events after a number, until it has ended; None where nothing happens for a while."""
         with self.watching(job, version) as feed:
             last = after
@@ -118,7 +119,7 @@ class Hub:
             return [event for event in feed.recent if event.number > last]
         # These may be newer than what the feed knows; they reach it, and its other watchers, by its own look.
         try:
-            return list(await run_in_threadpool(self._store.jobs.events, job, last))
+            return list(await self._threads.do(self._store.jobs.events, job, last))
         except StoreError as error:
             log.warning("hub cannot read", job=job, reason=str(error))
             await asyncio.sleep(RETRY)
@@ -126,13 +127,13 @@ class Hub:
 
     async def _look(self) -> None:
         watched = dict(self._feeds)
-        versions = await run_in_threadpool(self._store.jobs.versions, list(watched))
+        versions = await self._threads.do(self._store.jobs.versions, list(watched))
         for job, feed in watched.items():
             if job not in versions:
                 feed.gone = True
                 feed.tell()
             elif versions[job] > feed.version:
-                news = await run_in_threadpool(self._store.jobs.events, job, feed.version)
+                news = await self._threads.do(self._store.jobs.events, job, feed.version)
                 feed.recent.extend(news)
                 feed.version = max((versions[job], *(event.number for event in news)))
                 feed.tell()

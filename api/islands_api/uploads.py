@@ -1,6 +1,7 @@
 """Uploads: from the bytes of a stranger to a blob and what it holds."""
 
 import gzip
+import hashlib
 import zlib
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import IO
@@ -43,8 +44,8 @@ def name_of(given: str | None) -> tuple[str, bool]:
     return stem + suffix, compressed
 
 
-def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, most: int) -> int:
-    """Copy a file, unpacked, to where it is kept; return its bytes.
+def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, most: int) -> tuple[int, str]:
+    """Copy a file, unpacked, to where it is kept; return its bytes' count and SHA-256.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, m
     TooLarge
         It unpacks to more than ``most`` bytes: a small file may unpack to any size.
     """
-    size = 0
+    size, digest = 0, hashlib.sha256()
     stream = gzip.GzipFile(fileobj=source, mode="rb") if compressed else source
     try:
         while piece := stream.read(CHUNK):
@@ -63,10 +64,12 @@ def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, m
                     f"{name} has more than {most / 1e6:.0f} MB unpacked, the most that is taken here"
                 )
             target.write(piece)
+            digest.update(piece)
+        target.flush()
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise RecordError(
             f"{name}{GZIP} is no gzip, or damaged ({error}): compress the record anew"
         ) from error
     if size == 0:
         raise RecordError(f"{name} is empty: export the record once more")
-    return size
+    return size, digest.hexdigest()

@@ -1,7 +1,8 @@
 """How soon a service is there, and how soon it is back when a part of it is killed or hangs.
 
-    python tests/benchmarks/service_recovery.py [start cancel doors coordinator hung island ray] [--repeat 5]
+    python tests/benchmarks/service_recovery.py [MEASURE ...] [--repeat 5] [--json FILE]
 
+Measures: start, cancel, doors, coordinator, hung, island, ray, node; all of them by default.
 Watched, not asserted: the goals are those of the service's design.
 """
 
@@ -19,8 +20,9 @@ import httpx
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from processes import alive, eventually, kill
-from service_processes import Service, serving
+from processes import alive, descendants, eventually, kill
+from ray.cluster_utils import Cluster
+from service_processes import ROLES, Service, serving
 from service_table import Figure, percentile, run
 
 #: Generations of a job that does not end by itself, and of one of a few seconds.
@@ -34,6 +36,17 @@ PROVEN = 10.5
 
 #: Seconds of a lease, by default.
 LEASE = 5.0
+
+#: Generations that may be under way at once, and more.
+AHEAD = 20
+
+#: How soon a cluster's head misses a machine: what `docs/service.md` says to give to it.
+HEALTH = {
+    "RAY_health_check_initial_delay_ms": "1000",
+    "RAY_health_check_period_ms": "500",
+    "RAY_health_check_timeout_ms": "1000",
+    "RAY_health_check_failure_threshold": "4",
+}
 
 
 @contextmanager
@@ -173,6 +186,55 @@ def ray(repeat: int) -> Iterator[Figure]:
         yield Figure(f"Ray's {role} killed, until the job comes on", "s", 15.0, tuple(going))
 
 
+def node(repeat: int) -> Iterator[Figure]:
+    """A machine of a cluster, killed or frozen in a job, until the job comes on with those that are left."""
+    with nodes() as machines, service_on(machines) as running:
+        for name, goal, sign in (
+            ("killed", 5.0, signal.SIGKILL),
+            ("frozen, as if it were cut off", 12.0, signal.SIGSTOP),
+        ):
+            going = []
+            for _ in range(repeat):
+                job = running.submit(ENDLESS)
+                lost = machines.add_node(num_cpus=1, object_store_memory=10**8)
+                raylet = lost.all_processes["raylet"][0].process.pid
+                eventually(lambda: any(ROLES["island"] in line for line in descendants(raylet).values()))  # noqa: B023
+                _goes_on(running, job)
+                processes = (raylet, *descendants(raylet))
+                generation, began = running.generation(job), time.monotonic()
+                for pid in processes:
+                    os.kill(pid, sign)
+                # What was under way between the machines when it happened comes to an end first.
+                going.append(until(lambda: running.generation(job) > generation + AHEAD, began))  # noqa: B023
+                running.ask("POST", f"/v1/jobs/{job}/cancel")
+                running.ended(job)
+                for pid in alive(processes):
+                    kill(pid)
+                machines.remove_node(lost, allow_graceful=False)
+            yield Figure(f"one machine of two {name}, until the job comes on", "s", goal, tuple(going))
+
+
+@contextmanager
+def nodes() -> Iterator[Cluster]:
+    """Two machines of a cluster on this one: a head that carries nothing, and one with a CPU."""
+    os.environ.update(HEALTH, RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="0" * 32)
+    machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 10**8})
+    try:
+        machines.add_node(num_cpus=1, object_store_memory=10**8)
+        yield machines
+    finally:
+        machines.shutdown()
+
+
+@contextmanager
+def service_on(machines: Cluster) -> Iterator[Service]:
+    with (
+        tempfile.TemporaryDirectory(prefix="islands-recovery-", ignore_cleanup_errors=True) as folder,
+        serving(Path(folder) / "data", "--ray-address", machines.address) as running,
+    ):
+        yield running
+
+
 def _goes_on(running: Service, job: str) -> None:
     generation = running.generation(job)
     eventually(lambda: running.generation(job) > generation)
@@ -215,6 +277,7 @@ MEASURES = {
     "hung": hung,
     "island": island,
     "ray": ray,
+    "node": node,
 }
 
 if __name__ == "__main__":

@@ -235,7 +235,9 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, help="Keep the service's data and its log there.")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="islands-soak-", ignore_cleanup_errors=True) as temporary:
-        found = soak((given.folder or Path(temporary)) / "data", given.kills, given.seed)
+        folder = given.folder or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        found = soak(folder / "data", given.kills, given.seed)
     for name, value in vars(found).items():
         print(f"{name.replace('_', ' '):24s} {dict(value) if isinstance(value, dict) else value}")
     if given.json:

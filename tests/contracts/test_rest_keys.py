@@ -1,6 +1,7 @@
 """Keys: without one nothing is seen, with one what is its owner's and its scopes allow, and not too fast."""
 
 import shutil
+import socket
 import time
 
 import pytest
@@ -168,8 +169,10 @@ def test_an_owner_has_so_many_bytes_and_no_more(service):
 
     first = upload(400)
     assert first.status_code == 201
+    blobs = set(service.settings.blobs.glob("??/*"))
     answer = upload(401)
     assert "MB is the most: delete some" in problem_of(answer, 429, "quota-exceeded")
+    assert set(service.settings.blobs.glob("??/*")) == blobs
     assert upload(400).status_code == 200
     service.client.delete(first.headers["location"], headers=mine)
     assert upload(401).status_code == 201
@@ -212,3 +215,35 @@ def test_an_address_guesses_so_often(strict, wrong, least):
     assert int(answer.headers["retry-after"]) >= 1
     assert strict.client.get("/v1/jobs", headers=mine).status_code == 200
     assert strict.client.get("/healthz").status_code == 200
+
+
+def test_a_wrong_key_is_told_so_however_small_the_burst(tmp_path, prepared_sqlite):
+    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
+    with served(tmp_path, require_keys=True, rate=2.0, burst=3) as few:
+        wrong = {"Authorization": "Bearer islands_guess"}
+        problem_of(few.client.get("/v1/jobs", headers=wrong), 401, "no-key")
+        problem_of(few.client.get("/v1/jobs", headers=wrong), 429, "too-many-requests")
+
+
+@pytest.mark.parametrize("path", ["/v1/datasets", "/v1/jobs"])
+def test_a_strangers_body_is_not_even_received(service, path):
+    """Nobody answers before a body has come to its end, unless he does not want it."""
+    with socket.create_connection(("127.0.0.1", service.port), PATIENCE) as stranger:
+        stranger.sendall(
+            f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000\r\n"
+            "Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n".encode()
+        )
+        assert stranger.recv(100).startswith(b"HTTP/1.1 401 ")
+
+
+@pytest.mark.parametrize(
+    ("form", "why"),
+    [
+        ([("file", ("a.csv", csv())), ("file", ("b.csv", csv()))], "Too many files"),
+        ([("file", ("a.csv", csv())), ("output", (None, "y" * 2000))], "exceeded maximum size"),
+        ([("file", ("a.csv", csv())), *[("inputs", (None, "u"))] * 30], "Too many fields"),
+    ],
+)
+def test_a_form_holds_a_file_and_a_few_short_words(service, form, why):
+    answer = service.client.post("/v1/datasets", files=form, headers=service.key())
+    assert why in problem_of(answer, 400, "bad-request")

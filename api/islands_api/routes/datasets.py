@@ -38,7 +38,13 @@ Id = Annotated[
 ]
 
 
-@router.post("", status_code=201, response_model=DatasetView, responses=_STORED)
+@router.post(
+    "",
+    status_code=201,
+    response_model=DatasetView,
+    responses=_STORED,
+    form_limits={"max_files": 1, "max_fields": 20, "max_part_size": 1000},
+)
 async def upload(
     file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],
     caller: Writer,
@@ -66,18 +72,19 @@ async def _stored(
 ) -> tuple[StoredDataset, bool]:
     settings = doors.settings
     with doors.blobs.receiving() as stream:
-        size = await doors.do(receive, file.file, stream, name, compressed, settings.max_unpacked)
-        await doors.do(stream.flush)
-        with named(Path(stream.name), name) as path:
-            async with doors.inspections:
+        # A few at a time: a small file may unpack to a thousand times its size.
+        async with doors.inspections:
+            size, blob = await doors.do(receive, file.file, stream, name, compressed, settings.max_unpacked)
+            with named(Path(stream.name), name) as path:
                 preview = await inspected(
                     path, asked, settings.inspection_memory, settings.inspection_seconds
                 )
-        # What was refused until here is gone with the block.
-        blob = await doors.do(doors.blobs.keep, stream)
+            suffix = Path(name).suffix.lower()
+            await doors.do(doors.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored)
+            # What was refused until here is gone with the block.
+            await doors.do(doors.blobs.keep, stream)
     return await doors.do(
-        doors.store.datasets.add,
-        *(owner, name, Path(name).suffix.lower(), blob, size, preview, settings.max_stored),
+        doors.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored
     )
 
 

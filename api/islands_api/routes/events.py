@@ -18,8 +18,8 @@ from islands_service.jobs import TERMINAL, Event, Job
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 
 #: Seconds of silence after which a comment is sent: a connection that says nothing is cut by some proxies.
-#: A stream outlives its key's revocation for as long.
-_ALIVE = 15.0
+#: A stream outlives its key's revocation for twice as long at the most.
+_ALIVE = 7.0
 
 #: What may happen to a job.
 _KINDS = ("queued", "running", "progress", "cancelling", "succeeded", "failed", "cancelled")
@@ -72,8 +72,9 @@ async def events(
 
 async def _stream(doors: Doors, job: Job, last: int) -> AsyncGenerator[bytes]:
     with doors.measures.streams.track_inprogress():
-        async for event in doors.hub.events(job.id, job.version, last, _ALIVE):
-            yield b": alive\n\n" if event is None else _encoded(event)
+        async with aclosing(doors.hub.events(job.id, job.version, last, _ALIVE)) as events:
+            async for event in events:
+                yield b": alive\n\n" if event is None else _encoded(event)
 
 
 async def _while_open(keys: KeyRing, caller: Caller, stream: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:

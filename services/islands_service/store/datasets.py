@@ -84,15 +84,8 @@ class Datasets:
             before = connection.execute(_one(owner, identity)).one_or_none()
             if before is not None:
                 return _dataset_of(before), False
-            used = connection.execute(
-                select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
-            ).scalar_one()
-            used = int(used)  # PostgreSQL adds integers up to a decimal number
-            if most_bytes is not None and used + size > most_bytes:
-                raise QuotaExceeded(
-                    f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
-                    f"{most_bytes / 1e6:.1f} MB is the most: delete some"
-                )
+            if most_bytes is not None:
+                _refuse_above(connection, owner, size, most_bytes)
             values = {
                 "owner": owner,
                 "id": identity,
@@ -107,6 +100,17 @@ class Datasets:
             return _dataset_of(row), True
 
         return self._database.write(operation)
+
+    def check_room(self, owner: str, suffix: str, blob: str, size: int, most_bytes: int) -> None:
+        """Refuse what `add` would refuse, before its bytes are kept.
+
+        Raises
+        ------
+        QuotaExceeded
+        """
+        with self._database.read() as connection:
+            if connection.execute(_one(owner, dataset_id(blob, suffix))).one_or_none() is None:
+                _refuse_above(connection, owner, size, most_bytes)
 
     def get(self, owner: str, dataset: str) -> StoredDataset:
         """Return a data set.
@@ -160,6 +164,18 @@ class Datasets:
 def dataset_id(blob: str, suffix: str) -> str:
     """Return a data set's name: the same bytes in the same format are the same data set."""
     return f"{blob[:32]}-{suffix.removeprefix('.')}"
+
+
+def _refuse_above(connection: Connection, owner: str, size: int, most: int) -> None:
+    used = connection.execute(
+        select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
+    ).scalar_one()
+    used = int(used)  # PostgreSQL adds integers up to a decimal number
+    if used + size > most:
+        raise QuotaExceeded(
+            f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
+            f"{most / 1e6:.1f} MB is the most: delete some"
+        )
 
 
 def _one(owner: str, dataset: str) -> Any:

@@ -193,3 +193,19 @@ def test_a_form_that_is_none_is_refused(service, body, media, status, words):
 )
 def test_a_form_says_what_of_it_cannot_be_used(service, form, words):
     assert words in problem_of(service.upload(csv(), **form), 422, "invalid-request")
+
+
+@pytest.mark.timeout(20)
+def test_a_name_that_stands_twice_is_found_among_as_many_as_a_body_holds():
+    """A look at every name for each of them would keep all other requests waiting for minutes."""
+    names = [f"{number:x}" for number in range(120_000)]
+    body = json.dumps(dict.fromkeys(names)).encode()[:-1] + b', "1d4bf": 1}'
+    with pytest.raises(Unreadable, match="'1d4bf' stands in it twice"):
+        read_json(body)
+
+
+def test_a_long_name_that_stands_twice_is_not_sent_back_whole():
+    name = "n" * 100_000
+    with pytest.raises(Unreadable) as refused:
+        read_json(f'{{"{name}": 1, "{name}": 2}}'.encode())
+    assert len(refused.value.detail) < 100

@@ -9,6 +9,7 @@ from stores import CANCELLED, FOUND, LONG, brought_on, claimed, submitted
 
 from islands_api import hub as hubs
 from islands_api.hub import Hub
+from islands_api.threads import Threads
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailable
 
@@ -29,7 +30,7 @@ def store(tmp_path, prepared_sqlite):
 
 @asynccontextmanager
 async def running(store):
-    hub = Hub(store)
+    hub = Hub(store, Threads())
     task = asyncio.create_task(hub.run())
     try:
         yield hub
@@ -104,7 +105,7 @@ def test_a_reader_of_the_past_hides_nothing_from_those_who_wait(store):
     async def scene():
         job = submitted(store)
         lease = claimed(store)
-        hub = Hub(store)
+        hub = Hub(store, Threads())
         with hub.watching(job.id, 2) as feed:
             store.leases.report(lease, brought_on(0))
             await hub._look()
