@@ -1,9 +1,11 @@
 """``python -m islands_api``: the doors, as a child of ``islands serve`` or on their own."""
 
 import gc
+import resource
 import socket
 import ssl
 import sys
+from contextlib import suppress
 from errno import EADDRINUSE
 from time import monotonic, sleep
 
@@ -25,6 +27,9 @@ _TAKEN = 2.0
 #: New objects after which garbage is looked for among them, and how often before it is among older ones.
 _GARBAGE = 10_000, 20, 20
 
+#: Files that may be open at once, where the machine allows as many: every connection is one.
+_FILES = 65_536
+
 #: Connections that may wait to be accepted.
 _WAITING = 2048
 
@@ -40,7 +45,7 @@ def main() -> int:
     except IslandsError as error:
         print(f"islands: {error}", file=sys.stderr)
         return MISCONFIGURED if isinstance(error, SettingsError) else 1
-    server = uvicorn.Server(
+    server = _Server(
         uvicorn.Config(
             create_app(settings, store),
             access_log=False,
@@ -52,8 +57,18 @@ def main() -> int:
         )
     )
     _settle()
+    raise_file_limit()
     server.run([listener])
     return 0 if server.started else MISCONFIGURED
+
+
+class _Server(uvicorn.Server):
+    """A server that ends the streams of events first: by themselves they would not end in its grace."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End all that is open."""
+        self.config.app.state.doors.hub.close()  # type: ignore[union-attr]
+        await super().shutdown(sockets)
 
 
 def _settle() -> None:
@@ -65,6 +80,16 @@ def _settle() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(*_GARBAGE)
+
+
+def raise_file_limit() -> None:
+    """Allow as many open files as this process may allow itself: by default they are a thousand or so."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = _FILES if hard == resource.RLIM_INFINITY else min(hard, _FILES)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        # Some systems have a limit of their own below the one that they tell.
+        with suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def check_safe(settings: ServiceSettings, store: Store) -> None:

@@ -26,8 +26,9 @@ from islands_api.problems import (
     WrongMethod,
     problem_of,
 )
+from islands_service.blobs import NoSuchBlob
 from islands_service.jobs import QuotaExceeded
-from islands_service.store.database import StoreError, StoreFull
+from islands_service.store.database import StoreError, StoreFull, StoreInDoubt
 
 log = structlog.get_logger()
 
@@ -87,9 +88,14 @@ async def _deliberate(request: Request, error: Exception) -> JSONResponse:
         headers["WWW-Authenticate"] = 'Bearer realm="islands"'
     if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         log.error("request failed", type=problem.type, reason=str(error))
-    # Where the database is, and what its driver says, is for whoever runs the service.
-    detail = str(type(error).__doc__) if isinstance(error, StoreError) else str(error)
-    return answer(request, problem, detail, headers=headers)
+    return answer(request, problem, _detail(error), headers=headers)
+
+
+def _detail(error: Exception) -> str:
+    """Return what a stranger is told: where data lies, what a driver says, is for the log."""
+    if isinstance(error, StoreInDoubt):
+        return f"{error.__doc__} Look whether it was, or ask again under the same idempotency key."
+    return str(error.__doc__) if isinstance(error, StoreError | NoSuchBlob) else str(error)
 
 
 async def _invalid(request: Request, error: Exception) -> JSONResponse:

@@ -1,6 +1,6 @@
 """Problems: the one table from an error to what HTTP says of it (RFC 9457).
 
-A newcomer's error is an entry here; its type is documented in docs/reference.md and never changes.
+A newcomer's error is an entry here; its type is documented in docs/service.md and never changes.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from starlette.exceptions import HTTPException
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
 from islands_service.blobs import NoSuchBlob
 from islands_service.jobs import IdempotencyConflict, NoSuchJob, QuotaExceeded, WrongState
-from islands_service.store.database import StoreFull, StoreUnavailable
+from islands_service.store.database import StoreFull, StoreInDoubt, StoreUnavailable
 from islands_service.store.datasets import DatasetInUse, NoSuchDataset
 
 MEDIA_TYPE = "application/problem+json"
@@ -123,6 +123,9 @@ PROBLEMS: Mapping[type[Exception], Problem] = MappingProxyType(
         NoSuchBlob: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "no-such-blob", "Stored data is lost"),
         StoreUnavailable: Problem(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
+        ),
+        StoreInDoubt: Problem(
+            HTTPStatus.GATEWAY_TIMEOUT, "store-in-doubt", "Nobody knows whether it was done"
         ),
         StoreFull: Problem(HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "There is no room left"),
         IslandsError: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "failed", "The service failed"),

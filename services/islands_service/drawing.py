@@ -1,14 +1,16 @@
 """``python -m islands_service.drawing JOB``: draws a finished job's figures and keeps them beside its result.
 
-A process of its own: drawing takes seconds, and whoever answers requests has none.
+A process of its own: drawing takes seconds, and whoever answers requests has none. What it says on standard
+output is meant for whoever asked; what it says on standard error, for whoever runs the service.
 """
 
 import argparse
 import io
 import json
+import resource
 import sys
 from collections.abc import Mapping
-from errno import ENOSPC
+from errno import EAGAIN, EINVAL, ENODATA, ENOSPC
 from typing import Any
 
 import numpy as np
@@ -23,20 +25,24 @@ from islands.io.states import history_of
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.findings import Assessed, Findings, Search
-from islands_service.blobs import Blobs
+from islands_service.blobs import Blobs, NoSuchBlob
 from islands_service.jobs import Job
 from islands_service.records import record_and_validation
 from islands_service.report import report
-from islands_service.settings import service_settings
+from islands_service.settings import ServiceSettings, service_settings
 from islands_service.specification import identification_of
 from islands_service.store import Store
-from islands_service.store.database import StoreFull
+from islands_service.store.database import StoreError, StoreFull
 
 #: The artefact that is a job's report.
 REPORT = "report.html"
 
 #: Samples of a simulation that are handed out as numbers: a screen shows no more.
 POINTS = 4000
+
+#: Bytes of address space for the libraries and the figures, beside what the records take, and seconds of all
+#: cores together.
+_MEMORY, _SECONDS = 8_000_000_000, 600
 
 
 def main() -> int:
@@ -47,6 +53,7 @@ def main() -> int:
     parser.add_argument("--rank", type=int, help="a model's; without it, the figures of the search")
     asked = parser.parse_args()
     settings = service_settings()
+    _limit(settings)
     blobs = Blobs(settings.blobs)
     try:
         with Store(settings.url) as store:
@@ -54,10 +61,31 @@ def main() -> int:
             findings = findings_of(job, store, blobs, asked.rank)
             made = drawn(job, findings) if asked.rank is None else drawn_model(findings, asked.rank)
             store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
+    except StoreFull as error:
+        return _failed(error, ENOSPC)
+    except StoreError as error:
+        return _failed(error, EAGAIN)
+    except NoSuchBlob as error:
+        return _failed(error, ENODATA)
     except IslandsError as error:
-        print(error, file=sys.stderr)
-        return ENOSPC if isinstance(error, StoreFull) else 1
+        print(error)
+        return EINVAL
     return 0
+
+
+def _limit(settings: ServiceSettings) -> None:
+    # A record and what it is validated on were each read within what an inspection may take.
+    for kind, most in (
+        (resource.RLIMIT_AS, 2 * settings.inspection_memory + _MEMORY),
+        (resource.RLIMIT_CPU, _SECONDS),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        resource.setrlimit(kind, (most, most))
+
+
+def _failed(error: IslandsError, status: int) -> int:
+    print(error, file=sys.stderr)
+    return status
 
 
 def findings_of(job: Job, store: Store, blobs: Blobs, rank: int | None) -> Findings:

@@ -24,6 +24,12 @@ _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDON
 #: The most columns of a record: what is said of them is kept, and shown in every list.
 _COLUMNS = 1000
 
+#: The longest name of a column: a job could not say a longer one (`islands_service.specification.Name`).
+_NAME = 200
+
+#: Characters of such a name that are shown.
+_SHOWN = 40
+
 #: Files that it may have open at once.
 _FILES = 64
 
@@ -112,11 +118,12 @@ def main() -> None:
     asked = Asked(**request["asked"])
     try:
         found = preview(request["path"])
+        # First: what is said of the columns asked for lists those that there are.
+        _refuse_unreadable(found, request["path"])
         if asked.inputs and asked.output is not None:
             read_record(request["path"], asked.inputs, asked.output, asked.dt, rows_of(asked.rows))
         else:
             _refuse_unusable({column.name: column.problem for column in found.columns}, asked)
-        _refuse_unreadable(found, request["path"])
     except RecordError as error:
         json.dump({"error": str(error)}, sys.stdout)
         sys.exit(_REFUSED)
@@ -130,6 +137,12 @@ def _refuse_unreadable(found: "Preview", path: str) -> None:
             f"{Path(path).name} has {len(found.columns)} columns, and {_COLUMNS} is the most: leave out what "
             "is not needed"
         )
+    for column in found.columns:
+        if len(column.name) > _NAME:
+            raise RecordError(
+                f"{Path(path).name} has a column {column.name[:_SHOWN]}... whose name has {len(column.name)} "
+                f"characters, and {_NAME} is the most: give it a shorter one"
+            )
     if not found.samples:
         problems = [column.problem for column in found.columns if column.problem]
         raise RecordError(problems[0] if problems else f"{Path(path).name} holds no column: export it anew")

@@ -79,7 +79,7 @@ class Submission:
     spec : mapping
         What determines the result: see `islands_service.specification`.
     kind : str
-        What kind of job: an entry of ``KINDS`` in `islands_service.work`.
+        What kind of job: an entry of ``WORK`` in `islands_service.coordinator.loop`.
     name : str
         For people.
     priority : int

@@ -29,7 +29,7 @@ class ServiceSettings(BaseSettings):
     ray_address
         ``HOST:PORT`` of a Ray cluster; by default a Ray on this machine is started.
     lease
-        Seconds after which a coordinator that says nothing has lost its job.
+        Seconds after which a coordinator that says nothing has lost its job; at least one.
     checkpoint_every
         Seconds between two checkpoints: what a crash may cost.
     max_upload, max_unpacked
@@ -64,7 +64,7 @@ class ServiceSettings(BaseSettings):
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     ray_address: str | None = None
     coordinators: Annotated[int, Field(ge=0, le=64)] = 1
-    lease: Positive = 5.0
+    lease: Annotated[float, Field(ge=1.0)] = 5.0
     checkpoint_every: Positive = 5.0
     max_upload: Count = 256_000_000
     max_unpacked: Count = 1_000_000_000

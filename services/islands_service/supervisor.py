@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from time import monotonic
@@ -27,15 +27,19 @@ _LOOK = 0.05
 
 #: Seconds that a child waits for its next start after an end: at first, and at the most. One that has lived
 #: for `_PROVEN` seconds is started again at once.
-_BACKOFF, _MOST_BACKOFF, _PROVEN = 0.2, 5.0, 10.0
+_BACKOFF, _MOST_BACKOFF, _PROVEN = 0.2, 2.5, 10.0
 
 #: Seconds that everything else waits for the API: on two cores Ray's start would double its own.
 _API_FIRST = 2.0
 
+#: Seconds that a child has until its first sign of life: Ray is read from a slow disk, a database is locked.
+_STARTING = 120.0
+
 #: Seconds that a child has to end by itself.
 _GRACE = 15.0
 
-#: Exit status of a child that cannot run with these settings: starting it again would not help.
+#: Exit status of a child that cannot run with these settings: starting it again would not help, unless it has
+#: run with them before.
 MISCONFIGURED = 2
 
 #: Linux: a process is sent this signal when its parent ends.
@@ -55,13 +59,16 @@ class Role:
     name : str
     command : sequence of str
     patience : float
-        Seconds without a sign of life after which it is taken for hanging, once it has given one.
+        Seconds without a sign of life after which it is taken for hanging, once it has given one; until then
+        it is starting, and may take longer.
     orphaned : signal
         What it is sent when the supervisor is lost.
     needs : tuple of str
         Roles that it cannot go on without: it is started again with them.
     address : Path, optional
         The file in which it says how it is reached: that holds no more when it has ended.
+    worked : bool
+        It has given signs of life, and ended, before.
     """
 
     name: str
@@ -75,7 +82,8 @@ class Role:
     heard: float | None = None
     started: float = 0.0
     start_at: float = 0.0
-    backoff: float = field(default=_BACKOFF)
+    backoff: float = _BACKOFF
+    worked: bool = False
 
 
 @contextmanager
@@ -115,7 +123,7 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     Returns
     -------
     int
-        0, or `MISCONFIGURED` where a child says that it cannot run so.
+        0, or `MISCONFIGURED` where a child says that it cannot run so, and never has.
     """
     stopping = Event()
     stop_on_signals(stopping)
@@ -142,13 +150,16 @@ def _tend(role: Role, roles: Sequence[Role], environment: Mapping[str, str], now
         return 0
     _listen(role, now)
     if role.process.poll() is None:
-        if role.heard is not None and now - role.heard > role.patience:
-            _say(log, f"{role.name} has said nothing for {now - role.heard:.1f} s: it is started again")
+        since, patience = (role.started, _STARTING) if role.heard is None else (role.heard, role.patience)
+        if now - since > patience:
+            _say(log, f"{role.name} has said nothing for {now - since:.1f} s: it is started again")
             role.process.kill()
         return 0
-    code = role.process.returncode
+    code, worked = role.process.returncode, role.worked
     _ended(role, now)
-    if code == MISCONFIGURED:
+    # Where it has worked with these settings, a key has expired, or a port was taken meanwhile: that can be
+    # mended while the jobs go on.
+    if code == MISCONFIGURED and not worked:
         return MISCONFIGURED
     _say(log, f"{role.name} ended ({code}): it is started again")
     for other in roles:
@@ -194,8 +205,9 @@ def _ended(role: Role, now: float) -> None:
     if role.address is not None:
         role.address.unlink(missing_ok=True)
     proven = now - role.started > _PROVEN
+    role.start_at = now if proven else now + role.backoff
     role.backoff = _BACKOFF if proven else min(2.0 * role.backoff, _MOST_BACKOFF)
-    role.start_at = now if proven else now + role.backoff / 2.0
+    role.worked = role.worked or role.heard is not None
     role.process, role.signs = None, -1
 
 

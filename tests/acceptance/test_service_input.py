@@ -98,6 +98,11 @@ REFUSED = {
     "0.8 GB header": (claiming(10**8), "a.npz", ("claims 800000000 bytes, and the file stores 64", "anew")),
     "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it anew")),
     "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it anew")),
+    "long name": (
+        csv().replace(b"y_um", b"y" * 100_000),
+        "a.csv",
+        (f"a.csv has a column {'y' * 40}... whose name has 100000 characters", "200 is the most", "shorter"),
+    ),
     "no gzip": (csv(), "a.csv.gz", ("a.csv.gz is no gzip, or damaged", "compress the record anew")),
     "gzip cut short": (gzip.compress(csv())[:-50], "a.csv.gz", ("is no gzip, or damaged", "compress")),
     "line cut short": (
@@ -115,6 +120,18 @@ def test_a_file_that_nobody_could_use_is_refused_and_not_kept(service, case):
     for word in words:
         assert word in detail
     assert nothing_stored(service)
+
+
+def test_a_name_that_a_job_can_say_is_kept_and_a_longer_one_is_nowhere_repeated(service):
+    """A thousand of them would stand in every message and in every list of data sets."""
+    name = "y" * 199
+    stored = service.upload(csv().replace(b"y_um", name.encode() + b"1")).json()["id"]
+    assert service.submit(**{**spec(stored), "output": name + "1"}).status_code == 202
+    longer = csv().replace(b"y_um", name.encode() + b"12")
+    for asked in ({}, {"output": "force"}, {"inputs": ["u_V"], "output": "force"}):
+        detail = problem_of(service.upload(longer, "a.csv", **asked), 422, "invalid-record")
+        assert "whose name has 201 characters" in detail
+        assert len(detail) < 200
 
 
 def test_a_zip_bomb_ends_the_process_that_reads_it_and_nothing_else(service):

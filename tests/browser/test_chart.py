@@ -218,5 +218,19 @@ def test_best_and_worst_stand_for_islands_that_are_too_many(page: Any) -> None:
     assert series[0]["points"][0][1] is None
 
 
+def test_a_figure_of_the_browsers_own_store_does_not_turn_the_clock_back(page: Any) -> None:
+    """It comes with the moment at which the service sent it first."""
+    headers = {"Date": "Thu, 01 Jan 2026 00:00:00 GMT", "Cache-Control": "private, max-age=86400, immutable"}
+    page.route("**/kept.svg", lambda route: route.fulfill(headers=headers, body="<svg/>"))
+    told = page.evaluate("""async () => {
+      const [api, clock] = await Promise.all([import("/dashboard/api.js"), import("/dashboard/clock.js")]);
+      await api.json("/healthz");
+      await api.blob("/kept.svg");
+      return clock.age(new Date(Date.now() - 7_300_000).toISOString()).textContent;
+    }""")
+    page.unroute("**/kept.svg")
+    assert told == "2 h ago"
+
+
 def test_a_long_history_is_thinned_without_losing_its_end(page: Any) -> None:
     assert call(page, "course.js", "halved", list(range(10))) == [0, 2, 4, 6, 8, 9]

@@ -3,17 +3,23 @@
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import threading
 import time
 from contextlib import suppress
+from dataclasses import replace
 
 import httpx
 import pytest
 from databases import server
 from processes import eventually
 from service import PATIENCE, csv, identified, parsed, problem_of, queued, served, spec
+from sqlalchemy import update
 from stores import FOUND, claimed
+
+from islands_api.routes import figures
+from islands_service.store.tables import models, results
 
 #: Bytes of a small disk.
 DISK = 6_000_000
@@ -185,3 +191,107 @@ def test_text_of_strangers_is_kept_by_postgresql_as_by_sqlite(tmp_path, prepared
         assert dataset["name"] == "größe😀' ;%_.csv"
         for changes in ({"inputs": ["u\0V"]}, {"name": "a\0b"}, {"dataset": "a\0b"}):
             assert service.submit(**spec(dataset["id"], **changes)).status_code == 422
+
+
+@pytest.fixture(scope="module")
+def drawing(tmp_path_factory, prepared_sqlite):
+    """A service whose figures cannot be drawn: what stands in their way is put there by each test."""
+    folder = tmp_path_factory.mktemp("service")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    with served(folder) as running:
+        yield running
+
+
+def spoilt(service, table, **values):
+    """Identify a record, and spoil what the store holds of it; return the path of a figure."""
+    job = identified(service)
+    service.store.database.write(
+        lambda connection: connection.execute(update(table).where(table.c.job_id == job).values(**values))
+    )
+    return f"/v1/jobs/{job}/models/1/figures/loop.svg"
+
+
+@pytest.mark.slow
+def test_a_figure_that_cannot_be_drawn_says_why_in_words_for_people(drawing):
+    detail = problem_of(drawing.client.get(spoilt(drawing, models, file="{}")), 500, "failed")
+    assert "cannot be drawn: model 1" in detail
+
+
+@pytest.mark.slow
+def test_a_defect_of_drawing_stands_in_the_log_alone_and_is_not_met_again_at_once(drawing):
+    path = spoilt(drawing, results, document='{"settings": {"islands": 1}}')
+    drawing.logs.clear()
+    said = [problem_of(drawing.client.get(path), 500, "failed") for _ in range(2)]
+    assert said[0] == said[1]
+    assert said[0].endswith("cannot be drawn: why stands in the log, for whoever runs this service")
+    (entry,) = [each for each in drawing.logs if each["event"] == "drawing failed"]
+    assert entry["reason"].endswith("KeyError: 'search'")
+
+
+@pytest.mark.slow
+def test_a_lost_record_and_a_database_that_is_away_are_told_as_such_where_a_figure_is_wanted(drawing):
+    path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
+    doors = drawing.app.state.doors
+    gone = doors.settings.model_copy(update={"database": "sqlite:////nowhere/islands.db"})
+    drawing.app.state.doors = replace(doors, settings=gone)
+    try:
+        answer = drawing.client.get(path)
+    finally:
+        drawing.app.state.doors = doors
+    problem_of(answer, 503, "store-unavailable")
+    assert "nowhere" not in answer.text
+    (blob,) = [each for each in doors.settings.blobs.glob("??/*") if each.read_bytes() == csv(400)]
+    data = blob.read_bytes()
+    blob.unlink()
+    answer = drawing.client.get(path)
+    blob.write_bytes(data)
+    problem_of(answer, 500, "no-such-blob")
+    assert str(blob.parent.parent) not in answer.text
+
+
+def test_a_drawing_that_takes_too_long_is_not_begun_again_at_once(drawing, monkeypatch):
+    path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
+    monkeypatch.setattr(figures, "_PATIENCE", 0.1)
+    detail = problem_of(drawing.client.get(path), 500, "failed")
+    assert "take longer than" in detail
+    monkeypatch.undo()
+    assert problem_of(drawing.client.get(path), 500, "failed") == detail
+
+
+def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
+    failures, error = figures.Failures(), figures.DrawingFailed("no")
+    monkeypatch.setattr(figures, "_REMEMBERED", 2)
+    for job in ("a", "b", "a", "c"):
+        failures.remember(job, 1, error)
+    for job, rank in (("b", 1), ("a", 2), ("a", None)):
+        failures.refuse(job, rank)  # forgotten, or never tried
+    for job in ("a", "c"):
+        with pytest.raises(figures.DrawingFailed, match="no"):
+            failures.refuse(job, 1)
+    monkeypatch.setattr(figures, "_REST", 0.0)
+    failures.remember("a", 1, error)
+    failures.refuse("a", 1)
+
+
+@pytest.mark.slow
+def test_a_process_that_draws_may_take_only_so_much(tmp_path):
+    """It reads the files of strangers, too."""
+    script = (
+        "import resource, sys\n"
+        "from islands_service import drawing\n"
+        "sys.argv = ['drawing', 'job', '--owner', 'local']\n"
+        "assert drawing.main() == 22\n"
+        "print(resource.getrlimit(resource.RLIMIT_AS)[0], resource.getrlimit(resource.RLIMIT_CPU)[0])\n"
+    )
+    environment = {
+        **os.environ,
+        "ISLANDS_DATA_DIR": str(tmp_path),
+        "ISLANDS_DATABASE": "",
+        "ISLANDS_INSPECTION_MEMORY": "1",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
+    )
+    told, limits = done.stdout.splitlines()
+    assert told == "there is no job 'job'"
+    assert [int(each) for each in limits.split()] == [8_000_000_002, 600]

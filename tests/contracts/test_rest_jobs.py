@@ -7,10 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from service import emptied, kept, problem_of, queued, served, spec
-from stores import brought_on, claimed, job_in
+from stores import FOUND, brought_on, claimed, job_in
 
 from islands_api.auth import LOCAL
-from islands_service.jobs import JobState
+from islands_service.jobs import JobState, Report, Submission
 
 MANY = 16
 
@@ -277,3 +277,36 @@ def test_the_course_of_a_search_is_read_from_a_generation_on(service):
     assert points[1] == {"generation": 1, "evaluations": 10, "best": {"3": 0.5}, "islands": [0.5, None]}
     assert service.client.get(path, params={"after": 2}).json()["items"] == points[3:]
     assert service.client.get(path, params={"after": 99}).json()["items"] == []
+
+
+def test_the_course_of_many_islands_comes_in_pages_that_can_be_sent(service):
+    asked = {**spec("0-csv"), "settings": {"islands": 256}}
+    job, _ = service.store.jobs.submit(Submission(LOCAL, asked))
+    points = tuple((at, 60 * at, {"3": 0.5}, (1.0 / 3.0,) * 256) for at in range(400))
+    service.store.leases.report(claimed(service.store), Report({"generation": 399}, points))
+    path, sizes, seen = f"/v1/jobs/{job.id}/history", [], [-1]
+    while not sizes or sizes[-1]:
+        answer = service.client.get(path, params={"after": seen[-1]})
+        assert len(answer.content) < 3_000_000
+        sizes.append(len(answer.json()["items"]))
+        seen += [point["generation"] for point in answer.json()["items"]]
+    assert seen[1:] == list(range(400))
+    assert sizes == [390, 10, 0]
+
+
+def test_a_job_of_another_version_says_so_where_a_figure_is_wanted(service):
+    job, _ = service.store.jobs.submit(Submission(LOCAL, {**spec("0-csv"), "colour": "red"}))
+    service.store.leases.finish(claimed(service.store), FOUND)
+    answer = service.client.get(f"/v1/jobs/{job.id}/models/1/figures/loop.svg")
+    detail = problem_of(answer, 422, "invalid-settings")
+    assert "this version of islands cannot read the job (colour: " in detail
+    assert "submit it again" in detail
+
+
+def test_a_figure_that_a_browser_keeps_is_kept_for_its_key_alone(service):
+    job = in_state(service, JobState.SUCCEEDED)
+    blob = service.app.state.doors.blobs.write(b"<svg/>" * 1000)
+    service.store.results.keep(job, {"1/loop.svg": blob})
+    headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers
+    assert headers["cache-control"] == "private, max-age=86400, immutable"
+    assert headers["vary"] == "Authorization, Accept-Encoding"

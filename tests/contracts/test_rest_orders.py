@@ -1,6 +1,8 @@
 """Orders over REST on a real record: what its columns, rows and times allow is accepted, and nothing else."""
 
+import asyncio
 import shutil
+from dataclasses import replace
 
 import pytest
 from service import csv, emptied, npz, problem_of, served, spec
@@ -112,3 +114,18 @@ def test_two_recordings_in_one_file_are_not_mixed(service):
         assert service.submit(dataset=dataset, inputs=inputs, output=output).status_code == 202
     answer = service.submit(dataset=dataset, inputs=["u"], output="z")
     assert "channels of one record are of equal length" in problem_of(answer, 422, "invalid-record")
+
+
+def test_what_was_accepted_is_not_inspected_again(service, dataset):
+    """An inspection may take two minutes: a client that lost the answer asks again long before."""
+    order, doors = spec(dataset, rows="0:100"), service.app.state.doors
+    first = service.submit({"Idempotency-Key": "looked into"}, **order)
+    service.app.state.doors = replace(doors, inspections=asyncio.Semaphore(0))
+    try:
+        again = service.client.post(
+            "/v1/jobs", json=order, headers={"Idempotency-Key": "looked into"}, timeout=3.0
+        )
+    finally:
+        service.app.state.doors = doors
+    assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
+    assert again.json() == first.json()

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from pathlib import Path
 
 import httpx
 import pytest
@@ -9,6 +10,8 @@ from fastapi.responses import StreamingResponse
 from service import PROBLEM, problem_of, queued, served
 
 from islands_api.problems import PROBLEMS
+from islands_service.blobs import NoSuchBlob
+from islands_service.store.database import StoreInDoubt
 
 FORM = {"type", "title", "status", "detail", "request_id"}
 
@@ -21,6 +24,8 @@ def service(tmp_path_factory, prepared_sqlite):
         running.app.add_api_route("/defect", defect)
         running.app.add_api_route("/late", late, methods=["POST"])
         running.app.add_api_route("/half", half)
+        running.app.add_api_route("/doubt", doubt, methods=["POST"])
+        running.app.add_api_route("/lost", lost)
         yield running
 
 
@@ -31,6 +36,14 @@ async def defect():
 
 def late():
     raise KeyError("in a thread")
+
+
+async def doubt():
+    raise StoreInDoubt("connection to server at 10.0.0.7 failed: nobody knows whether it was written")
+
+
+async def lost():
+    raise NoSuchBlob("the blob 0 is not in /srv/islands/blobs: restore the data folder from a backup")
 
 
 async def half():
@@ -151,6 +164,24 @@ def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
     assert isinstance(entry["exc_info"], ZeroDivisionError | KeyError)
 
 
+def test_what_may_have_been_done_is_not_told_as_undone(service):
+    """Whoever takes it for that sends it again, and does it twice."""
+    answer = service.client.post("/doubt")
+    detail = problem_of(answer, 504, "store-in-doubt")
+    assert "nobody knows whether it was written" in detail
+    assert "ask again under the same idempotency key" in detail
+    assert "10.0.0.7" not in answer.text
+    assert "retry-after" not in answer.headers
+
+
+def test_where_data_lies_is_told_to_nobody_but_the_log(service):
+    service.logs.clear()
+    answer = service.client.get("/lost")
+    assert "has lost a file" in problem_of(answer, 500, "no-such-blob")
+    assert "/srv" not in answer.text
+    assert "/srv/islands/blobs" in service.logs[0]["reason"]
+
+
 def test_an_answer_that_breaks_off_is_not_taken_for_a_whole_one(service):
     service.logs.clear()
     with pytest.raises(httpx.RemoteProtocolError, match="incomplete"):
@@ -199,6 +230,12 @@ def test_every_type_of_problem_is_explained_where_it_points_to(service):
             "status": int(problem.status),
             "title": problem.title,
         }
+
+
+def test_every_type_of_problem_stands_in_the_page_of_the_service():
+    page = (Path(__file__).parents[2] / "docs" / "service.md").read_text()
+    rows = re.findall(r"^\| `([a-z-]+)` \| (\d{3}) \| (.+) \|$", page, re.MULTILINE)
+    assert set(rows) == {(each.type, str(int(each.status)), each.title) for each in PROBLEMS.values()}
 
 
 def test_one_type_has_one_status():

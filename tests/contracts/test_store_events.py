@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+from sqlalchemy import update
 from stores import (
     ALICE,
     EXPIRED,
@@ -21,6 +22,7 @@ from stores import (
 
 from islands_service.jobs import JobState, WrongState
 from islands_service.store.leases import ATTEMPTS
+from islands_service.store.tables import jobs
 
 
 def test_everything_that_happens_to_a_job_is_an_event_and_its_number_is_the_jobs_version(store):
@@ -166,3 +168,16 @@ def test_the_standing_of_all_jobs_is_told_without_names(store, waiting):
 def claimed_as(store, submission):
     store.jobs.submit(submission)
     return claimed(store)
+
+
+def test_a_job_that_was_given_back_waits_since_then(store):
+    """It may have run for days before."""
+    submitted(store)
+    lease = claimed(store)
+    aged = update(jobs).values(created=jobs.c.created - LONG, updated=jobs.c.updated - LONG)
+    store.database.write(lambda connection: connection.execute(aged))
+    store.leases.release(lease)
+    assert 0.0 < store.jobs.standing().oldest < LONG / 2
+    store.database.write(lambda connection: connection.execute(aged))
+    submitted(store)
+    assert LONG <= store.jobs.standing().oldest < 1.5 * LONG

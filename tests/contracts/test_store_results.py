@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+from sqlalchemy import event
 from stores import (
     ALICE,
     BLOB,
@@ -276,3 +277,27 @@ def test_what_jobs_bring_does_not_get_mixed_up(store):
     store.jobs.delete(ALICE, second.job.id)
     assert generations(store, first) == [1]
     assert store.results.artefact(first.job.id, "a") == "1" * 64
+
+
+def test_two_who_have_drawn_the_same_at_once_both_keep_it(database):
+    with several(database, 2) as (first, second):
+        job = submitted(first).id
+        writing, late = (
+            threading.Event(),
+            threading.Thread(
+                target=lambda: kept.append(second.results.keep(job, {"a": "2" * 64, "c": "3" * 64}))
+            ),
+        )
+        kept = []
+
+        def slowly(_connection):
+            if not writing.is_set():
+                writing.set()
+                late.start()
+                late.join(0.3)  # it has to wait for what is written here
+
+        event.listen(first.database.engine, "commit", slowly)
+        first.results.keep(job, {"a": "1" * 64, "b": "1" * 64})
+        late.join()
+        assert kept == [None]
+        assert [first.results.artefact(job, name) for name in "abc"] == ["2" * 64, "1" * 64, "3" * 64]

@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 
 LONG = 600
 
-#: Seconds of a lease, and what a coordinator may say nothing before the supervisor ends it.
+#: Seconds of a lease; the supervisor ends a coordinator that has said nothing for five.
 LEASE = {"ISLANDS_LEASE": "2"}
 
 #: What Ray asks everybody for who talks to it.

@@ -1,5 +1,6 @@
 """What a service refuses to start with, and TLS: each refusal says what to do, and ends with status 2."""
 
+import resource
 import socket
 import ssl
 from pathlib import Path
@@ -8,6 +9,7 @@ from threading import Timer
 import pytest
 import trustme
 from front_door import succeed
+from processes import eventually, kill
 from service_processes import free_port, serving, started
 
 from islands_api.__main__ import listening
@@ -67,6 +69,31 @@ def test_an_address_that_others_reach_needs_a_key(tmp_path: Path) -> None:
         assert answer.status_code == 200
 
 
+def test_doors_that_have_lost_their_last_key_stay_shut_until_there_is_one(tmp_path: Path) -> None:
+    """And nothing else ends for it: jobs run meanwhile."""
+    folder = tmp_path / "data"
+    _, _, key, *_ = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()
+    with serving(folder, "--host", "0.0.0.0", environment=DOORS) as service:
+        succeed("keys", "revoke", key, "--data-dir", folder)
+        kill(service.one("api"))
+        eventually(lambda: "api ended (2): it is started again" in service.log.read_text())
+        assert "there is no key: make one" in " ".join(service.log.read_text().split())
+        succeed("keys", "create", "--scope", "read", "--data-dir", folder)
+        service.ready()
+
+
+def test_the_doors_have_as_many_files_as_the_machine_allows(tmp_path: Path) -> None:
+    """Every connection is one: a thousand of them that say nothing would shut the doors."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(soft, 256), hard))
+    try:
+        with serving(tmp_path / "data", environment=DOORS) as service:
+            theirs = resource.prlimit(service.one("api"), resource.RLIMIT_NOFILE)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    assert theirs == (min(hard, 65_536), hard)
+
+
 @pytest.fixture
 def certificate(tmp_path: Path) -> tuple[Path, Path, ssl.SSLContext]:
     """A certificate, its key, and what a client needs to trust it."""
@@ -107,3 +134,15 @@ def test_a_certificate_without_its_key_is_refused(
     said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", certificate[0])
     assert "are no certificate with its key" in said
     assert "give two PEM files that belong together" in said
+
+
+def test_a_stream_ends_in_good_order_when_the_service_is_told_to_end(tmp_path: Path) -> None:
+    with serving(tmp_path / "data", environment={"ISLANDS_COORDINATORS": "0"}) as service:
+        job = service.submit(5)
+        with service.client.stream("GET", f"/v1/jobs/{job}/events") as answer:
+            lines = answer.iter_lines()
+            assert next(lines) == "id: 1"
+            service.process.terminate()
+            # An answer that is cut off would raise an error here.
+            assert not [line for line in lines if line.startswith("id: ")]
+        assert service.process.wait(30) == 0

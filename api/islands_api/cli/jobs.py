@@ -11,7 +11,7 @@ from islands_api.cli import options
 from islands_api.cli import search_options as search
 from islands_api.cli.console import errors, output
 from islands_api.client import Client, JobFailed
-from islands_api.schemas import JobView
+from islands_api.schemas import JobView, ModelPage
 from islands_service.jobs import JobState
 
 jobs = typer.Typer(
@@ -177,7 +177,7 @@ def result(
         check_folder(out, force)
     with _client(url, key) as client:
         document = client.result(job)
-        models = client.models(job)
+        models = ModelPage(items=document["models"]).items
         if out is not None:
             views.download(client, job, document, models, out)
     if as_json:

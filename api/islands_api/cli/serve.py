@@ -15,6 +15,9 @@ from islands_service.supervisor import Role, folder_lock, supervise
 #: Seconds without a sign of life after which the doors, and the Ray on this machine, are taken for hanging.
 _API_PATIENCE, _RAY_PATIENCE = 10.0, 20.0
 
+#: The least of these seconds for a coordinator; else they are its lease's, after which its job is another's.
+_LEAST_PATIENCE = 5.0
+
 
 def serve(
     data_dir: Annotated[
@@ -64,7 +67,7 @@ def roles(settings: ServiceSettings) -> list[Role]:
         Role(
             f"coordinator {index}",
             (*python, "islands_service.coordinator", "--name", f"{instance}-{index}"),
-            settings.lease,
+            max(settings.lease, _LEAST_PATIENCE),
             needs=needs,
         )
         for index in range(settings.coordinators)

@@ -168,7 +168,7 @@ class AsyncClient:
         return await self.call(calls.result(which))
 
     async def history(self, which: JobRef, after: int = -1) -> HistoryPage:
-        """Take the course of the search behind a generation."""
+        """Take a page of the course of the search behind a generation; an empty one is the end."""
         return await self.call(calls.history(which, after))
 
     async def export(self, which: JobRef, rank: int = 1, form: str = "python") -> str:

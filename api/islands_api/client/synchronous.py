@@ -184,7 +184,7 @@ class Client:
         return self.call(calls.result(which))
 
     def history(self, which: JobRef, after: int = -1) -> HistoryPage:
-        """Take the course of the search behind a generation."""
+        """Take a page of the course of the search behind a generation; an empty one is the end."""
         return self.call(calls.history(which, after))
 
     def export(self, which: JobRef, rank: int = 1, form: str = "python") -> str:

@@ -66,7 +66,8 @@ export async function ask(path, { headers = {}, signal, ...options } = {}) {
     if (signal?.aborted) throw error;
     throw away("The service does not answer.");
   }
-  synchronise(answer);
+  // What a browser has kept tells the time of long ago.
+  if (!answer.headers.get("cache-control")?.includes("immutable")) synchronise(answer);
   if ([502, 503, 504].includes(answer.status)) throw away((await problemOf(answer)).message);
   tell("back");
   if (answer.ok || answer.status === 304) return answer;

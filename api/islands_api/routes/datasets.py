@@ -43,7 +43,7 @@ Id = Annotated[
     status_code=201,
     response_model=DatasetView,
     responses=_STORED,
-    form_limits={"max_files": 1, "max_fields": 20, "max_part_size": 1000},
+    form_limits={"max_files": 1, "max_fields": 200, "max_part_size": 10_000},
 )
 async def upload(
     file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],

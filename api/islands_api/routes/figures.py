@@ -1,12 +1,14 @@
 """Figures of a finished job: drawn by a process of their own when somebody first wants one, and kept."""
 
 import asyncio
+import errno
 import sys
 from asyncio.subprocess import PIPE
 from collections.abc import Mapping
-from errno import ENOSPC
+from time import monotonic
 from typing import Annotated, Any
 
+import structlog
 from fastapi import APIRouter, Path, Response
 
 from islands.errors import IslandsError
@@ -16,8 +18,11 @@ from islands_api.problems import RESPONSES, NoSuchThing
 from islands_api.routes.jobs import Id
 from islands_api.routes.models import Rank, finished, stored
 from islands_api.schemas import Names
-from islands_service.specification import Identification
-from islands_service.store.database import StoreFull
+from islands_service.blobs import NoSuchBlob
+from islands_service.specification import identification_of
+from islands_service.store.database import StoreFull, StoreUnavailable
+
+log = structlog.get_logger()
 
 router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES)
 
@@ -31,6 +36,9 @@ _OF_SEVERAL = "islands"
 
 #: Seconds that drawing may take: until then nobody else's figures are drawn.
 _PATIENCE = 120.0
+
+#: Seconds for which what could not be drawn is not tried again, and how many such are remembered.
+_REST, _REMEMBERED = 300.0, 1000
 
 #: A model's simulation, as numbers.
 SIMULATION = "free-run.json"
@@ -63,6 +71,35 @@ SearchFigure = Annotated[
 
 class DrawingFailed(IslandsError):
     """The figures cannot be drawn."""
+
+
+class Failures:
+    """What could not be drawn of late: to try it again would keep others from their figures."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, int | None], tuple[float, IslandsError]] = {}
+
+    def remember(self, job: str, rank: int | None, error: IslandsError) -> None:
+        """Keep why figures could not be drawn."""
+        self._known.pop((job, rank), None)
+        if len(self._known) == _REMEMBERED:
+            del self._known[next(iter(self._known))]
+        self._known[job, rank] = monotonic() + _REST, error
+
+    def refuse(self, job: str, rank: int | None) -> None:
+        """Raise once more what came of an earlier try.
+
+        Raises
+        ------
+        DrawingFailed, NoSuchBlob
+        """
+        until, error = self._known.get((job, rank), (0.0, None))
+        if error is not None and monotonic() < until:
+            raise type(error)(*error.args)
+
+
+#: Of this process: a job's id is of no other service.
+_FAILURES = Failures()
 
 
 @router.get("/{job}/figures", response_model=Names)
@@ -133,30 +170,58 @@ async def _figure(
     if blob is None:
         raise NoSuchThing(f"job {job} has no figure {name}")
     data = await doors.do(doors.blobs.read, blob)
-    return Response(data, media_type=media, headers={"Cache-Control": "private, max-age=86400, immutable"})
+    # A browser may have several keys, one after the other.
+    headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization"}
+    return Response(data, media_type=media, headers=headers)
 
 
 async def _draw(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
-    spec = Identification.model_validate((await doors.do(doors.store.jobs.get, caller.owner, job)).spec)
-    for dataset in spec.datasets:
+    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    for dataset in identification_of(found.spec).datasets:
         await doors.do(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
+    _FAILURES.refuse(job, rank)
+    try:
+        await _drawn(doors, caller, job, rank)
+    except (DrawingFailed, NoSuchBlob) as error:
+        _FAILURES.remember(job, rank, error)
+        raise
+
+
+async def _drawn(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
     of = () if rank is None else ("--rank", str(rank))
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "islands_service.drawing", job, f"--owner={caller.owner}", *of),
+        stdout=PIPE,
         stderr=PIPE,
         env=doors.settings.environment(),
     )
     try:
         async with asyncio.timeout(_PATIENCE):
-            _, complaint = await process.communicate()
+            said, complaint = await process.communicate()
     except TimeoutError:
         raise DrawingFailed(f"the figures of job {job} take longer than {_PATIENCE:.0f} s to draw") from None
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
-    if process.returncode == ENOSPC:
-        raise StoreFull(f"there is no room for the figures of job {job}: make room")
-    if process.returncode != 0:
-        reason = complaint.decode(errors="replace").strip().rpartition("\n")[2]
-        raise DrawingFailed(f"the figures of job {job} cannot be drawn: {reason or process.returncode}")
+    if process.returncode == 0:
+        return
+    # What is not meant for whoever asked: paths, and what the database's driver says.
+    reason = _text(complaint)
+    match process.returncode:
+        case errno.EINVAL:
+            raise DrawingFailed(f"the figures of job {job} cannot be drawn: {_text(said)}")
+        case errno.ENOSPC:
+            raise StoreFull(reason)
+        case errno.EAGAIN:
+            raise StoreUnavailable(reason)
+        case errno.ENODATA:
+            raise NoSuchBlob(reason)
+    log.error("drawing failed", job=job, status=process.returncode, reason=reason)
+    raise DrawingFailed(
+        f"the figures of job {job} cannot be drawn: why stands in the log, for whoever runs this service"
+    )
+
+
+def _text(said: bytes) -> str:
+    return said.decode(errors="replace").strip()

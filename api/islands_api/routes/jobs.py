@@ -5,14 +5,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Path, Query, Response
 
 from islands.errors import IslandsError
-from islands_api.auth import Reader, Writer
+from islands_api.auth import Caller, Reader, Writer
 from islands_api.bodies import JSONRoute
 from islands_api.cursors import Cursor, Limit, cursor_of, place_of
-from islands_api.documents import Document, job_document
+from islands_api.documents import Document, Items, job_document
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES
 from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
-from islands_service.admission import admit
+from islands_service.admission import Doubt, admit
 from islands_service.inspection import inspected
 from islands_service.jobs import TERMINAL, Job, JobState, Submission
 from islands_service.records import named
@@ -46,8 +46,9 @@ _ACCEPTED: dict[int | str, dict[str, Any]] = {
     }
 }
 
-#: Points of a page of the history.
-_POINTS = 5000
+#: The most and the fewest points of a page of the history, and the most errors of islands in it: with many
+#: islands it would hold up everybody else for seconds.
+_POINTS, _FEWEST, _ERRORS = 5000, 50, 100_000
 
 
 @router.post("", status_code=202, response_model=JobView, responses=_ACCEPTED)
@@ -147,32 +148,50 @@ async def history(
         int, Query(ge=-1, le=2**31 - 1, description="From the generation behind this one on.")
     ] = -1,
 ) -> Any:
-    """Look at the course of a search: the error of every size and of every island over generations."""
-    await doors.do(doors.store.jobs.get, caller.owner, job)
-    points = await doors.do(doors.store.results.history, job, after, _POINTS)
-    names = ("generation", "evaluations", "best", "islands")
-    return Document({"items": [dict(zip(names, point, strict=True)) for point in points]})
+    """Look at the course of a search: the error of every size and of every island over generations.
+
+    It comes in pages: ask for what is behind the last generation of one, until a page is empty.
+    """
+    return await doors.do(_course, doors, caller, job, after)
 
 
 async def _submitted(doors: Doors, request: JobRequest, submission: Submission) -> tuple[Job, bool]:
-    try:
-        await _admitted(doors, request, submission.owner)
-    except IslandsError:
-        # What was accepted once stays so, even if its data set was deleted since.
-        before = await doors.do(doors.store.jobs.accepted, submission)
-        if before is None:
-            raise
+    before, doubts = await doors.do(_admitted, doors, request, submission)
+    if before is not None:
         return before, False
-    return await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
-
-
-async def _admitted(doors: Doors, request: JobRequest, owner: str) -> None:
-    for doubt in await doors.do(admit, request, owner, doors.store, doors.settings):
+    for doubt in doubts:
         with named(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
             async with doors.inspections:
                 await inspected(
                     path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
                 )
+    return await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
+
+
+def _admitted(
+    doors: Doors, request: JobRequest, submission: Submission
+) -> tuple[Job | None, tuple[Doubt, ...]]:
+    """Return what is in doubt about a submission, or the job that it is already.
+
+    That is looked for only where it spares an inspection or a refusal: what was accepted once stays so, even
+    if its data set was deleted since. All others are told by `Jobs.submit`, in the transaction that accepts.
+    """
+    try:
+        doubts = admit(request, submission.owner, doors.store, doors.settings)
+    except IslandsError:
+        if (before := doors.store.jobs.accepted(submission)) is not None:
+            return before, ()
+        raise
+    return doors.store.jobs.accepted(submission) if doubts else None, doubts
+
+
+def _course(doors: Doors, caller: Caller, job: str, after: int) -> Items:
+    spec = doors.store.jobs.get(caller.owner, job).spec
+    islands = (spec.get("settings") or {}).get("islands") or 1
+    most = min(_POINTS, max(_FEWEST, _ERRORS // islands))
+    names = ("generation", "evaluations", "best", "islands")
+    points = doors.store.results.history(job, after, most)
+    return Items([dict(zip(names, point, strict=True)) for point in points])
 
 
 async def _changed(doors: Doors, job: Job, seconds: float) -> Job:

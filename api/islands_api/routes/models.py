@@ -7,7 +7,7 @@ from fastapi import APIRouter, Path, Query, Response
 from islands.io.export import EXPORTS, export
 from islands.io.models import model_from_json
 from islands_api.auth import Caller, Reader
-from islands_api.documents import Document
+from islands_api.documents import Document, Items
 from islands_api.doors import AtDoors, Doors
 from islands_api.problems import RESPONSES, NoSuchThing, NotFinished
 from islands_api.routes.jobs import Id
@@ -40,8 +40,7 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
 async def models(job: Id, caller: Reader, doors: AtDoors) -> Any:
     """Look at the models of a job, best first; there are none before it has succeeded."""
     await doors.do(doors.store.jobs.get, caller.owner, job)
-    found = await doors.do(doors.store.results.models, job)
-    return Document({"items": [model.document for model in found]})
+    return await doors.do(lambda: Items([model.document for model in doors.store.results.models(job)]))
 
 
 @router.get("/{job}/models/{rank}", response_model=ModelView)

@@ -1,6 +1,10 @@
 """The heartbeat of a lease: says that the coordinator lives, and hears whether it is to go on."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from threading import Event, Thread
+from time import monotonic
 from types import TracebackType
 
 import structlog
@@ -17,6 +21,10 @@ BEATS = 10
 
 #: Seconds that a cancelled job's coordinator has to let go of it; then it is cancelled over its head.
 GRACE = 1.0
+
+#: Seconds after which a search that does not ask whether it is to go on hangs. It asks many times a second;
+#: a checkpoint of a thousand islands takes half a minute.
+HANGS = 600.0
 
 
 class JobCancelled(IslandsError):
@@ -44,6 +52,7 @@ class Heartbeat:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
         self._over = Event()
         self._lost = self._cancelled = False
+        self._asked: float | None = None
         self._thread = Thread(target=self._beat, name="heartbeat", daemon=True)
 
     def __enter__(self) -> "Heartbeat":
@@ -67,6 +76,8 @@ class Heartbeat:
         ------
         LeaseLost, JobCancelled, CoordinatorStopping
         """
+        if self._asked is not None:
+            self._asked = monotonic()
         if self._lost:
             raise LeaseLost(f"job {self._lease.job.id} is not ours any more")
         if self._cancelled:
@@ -74,9 +85,24 @@ class Heartbeat:
         if self._stopping.is_set():
             raise CoordinatorStopping("the coordinator is to stop")
 
+    @contextmanager
+    def search(self) -> Iterator[None]:
+        """End this process if nobody checks for long within the block: a call of Ray's may never come back.
+
+        Reading before a search, and refining after it, take long without a check where the record is long.
+        """
+        self._asked = monotonic()
+        try:
+            yield
+        finally:
+            self._asked = None
+
     def _beat(self) -> None:
         waited = 0.0
         while not self._over.wait(self._seconds / BEATS):
+            self._end_hanging()
+            if self._lost:
+                continue
             try:
                 self._cancelled = self._store.leases.beat(self._lease, self._seconds) or self._cancelled
                 waited += self._seconds / BEATS if self._cancelled else 0.0
@@ -84,10 +110,15 @@ class Heartbeat:
                     # Something long that asks nobody, a refinement perhaps: its result comes too late.
                     self._store.leases.finish(self._lease, Outcome(JobState.CANCELLED))
                     self._lost = True
-                    return
             except LeaseLost:
                 self._lost = True
-                return
             except StoreError as error:
                 # The lease may run out meanwhile: then the next beat is told so.
                 log.warning("heartbeat failed", job=self._lease.job.id, reason=str(error))
+
+    def _end_hanging(self) -> None:
+        asked = self._asked
+        if asked is not None and monotonic() - asked > HANGS:
+            log.error("search hangs", job=self._lease.job.id, seconds=round(monotonic() - asked))
+            # The thread that hangs cannot be told. Whoever has the job next goes on from its checkpoint.
+            os._exit(1)

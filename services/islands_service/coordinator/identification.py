@@ -158,6 +158,9 @@ class _Watch:
             # The search goes on: what could not be told now is told with the next report.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
             self._report_at = monotonic() + REPORT_EVERY
+            if report.checkpoint is not None:
+                # One that nobody could be told of stays on the disk until a sweep.
+                self._checkpoint_at = monotonic() + self._every
             return False
         self._told = len(state.history) - 1
         now = monotonic()

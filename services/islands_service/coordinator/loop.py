@@ -1,8 +1,9 @@
 """The coordinator's loop: claim a job, carry it out, write down how it ended; and again."""
 
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, closing, suppress
+from functools import partial
 from threading import Event
 from time import monotonic, time
 from types import MappingProxyType
@@ -22,7 +23,9 @@ from islands_service.store.database import StoreError
 from islands_service.telemetry import Traces
 
 if TYPE_CHECKING:
-    from islands.evolution.engine import Engine
+    from islands.evolution.archipelago import Archipelago
+    from islands.evolution.engine import Engine, Epoch, Stop
+    from islands.evolution.problem import Problem
 
 log = structlog.get_logger()
 
@@ -97,9 +100,7 @@ class Coordinator:
 
     def _next(self) -> None:
         try:
-            if monotonic() > self._sweep_at:
-                self._sweep_at = monotonic() + SWEEP_EVERY
-                self._sweep()
+            self._sweep_now_and_then()
             lease = self._store.leases.claim(self._name, self._settings.lease)
             if lease is None:
                 self._idle()
@@ -154,8 +155,8 @@ class Coordinator:
                 lease,
                 self._store,
                 self._blobs,
-                self._engine(lease),
-                heartbeat.check,
+                _Watched(self._engine(lease), heartbeat),
+                partial(self._check, heartbeat),
                 self._settings.checkpoint_every,
             )
         except JobCancelled:
@@ -174,6 +175,15 @@ class Coordinator:
                     "detail": f"{type(error).__name__}: {error}. Please report it with the job's id.",
                 },
             )
+
+    def _check(self, heartbeat: Heartbeat) -> None:
+        """Return if a job is to go on: see `Heartbeat.check`."""
+        heartbeat.check()
+        # A job that runs for days leaves a checkpoint every few seconds.
+        try:
+            self._sweep_now_and_then()
+        except (StoreError, OSError) as error:
+            log.warning("sweep failed", reason=str(error))
 
     def _finish(self, lease: Lease, outcome: Outcome, heartbeat: Heartbeat) -> None:
         """Write down how a job ended; a store that is away or full is waited for: the work is done."""
@@ -233,13 +243,31 @@ class Coordinator:
             log.warning("actors of a lost lease ended", actors=ended)
         return RayEngine(lambda line: log.warning("islands", note=line), f"{lease.job.id}.{lease.epoch}")
 
+    def _sweep_now_and_then(self) -> None:
+        if monotonic() > self._sweep_at:
+            self._sweep_at = monotonic() + SWEEP_EVERY
+            self._sweep()
+
     def _sweep(self) -> None:
         if self._settings.retention:
             self._store.retention.forget(self._settings.retention)
-        # Read before looking: what is named after this is younger than an hour.
+        # The time first, then the names, then the files: what is named after this is younger than an hour.
+        before = time() - ORPHAN
         named = self._store.retention.named_blobs()
-        removed = self._blobs.sweep(named, time() - ORPHAN)
+        removed = self._blobs.sweep(named, before)
         log.info("swept", blobs=removed)
+
+
+class _Watched:
+    """An engine whose search ends this process where it hangs."""
+
+    def __init__(self, engine: "Engine", heartbeat: Heartbeat) -> None:
+        self._engine, self._heartbeat = engine, heartbeat
+
+    def run(self, problem: "Problem", start: "Archipelago", stop: "Stop") -> Generator["Epoch"]:
+        """See `islands.evolution.engine.Engine`."""
+        with self._heartbeat.search():
+            yield from self._engine.run(problem, start, stop)
 
 
 def problem_of(error: IslandsError) -> dict[str, str]:

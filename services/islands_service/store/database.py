@@ -117,8 +117,10 @@ class Database:
         with self._lock:
             self._refuse_closed()
             if self._writer is None:
-                self._writer = Thread(target=self._write_groups, name="store writer", daemon=True)
-                self._writer.start()
+                writer = Thread(target=self._write_groups, name="store writer", daemon=True)
+                # One that cannot start is no writer: whoever comes next would wait for it for ever.
+                writer.start()
+                self._writer = writer
             self._waiting.put((operation, done))
         return done.result()
 

@@ -1,6 +1,5 @@
 """What owners do with jobs: submit, look, list, cancel, resume, delete. Each owner sees its own alone."""
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,19 +9,17 @@ from uuid import uuid4
 from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_
 
 from islands_service.jobs import (
-    ACTIVE,
     RESUMABLE,
     TERMINAL,
     Event,
-    IdempotencyConflict,
     Job,
     JobState,
     NoSuchJob,
-    QuotaExceeded,
     Submission,
     WrongState,
 )
 from islands_service.store import locks
+from islands_service.store.acceptance import accepted, digest, refuse_above
 from islands_service.store.changes import change, job_of, read_document, record
 from islands_service.store.clock import now
 from islands_service.store.database import Database
@@ -52,7 +49,7 @@ class Standing:
     counts : mapping
         Jobs by state.
     oldest : float
-        Seconds that the one that waits longest has waited.
+        Seconds that the one that waits longest has waited, since it was queued last.
     running : mapping
         The progress of those under a lease that has not expired, by job.
     """
@@ -94,17 +91,17 @@ class Jobs:
 
         def operation(connection: Connection) -> tuple[Job, bool]:
             locks.counting(connection, submission.owner)
-            if (before := _accepted(connection, submission)) is not None:
+            if (before := accepted(connection, submission)) is not None:
                 return before, False
             if most_active is not None:
-                _refuse_above(connection, submission.owner, most_active)
+                refuse_above(connection, submission.owner, most_active)
             values = {
                 "id": uuid4().hex,
                 "owner": submission.owner,
                 "kind": submission.kind,
                 "name": submission.name,
                 "spec": spec,
-                "request_sha256": _digest(submission),
+                "request_sha256": digest(submission),
                 "idempotency_key": submission.idempotency_key,
                 "priority": submission.priority,
             }
@@ -123,7 +120,7 @@ class Jobs:
             The key was used with another request.
         """
         with self._database.read() as connection:
-            return _accepted(connection, submission)
+            return accepted(connection, submission)
 
     def get(self, owner: str, job: str) -> Job:
         """Return a job.
@@ -204,7 +201,7 @@ class Jobs:
                     f"job {job} is {before.state}: only one that failed or was cancelled resumes"
                 )
             if most_active is not None:
-                _refuse_above(connection, owner, most_active)
+                refuse_above(connection, owner, most_active)
             row = change(
                 connection,
                 job,
@@ -258,7 +255,7 @@ class Jobs:
     def standing(self) -> Standing:
         """Return how all owners' jobs stand."""
         counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
-        waits = select(func.coalesce(now() - func.min(jobs.c.created), 0.0)).where(
+        waits = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
             jobs.c.state == JobState.QUEUED
         )
         running = select(jobs.c.id, jobs.c.progress).where(
@@ -279,33 +276,3 @@ def _own(connection: Connection, owner: str, job: str, locked: bool = False) -> 
     if row is None:
         raise NoSuchJob(f"there is no job {job!r}")
     return row
-
-
-def _digest(submission: Submission) -> str:
-    return hashlib.sha256(submission.request.encode()).hexdigest()
-
-
-def _accepted(connection: Connection, submission: Submission) -> Job | None:
-    key = submission.idempotency_key
-    if key is None:
-        return None
-    query = select(jobs).where(jobs.c.owner == submission.owner, jobs.c.idempotency_key == key)
-    before = connection.execute(query).one_or_none()
-    if before is None:
-        return None
-    if before.request_sha256 != _digest(submission):
-        raise IdempotencyConflict(
-            f"the idempotency key {key!r} belongs to job {before.id}, which was asked for with another "
-            "request: take a new key"
-        )
-    return job_of(before)
-
-
-def _refuse_above(connection: Connection, owner: str, most: int) -> None:
-    active = connection.execute(
-        select(func.count()).select_from(jobs).where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
-    ).scalar_one()
-    if active >= most:
-        raise QuotaExceeded(
-            f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"
-        )

@@ -6,7 +6,7 @@ import secrets
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Row, func, insert, or_, select, update
+from sqlalchemy import Column, Connection, Row, func, insert, or_, select, update
 
 from islands.errors import IslandsError, SettingsError
 from islands_service.store.clock import now
@@ -74,13 +74,15 @@ class Keys:
         Raises
         ------
         SettingsError
-            A scope is unknown, or there is none.
+            A scope is unknown, or there is none; the name or the owner is too long.
         """
         if not scopes or not scopes <= set(SCOPES):
             raise SettingsError(
                 f"unknown scopes {', '.join(sorted(scopes - set(SCOPES))) or '(none)'}: take some of "
                 f"{', '.join(SCOPES)}"
             )
+        _refuse_long("name", name, keys.c.name)
+        _refuse_long("owner", owner or "", keys.c.owner)
         identity = secrets.token_hex(8)
         secret = PREFIX + secrets.token_urlsafe(32)
 
@@ -138,6 +140,15 @@ class Keys:
         valid = keys.c.revoked.is_(None) & or_(keys.c.expires.is_(None), keys.c.expires > now())
         with self._database.read() as connection:
             return connection.execute(select(keys.c.id).where(valid).limit(1)).scalar() is not None
+
+
+def _refuse_long(what: str, text: str, column: Column[str]) -> None:
+    # SQLite would take it, and PostgreSQL not say which it was.
+    most = column.type.length  # type: ignore[attr-defined]
+    if len(text) > most:
+        raise SettingsError(
+            f"the {what} of a key has at most {most} characters, this one has {len(text)}: take a shorter one"
+        )
 
 
 def _hash(secret: str) -> str:

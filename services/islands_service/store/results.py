@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection, delete, insert, select
-from sqlalchemy.exc import IntegrityError
 
 from islands_service.jobs import NoSuchJob
 from islands_service.store.database import Database
-from islands_service.store.tables import artefacts, models, points, results
+from islands_service.store.tables import artefacts, jobs, models, points, results
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +78,14 @@ class Results:
         """
 
         def operation(connection: Connection) -> None:
+            # Locked: others may have drawn the same, and one has to see what the other has kept.
+            there = connection.execute(select(jobs.c.id).where(jobs.c.id == job).with_for_update())
+            if there.one_or_none() is None:
+                raise NoSuchJob(f"there is no job {job!r} any more")
             connection.execute(
                 delete(artefacts).where(artefacts.c.job_id == job, artefacts.c.name.in_(blobs))
             )
-            try:
-                for name, blob in blobs.items():
-                    connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
-            except IntegrityError as error:
-                raise NoSuchJob(f"there is no job {job!r} any more") from error
+            for name, blob in blobs.items():
+                connection.execute(insert(artefacts).values(job_id=job, name=name, blob=blob))
 
         self._database.write(operation)

@@ -350,6 +350,12 @@ def test_a_result_is_shown_and_downloaded(run: Run, done: str, found: Outcome) -
     assert json.loads(run("result", done, "--json")[1]) == result
 
 
+def test_a_result_is_asked_for_once(run: Run, service: Service, done: str) -> None:
+    service.logs.clear()
+    assert run("result", done)[0] == 0
+    assert [each["path"] for each in service.logs if "path" in each] == [f"/v1/jobs/{done}/result"]
+
+
 def test_a_result_is_replaced_by_force_alone_and_without_leftovers(run: Run, done: str) -> None:
     assert run("result", done, "--out", "out")[0] == 0
     Path("out/models/99.json").write_text("of another job")

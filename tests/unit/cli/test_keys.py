@@ -203,3 +203,12 @@ def test_a_key_without_a_scope_is_not_made(run: Run, service: Service) -> None:
 def line_of(run: Run, key: str) -> str:
     """The line of a key in the list."""
     return next(line for line in run("list")[1].splitlines() if key in line)
+
+
+@pytest.mark.parametrize(("option", "most"), [("--name", 200), ("--owner", 64)])
+def test_a_name_or_an_owner_that_no_database_holds_is_refused(run: Run, option: str, most: int) -> None:
+    made(run, *ALL, option, "ü" * most)
+    code, out, err = run("create", *ALL, option, "ü" * (most + 1))
+    assert (code, out) == (2, "")
+    told = f"the {option[2:]} of a key has at most {most} characters, this one has {most + 1}: take a shorter"
+    assert told in err

@@ -11,6 +11,7 @@ from service import Service, served
 
 from islands_api.client import ServiceError, Unreachable, calls
 from islands_service.jobs import JobState
+from islands_service.store.database import StoreInDoubt
 
 pytestmark = pytest.mark.usefixtures("quick")
 
@@ -74,6 +75,22 @@ def test_what_would_do_harm_is_not_sent_twice(client: Any, connect: Any, me: Any
             client.cancel(job)
     with pytest.raises(ServiceError, match="there is no job"):
         client.job(job)
+
+
+def test_what_may_have_been_done_is_not_sent_twice(
+    client: Any, connect: Any, me: Any, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job, asked = client.cancel(client.submit(me.dataset, **SPEC)), []
+
+    def resume(*_: Any) -> None:
+        asked.append(1)
+        raise StoreInDoubt("the database went away")
+
+    monkeypatch.setattr(service.store.jobs, "resume", resume)
+    with pytest.raises(ServiceError, match="nobody knows whether it was written") as caught:
+        client.resume(job)
+    assert (caught.value.status, caught.value.type) == (504, "/problems/store-in-doubt")
+    assert len(asked) == 1
 
 
 def test_what_never_left_may_be_sent_again(client: Any, connect: Any, me: Any, wire: Any, later: Any) -> None:

@@ -129,7 +129,7 @@ def test_who_ends_is_started_again(supervised: Start) -> None:
 
 
 def test_who_ends_at_once_waits_twice_as_long_every_time_up_to_a_limit(supervised: Start) -> None:
-    running = supervised(role("doors", "note('start')"), _BACKOFF=0.2, _MOST_BACKOFF=0.8)
+    running = supervised(role("doors", "note('start')"), _BACKOFF=0.2, _MOST_BACKOFF=0.4)
     times = [at for at, *_ in running.started(6)]
     waits = [after - before for before, after in pairwise(times)]
     # And the start of an interpreter, which takes a few hundredths.
@@ -188,6 +188,14 @@ def test_who_has_not_spoken_yet_is_starting_and_may_take_its_time(supervised: St
     assert len(running.entries("start")) == 1
 
 
+def test_who_never_speaks_hangs_too(supervised: Start) -> None:
+    running = supervised(role("doors", "note('start'); time.sleep(60)", patience=0.1), _STARTING=0.6)
+    (first, _, _, pid), (second, *_) = running.started(2)[:2]
+    assert second - first > 0.5
+    assert not alive([pid])
+    assert "doors has said nothing for 0." in running.end()
+
+
 def test_the_others_wait_for_the_first_sign_of_the_first_one(supervised: Start) -> None:
     slow = role("doors", "note('start'); time.sleep(0.5); note('ready'); stay()")
     running = supervised(slow, role("work"))
@@ -222,6 +230,22 @@ def test_where_one_says_that_it_cannot_run_so_all_end_and_so_does_the_supervisor
     assert "started again" not in running.said()
     assert running.process.returncode == 2
     assert running.order("told", "end") == ["work told", "work end"]
+
+
+def test_one_that_has_run_so_before_and_now_cannot_is_started_again_until_it_can(supervised: Start) -> None:
+    """The doors, whose last key has expired: it is no reason to end the jobs."""
+    script = (
+        "count = open(os.environ['JOURNAL']).read().count('doors start')\n"
+        "if count in (1, 2): note('start'); sys.exit(2)\n"
+        "stay()"
+    )
+    running = supervised(role("doors", script), role("work"), _BACKOFF=0.05)
+    running.started(1, "work")
+    os.kill(running.started(1, "doors")[0][3], signal.SIGKILL)
+    running.started(4, "doors")
+    assert len(running.entries("start", "work")) == 1
+    assert running.end().count("doors ended (2): it is started again") == 2
+    assert running.process.returncode == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from processes import eventually
-from stores import ALICE, claimed, job_in, submitted
+from stores import ALICE, child, claimed, job_in, submitted
 
 from islands_service.coordinator import heartbeat as heartbeats
 from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
@@ -79,7 +79,7 @@ def test_who_has_lost_the_lease_is_told_and_writes_nothing(store: Store, lease: 
     before = store.jobs.get(ALICE, lease.job.id)
     with Heartbeat(store, lease, SECONDS, Event()) as heartbeat:
         eventually(lambda: said(heartbeat) is LeaseLost, seconds=5.0)
-        eventually(lambda: not heartbeat._thread.is_alive(), seconds=5.0)
+        time.sleep(SECONDS)  # ten beats more
     assert store.jobs.get(ALICE, lease.job.id) == before
 
 
@@ -172,3 +172,42 @@ def test_a_finished_job_has_no_heartbeat(store: Store) -> None:
     job = job_in(store, JobState.SUCCEEDED)
     with Heartbeat(store, Lease(job, 1), SECONDS, Event()) as heartbeat:
         eventually(lambda: said(heartbeat) is LeaseLost, seconds=5.0)
+
+
+HANGING = """
+import sys, time
+from threading import Event
+from islands_service.coordinator import heartbeat
+from islands_service.store import Store
+heartbeat.HANGS = 0.3
+def silent():
+    time.sleep(0.6)
+    print("went on", flush=True)
+with Store(sys.argv[1]) as store:
+    lease = store.leases.claim("hanging", 1.0)
+    with heartbeat.Heartbeat(store, lease, 0.3, Event()) as beating:
+        silent()  # reading a record
+        with beating.search():
+            for _ in range(12):
+                time.sleep(0.05)
+                beating.check()
+        silent()  # refining
+        if len(sys.argv) > 2:
+            store.leases.finish(lease, heartbeat.Outcome(heartbeat.JobState.CANCELLED))
+            time.sleep(0.1)
+        with beating.search():
+            silent()
+"""
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_search_that_never_asks_again_ends_the_process_and_nothing_else_does(
+    store: Store, lost: bool
+) -> None:
+    job = submitted(store)
+    with child(HANGING, store.database.url, *["lost"] * lost) as hanging:
+        said, _ = hanging.communicate(timeout=30)
+    assert "search hangs" in said
+    assert (said.count("went on"), hanging.returncode) == (2, 1)
+    if not lost:
+        assert taken_over(store).job.id == job.id

@@ -166,3 +166,14 @@ def test_who_has_lost_the_lease_stops_at_its_next_report(store: Store, blobs: Bl
         carried_out(old, store, blobs)
     assert store.jobs.get(ALICE, job.id).version == new.job.version
     assert store.jobs.get(ALICE, job.id).checkpoint is None
+
+
+def test_a_store_that_is_away_is_not_offered_a_new_checkpoint_every_time(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    before = set(dict(blobs.all()))
+    flaky = Flaky(store, lambda number: number < 20)
+    identification(claim(store), flaky, blobs, SerialEngine(), lambda: None, 3600.0)  # type: ignore[arg-type]
+    assert flaky.reports >= 20
+    assert len(set(dict(blobs.all())) - before) == 1

@@ -1,5 +1,6 @@
 """The coordinator's loop: every job ends, or is given back, whatever happens to it."""
 
+import errno
 import json
 import os
 import time
@@ -10,14 +11,14 @@ from typing import Any
 
 import pytest
 from processes import eventually
-from stores import ALICE
+from stores import ALICE, child
 
 from islands.errors import IslandsError, RecordError
 from islands.evolution.engine import SerialEngine
 from islands_service.blobs import Blobs, NoSuchBlob
 from islands_service.coordinator import loop
 from islands_service.coordinator.loop import Coordinator
-from islands_service.jobs import Job, JobState, Lease, Outcome, Submission
+from islands_service.jobs import Job, JobState, Lease, Outcome, Report, Submission
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -254,3 +255,115 @@ def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
 
     eventually(swept, seconds=10.0)
     assert {young, named} <= {blob for blob, _ in blobs.all()}
+
+
+def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
+    store: Store,
+    blobs: Blobs,
+    job: Job,
+    coordinator: Callable[..., Thread],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    left: list[str] = []
+
+    def old(data: bytes) -> str:
+        blob = blobs.write(data)
+        os.utime(blobs.path(blob), (1e9, 1e9))
+        return blob
+
+    def keeps_checkpoints(lease: Lease, *arguments: Any) -> Outcome:
+        for data in (b"replaced", b"named"):
+            left.append(old(data))
+            store.leases.report(lease, Report({}, checkpoint=left[-1]))
+        left.append(blobs.write(b"about to be named"))
+        return wait_for_end(lease, *arguments)
+
+    working(monkeypatch, keeps_checkpoints)
+    monkeypatch.setattr(loop, "SWEEP_EVERY", 0.05)
+    coordinator()
+    eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=10.0)
+    now = store.jobs.get(ALICE, job.id)
+    assert (now.state, now.checkpoint) == (JobState.RUNNING, left[1])
+    assert set(left[1:]) <= set(dict(blobs.all()))
+
+
+@pytest.mark.parametrize(
+    "error", [StoreUnavailable("the database does not answer"), OSError(errno.ESTALE, "Stale file handle")]
+)
+def test_a_sweep_that_fails_costs_a_job_nothing(
+    store: Store,
+    job: Job,
+    coordinator: Callable[..., Thread],
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+) -> None:
+    tries = []
+
+    class Unswept(Alone):
+        def _sweep(self) -> None:
+            if self._store.jobs.standing().leases:
+                tries.append(1)
+                raise error
+
+    def works(*arguments: Any) -> Outcome:
+        while len(tries) < 3:
+            arguments[4]()
+        return DONE
+
+    working(monkeypatch, works)
+    monkeypatch.setattr(loop, "SWEEP_EVERY", 0.0)
+    coordinator(Unswept)
+    assert ends(store, job).state == JobState.SUCCEEDED
+    assert [event.kind for event in store.jobs.events(job.id)] == ["queued", "running", "succeeded"]
+
+
+def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
+    store: Store, blobs: Blobs, settings: ServiceSettings, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A coordinator may stand still between two steps of a sweep, for longer than a blob may be unnamed."""
+    monkeypatch.setattr(loop, "ORPHAN", 0.1)
+    sweeping = Alone(settings, "me", Event())
+    named_blobs = sweeping._store.retention.named_blobs
+    written: list[str] = []
+
+    def standing_still() -> frozenset[str]:
+        named = named_blobs()
+        written.append(blobs.write(b"named meanwhile"))
+        time.sleep(0.3)
+        return named
+
+    sweeping._store.retention.named_blobs = standing_still  # type: ignore[method-assign]
+    with sweeping._store:
+        sweeping._sweep()
+    assert blobs.read(written[0]) == b"named meanwhile"
+
+
+HANGING = """
+import sys, time
+from pathlib import Path
+from threading import Event
+from islands_service.coordinator import heartbeat
+from islands_service.coordinator.loop import Coordinator
+from islands_service.settings import ServiceSettings
+heartbeat.HANGS = 0.3
+class Engine:
+    def run(self, problem, start, stop):
+        stop()
+        time.sleep(60)
+        yield
+class Alone(Coordinator):
+    def _wait_for_ray(self, *_): pass
+    def _engine(self, _): return Engine()
+Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", Event()).run()
+"""
+
+
+def test_a_coordinator_whose_search_hangs_ends_and_its_job_goes_on(
+    store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
+) -> None:
+    with child(HANGING, str(settings.data_dir)) as hanging:
+        said, _ = hanging.communicate(timeout=60)
+    assert ("search hangs" in said, hanging.returncode) == (True, 1)
+    coordinator(name="hanging")
+    ended = ends(store, job)
+    assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, 2)

@@ -2,6 +2,7 @@
 
 import socket
 import sqlite3
+import threading
 import time
 from contextlib import closing
 from functools import partial
@@ -221,3 +222,21 @@ def test_many_who_open_a_new_file_at_once_all_succeed(tmp_path):
         assert not [answer for answer in answers if isinstance(answer, Exception)]
         for each in made:
             each.close()
+
+
+def test_a_writer_that_cannot_start_keeps_nobody_waiting(sqlite, monkeypatch):
+    """Where there are too many threads already: whoever comes next tries again."""
+    start, starts = threading.Thread.start, []
+
+    def refused_once(thread):
+        starts.append(thread.name)
+        if len(starts) == 1:
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", refused_once)
+    with pytest.raises(RuntimeError, match="can't start new thread"):
+        sqlite.write(executing("SELECT 1"))
+    monkeypatch.undo()
+    (answer,) = at_once([lambda: sqlite.write(executing("SELECT 1")) is not None])
+    assert answer is True
