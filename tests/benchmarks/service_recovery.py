@@ -15,13 +15,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import httpx
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from processes import alive, descendants, eventually, kill
-from ray.cluster_utils import Cluster
 from service_processes import ROLES, Service, serving
 from service_table import Figure, percentile, run
 
@@ -215,9 +215,12 @@ def node(repeat: int) -> Iterator[Figure]:
 
 
 @contextmanager
-def nodes() -> Iterator[Cluster]:
+def nodes() -> Iterator[Any]:
     """Two machines of a cluster on this one: a head that carries nothing, and one with a CPU."""
     os.environ.update(HEALTH, RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="0" * 32)
+    # Only now: how its processes know each other is settled when it is imported.
+    from ray.cluster_utils import Cluster
+
     machines = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 10**8})
     try:
         machines.add_node(num_cpus=1, object_store_memory=10**8)
@@ -227,7 +230,7 @@ def nodes() -> Iterator[Cluster]:
 
 
 @contextmanager
-def service_on(machines: Cluster) -> Iterator[Service]:
+def service_on(machines: Any) -> Iterator[Service]:
     with (
         tempfile.TemporaryDirectory(prefix="islands-recovery-", ignore_cleanup_errors=True) as folder,
         serving(Path(folder) / "data", "--ray-address", machines.address) as running,
