@@ -3,10 +3,14 @@
 In importlib mode pytest puts no test folder on the path, so the generators' folder is put there here.
 """
 
+import os
 import shutil
 import sys
 from contextlib import ExitStack
 from pathlib import Path
+
+# Before NumPy is imported: the workers have the cores, and threads of its linear algebra would wait for them.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import HealthCheck, settings

@@ -11,7 +11,8 @@ from islands.io.results import COLUMNS, row
 from islands.model.equations import mathml_equation
 from islands.validation.findings import Findings
 
-_TEMPLATES = Environment(
+#: Pages that are files of their own.
+TEMPLATES = Environment(
     loader=PackageLoader("islands_service", "templates"), autoescape=select_autoescape(), trim_blocks=True
 )
 
@@ -45,7 +46,7 @@ def report(name: str, findings: Findings, figures: Mapping[str, bytes]) -> bytes
         for rank, entry in enumerate(findings.models, start=1)
     ]
     shown = [(caption, _inline(figures[each])) for each, caption in CAPTIONS.items() if each in figures]
-    text = _TEMPLATES.get_template("report.html").render(
+    text = TEMPLATES.get_template("report.html").render(
         name=name,
         record=findings.record,
         findings=findings,

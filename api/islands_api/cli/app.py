@@ -1,5 +1,6 @@
 """The table of commands, and what becomes of an error: one line that says what to do, exit code 2."""
 
+import os
 import sys
 from importlib import import_module
 from typing import Any
@@ -11,8 +12,14 @@ from typer.core import TyperGroup
 from islands.errors import IslandsError
 from islands_api.cli.console import errors
 
+#: What tells libraries of linear algebra how many threads to take.
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
 #: Every command is a file of its own with a function, or a group of commands, of the command's name.
-COMMANDS = ("identify", "fit", "simulate", "show", "demo", "bench", "systems", "serve", "jobs", "keys")
+COMMANDS = (
+    *("identify", "fit", "diagnose", "simulate", "show", "demo"),
+    *("bench", "trials", "systems", "serve", "jobs", "keys"),
+)
 
 
 class Commands(TyperGroup):
@@ -51,6 +58,10 @@ def _islands() -> None:
 
 def main() -> None:
     """Run the command line."""
+    # Matrices are small here, and islands, trials and other jobs have the cores: threads of linear algebra
+    # would wait for each other, and sums depend on how many they are. NumPy is not imported yet.
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
     try:
         app()
     except (IslandsError, OSError) as error:

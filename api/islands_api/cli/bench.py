@@ -15,12 +15,9 @@ from islands.benchmark.figures import save_scalings
 from islands.benchmark.measurement import measure
 from islands.benchmark.report import Report, document, goals
 from islands.errors import IslandsError
+from islands_api.cli.app import THREADS
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_api.cli.fit import check_folder
-
-#: Threads of whatever linear algebra library numpy was built with. They wait in a loop, and their waiting
-#: would be counted as CPU time of plain numpy.
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def bench(
@@ -48,8 +45,11 @@ def bench(
 
 
 def _measured(quick: bool, tell: Callable[[str, float], None]) -> Report:
-    """Measure in a process of its own: a linear algebra library reads its threads when it is loaded."""
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    """Measure in a process of its own: a linear algebra library reads its threads when it is loaded.
+
+    They wait in a loop, and their waiting would be counted as CPU time of plain numpy.
+    """
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     context = get_context("spawn")
     receiving, sending = context.Pipe(duplex=False)
     process = context.Process(target=_measure, args=(quick, sending))

@@ -71,8 +71,8 @@ def fit(
     show_result(result, out)
 
 
-def check_folder(folder: Path, force: bool) -> None:
-    """Refuse to write over a result that somebody may still want.
+def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
+    """Refuse to write over a result that somebody may still want; it is there where its last file is.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def check_folder(folder: Path, force: bool) -> None:
         raise SettingsError(f"--out {folder}: {there} is a file, give a folder")
     if not os.access(there, os.W_OK):
         raise SettingsError(f"--out {folder}: nothing may be written in {there}, give another folder")
-    if (folder / "result.json").exists() and not force:
+    if (folder / result).exists() and not force:
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 
 

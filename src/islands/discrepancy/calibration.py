@@ -1,0 +1,165 @@
+"""Calibration: the values with which a simulation comes closest to a record, by Levenberg and Marquardt."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.discrepancy.effect import Signal
+from islands.discrepancy.extended import Extended
+from islands.discrepancy.noise import Noise, noise_of
+
+#: Steps at the most, tries of each, and what one has to gain in minus twice the log-likelihood.
+STEPS, TRIES, WORTH = 25, 6, 0.02
+
+#: Part of a parameter's scale that a derivative steps.
+STEP = 1e-2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """What a simulation is held against.
+
+    Attributes
+    ----------
+    y : ndarray, shape (samples,)
+        The measured output.
+    seen : ndarray of bool, shape (samples,)
+        What estimation may see.
+    noise : Noise or None
+        What residuals are whitened by; None takes them as they are.
+    tolerance : mapping
+        Relative standard deviations of the core's parameters about their nominal values; who is not named is
+        free.
+    """
+
+    y: Signal
+    seen: NDArray[np.bool_]
+    noise: Noise | None
+    tolerance: Mapping[str, float]
+
+    def residual(self, simulated: Signal) -> Signal:
+        """Return what is left of the samples that are seen, whitened."""
+        left = self.y - simulated
+        return (left if self.noise is None else self.noise.whiten(left))[self.seen]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibrated:
+    """A simulation with values, held against a record.
+
+    Attributes
+    ----------
+    simulation : Extended
+    values : ndarray, shape (parameters,)
+    output : ndarray, shape (samples,)
+        Of the whole record.
+    mean_square : float
+        Of the residual over the samples that estimation saw.
+    noise : Noise
+        Of that residual.
+    penalty : float
+        Squares of the deviations from tolerances.
+    """
+
+    simulation: Extended
+    values: Signal
+    output: Signal
+    mean_square: float
+    noise: Noise
+    penalty: float
+
+    @property
+    def score(self) -> float:
+        """Minus twice the log-likelihood, the noise's memory counted, effects' values not yet paid for."""
+        return self.noise.minus_twice_log_likelihood + self.penalty
+
+
+def calibrate(simulation: Extended, target: Target, start: Signal) -> Calibrated:
+    """Fit a simulation's values from a start."""
+    lower, upper = simulation.bounds
+    pull, nominal = pull_of(simulation, target.tolerance)
+    scales = simulation.scales
+    values = np.clip(start, lower, upper)
+    output = simulation.simulate(values)
+    residual = target.residual(output)
+    cost = _cost(residual, pull * (values - nominal))
+    damping = 1e-3
+    for _ in range(STEPS if values.size else 0):
+        jacobian = _jacobian(simulation, target, values, output)
+        weight = residual.size / max(float(residual @ residual), np.finfo(float).tiny)
+        hessian = weight * (jacobian.T @ jacobian) + np.diag((pull * scales) ** 2)
+        slope = weight * (jacobian.T @ residual) - scales * pull**2 * (values - nominal)
+        if not np.isfinite(hessian).all():
+            break
+        for _ in range(TRIES):
+            curved = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
+            moved = np.clip(values + np.linalg.lstsq(curved, slope, rcond=None)[0] * scales, lower, upper)
+            output_there = simulation.simulate(moved)
+            residual_there = target.residual(output_there)
+            cost_there = _cost(residual_there, pull * (moved - nominal))
+            if cost_there < cost:
+                break
+            damping = max(8 * damping, 1e-6)
+        else:
+            break
+        gained = cost - cost_there
+        values, output, residual, cost = moved, output_there, residual_there, cost_there
+        damping /= 5
+        if gained < WORTH:
+            break
+    return held_against(simulation, target, values)
+
+
+def held_against(simulation: Extended, target: Target, values: Signal) -> Calibrated:
+    """Hold a simulation against a record with values as they are."""
+    output = simulation.simulate(values)
+    residual = (target.y - output)[target.seen]
+    pull, nominal = pull_of(simulation, target.tolerance)
+    penalty = float(np.sum((pull * (values - nominal)) ** 2))
+    return Calibrated(simulation, values, output, float(np.mean(residual**2)), noise_of(residual), penalty)
+
+
+def covariance(fit: Calibrated, target: Target) -> NDArray[np.float64]:
+    """Return the covariance of a fit's values, shape (parameters, parameters): the noise's memory counts."""
+    simulation = fit.simulation
+    whitened = Target(target.y, target.seen, fit.noise, target.tolerance)
+    scales = simulation.scales
+    jacobian = _jacobian(simulation, whitened, fit.values, fit.output)
+    pull, _ = pull_of(simulation, target.tolerance)
+    information = jacobian.T @ jacobian / fit.noise.variance + np.diag((pull * scales) ** 2)
+    inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
+    return inverse
+
+
+def pull_of(simulation: Extended, tolerance: Mapping[str, float]) -> tuple[Signal, Signal]:
+    """Return one over each value's standard deviation, 0 where it is free; and where it is pulled to."""
+    nominal = simulation.nominal
+    pull = np.zeros(nominal.size)
+    for place, parameter in enumerate(simulation.core.parameters):
+        if parameter.name in tolerance:
+            pull[place] = 1.0 / (tolerance[parameter.name] * abs(parameter.nominal))
+    return pull, nominal
+
+
+def _jacobian(simulation: Extended, target: Target, values: Signal, output: Signal) -> NDArray[np.float64]:
+    """Return how the samples seen change with each scaled value, whitened, shape (seen, parameters)."""
+    _, upper = simulation.bounds
+    columns = np.empty((int(np.count_nonzero(target.seen)), values.size))
+    for place, scale in enumerate(simulation.scales):
+        step = STEP if values[place] + STEP * scale <= upper[place] else -STEP
+        moved = values.copy()
+        moved[place] += step * scale
+        change = (simulation.simulate(moved) - output) / step
+        columns[:, place] = (change if target.noise is None else target.noise.whiten(change))[target.seen]
+    return columns
+
+
+def _cost(residual: Signal, pulled: Signal) -> float:
+    # What explodes may be finite, and its square not.
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = max(float(residual @ residual), np.finfo(float).tiny)
+    if not np.isfinite(squares):
+        return float("inf")
+    return residual.size * float(np.log(squares)) + float(pulled @ pulled)

@@ -1,0 +1,161 @@
+"""The decision: whether an explanation may be called one, and how sure each of its names is."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from islands.discrepancy.calibration import Calibrated, Target, covariance, held_against
+from islands.discrepancy.effect import Effect, Signal
+from islands.discrepancy.effects.wrong_parameter import plain
+from islands.discrepancy.gain import held_out_gain
+from islands.discrepancy.ladder import Rung, ladder
+from islands.discrepancy.search import Explanation, without_effect
+
+#: Share of the explainable misfit that names have to explain, and from which on a remainder is no more than
+#: one.
+SHARE, MOST = 0.5, 0.9
+
+#: Names within so much of the best cannot be told from it, and confidences are so many times cooler than
+#: scores: untempered they say 0.97 where 0.72 is true.
+EQUIVALENT, TEMPER = 6.0, 4.0
+
+
+class Verdict(StrEnum):
+    """What an analysis comes to."""
+
+    NOTHING = "nothing"
+    NAMED = "named"
+    REMAINDER = "named with remainder"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A parameter that was found.
+
+    Attributes
+    ----------
+    value : float
+    unit : str
+    ci95 : tuple of float or None
+        Where it lies with 95 percent probability, if the simulation is right; None where nothing tells.
+    """
+
+    value: float
+    unit: str
+    ci95: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A cause that was named.
+
+    Attributes
+    ----------
+    name, family : str
+        Of the catalogue.
+    confidence : float
+        Among the causes that would explain the same, from 0 to 1.
+    equivalents : tuple of str
+        Names that this record cannot tell from it.
+    parameters : mapping of str to Value
+    score : float
+        What it gains, in minus twice the log-likelihood, its values paid for.
+    eta : float or None
+        Share of the explainable misfit that goes with it; None for what is no misfit of the mean.
+    """
+
+    name: str
+    family: str
+    confidence: float
+    equivalents: tuple[str, ...]
+    parameters: Mapping[str, Value]
+    score: float
+    eta: float | None
+
+
+def confirmed(
+    found: Explanation, base: Calibrated, target: Target, fitted: int, rng: np.random.Generator
+) -> Explanation:
+    """Leave out what does not foretell samples that were not fitted: without that gain there is no name."""
+    while found.effects:
+        before = reference(found, base, target)
+        if held_out_gain(before, before is not base, found.fit, target, fitted, rng) > 0.0:
+            break
+        found = without_effect(found, found.effects[-1], target)
+    return found
+
+
+def reference(found: Explanation, base: Calibrated, target: Target) -> Calibrated:
+    """Return what an explanation is held against: the simulation, calibrated.
+
+    Calibration takes up a gain, or a parameter that is off: these are held against the simulation as given.
+    """
+    if all(effect.family == "scale" for effect in found.effects):
+        return held_against(base.simulation, target, base.simulation.nominal)
+    return base
+
+
+def share(before: Calibrated, after: Calibrated, floor: float) -> float:
+    """Return the share of the explainable misfit that is gone; ``floor`` is the noise's mean square."""
+    misfit = before.mean_square - floor
+    if misfit <= 0.0:
+        return 0.0
+    return float(np.clip((before.mean_square - after.mean_square) / misfit, 0.0, 1.0))
+
+
+def decided(explained: float, named: bool, remains: bool) -> Verdict:
+    """Return the verdict on names that explain a share, where something remains or not."""
+    if not named:
+        return Verdict.UNKNOWN if remains else Verdict.NOTHING
+    if explained < (MOST if remains else SHARE):
+        return Verdict.UNKNOWN
+    return Verdict.REMAINDER if remains else Verdict.NAMED
+
+
+def findings(
+    found: Explanation, target: Target, effects: Sequence[Effect], floor: float
+) -> tuple[tuple[Finding, ...], tuple[Rung, ...]]:
+    """Say what was found, and which other rungs could stand in the place of one.
+
+    Each effect is taken out, and all others are tried in its place.
+    """
+    named, instead = [], []
+    spread = np.sqrt(np.maximum(np.diag(covariance(found.fit, target)), 0.0))
+    for effect in found.effects:
+        without = without_effect(found, effect, target)
+        rungs = ladder(without.fit, target, [each for each in effects if each not in without.effects])
+        scores = {plain(rung.effect.name): rung.gained(without.fit) for rung in reversed(rungs)}
+        own = max(scores.get(plain(effect.name), 0.0), without.cost - found.cost)
+        scores[plain(effect.name)] = own
+        equal = {name for name, score in scores.items() if score > own - EQUIVALENT} - {plain(effect.name)}
+        instead += [rung for rung in rungs if plain(rung.effect.name) in equal]
+        named.append(
+            Finding(
+                plain(effect.name),
+                effect.family,
+                _confidence(own, scores),
+                tuple(sorted(equal, key=lambda name: -scores[name])),
+                _values(found.fit, effect, spread),
+                own,
+                share(reference(found, without.fit, target), found.fit, floor),
+            )
+        )
+    return tuple(named), tuple(instead)
+
+
+def _confidence(own: float, scores: Mapping[str, float]) -> float:
+    rivals = (*scores.values(), 0.0)  # and nothing at all
+    return 1.0 / sum(float(np.exp(min(score - own, 0.0) / (2 * TEMPER))) for score in rivals)
+
+
+def _values(fit: Calibrated, effect: Effect, spread: Signal) -> Mapping[str, Value]:
+    part = fit.simulation.part(effect)
+    found = {}
+    for place in range(part.start, part.stop):
+        parameter, value = fit.simulation.parameters[place], float(fit.values[place])
+        reach = 1.96 * float(spread[place])
+        found[parameter.name] = Value(value, parameter.unit, (value - reach, value + reach))
+    return found

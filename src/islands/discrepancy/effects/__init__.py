@@ -1,0 +1,87 @@
+"""The catalogue of effects: what the analysis looks for, in the order in which maps act on a signal.
+
+An effect is one file with one `EFFECT`; a line here puts it into the analysis, the report, the trials and the
+guide.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from islands.discrepancy.effect import Effect
+from islands.discrepancy.effects import (
+    absolute_value_sensor,
+    ageing,
+    backlash,
+    clock_skew,
+    coulomb_friction,
+    cross_coupling,
+    cubic_stiffness,
+    dead_zone,
+    delay,
+    even_nonlinearity,
+    exponential_creep,
+    gain_step,
+    input_gain,
+    input_saturation,
+    jump,
+    linear_drift,
+    logarithmic_creep,
+    loop_asymmetry,
+    offset,
+    output_saturation,
+    periodic_disturbance,
+    quadratic_drag,
+    rate_dependent_loop,
+    relaxation,
+    resonance,
+    second_hysteresis,
+    sensor_gain,
+    sensor_lag,
+    stiction,
+    thermal_drift,
+    viscous,
+    viscous_asymmetry,
+)
+
+CATALOGUE: Mapping[str, Effect] = {
+    module.EFFECT.name: module.EFFECT
+    for module in (
+        delay,
+        clock_skew,
+        input_gain,
+        dead_zone,
+        input_saturation,
+        backlash,
+        stiction,
+        relaxation,
+        rate_dependent_loop,
+        loop_asymmetry,
+        second_hysteresis,
+        gain_step,
+        ageing,
+        viscous,
+        coulomb_friction,
+        viscous_asymmetry,
+        quadratic_drag,
+        even_nonlinearity,
+        cubic_stiffness,
+        exponential_creep,
+        logarithmic_creep,
+        sensor_lag,
+        resonance,
+        absolute_value_sensor,
+        output_saturation,
+        sensor_gain,
+        offset,
+        linear_drift,
+        jump,
+        thermal_drift,
+        cross_coupling,
+        periodic_disturbance,
+    )
+}
+
+
+def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Return effects in the order in which they act."""
+    places = {name: place for place, name in enumerate(CATALOGUE)}
+    return tuple(sorted(effects, key=lambda effect: places.get(effect.name, -1)))

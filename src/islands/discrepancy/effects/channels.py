@@ -1,0 +1,40 @@
+"""Channels that were recorded beside the output: a temperature by its unit, or a neighbour's signal."""
+
+import numpy as np
+
+from islands.discrepancy.effect import Scene, Signal
+
+#: Units of temperatures.
+TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
+
+
+def there(scene: Scene, thermal: bool) -> bool:
+    """Tell whether a channel was recorded that is a temperature, or one that is none, and that moves."""
+    return _name(scene, thermal) is not None
+
+
+def channel(scene: Scene, thermal: bool) -> Signal:
+    """Return the channel; a temperature from its first value on, since its zero says nothing here."""
+    signal = scene.channels[_name(scene, thermal) or ""]
+    return signal - signal[0] if thermal else signal
+
+
+def channel_unit(scene: Scene, thermal: bool) -> str:
+    """Return the channel's unit."""
+    return scene.units[_name(scene, thermal) or ""] or "1"
+
+
+def spread(scene: Scene, thermal: bool) -> float:
+    """Return how far the channel moves."""
+    return float(np.ptp(channel(scene, thermal)))
+
+
+def _name(scene: Scene, thermal: bool) -> str | None:
+    return next(
+        (
+            name
+            for name, signal in scene.channels.items()
+            if (scene.units[name] in TEMPERATURES) == thermal and np.ptp(signal) > 0.0
+        ),
+        None,
+    )

@@ -1,0 +1,34 @@
+"""An odd part of the characteristic: + k x^3."""
+
+from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.parameter import Parameter
+
+
+def _form(x: Signal, _rate: Signal, values: Signal, _scene: Scene) -> Signal:
+    return values[0] * x * x * x
+
+
+def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "k",
+            f"{scene.output_unit}/{scene.input_unit}^3",
+            0.0,
+            0.01 * scene.output_peak / scene.input_peak**3,
+        ),
+    )
+
+
+def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * scene.output_peak / scene.input_peak**3,),)
+
+
+EFFECT = Effect(
+    name="cubic-stiffness",
+    family="shape",
+    site=Site.FORCE,
+    parameters=_parameters,
+    grid=_grid,
+    form=_form,
+    source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+)

@@ -1,0 +1,39 @@
+"""Nothing happens around zero: u is smaller by d, and zero below it."""
+
+import numpy as np
+
+from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.parameter import Parameter
+
+
+def _form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+    return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
+
+
+def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "d",
+            scene.input_unit,
+            0.0,
+            0.005 * scene.input_peak,
+            -0.2 * scene.input_peak,
+            0.3 * scene.input_peak,
+        ),
+    )
+
+
+def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * scene.input_peak,) for part in (0.0075, 0.025, 0.075))
+
+
+EFFECT = Effect(
+    name="dead-zone",
+    family="shape",
+    site=Site.INPUT,
+    parameters=_parameters,
+    grid=_grid,
+    form=_form,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    linear=0,
+)

@@ -1,0 +1,27 @@
+"""The output drifts: y + c t / T over the record's duration T."""
+
+from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.parameter import Parameter
+
+
+def _form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    return y + values[0] * scene.time / scene.duration
+
+
+def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
+
+
+def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * scene.output_peak,),)
+
+
+EFFECT = Effect(
+    name="linear-drift",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_parameters,
+    grid=_grid,
+    form=_form,
+    source="Doebelin, Measurement Systems, section 3",
+)

@@ -1,0 +1,33 @@
+"""The loop's shape changes with the rate: beta, gamma (1 + k |u'|)."""
+
+from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.effects.rates import rate_of
+from islands.discrepancy.parameter import Parameter
+
+
+def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "rate-dependent-loop",
+            f"s/{scene.input_unit}",
+            0.0,
+            0.05 / rate_of(scene),
+            -0.6 / rate_of(scene),
+            5.0 / rate_of(scene),
+        ),
+    )
+
+
+def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.1 / rate_of(scene),),)
+
+
+EFFECT = Effect(
+    name="rate-dependent-loop",
+    family="memory",
+    site=Site.CORE,
+    parameters=_parameters,
+    grid=_grid,
+    form=None,
+    source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
+)

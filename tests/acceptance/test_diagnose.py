@@ -1,0 +1,85 @@
+"""``islands diagnose`` through its front door."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from front_door import fail, succeed
+
+from islands.io.records import write_record
+from islands.trials.hide.records import hide
+
+COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record in which the sensor follows a temperature, and what is said of it."""
+    base = tmp_path_factory.mktemp("diagnosis")
+    hidden = hide(["thermal-drift"], np.random.default_rng(4), seconds=24.0, band=(1.0, 4.0))
+    write_record(hidden.record, base / "piezo.csv")
+    succeed(
+        *("diagnose", base / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo"),
+        *("--tolerance", "A=0.02", "--tolerance", "dp=0.01", "--out", base / "out"),
+    )
+    return base
+
+
+def test_one_command_names_what_the_simulation_lacks(folder: Path) -> None:
+    document = json.loads((folder / "out/discrepancy.json").read_text())
+    assert document["verdict"] == "named"
+    assert [effect["name"] for effect in document["effects"]] == ["thermal-drift"]
+    effect = document["effects"][0]
+    assert effect["parameters"]["k"]["unit"] == "um/K"
+    low, high = effect["parameters"]["k"]["ci95"]
+    assert low < effect["parameters"]["k"]["value"] < high
+    assert document["gain"]["reduction_percent"] > 20
+    assert document["gain"]["after"]["rmse"] < document["gain"]["before"]["rmse"]
+    assert set(document["gain"]["noise_floor"]) == {"rmse", "mape"}
+    assert document["candidates"][0]["name"] == "thermal-drift"
+    assert document["wall_s"] > 0
+    assert document["false_alarm_rate"] is None
+    extended = json.loads((folder / "out" / document["extended_model"]).read_text())
+    assert [each["name"] for each in extended["effects"]] == ["thermal-drift"]
+
+
+def test_the_report_is_one_file_that_says_it_in_words(folder: Path) -> None:
+    text = (folder / "out/report.html").read_text()
+    assert "thermal-drift: k = " in text
+    assert "which nothing else has\nseen" in text
+    assert text.count("<img ") == 4
+    assert not re.findall(r'(?:src|href)="(?!data:)', text)
+
+
+def test_a_result_is_not_written_over_unasked(folder: Path) -> None:
+    asked = (
+        "diagnose",
+        folder / "piezo.csv",
+        *COLUMNS,
+        "--simulation",
+        "bouc-wen-piezo",
+        "--out",
+        folder / "out",
+    )
+    assert "holds a result already" in fail(*asked)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--simulation", "pendulum"), "unknown simulation 'pendulum': take one of bouc-wen-piezo"),
+        (("--simulation", "bouc-wen-piezo:none.json"), "none.json cannot be read as JSON"),
+        (("--simulation", "model:none.json"), "none.json"),
+        (("--simulation", "column:y_sim"), "no column y_sim"),
+        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
+        (("--simulation", "bouc-wen-piezo", "--tolerance", "mass=0.1"), "has no parameter 'mass'"),
+        (("--simulation", "bouc-wen-piezo", "--input", "T_K"), "is driven by one input"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_a_line(folder: Path, options: tuple[str, ...], why: str) -> None:
+    said = fail("diagnose", folder / "piezo.csv", *COLUMNS, *options, "--out", folder / "other")
+    assert why in said
+    assert "Traceback" not in said
+    assert not (folder / "other").exists()

@@ -1,0 +1,75 @@
+"""Something is hidden in data, and has to be found: every effect, clean records, and causes without a name.
+
+The truth is made by code that shares nothing with what looks for it.
+"""
+
+import pytest
+
+from islands.trials.hide.forms import KNOWN, UNKNOWN
+from islands.trials.trial import Outcome, Trial, carried_out
+
+#: Seconds of a record.
+SECONDS = 30.0
+
+#: Seeds that nothing was tuned on.
+SEED = 910_000
+
+#: Gains take each other's place: which of them is off, tolerances alone decide.
+SCALE = ("sensor-gain", "input-gain", "wrong-parameter")
+
+#: Slips look like play: something is found, under the other's name mostly.
+HARD = ("stiction",)
+
+
+def outcome(*effects: str, seed: int = SEED, **asked: object) -> Outcome:
+    return carried_out(Trial(effects, seed, seconds=SECONDS, **asked))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("band", [(0.5, 1.5), (1.5, 5.0)], ids=["weak", "strong"])
+@pytest.mark.parametrize("name", [name for name in KNOWN if name not in SCALE + HARD])
+def test_a_hidden_effect_is_found(name: str, band: tuple[float, float]) -> None:
+    found = outcome(name, band=band)
+    assert found.verdict in ("named", "named with remainder")
+    assert found.within_set, (found.named, found.equivalents, found.candidates)
+
+
+@pytest.mark.parametrize("name", SCALE)
+def test_what_is_off_beyond_its_tolerance_is_found(name: str) -> None:
+    found = outcome(name, band=(5.0, 20.0))
+    assert found.verdict in ("named", "named with remainder")
+    assert found.named[0] in SCALE
+    assert found.within_set, (found.named, found.equivalents, found.candidates)
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_what_is_hard_to_name_is_not_overlooked(name: str) -> None:
+    assert outcome(name, band=(1.0, 4.0)).verdict != "nothing"
+
+
+@pytest.mark.parametrize("seed", range(SEED, SEED + 6))
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_on_a_clean_record_it_says_nothing(seed: int, pole: float) -> None:
+    found = outcome(seed=seed, pole=pole)
+    assert not found.named
+    assert found.noise == (() if pole == 0.0 else ("coloured-noise",))
+    assert found.verdict == ("nothing" if pole == 0.0 else "named")
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_a_cause_without_a_name_is_not_passed_over_in_silence(name: str) -> None:
+    assert outcome(name).verdict in ("unknown", "named with remainder")
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        ("coulomb-friction", "exponential-creep"),
+        ("delay", "thermal-drift"),
+        ("even-nonlinearity", "loop-asymmetry"),
+        ("gain-step", "periodic-disturbance"),
+    ],
+)
+def test_two_at_once_are_both_found(pair: tuple[str, str]) -> None:
+    found = outcome(*pair, band=(1.0, 4.0))
+    seen = [{name, *others} for name, others in zip(found.named, found.equivalents, strict=True)]
+    assert all(any(name in each for each in seen) for name in pair), (found.named, found.equivalents)

@@ -1,0 +1,126 @@
+"""Laws of every effect in the catalogue: at rest it does nothing, and what it says of itself is true."""
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.effect import Scene, Site
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.extended import Extended
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    rng = np.random.default_rng(3)
+    time = np.arange(1500) * 0.01
+    u = 40 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.11 * time)
+    channels = {"T_K": np.cumsum(rng.normal(size=time.size)), "w_V": rng.normal(size=time.size)}
+    return Scene(u, 0.01, channels, {"T_K": "K", "w_V": "V"}, 40.0, 33.0, "V", "um", 11.0)
+
+
+@pytest.fixture(scope="module")
+def alone(scene: Scene) -> Extended:
+    return Extended(BoucWenPiezoCore(), (), scene)
+
+
+@pytest.fixture(params=CATALOGUE)
+def extended(request: pytest.FixtureRequest, alone: Extended) -> Extended:
+    return alone.with_effects([CATALOGUE[request.param]])
+
+
+def at(extended: Extended, point: tuple[float, ...]) -> np.ndarray:
+    values = extended.nominal
+    values[extended.part(extended.effects[0])] = point
+    return values
+
+
+def grid(extended: Extended) -> tuple[tuple[float, ...], ...]:
+    residual = 0.1 * np.sin(2 * np.pi * 7.3 * extended.scene.time)
+    return tuple(extended.effects[0].grid(extended.scene, residual))
+
+
+def test_at_rest_an_effect_does_nothing(extended: Extended, alone: Extended) -> None:
+    assert np.array_equal(extended.simulate(extended.nominal), alone.simulate(alone.nominal))
+
+
+def test_every_point_that_a_search_begins_from_does_something_and_is_allowed(
+    extended: Extended, alone: Extended
+) -> None:
+    lower, upper = extended.bounds
+    points = grid(extended)
+    assert points
+    at_rest = alone.simulate(alone.nominal)
+    for point in points:
+        values = at(extended, point)
+        assert (values >= lower).all()
+        assert (values <= upper).all()
+        simulated = extended.simulate(values)
+        assert np.isfinite(simulated).all()
+        assert np.max(np.abs(simulated - at_rest)) > 1e-4
+
+
+def test_what_is_called_linear_is(extended: Extended, alone: Extended) -> None:
+    """The response to half a strength is half the response; to a small one, where a core lies between."""
+    effect = extended.effects[0]
+    if effect.linear == 0:
+        pytest.skip("it has a threshold")
+    at_rest = alone.simulate(alone.nominal)
+    point = np.array(grid(extended)[0])
+    part = slice(0, effect.linear)
+    exact = effect.site in (Site.FORCE, Site.OUTPUT) and effect.family != "timing"
+    size = 1.0 if exact else 1e-3
+    responses = []
+    for strength in (size, size / 2):
+        scaled = point.copy()
+        scaled[part] *= strength
+        responses.append(extended.simulate(at(extended, tuple(scaled))) - at_rest)
+    assert responses[1] == pytest.approx(
+        responses[0] / 2, abs=(1e-9 if exact else 0.1) * np.abs(responses[0]).max()
+    )
+
+
+def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: Extended) -> None:
+    """Steps of a hundredth and of a fiftieth of a parameter's scale agree within a fifth."""
+    if extended.effects[0].name == "stiction":
+        pytest.skip("it changes by leaps")
+    points = grid(extended)
+    base = at(extended, points[len(points) // 2])
+    _, upper = extended.bounds
+    there = extended.simulate(base)
+    for place in range(extended.part(extended.effects[0]).start, base.size):
+        slopes = []
+        for part in (0.01, 0.02):
+            step = (
+                part
+                * extended.scales[place]
+                * (1 if base[place] + 0.02 * extended.scales[place] <= upper[place] else -1)
+            )
+            moved = base.copy()
+            moved[place] += step
+            slopes.append((extended.simulate(moved) - there) / step)
+        size = np.linalg.norm(slopes[0])
+        assert size > 0.0
+        assert np.linalg.norm(slopes[1] - slopes[0]) < 0.2 * size
+
+
+def test_an_effect_says_where_it_comes_from(extended: Extended) -> None:
+    effect = extended.effects[0]
+    parameters = effect.parameters(extended.scene)
+    assert parameters
+    assert effect.source
+    assert effect.family
+    for parameter in parameters:
+        assert parameter.scale > 0.0
+        assert parameter.lower < parameter.upper
+    assert (effect.form is None) == (effect.site == Site.CORE)
+    assert effect.site != Site.CORE or effect.name in extended.core.understood
+
+
+def test_a_memory_of_simulations_changes_none(alone: Extended) -> None:
+    values = alone.nominal
+    first = alone.simulate(values).copy()
+    for factor in (1.1, 0.9, 1.2, 0.8, 1.3, 1.0):
+        moved = values * factor
+        fresh = Extended(alone.core, alone.effects, alone.scene).simulate(moved)
+        assert np.array_equal(alone.simulate(moved), fresh)
+    assert np.array_equal(alone.simulate(values), first)

@@ -1,0 +1,134 @@
+"""Diagnosis: what it refuses, what it never sees, and that the same question has the same answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset, join
+from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.cores.column import ColumnCore
+from islands.discrepancy.decision import Verdict
+from islands.discrepancy.diagnosis import FEWEST, LOCKED, Diagnosis, diagnose
+from islands.errors import RecordError, SettingsError
+from islands.io.diagnoses import diagnosis_json
+from islands.systems.bouc_wen import BoucWenPiezo
+from islands.trials.hide.records import hide
+from islands.trials.trial import TOLERANCE
+
+
+@pytest.fixture(scope="module")
+def record() -> Dataset:
+    return hide(["quadratic-drag"], np.random.default_rng(8), seconds=24.0, band=(1.0, 4.0)).record
+
+
+@pytest.fixture(scope="module")
+def found(record: Dataset) -> Diagnosis:
+    return diagnose(record, BoucWenPiezoCore(), TOLERANCE)
+
+
+def changed(record: Dataset, column: int, values: object) -> Dataset:
+    u = np.array(record.u)
+    u[:, column] = values
+    return replace(record, u=u)
+
+
+def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: Diagnosis) -> None:
+    assert found.verdict == Verdict.NAMED
+    (finding,) = found.effects
+    assert (finding.name, finding.family) == ("quadratic-drag", "shape")
+    value = finding.parameters["c"]
+    assert value.unit == "um s^2/V^2"
+    assert value.ci95 is not None
+    assert value.ci95[0] < value.value < value.ci95[1]
+    assert finding.confidence > 0.9
+    assert finding.eta is not None
+    assert finding.eta > 0.95
+    assert found.gain is not None
+    assert found.gain.after.rmse == pytest.approx(0.135, rel=0.1)
+    assert found.gain.ci95[0] < found.gain.reduction_percent < found.gain.ci95[1]
+    assert found.gain.ci95[0] > 0.0
+    assert found.gain.noise_floor.rmse == pytest.approx(0.135, rel=0.1)
+    assert found.candidates[0].name == "quadratic-drag"
+
+
+def test_the_same_question_has_the_same_answer(record: Dataset, found: Diagnosis) -> None:
+    assert diagnosis_json(diagnose(record, BoucWenPiezoCore(), TOLERANCE)) == diagnosis_json(found)
+
+
+def test_what_is_locked_away_is_seen_by_the_gain_alone(record: Dataset, found: Diagnosis) -> None:
+    y = np.array(record.y)
+    fitted = int((1 - LOCKED) * record.samples)
+    y[fitted:] += 1.0
+    other = diagnose(replace(record, y=y), BoucWenPiezoCore(), TOLERANCE)
+    assert (other.effects, other.candidates, other.verdict) == (
+        found.effects,
+        found.candidates,
+        found.verdict,
+    )
+    assert other.gain is not None
+    assert found.gain is not None
+    assert other.gain.after.rmse > 5 * found.gain.after.rmse
+
+
+def test_a_parameter_without_a_tolerance_is_calibrated_and_no_discrepancy(record: Dataset) -> None:
+    clean = hide([], np.random.default_rng(9), seconds=24.0).record
+    off = BoucWenPiezoCore(BoucWenPiezo(dp=1.3, A=0.7))
+    assert diagnose(clean, off).verdict == Verdict.NOTHING
+    trusted = diagnose(clean, off, TOLERANCE)
+    assert {each.name for each in trusted.effects} <= {"wrong-parameter", "sensor-gain", "input-gain"}
+    assert trusted.effects
+
+
+def test_a_column_is_a_simulation(record: Dataset) -> None:
+    simulated = np.array(BoucWenPiezoCore().simulate(*_nominal(record)))
+    drifted = replace(record, y=simulated + 0.5 * record.time / 24.0 + 0.01 * np.sin(37.0 * record.time**2))
+    found = diagnose(drifted, ColumnCore("theirs", simulated))
+    assert [each.name for each in found.effects if each.eta is not None] == ["linear-drift"]
+    assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)
+
+
+def _nominal(record: Dataset) -> tuple:
+    from islands.discrepancy.diagnosis import _fitted, _scene
+
+    core = BoucWenPiezoCore()
+    scene = _scene(record, core, _fitted(record))
+    return np.array([each.nominal for each in core.parameters]), scene.u, scene, {}, ()
+
+
+REFUSED = {
+    "short": (lambda record: record[: FEWEST - 1], f"a diagnosis takes {FEWEST} at least"),
+    "still": (lambda record: changed(record, 0, 1.0), "column u_V is constant"),
+    "still channel": (lambda record: changed(record, 2, 1.0), "column w_V is constant"),
+    "twin": (
+        lambda record: changed(record, 1, record.u[:, 0]),
+        "channel T_K is the input itself: leave it out",
+    ),
+    "gaps": (lambda record: replace(record, y=np.where(record.time > 3, record.y, np.nan)), "has gaps"),
+    "several": (lambda record: join((record, record)), "diagnose one after the other"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_record_that_cannot_be_used_is_refused(record: Dataset, case: str) -> None:
+    spoil, why = REFUSED[case]
+    with pytest.raises(RecordError, match=why):
+        diagnose(spoil(record), BoucWenPiezoCore())
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "why"),
+    [
+        ({"mass": 0.1}, "has no parameter 'mass': it has A, beta, gamma, dp"),
+        ({"dp": 0.0}, "a part of its value, like 0.02; got 0"),
+        ({"dp": 2.0}, "a part of its value"),
+    ],
+)
+def test_a_tolerance_that_cannot_be_is_refused(record: Dataset, tolerance: dict, why: str) -> None:
+    with pytest.raises(SettingsError, match=why):
+        diagnose(record, BoucWenPiezoCore(), tolerance)
+
+
+def test_a_simulation_that_diverges_is_refused(record: Dataset) -> None:
+    with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
+        diagnose(record, BoucWenPiezoCore(BoucWenPiezo(gamma=-5.0)))
