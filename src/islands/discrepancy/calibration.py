@@ -39,10 +39,13 @@ class Target:
     noise: Noise | None
     tolerance: Mapping[str, float]
 
+    def observed(self, signal: Signal) -> Signal:
+        """Return the samples of a signal that are seen, whitened."""
+        return (signal if self.noise is None else self.noise.whiten(signal))[self.seen]
+
     def residual(self, simulated: Signal) -> Signal:
         """Return what is left of the samples that are seen, whitened."""
-        left = self.y - simulated
-        return (left if self.noise is None else self.noise.whiten(left))[self.seen]
+        return self.observed(self.y - simulated)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,8 +154,7 @@ def _jacobian(simulation: Extended, target: Target, values: Signal, output: Sign
         step = STEP if values[place] + STEP * scale <= upper[place] else -STEP
         moved = values.copy()
         moved[place] += step * scale
-        change = (simulation.simulate(moved) - output) / step
-        columns[:, place] = (change if target.noise is None else target.noise.whiten(change))[target.seen]
+        columns[:, place] = target.observed((simulation.simulate(moved) - output) / step)
     return columns
 
 

@@ -138,6 +138,13 @@ def diagnose(
     effects = effects_for(core, scene, known)
     tell(f"looking for each of {len(effects)} effects")
     rungs = ladder(base, target, effects)
+    memory = (rungs[0].fit if rungs and rungs[0].gained(base) > LEAST else base).noise
+    if memory.order:
+        # Once more, with what the noise remembers taken out: plain least squares would fit that as well.
+        tell("the noise remembers: once more with that taken out")
+        target = replace(target, noise=memory)
+        base = calibrate(simulation, target, base.values)
+        rungs = ladder(base, target, effects)
     found = confirmed(explained(base, rungs, target, effects, tell), base, target, fitted, rng)
     tell("what is left over")
     residual = (record.y - found.fit.output)[:fitted]

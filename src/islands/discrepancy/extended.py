@@ -73,12 +73,16 @@ class Extended:
         return replace(self, effects=tuple(effects))
 
     def simulate(self, values: Signal) -> Signal:
-        """Simulate the whole record, shape (samples,)."""
-        y = self._behind_core(values)
-        for effect, part in zip(self.effects, self._parts, strict=True):
-            if effect.site == Site.OUTPUT:
-                assert effect.form is not None
-                y = effect.form(y, values[part], self.scene)
+        """Simulate the whole record, shape (samples,).
+
+        Values that a search tries may make something explode: what comes back is not finite then.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            y = self._behind_core(values)
+            for effect, part in zip(self.effects, self._parts, strict=True):
+                if effect.site == Site.OUTPUT:
+                    assert effect.form is not None
+                    y = effect.form(y, values[part], self.scene)
         return y
 
     def _behind_core(self, values: Signal) -> Signal:

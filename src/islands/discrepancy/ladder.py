@@ -67,8 +67,8 @@ class _Projection:
 
     def __init__(self, base: Calibrated, target: Target) -> None:
         simulation, values = base.simulation, base.values
-        self._seen, self._values = target.seen, values.size
-        self._sigma = float(np.sqrt(base.mean_square)) or 1.0
+        self._target, self._values = target, values.size
+        self._sigma = float(np.std(target.residual(base.output))) or 1.0
         pull, _ = pull_of(simulation, target.tolerance)
         columns = []
         for place, scale in enumerate(simulation.scales):
@@ -89,7 +89,7 @@ class _Projection:
         return left
 
     def _observed(self, response: Signal, held: Signal) -> Signal:
-        return np.concatenate([response[self._seen] / self._sigma, held])
+        return np.concatenate([self._target.observed(response) / self._sigma, held])
 
 
 def _starts(

@@ -75,7 +75,7 @@ def tally(outcomes: Sequence[Outcome], unknown: Sequence[str]) -> list[Share]:
     ]
     pairs = [each for each in outcomes if len(each.trial.effects) == 2]
     triples = [each for each in outcomes if len(each.trial.effects) == 3]
-    detected = [each for each in single if each.verdict != "nothing"]
+    detected = [each for each in single if each.noticed]
 
     def share(
         name: str, among: Sequence[Outcome], right: Callable[[Outcome], bool], goal: float, most: bool = False
@@ -83,7 +83,7 @@ def tally(outcomes: Sequence[Outcome], unknown: Sequence[str]) -> list[Share]:
         return Share(name, sum(map(right, among)), len(among), goal, most)
 
     return [
-        share(f"detected, misfit > {FROM:g} sigma", single, lambda each: each.verdict != "nothing", 95.0),
+        share(f"detected, misfit > {FROM:g} sigma", single, lambda each: each.noticed, 95.0),
         share("named first, where detected", detected, lambda each: each.first_right, 97.0),
         share(
             "among the first three, where detected",

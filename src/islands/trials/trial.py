@@ -72,6 +72,11 @@ class Outcome:
     confidence: float
 
     @property
+    def noticed(self) -> bool:
+        """Whether something beside the noise was found, with a name or without."""
+        return bool(self.named) or self.verdict == "unknown"
+
+    @property
     def first_right(self) -> bool:
         """Whether the first name is one of those hidden."""
         return bool(self.named) and self.named[0] in self.trial.effects
