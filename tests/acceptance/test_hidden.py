@@ -55,7 +55,7 @@ def test_on_a_clean_record_it_says_nothing(seed: int, pole: float) -> None:
     assert found.verdict == ("nothing" if pole == 0.0 else "named")
 
 
-# A slew rate is not among them: sensor lag and others explain nearly all of it, and are named (decision 0012).
+# A slew rate is not among them: sensor lag and others explain nearly all of it, and are named (0012).
 @pytest.mark.parametrize("name", [name for name in UNKNOWN if name != "slew-rate"])
 def test_a_cause_without_a_name_is_not_passed_over_in_silence(name: str) -> None:
     assert outcome(name).verdict in ("unknown", "named with remainder")
