@@ -32,11 +32,15 @@ def actors(pid: int | None = None) -> list[int]:
 
 def alive(pids: Iterable[int]) -> list[int]:
     """Those that have not ended; one that nobody has asked for its end yet has ended."""
-    return [pid for pid in pids if Path(f"/proc/{pid}/cmdline").exists() and _state(pid) != "Z"]
+    return [pid for pid in pids if _state(pid) not in ("", "Z")]
 
 
 def _state(pid: int) -> str:
-    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    """The letter of a process's state; "" where there is no such process."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:  # it may end while it is looked at
+        return ""
 
 
 def kill(pid: int) -> None:

@@ -146,7 +146,7 @@ def _opened(pid):
     """What a process has open: it goes on opening and closing while it is looked at."""
     opened = []
     for path in Path(f"/proc/{pid}/fd").iterdir():
-        with suppress(FileNotFoundError):
+        with suppress(OSError):
             opened.append(str(path.readlink()))
     return opened
 
