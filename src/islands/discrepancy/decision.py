@@ -116,17 +116,30 @@ def decided(explained: float, named: bool, remains: bool) -> Verdict:
 
 
 def findings(
-    found: Explanation, target: Target, effects: Sequence[Effect], floor: float
+    found: Explanation,
+    base: Calibrated,
+    first: Sequence[Rung],
+    target: Target,
+    effects: Sequence[Effect],
+    floor: float,
 ) -> tuple[tuple[Finding, ...], tuple[Rung, ...]]:
     """Say what was found, and which other rungs could stand in the place of one.
 
     Each effect is taken out, and all others are tried in its place.
+
+    Parameters
+    ----------
+    base, first : Calibrated, sequence of Rung
+        The simulation alone and its ladder: what is left, and has been tried, where one effect was found.
     """
     named, instead = [], []
     spread = np.sqrt(np.maximum(np.diag(covariance(found.fit, target)), 0.0))
     for effect in found.effects:
-        without = without_effect(found, effect, target)
-        rungs = ladder(without.fit, target, [each for each in effects if each not in without.effects])
+        if len(found.effects) == 1:
+            without, rungs = Explanation(base, base.score, ()), first
+        else:
+            without = without_effect(found, effect, target)
+            rungs = ladder(without.fit, target, [each for each in effects if each not in without.effects])
         scores = {plain(rung.effect.name): rung.gained(without.fit) for rung in reversed(rungs)}
         own = max(scores.get(plain(effect.name), 0.0), without.cost - found.cost)
         scores[plain(effect.name)] = own

@@ -158,7 +158,7 @@ def diagnose(
     instead: tuple[Rung, ...] = ()
     if verdict in (Verdict.NAMED, Verdict.REMAINDER):
         tell("what else could be the cause")
-        named, instead = findings(found, target, effects, floor)
+        named, instead = findings(found, base, rungs, target, effects, floor)
     noise = _noise(record.y[:fitted], residual, scene) if verdict != Verdict.UNKNOWN else ()
     given = simulation.simulate(simulation.nominal)
     locked = slice(fitted, record.samples)

@@ -30,14 +30,14 @@ class Scene:
     ----------
     u : ndarray, shape (samples,)
         The input.
-    dt, start : float
-        Sampling time and the first sample's time in seconds; times of changes count from 0.
+    dt : float
+        Sampling time in seconds; times of changes count from the first sample.
     channels : mapping
         Other measured signals by name, each (samples,).
     units : mapping
         Their units.
     input_peak, output_peak : float
-        Largest absolute values; of the output as the nominal simulation has it, without its mean.
+        Largest absolute values; of the output as the nominal simulation has it.
     input_unit, output_unit : str
     fitted : float
         Seconds, from the first sample on, that estimation sees.
