@@ -44,14 +44,14 @@ def found(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in paths}
 
 
-def islands(*arguments: object) -> subprocess.CompletedProcess[str]:
+def islands(*arguments: object, seconds: float = 240.0) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=240
+        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=seconds
     )
 
 
-def succeed(*arguments: object) -> str:
-    done = islands(*arguments)
+def succeed(*arguments: object, seconds: float = 240.0) -> str:
+    done = islands(*arguments, seconds=seconds)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

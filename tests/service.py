@@ -25,9 +25,11 @@ from fastapi import FastAPI
 from sqlalchemy import Connection
 
 from islands.evolution.engine import SerialEngine
+from islands.io.records import write_record
 from islands_api.app import create_app
 from islands_api.auth import LOCAL
 from islands_service.blobs import Blobs
+from islands_service.coordinator.discrepancy import discrepancy
 from islands_service.coordinator.identification import identification
 from islands_service.jobs import Job, Submission
 from islands_service.settings import ServiceSettings
@@ -178,6 +180,39 @@ def matlab_73() -> bytes:
 def spec(dataset: str, /, **changes: Any) -> dict[str, Any]:
     """What a job needs to say at least."""
     return {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", **changes}
+
+
+def held(dataset: str, /, **changes: Any) -> dict[str, Any]:
+    """What a discrepancy job needs to say at least."""
+    simulation = {"kind": "bouc-wen-piezo"}
+    return {"dataset": dataset, "input": "u_V", "output": "y_um", "simulation": simulation, **changes}
+
+
+#: What is hidden in a record of `hidden`, and how well its simulation is known.
+HIDDEN, KNOWN = "thermal-drift", {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 0.01}
+
+
+def hidden(folder: Path, seconds: float = 8.0) -> bytes:
+    """A record of a piezo actuator whose sensor follows a temperature, which its simulation does not know."""
+    from islands.trials.hide.records import hide
+
+    found = hide([HIDDEN], np.random.default_rng(4), seconds=seconds, band=(1.0, 4.0))
+    write_record(found.record, folder / "hidden.csv")
+    return (folder / "hidden.csv").read_bytes()
+
+
+def diagnosed(service: Service, content: bytes, /, **changes: Any) -> str:
+    """Upload a record and have a simulation held against it, here and now; return the job's id."""
+    dataset = service.upload(content).json()["id"]
+    asked = held(dataset, channels=["T_K"], tolerance=KNOWN, **changes)
+    job = service.client.post("/v1/discrepancies", json=asked).json()
+    lease = service.store.leases.claim("test", 600.0)
+    assert lease is not None
+    assert lease.job.id == job["id"]
+    blobs = Blobs(service.settings.blobs)
+    outcome = discrepancy(lease, service.store, blobs, SerialEngine(), lambda: None, 600.0, map)
+    service.store.leases.finish(lease, outcome)
+    return str(job["id"])
 
 
 #: A search that takes a second.

@@ -31,6 +31,7 @@ _PACKED = 4000
 _DESCRIPTION = """Finds the equation behind measured data.
 
 Upload a record, submit a job, follow it, and take its models: small difference equations with their metrics.
+Or have a simulation held against the record: what it gets wrong, and why (`/v1/discrepancies`).
 Every answer that is not a success is `application/problem+json`; its `detail` says what to do.
 On this machine's own address no key is needed; elsewhere send `Authorization: Bearer islands_...`."""
 

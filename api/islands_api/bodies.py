@@ -85,7 +85,7 @@ def read_json(body: bytes) -> Any:
     try:
         return json.loads(body, object_pairs_hook=_once, parse_int=_whole, parse_constant=_no_number)
     except RecursionError:
-        raise Unreadable("the body is nested too deeply: a job needs three levels") from None
+        raise Unreadable("the body is nested too deeply: a job needs a few levels") from None
     except json.JSONDecodeError as error:
         raise Unreadable(
             f"the body is no JSON: {error.msg} in line {error.lineno}, column {error.colno}"

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from islands_service.jobs import PRIORITIES, JobState
-from islands_service.specification import Identification
+from islands_service.jobs import DISCREPANCY, IDENTIFICATION, PRIORITIES, JobState
+from islands_service.specification import Discrepancy, Identification
 
 _JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
 _DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"
@@ -17,6 +17,15 @@ _SPEC: dict[str, Any] = {
     "preset": "hysteresis",
     "seed": 0,
     "settings": {"islands": 2, "generations": 40},
+}
+_DISCREPANCY: dict[str, Any] = {
+    "dataset": _DATASET,
+    "input": "u_V",
+    "output": "y_um",
+    "channels": ["T_K"],
+    "simulation": {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.6}},
+    "tolerance": {"dp": 0.01},
+    "seed": 0,
 }
 
 
@@ -67,10 +76,8 @@ class DatasetPage(Answer):
     next: str | None = Field(default=None, description="The cursor of the next page, if there is one.")
 
 
-class JobRequest(Identification):
-    """Identify a record by evolution: what determines the result, and how the job is treated."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [{**_SPEC, "name": "piezo, 2 islands"}]})
+class Treated(BaseModel):
+    """How a job is treated, whatever it asks for."""
 
     name: Annotated[
         str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="For people; one line.")
@@ -86,6 +93,30 @@ class JobRequest(Identification):
         return self.model_dump(mode="json", exclude_unset=True, exclude={"name", "priority"})
 
 
+class JobRequest(Treated, Identification):
+    """Identify a record by evolution: what determines the result, and how the job is treated."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{**_SPEC, "name": "piezo, 2 islands"}]})
+
+
+class DiscrepancyRequest(Treated, Discrepancy):
+    """Find out what a simulation gets wrong about a record, and how the job is treated."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {**_DISCREPANCY, "name": "piezo against its model"},
+                {
+                    "dataset": _DATASET,
+                    "input": "u_V",
+                    "output": "y_um",
+                    "simulation": {"kind": "column", "column": "y_sim_um"},
+                },
+            ]
+        }
+    )
+
+
 class JobView(Answer):
     """A job as it stands."""
 
@@ -96,7 +127,7 @@ class JobView(Answer):
             "examples": [
                 {
                     "id": _JOB,
-                    "kind": "identification",
+                    "kind": IDENTIFICATION,
                     "name": "piezo, 2 islands",
                     "state": "running",
                     "priority": 0,
@@ -111,13 +142,38 @@ class JobView(Answer):
                     "progress": {"phase": "search", "generation": 12, "generations": 40, "best_error": 0.031},
                     "summary": None,
                     "problem": None,
-                }
+                },
+                {
+                    "id": "5d1b0a7e9c3f4e52a1f60c7b8d9e0f12",
+                    "kind": DISCREPANCY,
+                    "name": "piezo against its model",
+                    "state": "succeeded",
+                    "priority": 0,
+                    "version": 9,
+                    "attempt": 1,
+                    "cancel_requested": False,
+                    "created": "2026-11-20T14:00:00Z",
+                    "updated": "2026-11-20T14:00:05Z",
+                    "started": "2026-11-20T14:00:01Z",
+                    "finished": "2026-11-20T14:00:05Z",
+                    "spec": _DISCREPANCY,
+                    "progress": {"phase": "writing the report"},
+                    "summary": {
+                        "simulation": "bouc-wen-piezo",
+                        "verdict": "named",
+                        "effects": ["thermal-drift"],
+                        "reduction_percent": 64.3,
+                        "words": "The simulation lacks something that has a name.\n  thermal-drift: ...",
+                        "wall_s": 2.1,
+                    },
+                    "problem": None,
+                },
             ]
         },
     )
 
     id: str
-    kind: str
+    kind: str = Field(description=f"{IDENTIFICATION} or {DISCREPANCY}.")
     name: str
     state: JobState
     priority: int

@@ -26,16 +26,13 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.findings import Assessed, Findings, Search
 from islands_service.blobs import Blobs, NoSuchBlob
-from islands_service.jobs import Job
+from islands_service.jobs import REPORT, Job
 from islands_service.records import record_and_validation
 from islands_service.report import report
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.specification import identification_of
 from islands_service.store import Store
 from islands_service.store.database import StoreError, StoreFull
-
-#: The artefact that is a job's report.
-REPORT = "report.html"
 
 #: Samples of a simulation that are handed out as numbers: a screen shows no more.
 POINTS = 4000

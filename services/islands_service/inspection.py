@@ -46,7 +46,7 @@ class Asked:
     inputs, output : tuple of str, str or None
         Columns to read as a job would; without an output the file is only described.
     dt, rows : float, str or None
-        As in `islands_service.specification.Identification`.
+        As in a job of `islands_service.specification`.
     """
 
     inputs: tuple[str, ...] = ()

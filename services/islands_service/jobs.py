@@ -18,7 +18,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -43,6 +43,12 @@ ACTIVE = (JobState.QUEUED, JobState.RUNNING)
 
 #: States that a job may be resumed from.
 RESUMABLE = (JobState.FAILED, JobState.CANCELLED)
+
+#: Kinds of jobs: the entries of ``WORK`` in `islands_service.coordinator.loop`.
+IDENTIFICATION, DISCREPANCY = "identification", "discrepancy"
+
+#: Artefacts of a result: the page that says it all, and of a discrepancy the simulation with its effects.
+REPORT, EXTENDED = "report.html", "extended.json"
 
 #: The greatest and the least priority.
 PRIORITIES = range(-100, 101)
@@ -79,7 +85,7 @@ class Submission:
     spec : mapping
         What determines the result: see `islands_service.specification`.
     kind : str
-        What kind of job: an entry of ``WORK`` in `islands_service.coordinator.loop`.
+        `IDENTIFICATION` or `DISCREPANCY`.
     name : str
         For people.
     priority : int
@@ -90,7 +96,7 @@ class Submission:
 
     owner: str
     spec: Mapping[str, Any]
-    kind: str = "identification"
+    kind: str = IDENTIFICATION
     name: str = ""
     priority: int = 0
     idempotency_key: str | None = None
@@ -183,6 +189,8 @@ class Outcome:
         The result without its models.
     models : tuple of (mapping, str)
         Every model's entry of the result, and its model file.
+    artefacts : mapping of str to str
+        What belongs to the result beside the document, by name: blobs.
     summary, problem : mapping, optional
         See `Job`.
     """
@@ -192,6 +200,7 @@ class Outcome:
     models: tuple[tuple[Mapping[str, Any], str], ...] = ()
     summary: Mapping[str, Any] | None = None
     problem: Mapping[str, Any] | None = None
+    artefacts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

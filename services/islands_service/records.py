@@ -5,11 +5,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from islands.data.dataset import Dataset
 from islands.io.records import read_record
 from islands_service.blobs import Blobs, full_disk_told
 from islands_service.rows import rows_of
-from islands_service.specification import Identification, Part
+from islands_service.specification import Discrepancy, Identification, Part
 from islands_service.store.datasets import StoredDataset
 
 
@@ -49,3 +52,21 @@ def record_and_validation(
     if isinstance(spec.validation, Part):
         return record, read(spec.validation.dataset, spec.validation.rows)
     return record, spec.validation
+
+
+def record_and_columns(
+    spec: Discrepancy, stored: StoredDataset, blobs: Blobs
+) -> tuple[Dataset, dict[str, NDArray[np.float64]]]:
+    """Read what a simulation is held against, and beside it the column that is the simulation, if one is.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as the job says.
+    NoSuchBlob
+        The data folder has lost a file.
+    """
+    with named(blobs.path(stored.blob), stored.name) as path:
+        whole = read_record(path, spec.inputs, spec.output, spec.dt, rows_of(spec.rows))
+    kept = 1 + len(spec.channels)
+    return whole.first_inputs(kept), dict(zip(spec.beside, whole.u[:, kept:].T, strict=True))

@@ -5,14 +5,26 @@ import re
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    create_model,
+)
 
 from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS, settings_of
 from islands.evolution.settings import Settings
+from islands.io.simulation_spec import ColumnSpec, SimulationSpec, innermost
 from islands.model.library import candidates
+
+S = TypeVar("S", bound=BaseModel)
 
 
 def _rows(text: str) -> str:
@@ -26,6 +38,8 @@ _ROWS = r"^(-?[0-9]{1,12})?:(-?[0-9]{1,12})?$"
 #: ``START:STOP``; either may be left out, and a negative one counts from the end.
 Rows = Annotated[str, AfterValidator(_rows), Field(json_schema_extra={"pattern": _ROWS}, examples=["0:5000"])]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
+Seconds = Annotated[FiniteFloat, Field(gt=0.0)]
+Seed = Annotated[int, Field(ge=0, lt=2**63, description="The same seed gives the same result, bit for bit.")]
 DatasetId = Annotated[
     str, Field(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
 ]
@@ -45,7 +59,7 @@ LIMITS = {
 }
 
 #: The most entries of a list, the deepest back-shift, and the longest text.
-_ENTRIES, _SHIFT, _TEXT = 64, 1000, 20_000
+_ENTRIES, SHIFT, _TEXT = 64, 1000, 20_000
 
 
 def _described() -> dict[str, str]:
@@ -91,6 +105,10 @@ class Part(BaseModel):
     rows: Rows | None = None
 
 
+#: What a sampling time is given for.
+_DT = "Sampling time in seconds, where the record does not tell it."
+
+
 class Identification(BaseModel):
     """Identify a record by evolution."""
 
@@ -101,17 +119,13 @@ class Identification(BaseModel):
         description="Columns that are inputs; u_V+1 for the column u_V one sample early."
     )
     output: Name = Field(description="Column that is the output.", examples=["y_um"])
-    dt: Annotated[FiniteFloat, Field(gt=0.0)] | None = Field(
-        default=None, description="Sampling time in seconds, where the record does not tell it."
-    )
+    dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples that estimate; all by default.")
     validation: Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)] | Part = Field(
         default=0.25, description="The share of the record's end that selects among models, or a data set."
     )
     preset: str = Field(default="hysteresis", json_schema_extra={"enum": list(PRESETS)})
-    seed: int = Field(
-        default=0, ge=0, lt=2**63, description="The same seed gives the same result, bit for bit."
-    )
+    seed: Seed = 0
     settings: SettingsChanges = Field(default_factory=SettingsChanges)  # type: ignore[valid-type]
 
     @property
@@ -126,16 +140,73 @@ class Identification(BaseModel):
         return (self.dataset, *([self.validation.dataset] if isinstance(self.validation, Part) else []))
 
 
+def _one(given: Any) -> Any:
+    if isinstance(given, list | tuple):
+        raise ValueError("a simulation is driven by one input: give the others as channels")
+    return given
+
+
+class Discrepancy(BaseModel):
+    """Find out what a simulation gets wrong about a record."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    dataset: DatasetId = Field(description="The record: the id of an uploaded data set.")
+    input: Annotated[Name, BeforeValidator(_one)] = Field(
+        description="Column that drives the simulation.", examples=["u_V"]
+    )
+    output: Name = Field(description="Column that was measured.", examples=["y_um"])
+    channels: Annotated[tuple[Name, ...], Field(max_length=15, examples=[["T_K"]])] = Field(
+        default=(), description="Columns that may couple in, a temperature perhaps."
+    )
+    dt: Seconds | None = Field(default=None, description=_DT)
+    rows: Rows | None = Field(default=None, description="Samples to look at; all by default.")
+    simulation: SimulationSpec = Field(description="What is held against the record.")
+    tolerance: Annotated[dict[Name, Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)]], Field(max_length=100)] = (
+        Field(
+            default_factory=dict,
+            description="How well parameters are known: relative standard deviations, by name.",
+            examples=[{"dp": 0.01}],
+        )
+    )
+    seed: Seed = 0
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """The column that is the simulation, where one is."""
+        return (core.column,) if isinstance(core := innermost(self.simulation), ColumnSpec) else ()
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The columns that are read beside the output, the one that drives the simulation first."""
+        return (self.input, *self.channels, *self.beside)
+
+
 def identification_of(document: Mapping[str, Any]) -> Identification:
-    """Read a job's specification as it is stored.
+    """Read an identification as it is stored.
 
     Raises
     ------
     SettingsError
         It was written by another version of islands.
     """
+    return _read(Identification, document)
+
+
+def discrepancy_of(document: Mapping[str, Any]) -> Discrepancy:
+    """Read a discrepancy job as it is stored.
+
+    Raises
+    ------
+    SettingsError
+        It was written by another version of islands.
+    """
+    return _read(Discrepancy, document)
+
+
+def _read(form: type[S], document: Mapping[str, Any]) -> S:
     try:
-        return Identification.model_validate(document)
+        return form.model_validate(document)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))
@@ -162,8 +233,8 @@ def checked(spec: Identification, max_islands: int, max_evaluations: int) -> Set
             raise SettingsError(f"{name} has {len(value)} characters, and {_TEXT} is the most")
         if isinstance(value, tuple) and len(value) > _ENTRIES:
             raise SettingsError(f"{name} has {len(value)} entries, and {_ENTRIES} is the most")
-    if any(shift > _SHIFT for shift in changes.get("shifts", ())):
-        raise SettingsError(f"back-shifts are at most {_SHIFT} on this service, got {changes['shifts']}")
+    if any(shift > SHIFT for shift in changes.get("shifts", ())):
+        raise SettingsError(f"back-shifts are at most {SHIFT} on this service, got {changes['shifts']}")
     settings = settings_of(spec.preset, changes)
     asked = settings.population * (settings.generations + 1) * settings.islands
     if asked > max_evaluations:

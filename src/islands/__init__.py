@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from islands.data.dataset import Dataset, join
     from islands.data.split import Split, split
-    from islands.discrepancy.diagnosis import Diagnosis, diagnose
+    from islands.diagnosing import diagnose
+    from islands.discrepancy.diagnosis import Diagnosis
     from islands.errors import IslandsError, ModelError, RecordError, SettingsError
     from islands.fitting import fit
     from islands.identification import identify
     from islands.io.models import read_model, write_model
     from islands.io.records import read_record, write_record
-    from islands.io.simulations import simulation
+    from islands.io.simulations import simulated
     from islands.model.model import Model, model_of
     from islands.model.parsing import parse
     from islands.model.primitives import PRIMITIVES, primitive
@@ -46,7 +47,7 @@ __all__ = [
     "read_model",
     "read_record",
     "simulate",
-    "simulation",
+    "simulated",
     "split",
     "write_model",
     "write_record",
@@ -57,13 +58,14 @@ __all__ = [
 _HOMES = {
     "data.dataset": ("Dataset", "join"),
     "data.split": ("Split", "split"),
-    "discrepancy.diagnosis": ("Diagnosis", "diagnose"),
+    "diagnosing": ("diagnose",),
+    "discrepancy.diagnosis": ("Diagnosis",),
     "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
     "fitting": ("fit",),
     "identification": ("identify",),
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
-    "io.simulations": ("simulation",),
+    "io.simulations": ("simulated",),
     "model.model": ("Model", "model_of"),
     "model.parsing": ("parse",),
     "model.primitives": ("PRIMITIVES", "primitive"),

@@ -40,7 +40,8 @@ def test_one_command_names_what_the_simulation_lacks(folder: Path) -> None:
     assert set(document["gain"]["noise_floor"]) == {"rmse", "mape"}
     assert document["candidates"][0]["name"] == "thermal-drift"
     assert document["wall_s"] > 0
-    assert document["false_alarm_rate"] is None
+    for name in ("detection_limits", "false_alarm_rate", "p_value", "confusion"):
+        assert document[name] is None
     extended = json.loads((folder / "out" / document["extended_model"]).read_text())
     assert [each["name"] for each in extended["effects"]] == ["thermal-drift"]
 
@@ -51,6 +52,62 @@ def test_the_report_is_one_file_that_says_it_in_words(folder: Path) -> None:
     assert "which nothing else has\nseen" in text
     assert text.count("<img ") == 4
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short record with somebody else's simulation in a column, which lacks an offset."""
+    base = tmp_path_factory.mktemp("self-test")
+    rng = np.random.default_rng(6)
+    time = 0.01 * np.arange(400)
+    u = 40 * np.sin(2 * np.pi * 1.1 * time) * np.sin(2 * np.pi * 0.3 * time + 1)
+    simulated = 0.8 * u + 0.001 * u**2
+    y = simulated + 0.3 + 0.1 * rng.standard_normal(time.size)
+    rows = np.column_stack([time, u, simulated, y])
+    header = "t_s,u_V,theirs_um,y_um"
+    np.savetxt(base / "record.csv", rows, fmt="%.6f", delimiter=",", header=header, comments="")
+    return base
+
+
+def self_tested(base: Path, out: str, *options: object) -> tuple[str, dict]:
+    """Diagnose with a self-test; return what was said, and the document."""
+    said = succeed(
+        *("diagnose", base / "record.csv", "--input", "u_V", "--output", "y_um"),
+        *("--simulation", "column:theirs_um", "--self-test", *options, "--out", base / out),
+    )
+    return said, json.loads((base / out / "discrepancy.json").read_text())
+
+
+def test_a_self_test_says_what_the_record_could_show(beside: Path) -> None:
+    said, document = self_tested(beside, "one", "--workers", 1)
+    assert [effect["name"] for effect in document["effects"]] == ["offset"]
+    limits = document["detection_limits"]
+    assert {"offset", "viscous", "jump", "sensor-lag"} <= set(limits)
+    assert set(limits["offset"]) == {"strength", "unit", "misfit_sigma"}
+    assert limits["offset"]["unit"] == "um"
+    # An offset's misfit is the offset itself.
+    assert limits["offset"]["strength"] == pytest.approx(0.1 * limits["offset"]["misfit_sigma"], rel=0.2)
+    assert limits["offset"]["strength"] < document["effects"][0]["parameters"]["c"]["value"]
+    alarms = document["false_alarm_rate"]
+    assert alarms["of"] == 40
+    assert alarms["ci95"][0] <= alarms["value"] <= alarms["ci95"][1]
+    assert alarms["value"] < 0.2
+    assert document["p_value"] == pytest.approx(1 / 41)
+    assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == 40
+    assert "Of 40 records like this one with nothing wrong in them" in said
+    text = (beside / "one/report.html").read_text()
+    assert "smallest strength that was named" in text
+    assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("ray")
+def test_a_self_test_is_the_same_on_all_cores(beside: Path) -> None:
+    (_, alone), (_, together) = (
+        self_tested(beside, f"workers-{workers}", "--workers", workers) for workers in (1, 2)
+    )
+    for name in ("detection_limits", "false_alarm_rate", "p_value", "confusion"):
+        assert together[name] == alone[name]
 
 
 def test_a_result_is_not_written_over_unasked(folder: Path) -> None:

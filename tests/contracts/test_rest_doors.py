@@ -5,23 +5,10 @@ import shutil
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
-from service import emptied, kept, problem_of, queued, served, spec
+from service import kept, problem_of, queued, served, spec
 from stores import FOUND, claimed
 
 from islands_service.jobs import JobState, Report
-
-
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
-        yield running
-
-
-@pytest.fixture
-def service(shared):
-    return emptied(shared)
 
 
 @pytest.fixture

@@ -1,31 +1,17 @@
 """Jobs over REST: accepted once, waited for, listed whole, and changed as their state allows."""
 
-import shutil
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from service import emptied, kept, problem_of, queued, served, spec
+from service import kept, problem_of, queued, spec
 from stores import FOUND, brought_on, claimed, job_in
 
 from islands_api.auth import LOCAL
 from islands_service.jobs import JobState, Report, Submission
 
 MANY = 16
-
-
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
-        yield running
-
-
-@pytest.fixture
-def service(shared):
-    return emptied(shared)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import socket
 import time
 
 import pytest
-from service import PATIENCE, csv, emptied, kept, problem_of, queued, served, spec
+from service import PATIENCE, csv, held, kept, problem_of, queued, served, spec
 
 from islands_api.routes import events
 from islands_service.store.keys import SCOPES
@@ -17,11 +17,6 @@ def shared(tmp_path_factory, prepared_sqlite):
     shutil.copyfile(prepared_sqlite, folder / "islands.db")
     with served(folder, require_keys=True, rate=0.0, max_active=3, max_stored=20_000) as running:
         yield running
-
-
-@pytest.fixture
-def service(shared):
-    return emptied(shared)
 
 
 #: Every route that needs a key, and the scope that it needs.
@@ -44,6 +39,8 @@ GUARDED = {
     ("GET", "/v1/jobs/{job}/figures"): "read",
     ("GET", "/v1/jobs/{job}/figures/{figure}.svg"): "read",
     ("GET", "/v1/jobs/{job}/report"): "read",
+    ("GET", "/v1/jobs/{job}/extended"): "read",
+    ("POST", "/v1/discrepancies"): "write",
     ("GET", "/v1/datasets"): "read",
     ("POST", "/v1/datasets"): "write",
     ("GET", "/v1/datasets/{dataset}"): "read",
@@ -59,6 +56,8 @@ def asked(service, method, path, headers):
     """Ask with a body where one is due."""
     path = path.format(job="0" * 32, dataset="0" * 32, rank=1, figure="loop")
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
+    if path == "/v1/discrepancies":
+        body = {"json": held("0-csv")}
     if (method, path) == ("POST", "/v1/datasets"):
         body = {"files": {"file": ("a.csv", b"")}}
     return service.client.request(method, path, headers=headers, **body)

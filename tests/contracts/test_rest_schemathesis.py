@@ -38,8 +38,18 @@ rank = {{ values = [1, 2] }}
 "path.rank" = {{ dictionary = "rank", probability = 0.7 }}
 
 [[operations]]
-include-name = ["POST /v1/jobs", "POST /v1/datasets", "GET /v1/jobs", "GET /v1/datasets"]
+include-name = [
+    "POST /v1/jobs", "POST /v1/discrepancies", "POST /v1/datasets", "GET /v1/jobs", "GET /v1/datasets",
+]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "422", "429"]
+
+# Jobs of one kind have them, and a job of the other says so, however new it is.
+[[operations]]
+include-name = [
+    "GET /v1/jobs/{{job}}/extended", "GET /v1/jobs/{{job}}/figures", "GET /v1/jobs/{{job}}/history",
+    "GET /v1/jobs/{{job}}/models",
+]
+checks.ensure_resource_availability.enabled = false
 """
 
 OWNER = "me"

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 import pytest
 from jsonschema import Draft202012Validator
-from service import columns, csv, identified, kept, problem_of, queued, served, spec
+from service import columns, csv, diagnosed, hidden, identified, kept, problem_of, queued, served, spec
 
 from islands.figures.gallery import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
@@ -154,6 +154,18 @@ def test_what_can_be_done_is_as_documented(service, document):
     service.client.post(f"/v1/jobs/{known}/cancel")
     ended = service.client.get(f"/v1/jobs/{known}/events", headers={"Last-Event-ID": "9"})
     assert conforms(document, ended).status_code == 204
+
+
+def test_a_diagnosis_is_as_documented(service, document, tmp_path):
+    job = diagnosed(service, hidden(tmp_path))
+    for of in ("", "/events", "/result", "/report", "/extended"):
+        answer = conforms(document, service.client.get(f"/v1/jobs/{job}{of}"))
+        assert answer.status_code == 200
+    assert conforms(document, service.client.get(f"/v1/jobs/{job}/models")).status_code == 404
+    order = service.client.get(f"/v1/jobs/{job}").json()["spec"]
+    assert conforms(document, service.client.post("/v1/discrepancies", json=order)).status_code == 202
+    refused = service.client.post("/v1/discrepancies", json={**order, "input": "u"})
+    assert conforms(document, refused).status_code == 422
 
 
 def test_a_model_is_the_one_of_the_result(service, finished):

@@ -207,6 +207,7 @@ HALVES = {
     "a model": Outcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({"a": Unwritable()}, ""))),
     "a model's file": Outcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({}, None))),
     "summary": Outcome(JobState.SUCCEEDED, {}, FOUND.models, {"a": Unwritable()}),
+    "an artefact": Outcome(JobState.SUCCEEDED, {}, FOUND.models, artefacts={"a": None}),
 }
 
 
@@ -218,6 +219,21 @@ def test_an_end_that_fails_midway_leaves_the_job_running(store, lease, outcome):
         store.leases.finish(lease, outcome)
     assert contents(store) == before
     store.leases.finish(lease, FOUND)
+
+
+def test_what_belongs_to_a_result_comes_with_it_and_is_not_swept_away(store, lease):
+    job = lease.job.id
+    whole = Outcome(JobState.SUCCEEDED, {"found": 1}, artefacts={"a": BLOB, "b": "c" * 64})
+    store.leases.finish(lease, whole)
+    assert [store.results.artefact(job, name) for name in "abc"] == [BLOB, "c" * 64, None]
+    assert {BLOB, "c" * 64} <= store.retention.named_blobs()
+
+
+def test_what_belongs_to_a_result_takes_the_place_of_what_was_there(store, lease):
+    job = lease.job.id
+    lease = again(store, lease, Outcome(JobState.CANCELLED, {"old": 1}, artefacts={"a": BLOB, "b": BLOB}))
+    store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {"new": 1}, artefacts={"a": "c" * 64}))
+    assert [store.results.artefact(job, name) for name in "ab"] == ["c" * 64, None]
 
 
 def test_a_new_result_replaces_all_of_the_old_one(store, lease):

@@ -4,6 +4,7 @@ The oracle is the definition: a recursion over samples in plain floats, on `isla
 The kernel has to agree with it to the last bit.
 """
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset, join
+from islands.errors import RecordError
 from islands.kernels.sums import total
 from islands.model.expression import value
 from islands.model.model import model_of
 from islands.model.parsing import parse
 from islands.simulation.layout import WIDTHS, layout
+from islands.simulation.linked import LinkedModel
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 
 
@@ -320,6 +323,57 @@ def test_without_the_boundary_the_recordings_would_have_met():
     assert np.isnan(apart[40])
     assert np.isfinite(joined[40])
     assert apart[45] != joined[45]
+
+
+# Linked once.
+
+
+def begun(drawn, warm_up):
+    """Return a record whose output is known at its start alone."""
+    return replace(drawn, y=np.where(np.arange(drawn.samples) < warm_up, drawn.y, np.nan))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.data())
+def test_a_linked_model_runs_free_as_the_model_does_with_any_parameters_on_any_input(data):
+    chosen = MODELS[data.draw(st.sampled_from(list(MODELS)))]
+    linked = LinkedModel(chosen.regressors)
+    for _ in range(2):
+        length = chosen.maximum_lag + data.draw(st.integers(1, 200))
+        drawn = record(chosen, (length,), data.draw(st.integers(0, 2**32 - 1)))
+        # Large parameters make it diverge.
+        factor = data.draw(st.sampled_from([1.0, -0.3, 0.0, 40.0]))
+        theta = factor * np.array(chosen.theta)
+        expected = free_run(chosen.with_parameters(theta), begun(drawn, chosen.maximum_lag)).y
+        found = linked.free_run(theta, drawn.u, drawn.y[: chosen.maximum_lag])
+        assert same(found, expected)
+
+
+def test_a_linked_model_diverges_where_the_model_does():
+    chosen, data = MODELS["linear"], record(MODELS["linear"], (300,))
+    theta = 3.0 * np.array(chosen.theta)
+    found = LinkedModel(chosen.regressors).free_run(theta, data.u, data.y[:2])
+    assert np.isnan(found[-1])
+    assert np.isfinite(found[2])
+    assert same(found, free_run(chosen.with_parameters(theta), begun(data, 2)).y)
+
+
+def test_a_linked_model_is_linked_anew_in_another_process():
+    chosen, data = MODELS["shared subexpressions"], record(MODELS["shared subexpressions"], (90,))
+    linked = LinkedModel(chosen.regressors)
+    runs = [
+        each.free_run(np.array(chosen.theta), data.u, data.y[:2])
+        for each in (linked, pickle.loads(pickle.dumps(linked)))
+    ]
+    assert same(*runs)
+    # It takes what it was made of with it, and none of the addresses.
+    assert linked.__reduce__() == (LinkedModel, (chosen.regressors,))
+
+
+def test_a_linked_model_asks_for_more_samples_than_its_warm_up():
+    linked = LinkedModel(MODELS["deepest lag on u"].regressors)
+    with pytest.raises(RecordError, match="the input has 11 samples and the warm-up takes 11"):
+        linked.free_run(np.ones(3), np.zeros((11, 1)), np.zeros(11))
 
 
 # The true model.

@@ -1,7 +1,7 @@
 """``islands diagnose``: what a simulation gets wrong about a record, why, and what mending it is worth."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -9,16 +9,22 @@ from typing import Annotated, Any
 import typer
 
 from islands.data.dataset import Dataset
+from islands.discrepancy.core import Core
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as diagnosed
-from islands.errors import SettingsError
-from islands.io.diagnoses import diagnosis_json, extended_json
+from islands.discrepancy.proposal import Proposal
+from islands.discrepancy.self_test import SelfTest, self_test
+from islands.discrepancy.spread import Spread
+from islands.io.diagnoses import as_json, diagnosis_document
+from islands.io.extensions import extended_json
 from islands.io.records import read_record
-from islands.io.simulations import SIMULATIONS, column_of, simulation
+from islands.io.simulation_spec import ColumnSpec, innermost, spec_of
+from islands.io.simulations import simulation
+from islands.proposing import proposed
 from islands_api.cli import options
-from islands_api.cli.console import compile_kernels, output, progress
+from islands_api.cli.console import Tell, compile_kernels, output, progress
 from islands_api.cli.fit import check_folder
-from islands_service.diagnosis_report import in_words, report
+from islands_service.diagnosis_report import in_words, report, self_test_in_words
 from islands_service.rows import rows_of
 
 #: Files of a result.
@@ -30,21 +36,20 @@ def diagnose(
     inputs: options.Inputs,
     output_column: options.Output,
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")],
-    simulated: Annotated[
-        str,
-        typer.Option("--simulation", help=f"{', '.join(SIMULATIONS)}; after a colon what it needs."),
-    ],
-    channels: Annotated[
-        list[str] | None,
-        typer.Option("--channel", help="Column that may couple in, a temperature perhaps."),
-    ] = None,
-    tolerance: Annotated[
-        list[str] | None,
-        typer.Option("--tolerance", help="PARAM=REL: how well a parameter is known, 0.02 for 2 %."),
-    ] = None,
+    simulated: options.Simulated,
+    channels: options.Channels = None,
+    tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
     seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    tested: Annotated[
+        bool,
+        typer.Option("--self-test", help="Find out what this record could show: takes minutes."),
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", min=1, help="Cores; by default 1, for the self-test all."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
     """Show what a simulation gets wrong about a record, name the cause, and measure the gain."""
@@ -52,60 +57,93 @@ def diagnose(
     compile_kernels()
     with progress("diagnose") as tell:
         tell("reading", 0.0)
+        asked = spec_of(simulated)
+        inner = innermost(asked)
+        column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read(
-            record, options.columns(inputs), channels or [], simulated, output_column, dt, rows
+            record, options.columns(inputs), channels or [], column, output_column, dt, rows
         )
-        core = simulation(simulated, data, columns)
-        began = perf_counter()
-        found = diagnosed(data, core, _tolerances(tolerance or []), seed, lambda line: tell(line, 0.5))
-        wall = perf_counter() - began
+        core = simulation(asked, data, columns)
+        known = options.tolerances(tolerance or [])
+        with _cores(workers, tested) as spread:
+            began = perf_counter()
+            found = diagnosed(data, core, known, seed, lambda line: tell(line, 0.5), spread)
+            tell("a formula for what has no name", 0.8)
+            proposal = proposed(found, seed)
+            wall = perf_counter() - began
+            shown = _self_tested(found, core, known, seed, spread, tell) if tested else None
         tell("figures", 0.9)
-        write(found, out, record.name, wall)
-    output.print(in_words(found), markup=False)
+        write(found, out, record.name, wall, shown, proposal)
+    output.print(in_words(found, proposal), markup=False)
+    if shown is not None:
+        output.print(self_test_in_words(shown), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
 
 
-def write(found: Diagnosis, folder: Path, name: str, wall_s: float) -> None:
+def write(
+    found: Diagnosis,
+    folder: Path,
+    name: str,
+    wall_s: float,
+    tested: SelfTest | None = None,
+    proposal: Proposal | None = None,
+) -> None:
     """Write a diagnosis: the document last, so that where it is everything is."""
     folder.mkdir(parents=True, exist_ok=True)
     for path in (folder / EXTENDED, folder / RESULT):
         path.unlink(missing_ok=True)
-    (folder / REPORT).write_bytes(report(name, found))
+    (folder / REPORT).write_bytes(report(name, found, tested, proposal))
     if found.gain is not None:
-        (folder / EXTENDED).write_text(extended_json(found))
-    (folder / RESULT).write_text(diagnosis_json(found, wall_s))
+        (folder / EXTENDED).write_text(extended_json(found.best, found.record))
+    document = diagnosis_document(found, wall_s, tested, proposal)
+    (folder / RESULT).write_text(as_json(document))
+
+
+def _self_tested(
+    found: Diagnosis,
+    core: Core,
+    tolerance: Mapping[str, float],
+    seed: int,
+    spread: Spread,
+    tell: Tell,
+) -> SelfTest:
+    """Carry out the self-test, and show how long it will take."""
+    tell("self-test", 0.0)
+    began = perf_counter()
+
+    def ended(count: int, of: int) -> None:
+        left = (perf_counter() - began) * (of - count) / count
+        tell(f"self-test, {count} of {of} analyses, {_duration(left)} left", count / of)
+
+    return self_test(found, core, tolerance, seed, spread, tell=ended)
+
+
+def _cores(workers: int | None, tested: bool) -> AbstractContextManager[Spread]:
+    if workers == 1 or (workers is None and not tested):
+        return nullcontext(map)
+    # An analysis of some seconds need not wait for Ray.
+    from islands_service.runtime.pool import pool  # noqa: PLC0415
+
+    return pool(workers)
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def _read(
     record: Path,
     inputs: list[str],
     channels: list[str],
-    spec: str,
+    column: str | None,
     output_column: str,
     dt: float | None,
     rows: str | None,
 ) -> tuple[Dataset, Mapping[str, Any]]:
     """Read the record, and beside it the column that is the simulation, if one is."""
-    if len(inputs) != 1:
-        raise SettingsError(
-            f"a simulation is driven by one input, got {', '.join(inputs)}: give the others as --channel"
-        )
-    column = column_of(spec)
     beside = [] if column is None else [column]
-    whole = read_record(record, [*inputs, *channels, *beside], output_column, dt, rows_of(rows))
-    kept = 1 + len(channels)
-    data = replace(
-        whole, u=whole.u[:, :kept], input_names=whole.input_names[:kept], input_units=whole.input_units[:kept]
+    whole = read_record(
+        record, [options.driving(inputs), *channels, *beside], output_column, dt, rows_of(rows)
     )
-    return data, {} if column is None else {column: whole.u[:, kept]}
-
-
-def _tolerances(texts: list[str]) -> dict[str, float]:
-    found = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        try:
-            found[name] = float(value)
-        except ValueError:
-            raise SettingsError(f"--tolerance {text}: write PARAM=REL, for example dp=0.01") from None
-    return found
+    kept = 1 + len(channels)
+    return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

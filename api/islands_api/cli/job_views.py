@@ -1,9 +1,11 @@
 """How ``islands jobs`` shows what a service answers: as JSON, as lines, as tables, as a folder of files."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import typer
@@ -11,8 +13,8 @@ from rich.table import Table
 
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
-from islands_api.schemas import JobView, ModelView
-from islands_service.jobs import TERMINAL
+from islands_api.schemas import JobView, ModelPage, ModelView
+from islands_service.jobs import DISCREPANCY, TERMINAL
 
 #: Islands of a running job that are shown one by one.
 _SHOWN = 16
@@ -33,10 +35,20 @@ def show_job(job: JobView, as_json: bool) -> None:
         output.print(
             f"generation {told['generation']}/{told['generations']}, best error {best}", markup=False
         )
-    if job.summary is not None:
+    if job.kind == DISCREPANCY:
+        show_words(job)
+    elif job.summary is not None:
         output.print(job.summary["equation"], markup=False)
     if job.problem is not None:
         output.print(job.problem["detail"], markup=False)
+
+
+def show_words(job: JobView) -> None:
+    """Show what a discrepancy job found, in words, or where it is."""
+    if job.summary is not None:
+        output.print(job.summary["words"], markup=False)
+    elif job.progress is not None and job.state not in TERMINAL:
+        output.print(job.progress["phase"], markup=False)
 
 
 def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
@@ -50,7 +62,15 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
         told = job.progress or {}
         generation = f"{told.get('generation', '-')}/{told.get('generations', '-')}"
         best, created = _number(told.get("best_error")), f"{job.created:%Y-%m-%d %H:%M:%S}"
-        output.print(_LINE.format(job.id, job.state, generation, best, created, job.name), markup=False)
+        line = _LINE.format(job.id, job.state, generation, best, created, f"{job.name}{_verdict(job)}")
+        output.print(line, markup=False)
+
+
+def _verdict(job: JobView) -> str:
+    """Say in short what a discrepancy job found."""
+    if job.kind != DISCREPANCY or job.summary is None:
+        return ""
+    return f" ({': '.join([job.summary['verdict'], *filter(None, [', '.join(job.summary['effects'])])])})"
 
 
 def show_models(models: Sequence[ModelView]) -> None:
@@ -81,6 +101,8 @@ def bar_of_job() -> Iterator[Callable[[JobView], None]]:
             done = told.get("generation", 0)
             best = _number(told.get("best_error"))
             text = f"{job.state}, generation {done}/{told.get('generations', '?')}, best error {best}"
+            if job.kind == DISCREPANCY:
+                text = f"{job.state}, {told.get('phase', 'waiting')}"
             islands = [
                 f"  island {index:3d}  RMSE {_number(error)}"
                 for index, error in enumerate(told.get("islands", ())[:_SHOWN])
@@ -90,10 +112,9 @@ def bar_of_job() -> Iterator[Callable[[JobView], None]]:
         yield tell
 
 
-def download(
-    client: Client, job: str, document: dict[str, Any], models: Sequence[ModelView], folder: Path
-) -> None:
+def download(client: Client, job: str, document: dict[str, Any], folder: Path) -> None:
     """Write a result, its models and its figures into a folder; nothing of an earlier result stays there."""
+    models = models_of(document)
     for name, kind in (("models", "[0-9][0-9]*.json"), ("figures", "*.svg")):
         (folder / name).mkdir(parents=True, exist_ok=True)
         for old in (folder / name).glob(kind):
@@ -107,9 +128,56 @@ def download(
         for done, (name, rank) in enumerate(names):
             tell(name, done / len(names))
             (folder / "figures" / f"{name}.svg").write_bytes(client.figure(job, name, rank))
-    (folder / "result.json").write_text(
-        json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    _write_document(document, folder / "result.json")
+
+
+def download_diagnosis(client: Client, job: str, document: dict[str, Any], folder: Path) -> None:
+    """Write what a discrepancy job found into a folder, as ``islands diagnose`` does."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("extended.json", "discrepancy.json"):
+        (folder / name).unlink(missing_ok=True)
+    (folder / "report.html").write_bytes(client.report(job))
+    if document["extended_model"] is not None:
+        (folder / "extended.json").write_bytes(client.extended(job))
+    _write_document(document, folder / "discrepancy.json")
+
+
+def models_of(document: dict[str, Any]) -> tuple[ModelView, ...]:
+    """Return the models of a result."""
+    return ModelPage(items=document["models"]).items
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """How a result is kept and shown: its document's file, what the folder holds, and how it gets there."""
+
+    file: str
+    holds: str
+    download: Callable[[Client, str, dict[str, Any], Path], None]
+    show: Callable[[Client, str, dict[str, Any]], None]
+
+
+#: By what a result holds.
+RESULTS: Mapping[str, Kept] = MappingProxyType(
+    {
+        "models": Kept(
+            "result.json",
+            "result.json, models/, figures/",
+            download,
+            lambda _client, _job, document: show_models(models_of(document)),
+        ),
+        "verdict": Kept(
+            "discrepancy.json",
+            "discrepancy.json, report.html, extended.json where something was named",
+            download_diagnosis,
+            lambda client, job, _: show_words(client.job(job)),
+        ),
+    }
+)
+
+
+def _write_document(document: dict[str, Any], path: Path) -> None:
+    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def print_json(document: Any) -> None:

@@ -11,11 +11,12 @@ from islands_api.cli import options
 from islands_api.cli import search_options as search
 from islands_api.cli.console import errors, output
 from islands_api.client import Client, JobFailed
-from islands_api.schemas import JobView, ModelPage
-from islands_service.jobs import JobState
+from islands_api.client.discrepancies import simulation_of
+from islands_api.schemas import JobView
+from islands_service.jobs import DISCREPANCY, JobState
 
 jobs = typer.Typer(
-    help="Jobs of a service: submit, list, show, watch, cancel, resume, result.",
+    help="Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -25,6 +26,12 @@ ApiKey = Annotated[
     str | None, typer.Option("--key", envvar="ISLANDS_KEY", help="Not needed on the service's own machine.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Name = Annotated[str, typer.Option("--name", help="For people.")]
+Priority = Annotated[int, typer.Option("--priority", help="Higher ones go first.")]
+IdempotencyKey = Annotated[
+    str | None, typer.Option("--idempotency-key", help="The same one again is the same job.")
+]
+Watch = Annotated[bool, typer.Option("--watch", help="Wait for it, and print what it found.")]
 Id = Annotated[str, typer.Argument(help="The job's id.")]
 
 LOCAL = "http://127.0.0.1:8000"
@@ -66,14 +73,12 @@ def submit(
     max_evaluations: search.MaxEvaluations = None,
     target_error: search.TargetError = None,
     seed: search.Seed = 0,
-    name: Annotated[str, typer.Option("--name", help="For people.")] = "",
-    priority: Annotated[int, typer.Option("--priority", help="Higher ones go first.")] = 0,
-    idempotency_key: Annotated[
-        str | None, typer.Option("--idempotency-key", help="The same one again is the same job.")
-    ] = None,
+    name: Name = "",
+    priority: Priority = 0,
+    idempotency_key: IdempotencyKey = None,
     url: Url = LOCAL,
     key: ApiKey = None,
-    watch: Annotated[bool, typer.Option("--watch", help="Wait for it, and print what it found.")] = False,
+    watch: Watch = False,
     as_json: Json = False,
 ) -> None:
     """Upload a record and submit a job that identifies it."""
@@ -99,10 +104,56 @@ def submit(
             dt=dt,
             rows=rows,
             validation=validating,
-            name=name or "".join(each for each in record.name if each.isprintable())[:_NAME],
+            name=_called(name, record),
             priority=priority,
             idempotency_key=idempotency_key,
             **{each: given[each] for each in search.SETTINGS if given[each] is not None},
+        )
+    if watch:
+        _follow(url, key, job, as_json)
+    else:
+        views.show_job(job, as_json)
+
+
+@jobs.command()
+def diagnose(
+    record: Annotated[Path, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet.")],
+    inputs: options.Inputs,
+    output_column: options.Output,
+    simulated: options.Simulated,
+    channels: options.Channels = None,
+    tolerance: options.Tolerances = None,
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    seed: search.Seed = 0,
+    name: Name = "",
+    priority: Priority = 0,
+    idempotency_key: IdempotencyKey = None,
+    url: Url = LOCAL,
+    key: ApiKey = None,
+    watch: Watch = False,
+    as_json: Json = False,
+) -> None:
+    """Upload a record and submit a job that finds out what a simulation gets wrong about it."""
+    driving, known = options.driving(options.columns(inputs)), options.tolerances(tolerance or [])
+    beside = options.columns(channels or [])
+    asked = simulation_of(simulated)
+    read = [driving, *beside, *([asked["column"]] if "column" in asked else [])]
+    with _client(url, key) as client:
+        whole = output_column if rows is None else None
+        job = client.diagnose(
+            client.upload(record, read, whole, dt),
+            driving,
+            output_column,
+            asked,
+            channels=beside,
+            tolerance=known,
+            seed=seed,
+            dt=dt,
+            rows=rows,
+            name=_called(name, record),
+            priority=priority,
+            idempotency_key=idempotency_key,
         )
     if watch:
         _follow(url, key, job, as_json)
@@ -162,30 +213,36 @@ def resume(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False)
 def result(
     job: Id,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for result.json, the models and the figures.")
+        Path | None, typer.Option("--out", help="Folder for the result, its models and figures, its report.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
     url: Url = LOCAL,
     key: ApiKey = None,
     as_json: Json = False,
 ) -> None:
-    """Show the models of a job that has succeeded, and download them."""
+    """Show what a job that has succeeded found, and download it."""
     if out is not None:
         # It brings the kernels along: who only looks does not wait for them.
         from islands_api.cli.fit import check_folder  # noqa: PLC0415
 
-        check_folder(out, force)
+        for kept in views.RESULTS.values():
+            check_folder(out, force, kept.file)
     with _client(url, key) as client:
         document = client.result(job)
-        models = ModelPage(items=document["models"]).items
+        kept = views.RESULTS["models" if "models" in document else "verdict"]
         if out is not None:
-            views.download(client, job, document, models, out)
-    if as_json:
-        views.print_json(document)
-    else:
-        views.show_models(models)
-        if out is not None:
-            output.print(f"{out}/: result.json, models/, figures/", markup=False)
+            kept.download(client, job, document, out)
+        if as_json:
+            views.print_json(document)
+        else:
+            kept.show(client, job, document)
+            if out is not None:
+                output.print(f"{out}/: {kept.holds}", markup=False)
+
+
+def _called(name: str, record: Path) -> str:
+    """Return what a job is called: as its record, unless it has a name."""
+    return name or "".join(each for each in record.name if each.isprintable())[:_NAME]
 
 
 def _held_out(text: str | None) -> Path | str | float | None:
@@ -232,6 +289,8 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
             raise
         if as_json:
             views.show_job(job, as_json)
+        elif job.state == JobState.SUCCEEDED and job.kind == DISCREPANCY:
+            views.show_words(job)
         elif job.state == JobState.SUCCEEDED:
             views.show_models(client.models(job))
     if job.state != JobState.SUCCEEDED:

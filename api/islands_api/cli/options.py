@@ -9,6 +9,7 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.records import read_record
+from islands.io.simulation_spec import KINDS, LocalExtendedSpec, is_extended, spec_of
 from islands.model.model import Model
 from islands.systems.published_models import published
 from islands_service.rows import overlap, rows_of
@@ -27,6 +28,21 @@ Rows = Annotated[
     str | None, typer.Option("--rows", help="START:STOP, the samples of the record to use; all by default.")
 ]
 
+ModelFile = Annotated[
+    str,
+    typer.Argument(help="A model file, an extended.json, or published:12, published:13, published:14."),
+]
+Channels = Annotated[
+    list[str] | None, typer.Option("--channel", help="Column that may couple in, a temperature perhaps.")
+]
+Simulated = Annotated[
+    str, typer.Option("--simulation", help=f"{', '.join(KINDS)}; after a colon what it needs.")
+]
+Tolerances = Annotated[
+    list[str] | None,
+    typer.Option("--tolerance", help="PARAM=REL: how well a parameter is known, 0.02 for 2 %."),
+]
+
 #: Where a model may come from, besides a file: ``published:13``.
 PUBLISHED = "published:"
 
@@ -34,6 +50,39 @@ PUBLISHED = "published:"
 def columns(texts: list[str]) -> list[str]:
     """Split ``--input a,b`` and join what was repeated."""
     return [name for text in texts for name in text.split(",") if name]
+
+
+def driving(inputs: list[str]) -> str:
+    """Return the one input that drives a simulation.
+
+    Raises
+    ------
+    SettingsError
+        There is none, or there are several.
+    """
+    if len(inputs) != 1:
+        raise SettingsError(
+            f"a simulation is driven by one input, got {', '.join(inputs)}: give the others as --channel"
+        )
+    return inputs[0]
+
+
+def tolerances(texts: list[str]) -> dict[str, float]:
+    """Read ``--tolerance PARAM=REL``.
+
+    Raises
+    ------
+    SettingsError
+        A text is no name with a number.
+    """
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise SettingsError(f"--tolerance {text}: write PARAM=REL, for example dp=0.01") from None
+    return found
 
 
 def validation(
@@ -69,6 +118,15 @@ def validation(
         raise SettingsError(
             f"{option} {text}: give a file that exists, a fraction such as 0.25, or rows START:STOP"
         ) from None
+
+
+def extended(text: str) -> LocalExtendedSpec | None:
+    """Read an extended simulation; None where the file is none."""
+    if text.startswith(PUBLISHED) or not is_extended(text):
+        return None
+    found = spec_of(f"model:{text}")
+    assert isinstance(found, LocalExtendedSpec)
+    return found
 
 
 def model(text: str) -> Model:

@@ -1,34 +1,48 @@
 """``islands trials``: effects are hidden in data by code of its own, and the analysis has to find them."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from rich.table import Table
 
-from islands.errors import SettingsError
-from islands.trials.hide.forms import KNOWN, UNKNOWN
-from islands.trials.tally import Share, confusion, tally
-from islands.trials.trial import Trial
+from islands.errors import SettingsError, chosen
+from islands.figures.confusion import draw_confusion
+from islands.figures.style import save
+from islands.trials.cores import CORES, Simulated
+from islands.trials.tally import Bin, Measure, Share, confusion, reliability, tally
+from islands.trials.trial import Outcome, Trial, carried_out
 from islands_api.cli.console import compile_kernels, output, progress
-from islands_service.runtime.trials import side_by_side
+from islands_service.runtime.pool import pool
 
 #: Bands of the misfit of each effect in standard deviations of the noise: they are taken in turn.
-BANDS = ((0.2, 1.0), (1.0, 4.0))
+BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
+
+#: The band of those that are hidden together.
+TOGETHER = BANDS[1]
 
 #: The pole of noise that remembers.
 POLE = 0.9
 
 
 def trials(
-    effects: Annotated[
-        list[str] | None, typer.Option("--effects", help="Names to hide, repeated; all by default.")
+    cores: Annotated[
+        list[str] | None,
+        typer.Option("--core", help=f"The simulation, repeated: {', '.join(CORES)}; the first by default."),
     ] = None,
-    count: Annotated[int, typer.Option("--count", min=1, help="Trials of each effect.")] = 2,
+    effects: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effects",
+            help="Names to hide, repeated; by default all that the simulation can name, as 'all'.",
+        ),
+    ] = None,
+    count: Annotated[int, typer.Option("--count", min=1, help="Trials of each effect.")] = 3,
     noise: Annotated[str, typer.Option("--noise", help="white or ar.")] = "white",
     clean: Annotated[int, typer.Option("--clean", min=0, help="Records with nothing hidden in them.")] = 20,
     pairs: Annotated[int, typer.Option("--pairs", min=0, help="Records with two effects.")] = 0,
@@ -41,74 +55,110 @@ def trials(
         bool, typer.Option("--variant", help="Hide in forms unlike those that the analysis extends by.")
     ] = False,
     seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
-    seconds: Annotated[float, typer.Option("--seconds", min=10.0, help="Length of a record.")] = 60.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds", min=10.0, help="Length of a record; by default what its system usually has."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Trials side by side, at the most.")
+    ] = None,
     address: Annotated[str | None, typer.Option("--ray-address", help="HOST:PORT of a cluster.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="An SVG file for the confusion matrix.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--json", help="A file for the outcomes.")] = None,
 ) -> None:
     """Hide effects in simulated records, look for them, and count how often they are found and named."""
-    names = _names(effects)
+    asked_cores = {name: chosen(CORES, name, "core") for name in cores or [next(iter(CORES))]}
     if noise not in ("white", "ar"):
         raise SettingsError(f"--noise {noise}: take white or ar")
     pole = POLE if noise == "ar" else 0.0
-    rng = np.random.default_rng(seed)
-    asked = [
-        Trial((name,), seed + turn, pole, BANDS[turn % len(BANDS)], variant, seconds)
-        for name in names
-        for turn in range(count)
-    ]
-    asked += [Trial((), seed + turn, pole, None, False, seconds) for turn in range(clean)]
-    asked += [
-        Trial((name,), seed + turn, pole, None, False, seconds)
-        for name in UNKNOWN
-        for turn in range(open_set)
-    ]
-    for size, many in ((2, pairs), (3, triples)):
-        asked += [
-            Trial(
-                tuple(map(str, rng.choice(names, size, replace=False))),
-                seed + turn,
-                pole,
-                BANDS[1],
-                variant,
-                seconds,
-            )
-            for turn in range(many)
-        ]
+    asked: list[Trial] = []
+    for core, simulated in asked_cores.items():
+        names, rng = _names(effects, simulated), np.random.default_rng(seed)
+
+        def trial(
+            hidden: Sequence[str], turn: int, band: tuple[float, float] | None = None, core: str = core
+        ) -> Trial:
+            unlike = variant and band is not None
+            return Trial(tuple(hidden), seed + turn, pole, band, unlike, seconds, core, oracle=True)
+
+        asked += [trial((name,), turn, BANDS[turn % len(BANDS)]) for name in names for turn in range(count)]
+        asked += [trial((), turn) for turn in range(clean)]
+        asked += [trial((name,), turn) for name in simulated.system.unknown for turn in range(open_set)]
+        for size, many in ((2, pairs), (3, triples)):
+            if many and len(names) < size:
+                raise SettingsError(f"{size} effects at once need as many names: give more with --effects")
+            asked += [
+                trial([str(each) for each in rng.choice(names, size, replace=False)], turn, TOGETHER)
+                for turn in range(many)
+            ]
     compile_kernels()
-    with progress("trials") as tell:
-        found = list(
-            side_by_side(asked, address, lambda ended: tell(f"{ended} of {len(asked)}", ended / len(asked)))
-        )
-    shares = tally(found, list(UNKNOWN))
-    output.print(_table(shares))
-    wrong = {key: times for key, times in sorted(confusion(found).items()) if key[0] != key[1]}
-    for (hidden, named), times in islice(wrong.items(), 40):
-        output.print(f"{hidden or 'nothing'} was called {named or 'nothing'}: {times}", markup=False)
+    found = []
+    with progress("trials") as tell, pool(workers, address) as side_by_side:
+        for outcome in side_by_side(carried_out, asked):
+            found.append(outcome)
+            tell(f"{len(found)} of {len(asked)}", len(found) / len(asked))
+    document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
+    for core, simulated in asked_cores.items():
+        outcomes = [each for each in found if each.trial.core == core]
+        document["cores"][core] = _told(core, simulated, outcomes)
+        if figure is not None:
+            path = figure if len(asked_cores) == 1 else figure.with_stem(f"{figure.stem}-{core}")
+            title = f"{core}, {noise} noise: what was hidden, and what it was called"
+            save(draw_confusion(confusion(outcomes), simulated.nameable, title), path)
     if out is not None:
-        document = {
-            "shares": [{**asdict(share), "bounds": share.bounds} for share in shares],
-            "outcomes": [asdict(each) for each in found],
-        }
         out.write_text(json.dumps(document, indent=1))
 
 
-def _names(effects: list[str] | None) -> list[str]:
-    unknown = set(effects or ()) - set(KNOWN)
+def _told(core: str, simulated: Simulated, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Say how one kind of simulation did; return the same as a document."""
+    rows = tally(outcomes, simulated.nameless, simulated.goals)
+    bins = reliability([each for each in outcomes if not set(each.trial.effects) & set(simulated.nameless)])
+    output.print(_table(core, rows))
+    for each in bins:
+        output.print(_reliable(each), markup=False)
+    wrong = {key: times for key, times in sorted(confusion(outcomes).items()) if key[0] != key[1]}
+    for (hidden, named), times in islice(wrong.items(), 40):
+        output.print(f"{hidden or 'nothing'} was called {named or 'nothing'}: {times}", markup=False)
+    shares = [{**asdict(each), "bounds": each.bounds} for each in rows if isinstance(each, Share)]
+    measures = [asdict(each) for each in rows if isinstance(each, Measure) and each.of]
+    return {"shares": shares, "measures": measures, "reliability": [asdict(each) for each in bins]}
+
+
+def _names(effects: list[str] | None, simulated: Simulated) -> list[str]:
+    if not effects or effects == ["all"]:
+        return list(simulated.nameable)
+    unknown = set(effects) - set(simulated.system.known)
     if unknown:
         raise SettingsError(
-            f"nobody knows how to hide {', '.join(sorted(unknown))}: take some of {', '.join(KNOWN)}"
+            f"nobody knows how to hide {', '.join(sorted(unknown))}: take some of "
+            f"{', '.join(simulated.system.known)}"
         )
-    return list(effects or KNOWN)
+    return effects
 
 
-def _table(shares: list[Share]) -> Table:
-    table = Table("", "trials", "percent", "95 %", "goal", "")
-    for share in shares:
-        if share.of:
-            low, high = share.bounds
-            goal = "" if share.goal is None else f"{'<=' if share.most else '>='} {share.goal:g}"
-            kept = {True: "kept", False: "MISSED", None: ""}[share.kept]
-            table.add_row(
-                share.name, f"{share.of}", f"{share.percent:.1f}", f"{low:.1f} to {high:.1f}", goal, kept
-            )
+def _table(title: str, rows: Sequence[Share | Measure]) -> Table:
+    table = Table("", "trials", "", "95 %", "goal", "", title=title, title_justify="left")
+    for row in rows:
+        if row.of:
+            goal = "" if row.goal is None else f"{'<=' if row.most else '>='} {row.goal:g}"
+            kept = {True: "kept", False: "MISSED", None: ""}[row.kept]
+            table.add_row(row.name, f"{row.of}", *_value(row), goal, kept)
     return table
+
+
+def _value(row: Share | Measure) -> tuple[str, str]:
+    if isinstance(row, Measure):
+        return f"{row.value:.3f}", ""
+    low, high = row.bounds
+    return f"{row.percent:.1f} %", f"{low:.1f} to {high:.1f}"
+
+
+def _reliable(each: Bin) -> str:
+    return (
+        f"confidence {each.low:g} to {each.high:g}: {each.count} names, said {100 * each.said:.0f} %, "
+        f"right {100 * each.right:.0f} %"
+    )

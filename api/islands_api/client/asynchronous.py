@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import httpx
 
-from islands_api.client import calls
+from islands_api.client import calls, discrepancies
 from islands_api.client.answers import Event, EventLines, refuse_problem
 from islands_api.client.calls import Call, JobRef
 from islands_api.client.errors import JobFailed, ServiceError
@@ -122,6 +122,10 @@ class AsyncClient:
         """Submit a job: see `islands_api.client.calls.submit`."""
         return await self.call(calls.submit(*arguments, **named))
 
+    async def diagnose(self, *arguments: Any, **named: Any) -> JobView:
+        """Submit a discrepancy job: see `islands_api.client.discrepancies.diagnose`."""
+        return await self.call(discrepancies.diagnose(*arguments, **named))
+
     async def job(self, which: JobRef) -> JobView:
         """Look at a job."""
         return await self.call(calls.job(which))
@@ -164,8 +168,16 @@ class AsyncClient:
         return await self.call(calls.models(which))
 
     async def result(self, which: JobRef) -> dict[str, Any]:
-        """Take the whole result, in the form of ``result.json``."""
+        """Take the whole result, in the form of ``result.json``, or of ``discrepancy.json``."""
         return await self.call(calls.result(which))
+
+    async def report(self, which: JobRef) -> bytes:
+        """Take the report of a job: one HTML file."""
+        return await self.call(calls.report(which))
+
+    async def extended(self, which: JobRef) -> bytes:
+        """Take the simulation with what it lacked, in the form of ``extended.json``."""
+        return await self.call(calls.extended(which))
 
     async def history(self, which: JobRef, after: int = -1) -> HistoryPage:
         """Take a page of the course of the search behind a generation; an empty one is the end."""

@@ -61,7 +61,7 @@ def upload(
     dt: float | None = None,
 ) -> Call[DatasetView]:
     """Upload a record; with columns it is checked as a job would."""
-    given: dict[str, Any] = {"inputs": _names(inputs) or None, "output": output, "dt": dt}
+    given: dict[str, Any] = {"inputs": names_of(inputs) or None, "output": output, "dt": dt}
     form = {name: value for name, value in given.items() if value is not None}
     return Call("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
 
@@ -101,7 +101,7 @@ def submit(
         validation = {"dataset": id_of(validation)}
     given: dict[str, Any] = {
         "dataset": id_of(dataset),
-        "inputs": _names(inputs),
+        "inputs": names_of(inputs),
         "output": output,
         "preset": preset,
         "seed": seed,
@@ -112,12 +112,7 @@ def submit(
         "priority": priority or None,
         "settings": settings or None,
     }
-    body = {key: value for key, value in given.items() if value is not None}
-    _refuse_no_numbers(body)
-    key = uuid4().hex if idempotency_key is None else idempotency_key
-    if not (key.isascii() and key.isprintable()):
-        raise SettingsError(f"an idempotency key is a line of ASCII, got {key!r}")
-    return Call("POST", "/v1/jobs", read_as(JobView), headers={"Idempotency-Key": key}, json=body)
+    return submission("/v1/jobs", given, idempotency_key)
 
 
 def job(which: JobRef) -> Call[JobView]:
@@ -179,6 +174,16 @@ def result(which: JobRef) -> Call[dict[str, Any]]:
     return Call("GET", f"/v1/jobs/{_part(which)}/result", document_of)
 
 
+def report(which: JobRef) -> Call[bytes]:
+    """Take the report of a job."""
+    return Call("GET", f"/v1/jobs/{_part(which)}/report", lambda response: response.content)
+
+
+def extended(which: JobRef) -> Call[bytes]:
+    """Take the simulation with what it lacked."""
+    return Call("GET", f"/v1/jobs/{_part(which)}/extended", lambda response: response.content)
+
+
 def history(which: JobRef, after: int = -1) -> Call[HistoryPage]:
     """Take the course of the search."""
     return Call("GET", f"/v1/jobs/{_part(which)}/history", read_as(HistoryPage), params={"after": after})
@@ -220,6 +225,22 @@ def _part(which: JobView | DatasetView | str) -> str:
     return quote(id_of(which), safe="")
 
 
+def submission(path: str, given: Mapping[str, Any], idempotency_key: str | None) -> Call[JobView]:
+    """Submit a job of any kind, once; what is None is left to the service.
+
+    Raises
+    ------
+    SettingsError
+        As of `submit`.
+    """
+    body = {key: value for key, value in given.items() if value is not None}
+    _refuse_no_numbers(body)
+    key = uuid4().hex if idempotency_key is None else idempotency_key
+    if not (key.isascii() and key.isprintable()):
+        raise SettingsError(f"an idempotency key is a line of ASCII, got {key!r}")
+    return Call("POST", path, read_as(JobView), headers={"Idempotency-Key": key}, json=body)
+
+
 def _refuse_no_numbers(body: Mapping[str, Any]) -> None:
     try:
         json.dumps(body, allow_nan=False)
@@ -229,5 +250,6 @@ def _refuse_no_numbers(body: Mapping[str, Any]) -> None:
         ) from error
 
 
-def _names(given: str | Sequence[str]) -> list[str]:
+def names_of(given: str | Sequence[str]) -> list[str]:
+    """Return the names that are given as a list, or as one name."""
     return [given] if isinstance(given, str) else list(given)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import httpx
 
-from islands_api.client import calls
+from islands_api.client import calls, discrepancies
 from islands_api.client.answers import Event, EventLines, refuse_problem
 from islands_api.client.calls import Call, JobRef
 from islands_api.client.errors import JobFailed, ServiceError
@@ -138,6 +138,10 @@ class Client:
         """Submit a job: see `islands_api.client.calls.submit`."""
         return self.call(calls.submit(*arguments, **named))
 
+    def diagnose(self, *arguments: Any, **named: Any) -> JobView:
+        """Submit a discrepancy job: see `islands_api.client.discrepancies.diagnose`."""
+        return self.call(discrepancies.diagnose(*arguments, **named))
+
     def job(self, which: JobRef) -> JobView:
         """Look at a job."""
         return self.call(calls.job(which))
@@ -180,8 +184,16 @@ class Client:
         return self.call(calls.models(which))
 
     def result(self, which: JobRef) -> dict[str, Any]:
-        """Take the whole result, in the form of ``result.json``."""
+        """Take the whole result, in the form of ``result.json``, or of ``discrepancy.json``."""
         return self.call(calls.result(which))
+
+    def report(self, which: JobRef) -> bytes:
+        """Take the report of a job: one HTML file."""
+        return self.call(calls.report(which))
+
+    def extended(self, which: JobRef) -> bytes:
+        """Take the simulation with what it lacked, in the form of ``extended.json``."""
+        return self.call(calls.extended(which))
 
     def history(self, which: JobRef, after: int = -1) -> HistoryPage:
         """Take a page of the course of the search behind a generation; an empty one is the end."""

@@ -13,7 +13,10 @@ function columns({ preview }, spec) {
     if (name === preview.time) return "time";
     if (name === spec.output) return "output";
     // `u_V+1` is the column one sample early.
-    return spec.inputs.some((input) => input === name || input.replace(/\+\d+$/, "") === name) ? "input" : "";
+    const among = (given = []) => given.some((each) => each === name || each.replace(/\+\d+$/, "") === name);
+    if (among(spec.inputs ?? [spec.input])) return "input";
+    if (among(spec.channels)) return "channel";
+    return spec.simulation?.column === name ? "simulation" : "";
   };
   return table(
     "Columns of the data set",
@@ -69,6 +72,27 @@ function validation({ validation: given }) {
   return [`data set ${given.dataset}`, given.rows && `rows ${given.rows}`].filter(Boolean).join(", ");
 }
 
+/** What a simulation is: its kind, and what it was given. */
+function simulated({ kind, name, column, ...given }) {
+  const parameters = Object.entries(given.parameters ?? {}).map(
+    ([each, value]) => `${each} = ${short(value)}`,
+  );
+  return [kind, name ?? column, parameters.join(", ")].filter(Boolean).join(": ");
+}
+
+/** What a discrepancy job asks for beside what all do. */
+const against = ({ simulation, channels = [], tolerance = {} }) => [
+  ["Simulation", simulated(simulation)],
+  ["Channels", channels.join(", ")],
+  ...Object.entries(tolerance).map(([name, value]) => [`Tolerance of ${name}`, `${short(100 * value)} %`]),
+];
+
+/** What an identification asks for beside what all do. */
+const searched = (spec) => [
+  ["Preset", spec.preset ?? "default"],
+  ["Validated on", validation(spec)],
+];
+
 /** Show what a job asks for; what it leaves open is the service's default. */
 export function settingsPanel(spec) {
   const changed = Object.entries(spec.settings ?? {}).map(([name, value]) => [
@@ -80,13 +104,12 @@ export function settingsPanel(spec) {
     { class: "card" },
     el("h2", {}, "Settings"),
     facts([
-      ["Inputs", spec.inputs.join(", ")],
+      ["Inputs", (spec.inputs ?? [spec.input]).join(", ")],
       ["Output", spec.output],
-      ["Preset", spec.preset ?? "default"],
+      ...(spec.simulation ? against(spec) : searched(spec)),
       ["Seed", String(spec.seed ?? "default")],
       ["Rows", spec.rows],
       ["Sampling time", spec.dt ? `${short(spec.dt)} s` : null],
-      ["Validated on", validation(spec)],
       ...changed,
     ]),
   );

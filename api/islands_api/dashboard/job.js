@@ -6,6 +6,7 @@ import { age, utc } from "./clock.js";
 import { confirmed } from "./confirm.js";
 import { course } from "./course.js";
 import { datasetPanel, settingsPanel } from "./dataset.js";
+import { diagnoses, findingsPanel } from "./diagnosis.js";
 import { announce, el, facts, once, say } from "./dom.js";
 import { modelsPanel } from "./models.js";
 import { count, duration, number } from "./numbers.js";
@@ -15,7 +16,8 @@ import { follow } from "./watch.js";
 const path = (id) => `v1/jobs/${encodeURIComponent(id)}`;
 
 async function removed(job) {
-  const text = `${nameOf(job)} goes with its models, figures and history. This cannot be undone.`;
+  const found = diagnoses(job) ? "findings and report" : "models, figures and history";
+  const text = `${nameOf(job)} goes with its ${found}. This cannot be undone.`;
   if (!(await confirmed("Delete this job?", text, "Delete it"))) return null;
   await ask(path(job.id), { method: "DELETE" });
   location.hash = "#/jobs";
@@ -122,6 +124,7 @@ export function mountJob(host, { id, rank }, signal) {
   function build(job) {
     const known = (found) => {
       unit = found;
+      if (diagnoses(job)) return;
       search = course(id, unit, signal);
       courseHost.replaceChildren(search.node);
       if (shown) show(shown);
@@ -151,7 +154,12 @@ export function mountJob(host, { id, rank }, signal) {
     standingFacts.replaceChildren(told(job, unit));
     trouble.replaceChildren(...[failure(job)].filter(Boolean));
     search?.advance(job);
-    if (job.state === "succeeded" && models === null) {
+    if (diagnoses(job)) {
+      // Kept as it is: a button in it may have the focus.
+      const wanted = job.state === "succeeded";
+      if (wanted !== modelsHost.hasChildNodes())
+        modelsHost.replaceChildren(...(wanted ? [findingsPanel(job)] : []));
+    } else if (job.state === "succeeded" && models === null) {
       models = modelsPanel(job, rank, signal);
       modelsHost.replaceChildren(models.node);
     }

@@ -1,5 +1,6 @@
 /** A job's state in words and colour, and how far it is: the same in the list and on a job's own page. */
 
+import { diagnoses, verdict } from "./diagnosis.js";
 import { el, say } from "./dom.js";
 import { count } from "./numbers.js";
 
@@ -27,6 +28,7 @@ export function badge() {
 }
 
 function told(job) {
+  if (diagnoses(job) && job.summary) return verdict(job.summary);
   const { phase, note, generation, generations } = job.progress ?? {};
   if (job.state === "queued" && generation === undefined) return "waits for its turn";
   if (generation === undefined) return note ?? phase ?? "";
@@ -36,14 +38,17 @@ function told(job) {
 
 /** Make a bar with what it means in words. A search that ended early, for it was good enough, is whole. */
 export function progressBar() {
-  const bar = el("progress", { max: "1", value: "0", "aria-label": "Generations" });
+  const bar = el("progress", { max: "1", value: "0", "aria-label": "Progress" });
   const words = el("span", { class: "words" });
   return {
     node: el("div", { class: "progress" }, bar, words),
     show(job) {
       const { generation = 0, generations = 1 } = job.progress ?? {};
       bar.value = job.state === "succeeded" ? 1 : generation / Math.max(1, generations);
+      // How long a diagnosis goes on nobody knows.
+      if (diagnoses(job) && job.state === "running") bar.removeAttribute("value");
       bar.className = standing(job);
+      words.classList.toggle("long", diagnoses(job));
       say(words, told(job));
     },
   };

@@ -4,7 +4,6 @@ import asyncio
 import errno
 import sys
 from asyncio.subprocess import PIPE
-from collections.abc import Mapping
 from time import monotonic
 from typing import Annotated, Any
 
@@ -14,11 +13,13 @@ from fastapi import APIRouter, Path, Response
 from islands.errors import IslandsError
 from islands_api.auth import Caller, Reader
 from islands_api.doors import AtDoors, Doors
+from islands_api.kinds import finished, of_kind
 from islands_api.problems import RESPONSES, NoSuchThing
 from islands_api.routes.jobs import Id
-from islands_api.routes.models import Rank, finished, stored
+from islands_api.routes.models import Rank, stored
 from islands_api.schemas import Names
 from islands_service.blobs import NoSuchBlob
+from islands_service.jobs import IDENTIFICATION, REPORT
 from islands_service.specification import identification_of
 from islands_service.store.database import StoreFull, StoreUnavailable
 
@@ -48,7 +49,6 @@ _SVG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/svg+xml": {"sc
 _HTML: dict[int | str, dict[str, Any]] = {200: {"content": {"text/html": {"schema": {"type": "string"}}}}}
 
 #: A report brings its own style and figures, and needs nothing else.
-REPORT = "report.html"
 _REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
 
 ModelFigure = Annotated[
@@ -105,13 +105,13 @@ _FAILURES = Failures()
 @router.get("/{job}/figures", response_model=Names)
 async def search_figures(job: Id, caller: Reader, doors: AtDoors) -> Any:
     """Say which figures of the search there may be."""
-    return {"items": _of_search(await finished(doors, caller, job))}
+    return {"items": await _of_search(doors, caller, job)}
 
 
 @router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG)
 async def search_figure(job: Id, figure: SearchFigure, caller: Reader, doors: AtDoors) -> Response:
     """See a figure of the search: the record, error against size, convergence, the islands' course."""
-    _known(figure, _of_search(await finished(doors, caller, job)))
+    _known(figure, await _of_search(doors, caller, job))
     return await _figure(doors, caller, job, f"{figure}.svg", None)
 
 
@@ -139,14 +139,15 @@ async def simulation(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Res
 
 @router.get("/{job}/report", response_class=Response, responses=_HTML)
 async def report(job: Id, caller: Reader, doors: AtDoors) -> Response:
-    """Take the report of a job: one HTML file with its models and figures, to be kept or sent."""
-    await finished(doors, caller, job)
+    """Take the report of a job: one HTML file with what it found and its figures, to be kept or sent."""
+    await finished(doors, await doors.do(doors.store.jobs.get, caller.owner, job))
     answer = await _figure(doors, caller, job, REPORT, None, "text/html; charset=utf-8")
     answer.headers["Content-Security-Policy"] = _REPORT_POLICY
     return answer
 
 
-def _of_search(document: Mapping[str, Any]) -> tuple[str, ...]:
+async def _of_search(doors: Doors, caller: Caller, job: str) -> tuple[str, ...]:
+    document = await finished(doors, await of_kind(doors, caller, job, IDENTIFICATION))
     several = document["settings"]["islands"] > 1
     return tuple(name for name in SEARCH_FIGURES if several or name != _OF_SEVERAL)
 
@@ -176,7 +177,7 @@ async def _figure(
 
 
 async def _draw(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
-    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    found = await of_kind(doors, caller, job, IDENTIFICATION)
     for dataset in identification_of(found.spec).datasets:
         await doors.do(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
     _FAILURES.refuse(job, rank)

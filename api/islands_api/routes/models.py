@@ -9,10 +9,11 @@ from islands.io.models import model_from_json
 from islands_api.auth import Caller, Reader
 from islands_api.documents import Document, Items
 from islands_api.doors import AtDoors, Doors
-from islands_api.problems import RESPONSES, NoSuchThing, NotFinished
+from islands_api.kinds import finished, of_kind
+from islands_api.problems import RESPONSES, NoSuchThing
 from islands_api.routes.jobs import Id
 from islands_api.schemas import ModelPage, ModelView
-from islands_service.jobs import JobState
+from islands_service.jobs import IDENTIFICATION
 from islands_service.store.results import StoredModel
 
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)
@@ -39,7 +40,7 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
 @router.get("/{job}/models", response_model=ModelPage)
 async def models(job: Id, caller: Reader, doors: AtDoors) -> Any:
     """Look at the models of a job, best first; there are none before it has succeeded."""
-    await doors.do(doors.store.jobs.get, caller.owner, job)
+    await of_kind(doors, caller, job, IDENTIFICATION)
     return await doors.do(lambda: Items([model.document for model in doors.store.results.models(job)]))
 
 
@@ -76,29 +77,13 @@ async def exported(
 
 @router.get("/{job}/result", response_model=dict[str, Any])
 async def result(job: Id, caller: Reader, doors: AtDoors) -> Any:
-    """Take the whole result, in the form of `result.json`."""
-    document = await finished(doors, caller, job)
-    found = await doors.do(doors.store.results.models, job)
-    return Document({**document, "models": [model.document for model in found]})
-
-
-async def finished(doors: Doors, caller: Caller, job: str) -> dict[str, Any]:
-    """Return a job's result without its models.
-
-    Raises
-    ------
-    NotFinished
-    """
+    """Take the whole result, in the form of `result.json`, or of `discrepancy.json`."""
     found = await doors.do(doors.store.jobs.get, caller.owner, job)
-    document = await doors.do(doors.store.results.document, job)
-    if document is None:
-        hint = (
-            "wait until it has succeeded"
-            if found.state in (JobState.QUEUED, JobState.RUNNING)
-            else "resume it, or submit it again"
-        )
-        raise NotFinished(f"job {job} is {found.state} and has no result: {hint}")
-    return document
+    document = await finished(doors, found)
+    if found.kind != IDENTIFICATION:
+        return Document(document)
+    models = await doors.do(doors.store.results.models, job)
+    return Document({**document, "models": [model.document for model in models]})
 
 
 async def stored(doors: Doors, caller: Caller, job: str, rank: int) -> StoredModel:
@@ -108,7 +93,7 @@ async def stored(doors: Doors, caller: Caller, job: str, rank: int) -> StoredMod
     ------
     NotFinished, NoSuchThing
     """
-    await finished(doors, caller, job)
+    await finished(doors, await of_kind(doors, caller, job, IDENTIFICATION))
     found = await doors.do(doors.store.results.models, job, rank)
     if not found:
         raise NoSuchThing(f"job {job} has no model {rank}: look at its /models")

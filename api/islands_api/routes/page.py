@@ -29,6 +29,7 @@ FILES = {
     "confirm.js": _SCRIPT,
     "course.js": _SCRIPT,
     "dataset.js": _SCRIPT,
+    "diagnosis.js": _SCRIPT,
     "dom.js": _SCRIPT,
     "equation.js": _SCRIPT,
     "figures.js": _SCRIPT,

@@ -16,6 +16,8 @@ from islands_service.settings import service_settings
 
 def main() -> int:
     """Run until SIGTERM or SIGINT."""
+    # Sums depend on how many threads add them up, and a job's result must not. NumPy is not imported yet.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     parser = argparse.ArgumentParser(prog="python -m islands_service.coordinator", description=__doc__)
     parser.add_argument(
         "--name", default=f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(3)}", help="unique"

@@ -14,7 +14,7 @@ import structlog
 from islands.errors import IslandsError
 from islands_service.blobs import Blobs
 from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
-from islands_service.jobs import JobState, Lease, LeaseLost, Outcome, Report
+from islands_service.jobs import DISCREPANCY, IDENTIFICATION, JobState, Lease, LeaseLost, Outcome, Report
 from islands_service.lifeline import stop_on_signals
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
@@ -49,8 +49,14 @@ def _identification(*arguments: object) -> Outcome:
     return identification(*arguments)  # type: ignore[arg-type]
 
 
+def _discrepancy(*arguments: object) -> Outcome:
+    from islands_service.coordinator.discrepancy import discrepancy  # noqa: PLC0415
+
+    return discrepancy(*arguments)  # type: ignore[arg-type]
+
+
 #: How every kind of job is carried out.
-WORK: Mapping[str, Work] = MappingProxyType({"identification": _identification})
+WORK: Mapping[str, Work] = MappingProxyType({IDENTIFICATION: _identification, DISCREPANCY: _discrepancy})
 
 
 class Coordinator:

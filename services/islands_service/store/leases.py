@@ -113,7 +113,7 @@ class Leases:
         self._database.write(operation)
 
     def finish(self, lease: Lease, outcome: Outcome) -> None:
-        """Write down how a job ended, with its result and models.
+        """Write down how a job ended, with all that belongs to its result.
 
         Raises
         ------
@@ -140,6 +140,8 @@ class Leases:
                 for rank, (document, file) in enumerate(outcome.models, start=1):
                     values = {"job_id": row.id, "rank": rank, "document": _text(document), "file": file}
                     connection.execute(insert(models).values(values))
+                for name, blob in outcome.artefacts.items():
+                    connection.execute(insert(artefacts).values(job_id=row.id, name=name, blob=blob))
             record(connection, row, outcome.state, _text(outcome.problem or outcome.summary) or "{}")
 
         self._database.write(operation)

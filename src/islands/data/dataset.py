@@ -118,6 +118,15 @@ class Dataset:
     def __len__(self) -> int:
         return self.samples
 
+    def first_inputs(self, count: int) -> "Dataset":
+        """Return the record with its first inputs alone: what was read beside them is not one."""
+        return replace(
+            self,
+            u=self.u[:, :count],
+            input_names=self.input_names[:count],
+            input_units=self.input_units[:count],
+        )
+
     def __getitem__(self, rows: slice) -> "Dataset":
         """Return the samples of a slice (step 1) as a record of its own; segments are cut, none is joined."""
         first, last, step = rows.indices(self.samples)

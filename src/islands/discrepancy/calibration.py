@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.effect import Signal
 from islands.discrepancy.extended import Extended
-from islands.discrepancy.noise import Noise, noise_of
+from islands.discrepancy.noise import Noise, noise_of, white
 
 #: Steps at the most, tries of each, and what one has to gain in minus twice the log-likelihood.
 STEPS, TRIES, WORTH = 25, 6, 0.02
@@ -32,12 +32,16 @@ class Target:
     tolerance : mapping
         Relative standard deviations of the core's parameters about their nominal values; who is not named is
         free.
+    effective : float or None
+        How many samples that know nothing of each other the ones seen are worth, where what is left is the
+        simulation's misfit and no noise; None takes it as noise that may remember.
     """
 
     y: Signal
     seen: NDArray[np.bool_]
     noise: Noise | None
     tolerance: Mapping[str, float]
+    effective: float | None = None
 
     def observed(self, signal: Signal) -> Signal:
         """Return the samples of a signal that are seen, whitened."""
@@ -79,7 +83,7 @@ class Calibrated:
         return self.noise.minus_twice_log_likelihood + self.penalty
 
 
-def calibrate(simulation: Extended, target: Target, start: Signal) -> Calibrated:
+def calibrate(simulation: Extended, target: Target, start: Signal, steps: int = STEPS) -> Calibrated:
     """Fit a simulation's values from a start."""
     lower, upper = simulation.bounds
     pull, nominal = pull_of(simulation, target.tolerance)
@@ -89,13 +93,15 @@ def calibrate(simulation: Extended, target: Target, start: Signal) -> Calibrated
     residual = target.residual(output)
     cost = _cost(residual, pull * (values - nominal))
     damping = 1e-3
-    for _ in range(STEPS if values.size else 0):
+    # What is rounding alone cannot be fitted: a record may be what the simulation has made.
+    exact = residual.size * (np.finfo(float).eps * float(np.max(np.abs(target.y)))) ** 2
+    for _ in range(steps if values.size and np.isfinite(cost) else 0):
+        if float(residual @ residual) <= exact:
+            break
         jacobian = _jacobian(simulation, target, values, output)
         weight = residual.size / max(float(residual @ residual), np.finfo(float).tiny)
         hessian = weight * (jacobian.T @ jacobian) + np.diag((pull * scales) ** 2)
         slope = weight * (jacobian.T @ residual) - scales * pull**2 * (values - nominal)
-        if not np.isfinite(hessian).all():
-            break
         for _ in range(TRIES):
             curved = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
             moved = np.clip(values + np.linalg.lstsq(curved, slope, rcond=None)[0] * scales, lower, upper)
@@ -121,7 +127,9 @@ def held_against(simulation: Extended, target: Target, values: Signal) -> Calibr
     residual = (target.y - output)[target.seen]
     pull, nominal = pull_of(simulation, target.tolerance)
     penalty = float(np.sum((pull * (values - nominal)) ** 2))
-    return Calibrated(simulation, values, output, float(np.mean(residual**2)), noise_of(residual), penalty)
+    mean_square = float(np.mean(residual**2))
+    noise = noise_of(residual) if target.effective is None else white(mean_square, target.effective)
+    return Calibrated(simulation, values, output, mean_square, noise, penalty)
 
 
 def covariance(fit: Calibrated, target: Target) -> NDArray[np.float64]:
@@ -131,7 +139,8 @@ def covariance(fit: Calibrated, target: Target) -> NDArray[np.float64]:
     scales = simulation.scales
     jacobian = _jacobian(simulation, whitened, fit.values, fit.output)
     pull, _ = pull_of(simulation, target.tolerance)
-    information = jacobian.T @ jacobian / fit.noise.variance + np.diag((pull * scales) ** 2)
+    worth = fit.noise.samples / np.count_nonzero(target.seen)
+    information = worth * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((pull * scales) ** 2)
     inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
     return inverse
 
@@ -155,13 +164,12 @@ def _jacobian(simulation: Extended, target: Target, values: Signal, output: Sign
         moved = values.copy()
         moved[place] += step * scale
         columns[:, place] = target.observed((simulation.simulate(moved) - output) / step)
-    return columns
+    # Where a step explodes nothing is known of that direction.
+    return np.nan_to_num(columns, nan=0.0)
 
 
 def _cost(residual: Signal, pulled: Signal) -> float:
-    # What explodes may be finite, and its square not.
-    with np.errstate(over="ignore", invalid="ignore"):
-        squares = max(float(residual @ residual), np.finfo(float).tiny)
-    if not np.isfinite(squares):
+    squares = max(float(residual @ residual), np.finfo(float).tiny)
+    if np.isnan(squares):
         return float("inf")
     return residual.size * float(np.log(squares)) + float(pulled @ pulled)

@@ -3,13 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-import numpy as np
-
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.effect import Effect, Element, Site
 from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.scene import Frame, Scene, Signal
 
-#: Effects that act as forces, and the values of each.
-Forces = Sequence[tuple[Effect, Signal]]
+#: Elements that act on a core's coordinate, and the values of each.
+Forces = Sequence[tuple[Element, Signal]]
 
 
 class Core(Protocol):
@@ -31,6 +30,21 @@ class Core(Protocol):
     def understood(self) -> frozenset[str]:
         """Names of the effects on its state equation that it knows itself."""
 
+    @property
+    def has(self) -> frozenset[str]:
+        """Names of the effects that are in its equation already: nobody looks for them."""
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects of its own: those of each of its states."""
+
+    @property
+    def integrates(self) -> bool:
+        """Whether it solves an equation in steps, so that what its input does between samples matters."""
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """Return the coordinate that forces act on; ``output`` is that of the nominal simulation."""
+
     def simulate(
         self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
     ) -> Signal:
@@ -45,20 +59,10 @@ class Core(Protocol):
         own : mapping
             Parameters of effects that it understands, by name; what is not named is zero.
         forces : sequence
-            Effects on its coordinate and rate.
+            Elements on its coordinate.
 
         Returns
         -------
         ndarray, shape (samples,)
             The output before its map.
         """
-
-
-def add_forces(y: Signal, x: Signal, scene: Scene, forces: Forces) -> Signal:
-    """Add forces to an output whose coordinate is the input: what has no inertia answers at once."""
-    if forces:
-        rate = np.gradient(x, scene.dt)
-        for effect, strengths in forces:
-            assert effect.form is not None
-            y = y + effect.form(x, rate, strengths, scene)
-    return y

@@ -8,10 +8,12 @@ import numpy as np
 
 from islands.discrepancy.calibration import Calibrated, Target, covariance, held_against
 from islands.discrepancy.effect import Effect, Signal
-from islands.discrepancy.effects.wrong_parameter import plain
+from islands.discrepancy.explanation import Explanation, Rivals, rivals_of, without_effect
 from islands.discrepancy.gain import held_out_gain
-from islands.discrepancy.ladder import Rung, ladder
-from islands.discrepancy.search import Explanation, without_effect
+from islands.discrepancy.ladder import Rung
+from islands.discrepancy.likeness import Likeness, likeness
+from islands.discrepancy.search import LEAST
+from islands.discrepancy.spread import Spread
 
 #: Share of the explainable misfit that names have to explain, and from which on a remainder is no more than
 #: one.
@@ -19,7 +21,11 @@ SHARE, MOST = 0.5, 0.9
 
 #: Names within so much of the best cannot be told from it, and confidences are so many times cooler than
 #: scores: untempered they say 0.97 where 0.72 is true.
-EQUIVALENT, TEMPER = 6.0, 4.0
+EQUIVALENT, TEMPER = 9.0, 2.0
+
+#: Part of what a cause does beside, which no simulation is in step with, that every further name has to
+#: explain.
+BESIDE = 0.1
 
 
 class Verdict(StrEnum):
@@ -79,13 +85,28 @@ class Finding:
 def confirmed(
     found: Explanation, base: Calibrated, target: Target, fitted: int, rng: np.random.Generator
 ) -> Explanation:
-    """Leave out what does not foretell samples that were not fitted: without that gain there is no name."""
+    """Leave out what does not foretell samples that were not fitted: without that gain there is no name.
+
+    Beside a cause that no simulation is in step with, leave out what may be a part of that.
+    """
     while found.effects:
         before = reference(found, base, target)
         if held_out_gain(before, before is not base, found.fit, target, fitted, rng) > 0.0:
             break
         found = without_effect(found, found.effects[-1], target)
+    beside = _beside(found, target)
+    for effect in found.effects[:0:-1] if beside else ():
+        without = without_effect(found, effect, target)
+        less = without.fit.mean_square - found.fit.mean_square
+        if less < BESIDE * beside and effect.family != "scale":
+            found = without
     return found
+
+
+def _beside(found: Explanation, target: Target) -> float:
+    """Return the mean square of what causes do beside that no simulation is in step with."""
+    others = (likeness(found.fit, effect, target) for effect in found.effects)
+    return sum(other.beside for other in others if other is not None and other.gained > LEAST)
 
 
 def reference(found: Explanation, base: Calibrated, target: Target) -> Calibrated:
@@ -106,11 +127,14 @@ def share(before: Calibrated, after: Calibrated, floor: float) -> float:
     return float(np.clip((before.mean_square - after.mean_square) / misfit, 0.0, 1.0))
 
 
-def decided(explained: float, named: bool, remains: bool) -> Verdict:
-    """Return the verdict on names that explain a share, where something remains or not."""
+def decided(explained: float, named: bool, remains: bool, by_misfit: bool) -> Verdict:
+    """Return the verdict on names that explain a share, where something remains or not.
+
+    By misfit a form that is wrong may remain: a share of more than half is all that is asked for.
+    """
     if not named:
-        return Verdict.UNKNOWN if remains else Verdict.NOTHING
-    if explained < (MOST if remains else SHARE):
+        return Verdict.UNKNOWN if remains or by_misfit else Verdict.NOTHING
+    if explained < (MOST if remains and not by_misfit else SHARE):
         return Verdict.UNKNOWN
     return Verdict.REMAINDER if remains else Verdict.NAMED
 
@@ -122,6 +146,7 @@ def findings(
     target: Target,
     effects: Sequence[Effect],
     floor: float,
+    spread: Spread = map,
 ) -> tuple[tuple[Finding, ...], tuple[Rung, ...]]:
     """Say what was found, and which other rungs could stand in the place of one.
 
@@ -133,26 +158,32 @@ def findings(
         The simulation alone and its ladder: what is left, and has been tried, where one effect was found.
     """
     named, instead = [], []
-    spread = np.sqrt(np.maximum(np.diag(covariance(found.fit, target)), 0.0))
-    for effect in found.effects:
-        if len(found.effects) == 1:
-            without, rungs = Explanation(base, base.score, ()), first
-        else:
-            without = without_effect(found, effect, target)
-            rungs = ladder(without.fit, target, [each for each in effects if each not in without.effects])
-        scores = {plain(rung.effect.name): rung.gained(without.fit) for rung in reversed(rungs)}
-        own = max(scores.get(plain(effect.name), 0.0), without.cost - found.cost)
-        scores[plain(effect.name)] = own
-        equal = {name for name, score in scores.items() if score > own - EQUIVALENT} - {plain(effect.name)}
-        instead += [rung for rung in rungs if plain(rung.effect.name) in equal]
+    deviations = np.sqrt(np.maximum(np.diag(covariance(found.fit, target)), 0.0))
+    if len(found.effects) == 1:
+        rivals: Sequence[Rivals] = (Rivals(Explanation(base, base.score, ()), first),)
+    else:
+        rivals = found.rivals or rivals_of(found, target, effects, spread)
+    for effect, each in zip(found.effects, rivals, strict=True):
+        without, rungs = each.without, each.rungs
+        scores = {rung.effect.cause: rung.gained(without.fit) for rung in reversed(rungs)}
+        own = max(scores.get(effect.cause, 0.0), without.cost - found.cost)
+        scores[effect.cause] = own
+        name, family, values = effect.cause, effect.family, _values(found.fit, effect, deviations)
+        if (other := likeness(found.fit, effect, target)) is not None:
+            scores[other.effect.cause] = own + other.gained
+            if other.gained > 0.0:
+                name, family = other.effect.cause, other.effect.family
+                values = _times(other, values, found.fit)
+        equal = {each for each, score in scores.items() if score > scores[name] - EQUIVALENT} - {name}
+        instead += [rung for rung in rungs if rung.effect.cause in equal]
         named.append(
             Finding(
-                plain(effect.name),
-                effect.family,
-                _confidence(own, scores),
+                name,
+                family,
+                _confidence(scores[name], scores),
                 tuple(sorted(equal, key=lambda name: -scores[name])),
-                _values(found.fit, effect, spread),
-                own,
+                values,
+                scores[name],
                 share(reference(found, without.fit, target), found.fit, floor),
             )
         )
@@ -164,11 +195,22 @@ def _confidence(own: float, scores: Mapping[str, float]) -> float:
     return 1.0 / sum(float(np.exp(min(score - own, 0.0) / (2 * TEMPER))) for score in rivals)
 
 
-def _values(fit: Calibrated, effect: Effect, spread: Signal) -> Mapping[str, Value]:
+def _times(other: Likeness, values: Mapping[str, Value], fit: Calibrated) -> Mapping[str, Value]:
+    """Return the values of a cause in the place of one that it is like."""
+    parameters = other.effect.parameters(fit.simulation.scene)
+    found = {}
+    for parameter, each in zip(parameters, values.values(), strict=True):
+        low, high = each.ci95 or (each.value, each.value)
+        reach = None if each.ci95 is None else (other.times * low, other.times * high)
+        found[parameter.name] = Value(other.times * each.value, parameter.unit, reach)
+    return found
+
+
+def _values(fit: Calibrated, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
     part = fit.simulation.part(effect)
     found = {}
     for place in range(part.start, part.stop):
         parameter, value = fit.simulation.parameters[place], float(fit.values[place])
-        reach = 1.96 * float(spread[place])
+        reach = 1.96 * float(deviations[place])
         found[parameter.name] = Value(value, parameter.unit, (value - reach, value + reach))
     return found

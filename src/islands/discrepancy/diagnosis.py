@@ -1,6 +1,6 @@
 """Diagnosis: what a simulation gets wrong, its cause, the simulation with it, and what that is worth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,33 +13,27 @@ from islands.discrepancy.decision import (
     Finding,
     Value,
     Verdict,
-    confirmed,
-    decided,
     findings,
-    reference,
     share,
 )
 from islands.discrepancy.detectors import DETECTORS
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.effects.wrong_parameter import plain, wrong_parameter
+from islands.discrepancy.effect import Effect, Scene, Signal
+from islands.discrepancy.evidence import Evidence, by_misfit, by_noise, first_of, judged
 from islands.discrepancy.experiment import decisive
 from islands.discrepancy.extended import Extended
 from islands.discrepancy.gain import Gain, gain_of
 from islands.discrepancy.ladder import Rung, ladder
-from islands.discrepancy.reference import explainable
-from islands.discrepancy.remainder import remainder
-from islands.discrepancy.search import LEAST, Tell, explained
-from islands.errors import RecordError, SettingsError
+from islands.discrepancy.preparation import checked, effects_for, fitted_samples, scene_of
+from islands.discrepancy.search import LEAST, Tell, silent
+from islands.discrepancy.solver import settled, solved_alike
+from islands.discrepancy.spread import Spread
 
-#: Part of the record that nothing but the gain ever sees: its end.
-LOCKED = 0.25
+#: Times that causes are looked for anew because with them the record asks for another hold or step.
+ROUNDS = 3
 
-#: The fewest samples that are worth an analysis.
-FEWEST = 400
-
-#: Part of a residual's mean square that a flexible reference would not explain by chance.
-NOTICEABLE = 0.05
+#: Percent that errors grow by, with 97.5 % certainty, on samples that nothing has seen, before names are
+#: withdrawn: a gain that calibration takes up as well changes them by next to nothing, either way.
+REFUTED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +68,10 @@ class Diagnosis:
     base, best : Calibrated
         The simulation calibrated without the effects, and with them.
     noise_floor : float
-        RMSE that no simulation is expected to be below: an upper bound.
+        RMSE that no simulation is expected to be below.
+    measured_floor : bool
+        The floor is known, from periods that repeat; else it is an upper bound, by what a flexible fit of the
+        record foretells: nobody can know it.
     as_given : float
         RMSE of the simulation with its nominal values over the locked samples.
     """
@@ -90,11 +87,8 @@ class Diagnosis:
     base: Calibrated
     best: Calibrated
     noise_floor: float
+    measured_floor: bool
     as_given: float
-
-
-def _silent(_line: str) -> None:
-    pass
 
 
 def diagnose(
@@ -102,7 +96,8 @@ def diagnose(
     core: Core,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
-    tell: Tell = _silent,
+    tell: Tell = silent,
+    spread: Spread = map,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record.
 
@@ -119,6 +114,8 @@ def diagnose(
         Of all that is drawn by lot.
     tell : callable
         Told what is being done.
+    spread : Spread
+        Fits the effects of a ladder, side by side perhaps; the result is the same.
 
     Raises
     ------
@@ -127,126 +124,87 @@ def diagnose(
     SettingsError
         A tolerance is not positive, or of a parameter that the simulation does not have.
     """
-    known = _checked(tolerance or {}, core)
-    fitted = _fitted(record)
-    scene = _scene(record, core, fitted)
+    known = checked(tolerance or {}, core)
+    fitted = fitted_samples(record)
+    scene = scene_of(record, core, fitted)
     rng = np.random.default_rng(seed)
     simulation = Extended(core, (), scene)
     target = Target(record.y, np.arange(record.samples) < fitted, None, known)
     tell("calibrating the simulation")
-    base = calibrate(simulation, target, simulation.nominal)
+    plain = calibrate(simulation, target, simulation.nominal)
+    core = settled(plain, target)
     effects = effects_for(core, scene, known)
-    tell(f"looking for each of {len(effects)} effects")
-    rungs = ladder(base, target, effects)
-    memory = (rungs[0].fit if rungs and rungs[0].gained(base) > LEAST else base).noise
-    if memory.order:
-        # Once more, with what the noise remembers taken out: plain least squares would fit that as well.
-        tell("the noise remembers: once more with that taken out")
-        target = replace(target, noise=memory)
-        base = calibrate(simulation, target, base.values)
-        rungs = ladder(base, target, effects)
-    found = confirmed(explained(base, rungs, target, effects, tell), base, target, fitted, rng)
+    for _ in range(ROUNDS):
+        plain = calibrate(replace(simulation, core=core), target, plain.values)
+        tell(f"looking for each of {len(effects)} effects")
+        rungs = ladder(plain, target, effects, spread)
+        again = settled(first_of(plain, rungs), target)
+        if solved_alike(again, core):
+            evidence = by_noise(plain, rungs, target, effects, tell, spread)
+            again = settled(evidence.found.fit, evidence.target)
+        if solved_alike(again, core):
+            break
+        # With a cause in it another hold, or a finer step, fits better: it was the cause that hid that.
+        tell("once more: the input between its samples")
+        core = again
+    else:
+        evidence = by_noise(plain, rungs, target, effects, tell, spread)
     tell("what is left over")
-    residual = (record.y - found.fit.output)[:fitted]
-    seen = found.fit.output[:fitted]
-    left = explainable(residual, scene.u[:fitted], seen, rng)
-    maps = remainder(residual, seen, scene, rng)
-    floor = max(found.fit.mean_square - left, 0.0)
-    remains = bool(maps) or left > NOTICEABLE * found.fit.mean_square
-    verdict = decided(share(reference(found, base, target), found.fit, floor), bool(found.effects), remains)
+    evidence = judged(evidence, fitted, rng)
+    if evidence.verdict == Verdict.UNKNOWN or (
+        evidence.verdict == Verdict.NOTHING and evidence.found.fit.noise.order
+    ):
+        second = judged(by_misfit(plain, target, effects, tell, spread), fitted, rng)
+        evidence = second if second.verdict != Verdict.UNKNOWN else evidence
+    return _told(record, evidence, plain, effects, fitted, rng, tell, spread)
+
+
+def _told(
+    record: Dataset,
+    evidence: Evidence,
+    plain: Calibrated,
+    effects: Sequence[Effect],
+    fitted: int,
+    rng: np.random.Generator,
+    tell: Tell,
+    spread: Spread,
+) -> Diagnosis:
+    """Say what the evidence comes to, and measure the gain: once, on the locked part."""
+    base, found, rungs, verdict = evidence.base, evidence.found, evidence.rungs, evidence.verdict
+    floor = evidence.floor
+    locked = slice(fitted, record.samples)
+    gain = None
+    if verdict in (Verdict.NAMED, Verdict.REMAINDER):
+        gain = gain_of(record, plain.output, found.fit.output, locked, floor**0.5, rng)
+        if found.effects and gain.ci95[1] < -REFUTED:
+            # What nothing has seen speaks against it: there is something, but it is not this.
+            gain, verdict = None, Verdict.UNKNOWN
     named: tuple[Finding, ...] = ()
     instead: tuple[Rung, ...] = ()
-    if verdict in (Verdict.NAMED, Verdict.REMAINDER):
+    if gain is not None:
         tell("what else could be the cause")
-        named, instead = findings(found, base, rungs, target, effects, floor)
+        named, instead = findings(found, base, rungs, evidence.target, effects, floor, spread)
+    residual = (record.y - found.fit.output)[:fitted]
+    scene = found.fit.simulation.scene
     noise = _noise(record.y[:fitted], residual, scene) if verdict != Verdict.UNKNOWN else ()
+    simulation = plain.simulation
     given = simulation.simulate(simulation.nominal)
-    locked = slice(fitted, record.samples)
-    best = found.fit if named else base
+    best = found.fit if named else plain
     return Diagnosis(
         Verdict.NAMED if noise and verdict == Verdict.NOTHING else verdict,
         (*named, *noise),
-        tuple(Candidate(plain(r.effect.name), r.gained(base), share(base, r.fit, floor)) for r in rungs),
-        gain_of(record, base.output, best.output, locked, floor**0.5, rng) if named else None,
-        maps,
+        tuple(Candidate(r.effect.cause, r.gained(base), share(base, r.fit, floor)) for r in rungs),
+        gain,
+        evidence.remainder,
         decisive(found.fit, instead),
         record,
         fitted,
-        base,
+        plain,
         best,
         floor**0.5,
+        evidence.measured_floor,
         float(np.sqrt(np.mean((record.y - given)[locked] ** 2))),
     )
-
-
-def effects_for(core: Core, scene: Scene, tolerance: Mapping[str, float]) -> list[Effect]:
-    """Return the effects that can enter a simulation and that a record could show."""
-    trusted = {parameter.name for parameter in core.parameters} <= tolerance.keys()
-    effects = [
-        effect
-        for effect in CATALOGUE.values()
-        if effect.site in core.sites
-        and (effect.site != Site.CORE or effect.name in core.understood)
-        and (trusted or not effect.gain)
-        and effect.applies(scene)
-    ]
-    return effects + [wrong_parameter(each) for each in core.parameters if each.name in tolerance]
-
-
-def _checked(tolerance: Mapping[str, float], core: Core) -> Mapping[str, float]:
-    names = [parameter.name for parameter in core.parameters]
-    for name, value in tolerance.items():
-        if name not in names:
-            raise SettingsError(f"{core.name} has no parameter {name!r}: it has {', '.join(names) or 'none'}")
-        if not 0.0 < value < 1.0:
-            raise SettingsError(f"the tolerance of {name} is a part of its value, like 0.02; got {value:g}")
-    return dict(tolerance)
-
-
-def _fitted(record: Dataset) -> int:
-    """Return how many samples estimation sees, once it is known that the record can be used."""
-    if record.samples < FEWEST:
-        raise RecordError(
-            f"the record has {record.samples} samples, and a diagnosis takes {FEWEST} at least: give a "
-            "longer one"
-        )
-    if len(record.segments) > 1:
-        raise RecordError("the record is several recordings: diagnose one after the other")
-    if np.isnan(record.y).any():
-        raise RecordError("the measured output has gaps: repair them, or select rows without any")
-    fitted = int((1.0 - LOCKED) * record.samples)
-    for name, signal in zip((*record.input_names, record.output_name), (*record.u.T, record.y), strict=True):
-        if np.ptp(signal[:fitted]) == 0.0:
-            raise RecordError(f"column {name} is constant: a diagnosis needs signals that move")
-    for name, signal in zip(record.input_names[1:], record.u.T[1:], strict=True):
-        if np.array_equal(signal, record.u[:, 0]):
-            raise RecordError(f"channel {name} is the input itself: leave it out")
-    return fitted
-
-
-def _scene(record: Dataset, core: Core, fitted: int) -> Scene:
-    names, units = record.input_names, record.input_units
-    scene = Scene(
-        u=np.ascontiguousarray(record.u[:, 0]),
-        dt=record.dt,
-        channels={
-            name: np.ascontiguousarray(record.u[:, place]) for place, name in enumerate(names) if place
-        },
-        units=dict(zip(names[1:], units[1:], strict=True)),
-        input_peak=float(np.max(np.abs(record.u[:, 0]))),
-        output_peak=1.0,
-        input_unit=units[0] or "1",
-        output_unit=record.output_unit or "1",
-        fitted=fitted * record.dt,
-    )
-    simulation = Extended(core, (), scene)
-    nominal = simulation.simulate(simulation.nominal)
-    if not np.isfinite(nominal).all():
-        raise RecordError(
-            f"the simulation {core.name} diverges on this input: check its parameters, its units and the "
-            "sampling time"
-        )
-    return replace(scene, output_peak=float(np.max(np.abs(nominal))) or 1.0)
 
 
 def _noise(y: Signal, residual: Signal, scene: Scene) -> tuple[Finding, ...]:

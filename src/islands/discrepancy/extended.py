@@ -1,17 +1,25 @@
 """A simulation with effects in it: input maps, the core with its forces, output maps."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.core import Core
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.core import Core, Forces
+from islands.discrepancy.effect import Effect, Element, Site
 from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.scene import Scene, Signal
+from islands.errors import SettingsError
 
 #: Outputs of the core that are remembered: derivatives ask for the same one again and again.
 _REMEMBERED = 4
+
+_NONE: Mapping[str, float] = MappingProxyType({})
+
+#: An output that is so many times its peak has exploded: its squares would soon be no numbers any more.
+_EXPLODED = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,38 +80,40 @@ class Extended:
         """Return the core with other effects in it."""
         return replace(self, effects=tuple(effects))
 
-    def simulate(self, values: Signal) -> Signal:
+    def simulate(self, values: Signal, own: Mapping[str, float] = _NONE, forces: Forces = ()) -> Signal:
         """Simulate the whole record, shape (samples,).
 
-        Values that a search tries may make something explode: what comes back is not finite then.
+        ``own`` and ``forces`` are more of what the core takes.
+
+        Values that a search tries may make something explode: what comes back is not a number then.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            y = self._behind_core(values)
+            more = bool(own or forces)
+            y = self._simulate_core(values, own, forces) if more else self._behind_core(values)
             for effect, part in zip(self.effects, self._parts, strict=True):
                 if effect.site == Site.OUTPUT:
-                    assert effect.form is not None
-                    y = effect.form(y, values[part], self.scene)
-        return y
+                    y = mapped(effect, y, values[part], self.scene)
+            exploded = not float(np.max(np.abs(y))) < _EXPLODED * self.scene.output_peak
+        return np.full_like(y, np.nan) if exploded else y
 
     def _behind_core(self, values: Signal) -> Signal:
         key = values[self._inner].tobytes()
         y = self._known.get(key)
         if y is None:
-            y = self._simulate_core(values)
+            y = self._simulate_core(values, _NONE, ())
             while len(self._known) >= _REMEMBERED:
                 del self._known[next(iter(self._known))]
             self._known[key] = y
         return y
 
-    def _simulate_core(self, values: Signal) -> Signal:
-        x, forces = self.scene.u, []
-        own: dict[str, float] = {}
+    def _simulate_core(self, values: Signal, more: Mapping[str, float], further: Forces) -> Signal:
+        x, forces = self.scene.u, list(further)
+        own = dict(more)
         core = values[: len(self.core.parameters)].copy()
         for effect, part in zip(self.effects, self._parts, strict=True):
             match effect.site:
                 case Site.INPUT:
-                    assert effect.form is not None
-                    x = effect.form(x, values[part], self.scene)
+                    x = mapped(effect, x, values[part], self.scene)
                 case Site.CORE:
                     own |= {
                         parameter.name: float(value)
@@ -112,9 +122,30 @@ class Extended:
                 case Site.PARAMETER:
                     core[self._place(effect)] *= 1.0 + values[part][0]
                 case Site.FORCE:
-                    forces.append((effect, values[part]))
+                    assert isinstance(effect.form, Element)
+                    forces.append((effect.form, values[part]))
         return self.core.simulate(core, x, self.scene, own, forces)
 
     def _place(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")
         return [parameter.name for parameter in self.core.parameters].index(name)
+
+
+def mapped(effect: Effect, signal: Signal, values: Signal, scene: Scene) -> Signal:
+    """Return a signal behind the map of an effect."""
+    assert callable(effect.form)
+    try:
+        out = np.asarray(effect.form(signal, values, scene), dtype=np.float64)
+    except Exception as error:
+        raise broken(effect, f"its form fails: {type(error).__name__}: {error}") from error
+    if out.shape != signal.shape:
+        raise broken(effect, f"its form gives {out.shape} for {signal.shape}")
+    return out
+
+
+def broken(effect: Effect, why: str) -> SettingsError:
+    """Return the error of an entry of the catalogue that does not do what it says."""
+    file = effect.parameters.__code__.co_filename
+    return SettingsError(
+        f"the effect {effect.name} is broken: {why}; mend {file} or take it out of the catalogue"
+    )

@@ -20,13 +20,13 @@ class Noise:
     coefficients : ndarray, shape (order,)
     variance : float
         Of ``e``.
-    samples : int
-        Of the residual.
+    samples : float
+        Of the residual, as many as know nothing of each other.
     """
 
     coefficients: Signal
     variance: float
-    samples: int
+    samples: float
 
     @property
     def order(self) -> int:
@@ -56,6 +56,8 @@ def noise_of(residual: Signal, highest: int = HIGHEST) -> Noise:
     """
     found: Noise | None = None
     n = residual.size
+    if np.isnan(residual).any():  # of a simulation that explodes
+        return Noise(np.zeros(0), float("inf"), n)
     later = residual[highest:]
     # The same equations for every order: all lags' inner products at once.
     lagged = np.column_stack([residual[highest - lag : n - lag] for lag in range(1, highest + 1)])
@@ -72,3 +74,21 @@ def noise_of(residual: Signal, highest: int = HIGHEST) -> Noise:
             found = tried
     assert found is not None
     return found
+
+
+def white(mean_square: float, samples: float) -> Noise:
+    """Return noise that does not remember."""
+    return Noise(np.zeros(0), max(mean_square, np.finfo(float).tiny), samples)
+
+
+def effective_samples(residual: Signal) -> float:
+    """Return how many samples that know nothing of each other a residual is worth: n over the sum of rho^2.
+
+    Bartlett's: the variance of a mean square, of a stationary normal residual.
+    """
+    n = residual.size
+    centred = residual - residual.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[: n // 4]
+    rho = correlation / max(float(correlation[0]), np.finfo(float).tiny)
+    return max(10.0, n / (1.0 + 2.0 * float(np.sum(rho[1:] ** 2))))

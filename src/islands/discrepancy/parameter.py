@@ -19,6 +19,8 @@ class Parameter:
         A change that matters: steps of derivatives are a hundredth of it.
     lower, upper : float
         Bounds.
+    initial : bool
+        It is a state at the first sample, and belongs to the record more than to the simulation.
     """
 
     name: str
@@ -27,3 +29,4 @@ class Parameter:
     scale: float
     lower: float = -inf
     upper: float = inf
+    initial: bool = False

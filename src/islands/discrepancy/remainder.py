@@ -28,6 +28,8 @@ def remainder(
     n = residual.size
     left = noise_of(residual).whiten(residual)
     left = left - left.mean()
+    if not left.any():
+        return {}
     shifts = rng.integers(n // 20, n - n // 20, SHIFTS)
     found = {}
     for name, cells in _maps(scene.u[:n], simulated, scene.dt).items():

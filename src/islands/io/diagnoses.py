@@ -6,20 +6,29 @@ from typing import Any
 
 from islands.discrepancy.decision import Finding
 from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.proposal import Proposal
+from islands.discrepancy.self_test import SelfTest
 from islands.io.results import record_document
 
 SCHEMA = "islands.discrepancy/1"
 
-EXTENDED_SCHEMA = "islands.extended/1"
 
-
-def diagnosis_document(diagnosis: Diagnosis, wall_s: float | None = None) -> dict[str, Any]:
+def diagnosis_document(
+    diagnosis: Diagnosis,
+    wall_s: float | None = None,
+    tested: SelfTest | None = None,
+    proposal: Proposal | None = None,
+) -> dict[str, Any]:
     """Describe a diagnosis.
 
     Parameters
     ----------
     wall_s : float, optional
         Seconds that it took; the core knows no clock.
+    tested : SelfTest, optional
+        What the analysis can do on this record.
+    proposal : Proposal, optional
+        A formula for what has no name.
     """
     return {
         "schema": SCHEMA,
@@ -31,52 +40,19 @@ def diagnosis_document(diagnosis: Diagnosis, wall_s: float | None = None) -> dic
         "decisive_experiment": diagnosis.decisive_experiment or None,
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "remainder": dict(diagnosis.remainder),
+        "proposal": None if proposal is None else asdict(proposal),
         "as_given_rmse": diagnosis.as_given,
         "noise_floor_rmse": diagnosis.noise_floor,
+        "noise_floor_is": "measured by repeated periods" if diagnosis.measured_floor else "an upper bound",
         "calibrated": _values(diagnosis),
-        "detection_limits": {},
-        "false_alarm_rate": None,
+        **_self_test(tested),
         "extended_model": None if diagnosis.gain is None else "extended.json",
         "wall_s": wall_s,
     }
 
 
-def diagnosis_json(diagnosis: Diagnosis, wall_s: float | None = None) -> str:
+def as_json(document: dict[str, Any]) -> str:
     """Write ``discrepancy.json``."""
-    return json.dumps(diagnosis_document(diagnosis, wall_s), indent=2, allow_nan=False) + "\n"
-
-
-def extended_json(diagnosis: Diagnosis) -> str:
-    """Write the extended simulation: its core, its effects and the values of both."""
-    fit = diagnosis.best
-    simulation = fit.simulation
-    document = {
-        "schema": EXTENDED_SCHEMA,
-        "core": simulation.core.name,
-        "parameters": _values(diagnosis),
-        "effects": [
-            {
-                "name": effect.name,
-                "site": str(effect.site),
-                "parameters": {
-                    parameter.name: {"value": float(value), "unit": parameter.unit}
-                    for parameter, value in zip(
-                        simulation.parameters[simulation.part(effect)],
-                        fit.values[simulation.part(effect)],
-                        strict=True,
-                    )
-                },
-            }
-            for effect in simulation.effects
-        ],
-        "scales": {
-            "dt": simulation.scene.dt,
-            "input_peak": simulation.scene.input_peak,
-            "output_peak": simulation.scene.output_peak,
-            "fitted_s": simulation.scene.fitted,
-            "duration_s": simulation.scene.duration,
-        },
-    }
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
@@ -84,6 +60,27 @@ def _values(diagnosis: Diagnosis) -> dict[str, float]:
     fit = diagnosis.best
     own = fit.simulation.core.parameters
     return {parameter.name: float(value) for parameter, value in zip(own, fit.values, strict=False)}
+
+
+def _self_test(tested: SelfTest | None) -> dict[str, Any]:
+    """Describe a self-test; without one its names are there, and nothing in them."""
+    if tested is None:
+        return dict.fromkeys(("detection_limits", "false_alarm_rate", "p_value", "confusion"))
+    alarms = tested.false_alarm_rate
+    return {
+        "detection_limits": {
+            name: None
+            if limit is None
+            else {"strength": limit.strength, "unit": limit.unit, "misfit_sigma": limit.misfit}
+            for name, limit in tested.detection_limits.items()
+        },
+        "false_alarm_rate": {"value": alarms.value, "ci95": list(alarms.ci95), "of": alarms.of},
+        "p_value": tested.p_value,
+        "confusion": [
+            {"hidden": hidden, "called": called, "times": times}
+            for (hidden, called), times in tested.confusion.items()
+        ],
+    }
 
 
 def _effect(finding: Finding) -> dict[str, Any]:

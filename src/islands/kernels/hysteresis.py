@@ -19,11 +19,13 @@ def play(u, width, x):
 
 @kernel
 def slider(u, breakaway, x):
-    """Follow ``u`` in slips: ``x`` rests until ``u`` is ``breakaway`` away, and then joins it."""
+    """Follow ``u`` in slips: ``x`` rests until ``u`` is ``breakaway`` away, and then joins it.
+
+    Between two samples ``u`` passes through every value: ``x`` slips as often as it is that far away.
+    """
     at = u[0]
     for k in range(u.size):
-        if abs(u[k] - at) > breakaway:
-            at = u[k]
+        at += breakaway * np.trunc((u[k] - at) / breakaway)
         x[k] = at
 
 

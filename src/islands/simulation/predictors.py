@@ -106,7 +106,12 @@ def bound_of(record: Dataset) -> float:
     no scale, at least `BOUND` of the output's unit.
     """
     known = record.y[~np.isnan(record.y)]
+    return bound_from(known, complete=known.size == record.samples)
+
+
+def bound_from(known: NDArray[np.float64], complete: bool) -> float:
+    """Return the same from the measured outputs, all of the record's or those that are not missing."""
     scale = float(max(np.ptp(known), np.abs(known).max())) if known.size else 0.0
-    if known.size < record.samples or scale == 0.0:
+    if not complete or scale == 0.0:
         scale = max(scale, 1.0)
     return BOUND * scale

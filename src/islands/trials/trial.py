@@ -1,17 +1,26 @@
 """A blind trial: hide, diagnose, compare."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
 from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.effects import CATALOGUE
-from islands.trials.hide.records import SPREAD, hide
+from islands.discrepancy.effects import CATALOGUE, core_shape
+from islands.trials.cores import CORES
+from islands.trials.hide.piezo import PIEZO
+from islands.trials.hide.records import hide
+from islands.trials.oracle import share_of_gain
 
-#: Tolerances that are stated: twice the spread of the truth.
-TOLERANCE = {name: 2 * spread for name, spread in SPREAD.items()}
+#: Tolerances that are stated of the piezo's parameters.
+TOLERANCE = PIEZO.tolerance
+
+#: Families of causes that belong to a simulation, and have no entry of their own in the catalogue.
+_FAMILIES = {
+    "wrong-parameter": "scale",
+    "input-offset": "baseline",
+    "outflow-law": "shape",
+    "state-clip": "shape",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +38,12 @@ class Trial:
         Of the misfit of each effect, in standard deviations of the noise.
     variant : bool
         In forms unlike those that the analysis extends by.
-    seconds : float
+    seconds : float or None
+        Length of the record; None is what its system usually has.
+    core : str
+        The simulation that is held against it, an entry of `CORES`.
+    oracle : bool
+        Who knows the names is asked as well: this takes time.
     """
 
     effects: tuple[str, ...]
@@ -37,7 +51,9 @@ class Trial:
     pole: float = 0.0
     band: tuple[float, float] | None = None
     variant: bool = False
-    seconds: float = 60.0
+    seconds: float | None = None
+    core: str = "bouc-wen-piezo"
+    oracle: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +64,24 @@ class Outcome:
     ----------
     trial : Trial
     misfit : float
-        Of what was hidden, in standard deviations of the noise.
+        Of what was hidden, in standard deviations of the noise; of gains and parameters what tolerances do
+        not allow.
     verdict : str
     named : tuple of str
-        Causes, the most important first; without those of the noise.
+        Causes, the most important first; without those of the noise, and without the form of a model.
     noise : tuple of str
         What was said of sampling and noise.
     equivalents : tuple of tuple of str
         Of each name.
     candidates : tuple of str
-        The first three of the ladder.
+        The first three causes of the ladder.
     confidence : float
         Of the first name.
+    gain_share : float or None
+        Error on the locked samples: by how much it is smaller, relative to an oracle's; None where there is
+        nothing to gain, or no oracle was asked.
+    form : bool
+        The simulation's own form was said to be wrong: of an identified model that is true, and no cause.
     """
 
     trial: Trial
@@ -70,6 +92,8 @@ class Outcome:
     equivalents: tuple[tuple[str, ...], ...]
     candidates: tuple[str, ...]
     confidence: float
+    gain_share: float | None = None
+    form: bool = False
 
     @property
     def noticed(self) -> bool:
@@ -92,6 +116,11 @@ class Outcome:
         return bool(self.named) and bool({self.named[0], *self.equivalents[0]} & set(self.trial.effects))
 
     @property
+    def set_size(self) -> int:
+        """How many names are in the first name's set, itself included."""
+        return 1 + len(self.equivalents[0])
+
+    @property
     def family_right(self) -> bool:
         """Whether the first name is of the family of one of those hidden."""
         return bool(self.named) and _family(self.named[0]) in {_family(name) for name in self.trial.effects}
@@ -99,6 +128,7 @@ class Outcome:
 
 def carried_out(trial: Trial) -> Outcome:
     """Hide, diagnose, compare."""
+    simulated = CORES[trial.core]
     hiding = hide(
         trial.effects,
         np.random.default_rng([trial.seed, *map(ord, "".join(trial.effects))]),
@@ -106,9 +136,13 @@ def carried_out(trial: Trial) -> Outcome:
         trial.pole,
         trial.band,
         trial.variant,
+        simulated.system,
+        simulated.apart,
+        simulated.free,
     )
-    found = diagnose(hiding.record, BoucWenPiezoCore(), TOLERANCE, trial.seed)
-    causes = [finding for finding in found.effects if finding.eta is not None]
+    found = diagnose(hiding.record, simulated.made(hiding), simulated.tolerance, trial.seed)
+    causes = [each for each in found.effects if each.eta is not None and each.name != core_shape.NAME]
+    asked = trial.oracle and trial.effects
     return Outcome(
         trial,
         hiding.misfit,
@@ -116,15 +150,12 @@ def carried_out(trial: Trial) -> Outcome:
         tuple(finding.name for finding in causes),
         tuple(finding.name for finding in found.effects if finding.eta is None),
         tuple(finding.equivalents for finding in causes),
-        tuple(candidate.name for candidate in found.candidates[:3]),
+        tuple(each.name for each in found.candidates if each.name != core_shape.NAME)[:3],
         causes[0].confidence if causes else 0.0,
+        share_of_gain(found, trial.effects, simulated.tolerance) if asked else None,
+        any(finding.name == core_shape.NAME for finding in found.effects),
     )
 
 
 def _family(name: str) -> str:
-    return CATALOGUE[name].family if name in CATALOGUE else "scale" if name == "wrong-parameter" else name
-
-
-def one_of_each(seed: int, names: Sequence[str], band: tuple[float, float], pole: float = 0.0) -> list[Trial]:
-    """Return a trial of every effect, its misfit within a band."""
-    return [Trial((name,), seed, pole, band) for name in names]
+    return CATALOGUE[name].family if name in CATALOGUE else _FAMILIES.get(name, name)

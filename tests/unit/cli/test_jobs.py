@@ -18,7 +18,7 @@ import pytest
 import typer
 from front_door import ISLANDS
 from processes import eventually
-from service import Service, csv, kept, queued, served
+from service import Service, csv, held, kept, queued, served
 from stores import FAILED, LONG, at_once, brought_on
 
 from islands.evolution.engine import SerialEngine
@@ -28,7 +28,7 @@ from islands_api.cli.identify import identify
 from islands_api.cli.search_options import SETTINGS
 from islands_service.blobs import Blobs
 from islands_service.coordinator.identification import identification
-from islands_service.jobs import Lease, Outcome, Submission
+from islands_service.jobs import DISCREPANCY, EXTENDED, REPORT, JobState, Lease, Outcome, Submission
 from islands_service.specification import Identification
 
 Run = Callable[..., tuple[int, str, str]]
@@ -233,8 +233,10 @@ def test_validation_is_rows_or_a_file(
 
 
 def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) -> None:
-    first, second = (submitted(service, owner, name=name) for name in ("[/b] one", "two"))
+    first = submitted(service, owner, name="[/b] one")
     service.store.leases.report(claimed(service, first), brought_on(3))
+    time.sleep(0.005)  # a store may count milliseconds, and of those of one no job is the newer
+    second = submitted(service, owner, name="two")
     code, out, _ = run("list")
     assert code == 0
     _, one, other = (line.split() for line in out.splitlines())
@@ -317,7 +319,12 @@ def test_an_interrupted_watcher_leaves_the_job_running(service: Service, owner: 
     job = submitted(service, owner)
     claimed(service, job)
     with subprocess.Popen(
-        [ISLANDS, "jobs", "watch", job], env={**os.environ}, stderr=subprocess.PIPE, text=True
+        [ISLANDS, "jobs", "watch", job],
+        env={**os.environ},
+        stderr=subprocess.PIPE,
+        text=True,
+        # Whoever runs the tests in the background of a shell ignores it, and so would this one.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no thread yet
     ) as process:
         # It has been answered once, and waits for a change.
         eventually(lambda: any(each.get("path") == f"/v1/jobs/{job}" for each in service.logs))
@@ -369,6 +376,86 @@ def test_a_result_is_replaced_by_force_alone_and_without_leftovers(run: Run, don
     assert not Path("out/models/99.json").exists()
     assert not Path("out/figures/old.svg").exists()
     assert Path("out/notes.txt").read_text() == "of mine"
+
+
+# Discrepancy jobs.
+
+
+@pytest.fixture
+def diagnosed(service: Service, owner: str) -> str:
+    """A discrepancy job that has succeeded."""
+    spec = held("0-csv")
+    job = service.store.jobs.submit(Submission(owner, spec, DISCREPANCY, "piezo", priority=100))[0].id
+    blobs = Blobs(service.settings.blobs)
+    summary = {
+        "verdict": "named",
+        "effects": ["thermal-drift"],
+        "words": "It lacks something.\n  thermal-drift",
+    }
+    document = {"verdict": "named", "extended_model": "extended.json", "wall_s": 1.5}
+    artefacts = {REPORT: blobs.write(b"<!DOCTYPE html>"), EXTENDED: blobs.write(b'{"effects": []}')}
+    found = Outcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
+    service.store.leases.finish(claimed(service, job), found)
+    return job
+
+
+def test_a_discrepancy_job_is_submitted_as_it_is_said(run: Run, service: Service, owner: str) -> None:
+    words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--priority", 5)
+    code, out, err = run("diagnose", "r.csv", *COLUMNS, *words, "--rows", "0:150", "--json")
+    assert (code, err) == (0, "")
+    job = json.loads(out)
+    assert (job["kind"], job["name"], job["priority"]) == (DISCREPANCY, "r.csv", 5)
+    wanted = {"tolerance": {"dp": 0.01}, "seed": 3, "rows": "0:150"}
+    assert job["spec"] == {
+        **held(job["spec"]["dataset"], **wanted),
+        "simulation": {"kind": "bouc-wen-piezo", "parameters": {}},
+    }
+    code, out, err = run("show", job["id"])
+    assert out == f"job {job['id']}: queued\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("--simulation", "pendulum"), "unknown simulation 'pendulum'"),
+        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
+        (("--simulation", "bouc-wen-piezo", "--input", "t_s"), "is driven by one input, got u_V, t_s"),
+        (("--simulation", "column:y_sim"), "has no column y_sim"),
+        (("--simulation", "python:a.py:run"), "a service runs no code of others"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused_in_a_line(run: Run, arguments: Any, why: str) -> None:
+    code, out, err = run("diagnose", "r.csv", *COLUMNS, *arguments)
+    assert (code, out) == (2, "")
+    assert why in err
+    assert "Traceback" not in err
+
+
+def test_a_diagnosis_is_watched_listed_and_shown_in_words(run: Run, diagnosed: str) -> None:
+    words = "It lacks something.\n  thermal-drift\n"
+    assert run("watch", diagnosed)[1] == words
+    assert run("show", diagnosed)[1] == f"job {diagnosed}: succeeded\n{words}"
+    assert run("result", diagnosed)[1] == words
+    line = run("list")[1].splitlines()[1]
+    assert line.startswith(diagnosed)
+    assert line.endswith("piezo (named: thermal-drift)")
+
+
+def test_a_diagnosis_is_downloaded_as_the_command_line_writes_it(run: Run, diagnosed: str) -> None:
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("of mine")
+    code, out, err = run("result", diagnosed, "--out", "out")
+    assert code == 0, err
+    assert out.splitlines()[-1].startswith("out/: discrepancy.json, report.html, extended.json")
+    names = {"discrepancy.json", "report.html", "extended.json", "notes.txt"}
+    assert {path.name for path in Path("out").iterdir()} == names
+    document = json.loads(Path("out/discrepancy.json").read_text())
+    assert document == json.loads(run("result", diagnosed, "--json")[1])
+    assert Path("out/extended.json").read_bytes() == b'{"effects": []}'
+    code, _, err = run("result", diagnosed, "--out", "out")
+    assert code == 2
+    assert "holds a result already" in err
+    assert run("result", diagnosed, "--out", "out", "--force")[0] == 0
 
 
 # Refusals: one line, exit code 2.

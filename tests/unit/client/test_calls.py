@@ -13,9 +13,9 @@ from service import Service, csv, kept, queued
 from stores import FAILED, FOUND
 
 import islands_api
-from islands.errors import SettingsError
+from islands.errors import IslandsError, SettingsError
 from islands.evolution.settings import Settings
-from islands_api.client import AsyncClient, Client, ServiceError, calls
+from islands_api.client import AsyncClient, Client, ServiceError, calls, discrepancies
 from islands_api.client.calls import Call
 from islands_api.documents import job_document
 from islands_api.schemas import DatasetView, JobPage, JobRequest, JobView
@@ -197,6 +197,54 @@ def test_every_submission_has_a_key_of_its_own_unless_one_is_given(client: Any, 
 def test_what_cannot_be_sent_is_refused_before_it_is(wrong: dict[str, Any]) -> None:
     with pytest.raises(SettingsError, match=r"NaN or infinite|a line of ASCII"):
         calls.submit("0-csv", ["u_V"], "y_um", **wrong)
+
+
+def test_a_discrepancy_job_says_what_was_submitted(client: Any, me: Any) -> None:
+    simulation = {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}
+    job = client.diagnose(
+        me.dataset,
+        "u_V",
+        "y_um",
+        simulation,
+        tolerance={"dp": 0.01},
+        seed=7,
+        rows=None,
+        name="piezo",
+        priority=3,
+        idempotency_key="mine",
+    )
+    assert (job.kind, job.state, job.name, job.priority) == ("discrepancy", "queued", "piezo", 3)
+    wanted = {"dataset": me.dataset, "input": "u_V", "output": "y_um", "seed": 7}
+    assert job.spec == {**wanted, "simulation": simulation, "tolerance": {"dp": 0.01}}
+    assert client.job(job) == job
+    again = client.diagnose(me.dataset, "u_V", "y_um", "bouc-wen-piezo")
+    assert again.spec["simulation"] == {"kind": "bouc-wen-piezo", "parameters": {}}
+    for call in (client.report, client.extended, client.result):
+        with pytest.raises(ServiceError, match="wait until it has succeeded"):
+            call(again)
+    with pytest.raises(ServiceError, match="only those of the kind identification"):
+        client.models(again)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("pendulum", "unknown simulation 'pendulum'"),
+        ("model:none.json", "none.json cannot be read"),
+        ("python:model.py:run", "a service runs no code of others"),
+    ],
+)
+def test_a_simulation_that_cannot_be_sent_is_refused_before_it_is(text: str, why: str) -> None:
+    with pytest.raises(IslandsError, match=why):
+        discrepancies.diagnose("0-csv", "u_V", "y_um", text)
+
+
+def test_a_model_file_goes_along(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    path.write_text('{"terms": []}')
+    body = discrepancies.diagnose("0-csv", "u_V", "y_um", f"model:{path}", channels="T_K").json
+    assert body["channels"] == ["T_K"]
+    assert body["simulation"] == {"kind": "model", "model": {"terms": []}, "name": "model model.json"}
 
 
 def test_a_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> None:

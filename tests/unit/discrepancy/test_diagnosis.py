@@ -9,9 +9,10 @@ from islands.data.dataset import Dataset, join
 from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
 from islands.discrepancy.cores.column import ColumnCore
 from islands.discrepancy.decision import Verdict
-from islands.discrepancy.diagnosis import FEWEST, LOCKED, Diagnosis, diagnose
+from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.preparation import FEWEST, LOCKED
 from islands.errors import RecordError, SettingsError
-from islands.io.diagnoses import diagnosis_json
+from islands.io.diagnoses import as_json, diagnosis_document
 from islands.systems.bouc_wen import BoucWenPiezo
 from islands.trials.hide.records import hide
 from islands.trials.trial import TOLERANCE
@@ -53,7 +54,8 @@ def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: 
 
 
 def test_the_same_question_has_the_same_answer(record: Dataset, found: Diagnosis) -> None:
-    assert diagnosis_json(diagnose(record, BoucWenPiezoCore(), TOLERANCE)) == diagnosis_json(found)
+    again = diagnose(record, BoucWenPiezoCore(), TOLERANCE)
+    assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
 
 
 def test_what_is_locked_away_is_seen_by_the_gain_alone(record: Dataset, found: Diagnosis) -> None:
@@ -89,10 +91,10 @@ def test_a_column_is_a_simulation(record: Dataset) -> None:
 
 
 def _nominal(record: Dataset) -> tuple:
-    from islands.discrepancy.diagnosis import _fitted, _scene
+    from islands.discrepancy.preparation import fitted_samples, scene_of
 
     core = BoucWenPiezoCore()
-    scene = _scene(record, core, _fitted(record))
+    scene = scene_of(record, core, fitted_samples(record))
     return np.array([each.nominal for each in core.parameters]), scene.u, scene, {}, ()
 
 

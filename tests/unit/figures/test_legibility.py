@@ -2,13 +2,16 @@
 
 import itertools
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+import islands
 from islands.data.dataset import Dataset
+from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.loop import draw_loop
@@ -34,6 +37,15 @@ def leaking(pole: float) -> Model:
     return model_of([(parse("y(k-1)"), pole), (parse("u(k-1)"), 0.02)], ("u0_V",), "y_um", 1e-3)
 
 
+@cache
+def diagnosis(samples: int, scale: float = 1.0):
+    """Return a diagnosis of a column that lacks an offset."""
+    made = record(samples, scale=scale)
+    noise = np.random.default_rng(8).standard_normal(samples)
+    simulated = made.y - scale * (0.3 + 0.05 * noise)
+    return islands.diagnose(made, "column:y_sim", columns={"y_sim": simulated})
+
+
 SHORT, LONG = record(200), record(20_000)
 TWO = record(600, inputs=2, segments=(350, 250))
 LARGE = record(5_000, scale=12_345.0, start=1e4)
@@ -52,6 +64,13 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "residuals": lambda: draw_residual_correlations(residual_tests(SHORT.y, SHORT.u), LONG_TITLE),
     "residuals of two inputs": lambda: draw_residual_correlations(residual_tests(TWO.y, TWO.u)),
     "residuals of a constant": lambda: draw_residual_correlations(residual_tests(SHORT.y, 0 * SHORT.u)),
+    **{
+        f"{name} of a diagnosis, {samples} samples": lambda draw=draw, samples=samples, scale=scale: draw(
+            diagnosis(samples, scale)
+        )
+        for name, draw in DISCREPANCY_FIGURES.items()
+        for samples, scale in ((400, 1.0), (2000, 12_345.0))
+    },
 }
 
 

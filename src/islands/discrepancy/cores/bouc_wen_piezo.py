@@ -5,10 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from islands.discrepancy.core import Forces, add_forces
-from islands.discrepancy.effect import Scene, Signal, Site
-from islands.discrepancy.effects.changes import after
+from islands.discrepancy.core import Forces
+from islands.discrepancy.cores.coordinates import of_input
+from islands.discrepancy.effect import Effect, Site
+from islands.discrepancy.effects.changes import gain_over_time
+from islands.discrepancy.element import beside
 from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.scene import Frame, Scene, Signal
 from islands.kernels.hysteresis import bouc_wen
 from islands.systems.bouc_wen import BoucWenPiezo
 
@@ -29,12 +32,15 @@ class BoucWenPiezoCore:
     understood: frozenset[str] = frozenset(
         ("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing")
     )
+    has: frozenset[str] = frozenset()
+    effects: tuple[Effect, ...] = ()
+    integrates: bool = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """A, beta, gamma, dp: a fifth to five times what they are nominally."""
         return tuple(
-            Parameter(name, unit, nominal, part * abs(nominal), *sorted((0.2 * nominal, 5.0 * nominal)))
+            Parameter(name, unit, nominal, part * abs(nominal), *_about(nominal))
             for name, unit, nominal, part in (
                 ("A", "um/V", self.piezo.A, 0.01),
                 ("beta", "1/V", self.piezo.beta, 0.03),
@@ -42,6 +48,10 @@ class BoucWenPiezoCore:
                 ("dp", "um/V", self.piezo.dp, 0.005),
             )
         )
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.core.Core`."""
+        return of_input(scene, output)
 
     def simulate(
         self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
@@ -59,9 +69,9 @@ class BoucWenPiezoCore:
             ),
             *(0.0, h),
         )
-        gain = dp
-        if "gain-step" in own:
-            gain = gain * (1.0 + own["gain-step"] * after(scene, own["gain-step instant"]))
-        if "ageing" in own:
-            gain = gain * (1.0 + own["ageing"] * scene.time / scene.duration)
-        return add_forces(gain * x - h, x, scene, forces)
+        return dp * gain_over_time(own, scene) * x - h + beside(x, scene, forces)
+
+
+def _about(nominal: float) -> tuple[float, float]:
+    ends = (0.2 * nominal, 5.0 * nominal)
+    return min(ends), max(ends)

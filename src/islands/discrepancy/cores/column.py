@@ -5,9 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.core import Forces, add_forces
-from islands.discrepancy.effect import Scene, Signal, Site
+from islands.discrepancy.core import Forces
+from islands.discrepancy.cores.coordinates import of_input
+from islands.discrepancy.effect import Effect, Site
+from islands.discrepancy.element import beside
 from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.scene import Frame, Scene, Signal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,15 +22,27 @@ class ColumnCore:
 
     Attributes
     ----------
-    name : str
+    column : str
     simulated : ndarray, shape (samples,)
     """
 
-    name: str
+    column: str
     simulated: Signal
     parameters: tuple[Parameter, ...] = ()
     sites: frozenset[Site] = frozenset((Site.FORCE, Site.OUTPUT))
     understood: frozenset[str] = frozenset()
+    has: frozenset[str] = frozenset()
+    effects: tuple[Effect, ...] = ()
+    integrates: bool = False
+
+    @property
+    def name(self) -> str:
+        """How it is asked for."""
+        return f"column {self.column}"
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.core.Core`."""
+        return of_input(scene, output)
 
     def simulate(
         self,
@@ -38,4 +53,4 @@ class ColumnCore:
         forces: Forces,
     ) -> Signal:
         """See `islands.discrepancy.core.Core`."""
-        return add_forces(np.asarray(self.simulated), x, scene, forces)
+        return np.asarray(self.simulated) + beside(x, scene, forces)

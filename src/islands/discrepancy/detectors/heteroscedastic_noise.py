@@ -17,6 +17,8 @@ def _detect(y: Signal, residual: Signal, scene: Scene) -> Detection | None:
     n = left.size
     # A few outliers at large outputs would look the same: nobody weighs more than four deviations.
     scale = float(np.median(np.abs(left))) / 0.6745
+    if scale == 0.0:  # most of it is no noise at all
+        return None
     squares = np.minimum(left**2, (4 * scale * (1.0 + size)) ** 2)
     costs = [
         n * float(np.log(np.mean(squares / (1.0 + k * size) ** 2))) + 2 * float(np.sum(np.log1p(k * size)))

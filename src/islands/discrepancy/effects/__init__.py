@@ -4,7 +4,8 @@ An effect is one file with one `EFFECT`; a line here puts it into the analysis, 
 guide.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from inspect import getmodule
 
 from islands.discrepancy.effect import Effect
 from islands.discrepancy.effects import (
@@ -12,6 +13,7 @@ from islands.discrepancy.effects import (
     ageing,
     backlash,
     clock_skew,
+    core_shape,
     coulomb_friction,
     cross_coupling,
     cubic_stiffness,
@@ -21,12 +23,14 @@ from islands.discrepancy.effects import (
     exponential_creep,
     gain_step,
     input_gain,
+    input_offset,
     input_saturation,
     jump,
     linear_drift,
     logarithmic_creep,
     loop_asymmetry,
     offset,
+    outflow_law,
     output_saturation,
     periodic_disturbance,
     quadratic_drag,
@@ -36,14 +40,16 @@ from islands.discrepancy.effects import (
     second_hysteresis,
     sensor_gain,
     sensor_lag,
+    state_clip,
     stiction,
     thermal_drift,
     viscous,
     viscous_asymmetry,
+    wrong_parameter,
 )
 
-CATALOGUE: Mapping[str, Effect] = {
-    module.EFFECT.name: module.EFFECT
+_MODULES = {
+    module.EFFECT.name: module
     for module in (
         delay,
         clock_skew,
@@ -79,6 +85,27 @@ CATALOGUE: Mapping[str, Effect] = {
         periodic_disturbance,
     )
 }
+
+CATALOGUE: Mapping[str, Effect] = {name: module.EFFECT for name, module in _MODULES.items()}
+
+#: Effects that a simulation's own parameters and states have, one of each.
+OF_EACH: Mapping[str, Callable[..., Effect]] = {
+    module.NAME: make
+    for module, make in (
+        (wrong_parameter, wrong_parameter.wrong_parameter),
+        (state_clip, state_clip.state_clip),
+        (input_offset, input_offset.input_offset),
+        (outflow_law, outflow_law.outflow_law),
+        (core_shape, core_shape.core_shape),
+    )
+}
+
+
+def sentence(name: str) -> str:
+    """Return what an effect is, in a sentence with its form."""
+    cause = name.partition(":")[0]
+    module = _MODULES[cause] if cause in _MODULES else getmodule(OF_EACH[cause])
+    return (module.__doc__ or "").strip().partition("\n")[0].rstrip(".")
 
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:

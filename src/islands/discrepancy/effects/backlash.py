@@ -1,6 +1,7 @@
 """The input acts through a play of half width b."""
 
 from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.effects import stiction
 from islands.discrepancy.parameter import Parameter
 from islands.kernels.hysteresis import played
 
@@ -25,5 +26,5 @@ EFFECT = Effect(
     grid=_grid,
     form=_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
-    linear=0,
+    alike=(stiction.EFFECT, 2.0),
 )

@@ -1,5 +1,7 @@
 """Changes at an instant: where they may lie, and how they set in."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import scipy
 
@@ -25,3 +27,13 @@ def after(scene: Scene, instant: float) -> Signal:
     """Return 0 before an instant and 1 behind it, within a few samples: a jump would have no derivative."""
     out: Signal = scipy.special.expit((scene.time - instant) / (2 * scene.dt))
     return out
+
+
+def gain_over_time(own: Mapping[str, float], scene: Scene) -> Signal | float:
+    """Return the factor of a gain that steps or ages, for a core that understands both; 1 if it does not."""
+    gain: Signal | float = 1.0
+    if "gain-step" in own:
+        gain = gain * (1.0 + own["gain-step"] * after(scene, own["gain-step instant"]))
+    if "ageing" in own:
+        gain = gain * (1.0 + own["ageing"] * scene.time / scene.duration)
+    return gain

@@ -1,26 +1,28 @@
 """Dry friction: - F sign(x')."""
 
-import numpy as np
+from math import tanh
+from typing import Any
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects.rates import rate_of
+from islands.discrepancy.effect import Effect, Element, Scene, Signal, Site
 from islands.discrepancy.parameter import Parameter
 
-#: Part of the usual rate within which the force turns.
-_SMOOTH = 0.005
 
-
-def _form(_x: Signal, rate: Signal, values: Signal, scene: Scene) -> Signal:
+def _force(_x: float, rate: float, _z: float, numbers: Any) -> float:
     # Smooth within a part of the usual rate: a step would have no derivative.
-    return -values[0] * np.tanh(rate / (_SMOOTH * rate_of(scene)))
+    return numbers[0] * tanh(rate / numbers[1])
+
+
+def _turning(scene: Scene) -> tuple[float, ...]:
+    return (scene.frame.sharp * scene.frame.rate,)
 
 
 def _parameters(scene: Scene) -> tuple[Parameter, ...]:
-    return (Parameter("F", scene.output_unit, 0.0, 0.005 * scene.output_peak),)
+    frame = scene.frame
+    return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.least),)
 
 
 def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * scene.output_peak,),)
+    return ((0.01 * scene.frame.force,),)
 
 
 EFFECT = Effect(
@@ -29,6 +31,6 @@ EFFECT = Effect(
     site=Site.FORCE,
     parameters=_parameters,
     grid=_grid,
-    form=_form,
+    form=Element(_force, constants=_turning, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )

@@ -5,6 +5,9 @@ import numpy as np
 from islands.discrepancy.effect import Effect, Scene, Signal, Site
 from islands.discrepancy.parameter import Parameter
 
+#: Part of its peak within which an input has to come to zero.
+_NEAR = 0.05
+
 
 def _form(u: Signal, values: Signal, _scene: Scene) -> Signal:
     return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
@@ -27,6 +30,11 @@ def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((part * scene.input_peak,) for part in (0.0075, 0.025, 0.075))
 
 
+def _crossed(scene: Scene) -> bool:
+    # Of an input that is never near zero nobody can say more than that it is smaller.
+    return float(np.min(np.abs(scene.u))) < _NEAR * scene.input_peak
+
+
 EFFECT = Effect(
     name="dead-zone",
     family="shape",
@@ -34,6 +42,6 @@ EFFECT = Effect(
     parameters=_parameters,
     grid=_grid,
     form=_form,
+    applies=_crossed,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
-    linear=0,
 )

@@ -1,26 +1,22 @@
-"""An even part of the characteristic: + k x^2."""
+"""An even part of the characteristic: + k x^2, of a stiffness on the side of what resists."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
+from typing import Any
+
+from islands.discrepancy.effect import Effect, Element, Scene, Signal, Site
 from islands.discrepancy.parameter import Parameter
 
 
-def _form(x: Signal, _rate: Signal, values: Signal, _scene: Scene) -> Signal:
-    return values[0] * x * x
+def _force(x: float, _rate: float, _z: float, k: Any) -> float:
+    return k[0] * x * x
 
 
 def _parameters(scene: Scene) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "k",
-            f"{scene.output_unit}/{scene.input_unit}^2",
-            0.0,
-            0.01 * scene.output_peak / scene.input_peak**2,
-        ),
-    )
+    frame = scene.frame
+    return (Parameter("k", f"{frame.force_unit}/{frame.unit}^2", 0.0, 0.01 * frame.force / frame.peak**2),)
 
 
 def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.output_peak / scene.input_peak**2,),)
+    return ((0.02 * scene.frame.force / scene.frame.peak**2,),)
 
 
 EFFECT = Effect(
@@ -29,6 +25,6 @@ EFFECT = Effect(
     site=Site.FORCE,
     parameters=_parameters,
     grid=_grid,
-    form=_form,
+    form=Element(_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )

@@ -1,29 +1,23 @@
 """Drag of a turbulent flow: - c |x'| x'."""
 
-import numpy as np
+from typing import Any
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects.rates import rate_of
+from islands.discrepancy.effect import Effect, Element, Scene, Signal, Site
 from islands.discrepancy.parameter import Parameter
 
 
-def _form(_x: Signal, rate: Signal, values: Signal, _scene: Scene) -> Signal:
-    return -values[0] * np.abs(rate) * rate
+def _force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * abs(rate) * rate
 
 
 def _parameters(scene: Scene) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "c",
-            f"{scene.output_unit} s^2/{scene.input_unit}^2",
-            0.0,
-            0.01 * scene.output_peak / rate_of(scene) ** 2,
-        ),
-    )
+    frame = scene.frame
+    unit = f"{frame.force_unit} s^2/{frame.unit}^2"
+    return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.least),)
 
 
 def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.output_peak / rate_of(scene) ** 2,),)
+    return ((0.02 * scene.frame.force / scene.frame.rate**2,),)
 
 
 EFFECT = Effect(
@@ -32,6 +26,6 @@ EFFECT = Effect(
     site=Site.FORCE,
     parameters=_parameters,
     grid=_grid,
-    form=_form,
+    form=Element(_force, dissipative=True),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )

@@ -1,7 +1,6 @@
 """The loop's shape changes with the rate: beta, gamma (1 + k |u'|)."""
 
 from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects.rates import rate_of
 from islands.discrepancy.parameter import Parameter
 
 
@@ -11,15 +10,15 @@ def _parameters(scene: Scene) -> tuple[Parameter, ...]:
             "rate-dependent-loop",
             f"s/{scene.input_unit}",
             0.0,
-            0.05 / rate_of(scene),
-            -0.6 / rate_of(scene),
-            5.0 / rate_of(scene),
+            0.05 / scene.frame.rate,
+            -0.6 / scene.frame.rate,
+            5.0 / scene.frame.rate,
         ),
     )
 
 
 def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.1 / rate_of(scene),),)
+    return ((0.1 / scene.frame.rate,),)
 
 
 EFFECT = Effect(

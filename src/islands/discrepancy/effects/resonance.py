@@ -15,7 +15,8 @@ def _form(y: Signal, values: Signal, scene: Scene) -> Signal:
     w = 2 * np.pi / period if period > 0.0 else np.inf
     if w * scene.dt > FASTEST:
         return y
-    # Bilinear, with the resonance itself kept where it is.
+    # Bilinear, with the resonance itself kept where it is. In finer steps, the output interpolated between
+    # its samples, it takes the place of a delay where these are sparse (the gas furnace, the hair dryer).
     k = w / np.tan(w * scene.dt / 2)
     scale = k * k + 2 * zeta * w * k + w * w
     b = w * w / scale

@@ -4,19 +4,22 @@ import numpy as np
 
 from islands.discrepancy.effect import Signal
 
+#: Neighbours that an interpolation goes through: with four, a signal of ten samples a period is out by as
+#: much as a delay of a hundredth of a sample.
+_NEIGHBOURS = (-2, -1, 0, 1, 2, 3)
+
 
 def at_samples(signal: Signal, at: Signal) -> Signal:
-    """Interpolate through four neighbours at positions counted in samples; the ends are held."""
+    """Interpolate through six neighbours (Lagrange) at positions counted in samples; the ends are held."""
     last = signal.size - 1
     at = np.clip(at, 0.0, last)
     first = np.minimum(at.astype(np.int64), max(last - 1, 0))
     f = at - first
-    before, behind = signal[np.maximum(first - 1, 0)], signal[np.minimum(first + 2, last)]
-    here, there = signal[first], signal[np.minimum(first + 1, last)]
-    interpolated: Signal = (
-        -f * (f - 1) * (f - 2) / 6 * before
-        + (f + 1) * (f - 1) * (f - 2) / 2 * here
-        - (f + 1) * f * (f - 2) / 2 * there
-        + (f + 1) * f * (f - 1) / 6 * behind
-    )
+    interpolated = np.zeros_like(at)
+    for here in _NEIGHBOURS:
+        weight = signal[np.clip(first + here, 0, last)]
+        for other in _NEIGHBOURS:
+            if other != here:
+                weight = weight * ((f - other) / (here - other))
+        interpolated += weight
     return interpolated

@@ -1,26 +1,22 @@
 """Friction that differs between the directions: - c |x'|."""
 
-import numpy as np
+from typing import Any
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects.rates import rate_of
+from islands.discrepancy.effect import Effect, Element, Scene, Signal, Site
 from islands.discrepancy.parameter import Parameter
 
 
-def _form(_x: Signal, rate: Signal, values: Signal, _scene: Scene) -> Signal:
-    return -values[0] * np.abs(rate)
+def _force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * abs(rate)
 
 
 def _parameters(scene: Scene) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "c", f"{scene.output_unit} s/{scene.input_unit}", 0.0, 0.01 * scene.output_peak / rate_of(scene)
-        ),
-    )
+    frame = scene.frame
+    return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
 
 
 def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.output_peak / rate_of(scene),),)
+    return ((0.02 * scene.frame.force / scene.frame.rate,),)
 
 
 EFFECT = Effect(
@@ -29,6 +25,6 @@ EFFECT = Effect(
     site=Site.FORCE,
     parameters=_parameters,
     grid=_grid,
-    form=_form,
+    form=Element(_force, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )

@@ -26,8 +26,3 @@ def wrong_parameter(parameter: Parameter) -> Effect:
         form=None,
         source="Ljung, System Identification, 2nd ed., section 7",
     )
-
-
-def plain(name: str) -> str:
-    """Return a name as the catalogue has it: of one parameter's effect, without that."""
-    return name.partition(":")[0]

@@ -1,4 +1,4 @@
-"""What drives the truth: noise through a low-pass, a temperature that wanders, a neighbour that moves."""
+"""What drives the truth: an excitation, a temperature that wanders, a neighbour that moves."""
 
 from dataclasses import dataclass
 
@@ -8,55 +8,69 @@ from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
 
-#: Samples a second of the truth, and how many of them make one of the record.
-RATE, DECIMATION = 1000, 10
-
-#: Largest input in V, and the frequency in Hz up to which it moves.
-PEAK, BAND = 40.0, 1.0
-
-#: Largest output of the actuator in um, and the usual rate of its input in V/s: what strengths refer to.
-OUTPUT, SPEED = 45.0, 60.0
+#: The temperature's and the neighbour's highest frequency, as parts of the excitation's.
+_SLOW, _NEAR = 0.05, 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """What acts on the truth, at its own rate.
+    """What acts on the truth, at the truth's own rate, and the sizes that strengths refer to.
 
     Attributes
     ----------
     time, u : ndarray, shape (samples,)
-        Seconds, and volts.
+        Seconds, and the input.
     temperature : ndarray, shape (samples,)
         In K, from where it began.
     neighbour : ndarray, shape (samples,)
-        In V.
+        Its largest value is 1.
+    rate : float
+        Samples a second.
+    peak, output : float
+        The usual largest input and output.
     """
 
     time: Signal
     u: Signal
     temperature: Signal
     neighbour: Signal
+    rate: float
+    peak: float
+    output: float
 
 
-def drive(rng: np.random.Generator, seconds: float) -> Drive:
-    """Draw what acts on the truth; the input begins at rest."""
-    count = int(seconds * RATE)
-    time = np.arange(count) / RATE
-    u = _noise(rng, count, BAND) * np.minimum(1.0, time)
-    wander = np.cumsum(_noise(rng, count, 0.05))
+def driven(
+    rng: np.random.Generator, u: Signal, rate: float, band: float, peak: float, output: float
+) -> Drive:
+    """Draw what acts on the truth beside its input; ``band`` is the input's highest frequency in Hz."""
+    wander = np.cumsum(noise(rng, u.size, rate, _SLOW * band, band))
     wander -= wander[0]
-    neighbour = _noise(rng, count, 0.7 * BAND)
+    neighbour = noise(rng, u.size, rate, _NEAR * band, band)
     return Drive(
-        time,
-        PEAK * u / np.max(np.abs(u)),
+        np.arange(u.size) / rate,
+        u,
         wander / np.ptp(wander),
         neighbour / np.max(np.abs(neighbour)),
+        rate,
+        peak,
+        output,
     )
 
 
-def _noise(rng: np.random.Generator, count: int, band: float) -> Signal:
-    """Return noise below a frequency; what the filter needs to begin and to end is cut off."""
-    spare = 4 * RATE
-    poles = scipy.signal.butter(2, band, fs=RATE, output="sos")
+def noise(rng: np.random.Generator, count: int, rate: float, band: float, quickest: float) -> Signal:
+    """Return noise below a frequency.
+
+    What the filter needs to begin and to end is cut off: four periods of the quickest that is drawn.
+    """
+    spare = int(4 * rate / quickest)
+    poles = scipy.signal.butter(2, band, fs=rate, output="sos")
     smooth: Signal = scipy.signal.sosfiltfilt(poles, rng.standard_normal(count + 2 * spare))
     return smooth[spare:-spare]
+
+
+def multisine(rng: np.random.Generator, count: int, rate: float, band: float) -> Signal:
+    """Return sines of equal size and random phases: all that are periodic in the record, up to a band."""
+    lines = np.arange(1, int(band * count / rate) + 1)
+    spectrum = np.zeros(count // 2 + 1, dtype=complex)
+    spectrum[lines] = np.exp(1j * rng.uniform(0.0, 2 * np.pi, lines.size))
+    return np.fft.irfft(spectrum, count)

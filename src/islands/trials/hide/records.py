@@ -1,27 +1,31 @@
 """Records of a truth, as they would have been measured: decimated, and with noise."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.trials.hide.excitation import DECIMATION, OUTPUT, RATE, Drive, Signal, drive
-from islands.trials.hide.forms import KNOWN, UNKNOWN
+from islands.trials.hide.excitation import Drive, Signal
+from islands.trials.hide.hidden import Hidden, Hide, altered
+from islands.trials.hide.piezo import PIEZO
+from islands.trials.hide.system import System
 from islands.trials.hide.truth import Truth, respond
-
-#: Noise relative to the largest output, and how far the truth's parameters are from their nominal values: the
-#: tolerances that whoever made the simulation would state.
-NOISE = 0.003
-SPREAD = {"A": 0.01, "beta": 0.01, "gamma": 0.01, "dp": 0.005}
 
 #: Part of a record in which what is hidden has to be seen: the rest may be locked away.
 SEEN = 0.75
 
-#: How far below its least strength an effect may be to come into a band, in logarithms, and halvings of the
-#: interval of strengths until its misfit is there.
-_BELOW, _TRIES = 3.0, 14
+#: What calibration takes up: of these only what is left behind it can be seen.
+SCALE = ("sensor-gain", "input-gain", "wrong-parameter")
+
+#: Part of all clean records whose parameters are further from their nominal values than what counts as
+#: allowed: who calls less a wrong parameter has more false names than that.
+_BEYOND = 0.01
+
+#: How far below its least strength an effect may be to come into a band, and a gain above its most, in
+#: logarithms; halvings of the interval of strengths until its misfit is there, and draws of all else.
+_BELOW, _ABOVE, _TRIES, _DRAWS = 3.0, 1.5, 14, 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,83 +35,169 @@ class Hiding:
     Attributes
     ----------
     record : Dataset
-        Voltage, temperature and neighbour; displacement.
+        Input, temperature and neighbour; output.
     misfit : float
-        Root mean square of what was hidden, over the part that is not locked away, in the noise's.
+        Root mean square of what was hidden, over the part that is not locked away, in the noise's. Of gains
+        and parameters: of what is left of them when the parameters are moved as far as tolerances allow; and
+        so of all, where nothing is stated of parameters and they may be moved as far as they like.
     sigma : float
-        The noise's standard deviation in um.
+        The noise's standard deviation in the output's unit.
+    nominal : ndarray, shape (samples,)
+        What a system of nominal parameters would have done, with nothing hidden in it.
     """
 
     record: Dataset
     misfit: float
     sigma: float
+    nominal: Signal
 
 
 def hide(
     names: Sequence[str],
     rng: np.random.Generator,
-    seconds: float = 60.0,
+    seconds: float | None = None,
     pole: float = 0.0,
     band: tuple[float, float] | None = None,
     variant: bool = False,
+    system: System = PIEZO,
+    apart: bool = True,
+    free: bool = False,
 ) -> Hiding:
     """Hide effects, or nothing, in a record.
 
     Parameters
     ----------
     names : sequence of str
-        Of `KNOWN` and `UNKNOWN`.
+        Of what can be hidden in the system, known and unknown.
     rng : Generator
-    seconds : float
+    seconds : float, optional
+        The system's usual length where nothing is said.
     pole : float
         Of the noise's memory of the last sample of the record; 0 is white.
     band : tuple of float, optional
         Between which the misfit of each effect alone has to be, in standard deviations of the noise.
     variant : bool
         In forms unlike the usual ones, where there are others.
+    system : System
+    apart : bool
+        The truth's parameters are not the nominal ones, within what tolerances say. Else they are, for a
+        simulation that cannot be calibrated: then gains and parameters can be seen in full.
+    free : bool
+        Nothing is stated of the simulation's parameters: what they can take up is no misfit.
     """
-    driven = drive(rng, seconds)
-    truth = Truth()
-    for name, spread in SPREAD.items():
+    driven = system.drive(rng, seconds or system.seconds)
+    truth = system.truth
+    for name, spread in system.spread.items() if apart else ():
         factor = float(np.exp(spread * rng.standard_normal()))
-        truth = replace(truth, **{name: getattr(truth, name) * factor})
-    clean = respond(truth, driven)[::DECIMATION]
-    sigma = NOISE * OUTPUT
+        truth = altered(truth, **{name: getattr(truth, name) * factor})
+    seen = _Seen(system, driven, truth, free)
+    entries = {**system.known, **system.unknown}
     affected = truth
     for name in names:
-        affected = _hidden(name, rng, truth, affected, driven, clean, sigma, band, variant)
-    y = clean if affected is truth else respond(affected, driven)[::DECIMATION]
-    noise = sigma * _noise(rng, y.size, pole)
+        scale = free or (apart and name in SCALE)
+        affected = _hidden(entries[name], scale, rng, truth, affected, seen, band, variant)
+    y = seen.clean if affected is truth else seen.of(affected)
+    noise = seen.sigma * _noise(rng, y.size, pole)
     record = Dataset(
-        u=np.column_stack([driven.u, driven.temperature, driven.neighbour])[::DECIMATION],
+        u=np.column_stack([driven.u, driven.temperature, driven.neighbour])[:: system.decimation],
         y=y + noise,
-        dt=DECIMATION / RATE,
-        input_names=("u_V", "T_K", "w_V"),
-        input_units=("V", "K", "V"),
-        output_name="y_um",
-        output_unit="um",
+        dt=system.decimation / driven.rate,
+        input_names=(system.input[0], "T_K", system.neighbour[0]),
+        input_units=(system.input[1], "K", system.neighbour[1]),
+        output_name=system.output[0],
+        output_unit=system.output[1],
     )
-    return Hiding(record, _misfit(y - clean) / sigma, sigma)
+    misfit = seen.left if names and (free or (apart and set(names) & set(SCALE))) else seen.misfit
+    return Hiding(record, misfit(y), seen.sigma, seen.nominal)
+
+
+class _Seen:
+    """What a record shows of a truth, and how far that is from the truth with nothing hidden in it."""
+
+    def __init__(self, system: System, driven: Drive, truth: Truth, free: bool) -> None:
+        self._system, self._driven, self._free = system, driven, free
+        self.clean = self.of(truth)
+        self.nominal = self.of(system.truth)
+        self.sigma = system.noise * driven.output
+        self._moved: Signal | None = None
+
+    def of(self, truth: Truth) -> Signal:
+        """Return the samples of a truth that are recorded, without noise."""
+        return respond(truth, self._driven)[:: self._system.decimation]
+
+    def misfit(self, y: Signal) -> float:
+        """Return the root mean square of what was hidden, in the noise's."""
+        part = slice(int(SEEN * y.size))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.sqrt(np.mean((y - self.clean)[part] ** 2))) / self.sigma
+
+    def left(self, y: Signal) -> float:
+        """Return the same, of what is left when the nominal parameters are moved as far as they may be.
+
+        To the first order, and all parameters together: they are as many tolerances off, in the root of the
+        sum of squares, as in all but a few clean records.
+        """
+        part = slice(int(SEEN * y.size))
+        tolerance = self._system.tolerance
+        if self._moved is None:
+            self._moved = np.column_stack([self._by(name, stated) for name, stated in tolerance.items()])
+        moved, missed = self._moved[part], (y - self.nominal)[part]
+        reach = np.inf if self._free else float(np.sqrt(scipy.stats.chi2.ppf(1.0 - _BEYOND, len(tolerance))))
+        left = missed - moved @ _within(moved, missed, reach)
+        return float(np.sqrt(np.mean(left**2))) / self.sigma
+
+    def _by(self, name: str, far: float) -> Signal:
+        nominal = self._system.truth
+        change = {name: getattr(nominal, name) * (1.0 + far)}
+        return self.of(altered(nominal, **change)) - self.nominal
+
+
+def _within(columns: Signal, target: Signal, reach: float) -> Signal:
+    """Return least squares no longer than a reach: the pull to zero is as strong as that takes."""
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    values = np.maximum(values, 1e-12 * values[-1])
+    slope = vectors.T @ (columns.T @ target)
+
+    def far(pull: float) -> float:
+        return float(np.linalg.norm(slope / (values + pull))) - reach
+
+    pull = 0.0
+    if far(0.0) > 0.0:  # never, of a reach without end
+        pull = scipy.optimize.brentq(far, 0.0, float(np.linalg.norm(slope)) / reach)
+    return vectors @ (slope / (values + pull))
 
 
 def _hidden(
-    name: str,
+    entry: Hidden,
+    scale: bool,
     rng: np.random.Generator,
     truth: Truth,
     affected: Truth,
-    driven: Drive,
-    clean: Signal,
-    sigma: float,
+    seen: _Seen,
     band: tuple[float, float] | None,
     variant: bool,
 ) -> Truth:
-    entry = {**KNOWN, **UNKNOWN}[name]
-    forms = entry.forms if name == "wrong-parameter" else entry.forms[1:] if variant else entry.forms[:1]
-    form = forms[int(rng.integers(len(forms)))] if forms else entry.forms[0]
+    forms = (variant and entry.forms[entry.usual :]) or entry.forms[: entry.usual]
+    for _ in range(_DRAWS):
+        form = forms[int(rng.integers(len(forms)))]
+        hidden = _sought(entry, form, scale, rng, truth, seen, band)
+        if hidden is not None:
+            return hidden(affected)
+    raise ValueError(f"{entry.name} has no strength with a misfit within {band} sigma")
+
+
+def _sought(
+    entry: Hidden,
+    form: Hide,
+    scale: bool,
+    rng: np.random.Generator,
+    truth: Truth,
+    seen: _Seen,
+    band: tuple[float, float] | None,
+) -> Callable[[Truth], Truth] | None:
+    """Return what hides a form with a strength whose misfit is in a band, if there is one."""
     low, high = np.log(entry.least), np.log(entry.most)
     logarithm = float(rng.uniform(low, high))
-    if band is not None:
-        low = low - _BELOW
     state = rng.bit_generator.state
 
     def hidden(in_truth: Truth) -> Truth:
@@ -115,20 +205,17 @@ def _hidden(
         rng.bit_generator.state = state
         return form(rng, float(np.exp(logarithm)), in_truth)
 
-    for _ in range(_TRIES if band is not None else 0):
-        misfit = _misfit(respond(hidden(truth), driven)[::DECIMATION] - clean) / sigma
-        if band[0] <= misfit <= band[1]:  # type: ignore[index]
-            break
-        low, high = (logarithm, high) if misfit < band[0] else (low, logarithm)  # type: ignore[index]
+    if band is None:
+        return hidden
+    measure = seen.left if scale else seen.misfit
+    low, high = low - _BELOW, high + (_ABOVE if scale else 0.0)
+    for _ in range(_TRIES):
+        misfit = measure(seen.of(hidden(truth)))
+        if band[0] <= misfit <= band[1]:
+            return hidden
+        low, high = (logarithm, high) if misfit < band[0] else (low, logarithm)
         logarithm = (low + high) / 2
-    else:
-        if band is not None:
-            raise ValueError(f"{name} has no strength with a misfit within {band} sigma")
-    return hidden(affected)
-
-
-def _misfit(hidden: Signal) -> float:
-    return float(np.sqrt(np.mean(hidden[: int(SEEN * hidden.size)] ** 2)))
+    return None
 
 
 def _noise(rng: np.random.Generator, count: int, pole: float) -> Signal:

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from processes import eventually
+from service import held
 from stores import ALICE, child
 
 from islands.errors import IslandsError, RecordError
@@ -18,7 +19,16 @@ from islands.evolution.engine import SerialEngine
 from islands_service.blobs import Blobs, NoSuchBlob
 from islands_service.coordinator import loop
 from islands_service.coordinator.loop import Coordinator
-from islands_service.jobs import Job, JobState, Lease, Outcome, Report, Submission
+from islands_service.jobs import (
+    DISCREPANCY,
+    IDENTIFICATION,
+    Job,
+    JobState,
+    Lease,
+    Outcome,
+    Report,
+    Submission,
+)
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -79,6 +89,20 @@ def test_a_coordinator_carries_out_one_job_after_the_other(
     for each in (job, second):
         assert ends(store, each).state == JobState.SUCCEEDED
         assert [model.document for model in store.results.models(each.id)] == undisturbed[0]
+
+
+def test_a_coordinator_carries_out_jobs_of_every_kind(
+    store: Store, job: Job, coordinator: Callable[..., Thread]
+) -> None:
+    assert set(loop.WORK) == {IDENTIFICATION, DISCREPANCY}
+    short = store.jobs.submit(Submission(ALICE, held(job.spec["dataset"], rows="0:99"), DISCREPANCY))[0]
+    coordinator()
+    assert ends(store, job).state == JobState.SUCCEEDED
+    failed = ends(store, short)
+    assert failed.state == JobState.FAILED
+    assert failed.problem is not None
+    assert failed.problem["type"] == "invalid-record"
+    assert "99 samples, and a diagnosis takes " in failed.problem["detail"]
 
 
 @pytest.mark.parametrize(

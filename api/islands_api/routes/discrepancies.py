@@ -1,0 +1,42 @@
+"""Discrepancies: have a simulation held against a record, and take it along with what it lacked."""
+
+from typing import Any
+
+from fastapi import APIRouter, Response
+
+from islands_api.auth import Reader, Writer
+from islands_api.bodies import JSONRoute
+from islands_api.doors import AtDoors
+from islands_api.kinds import finished, of_kind
+from islands_api.problems import RESPONSES, NoSuchThing
+from islands_api.routes.jobs import Id
+from islands_api.schemas import DiscrepancyRequest, JobView
+from islands_api.submissions import ACCEPTED, JOBS, IdempotencyKey, accept
+from islands_service.jobs import DISCREPANCY, EXTENDED
+
+router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)
+
+
+@router.post("/v1/discrepancies", status_code=202, response_model=JobView, responses=ACCEPTED)
+async def submit(
+    request: DiscrepancyRequest, caller: Writer, doors: AtDoors, idempotency_key: IdempotencyKey = None
+) -> Any:
+    """Submit a job that finds out what a simulation gets wrong about a record, and why.
+
+    It is a job as all others are, under `/v1/jobs`: followed, cancelled and resumed there. Its `result` is
+    what the command line writes as `discrepancy.json`, its `report` says it in words and figures.
+    """
+    return await accept(doors, caller, request, DISCREPANCY, idempotency_key)
+
+
+@router.get(JOBS + "/{job}/extended", response_model=dict[str, Any])
+async def extended(job: Id, caller: Reader, doors: AtDoors) -> Response:
+    """Take the simulation with the effects that it lacked; there is none where nothing was named."""
+    found = await of_kind(doors, caller, job, DISCREPANCY)
+    document = await finished(doors, found)
+    blob = await doors.do(doors.store.results.artefact, job, EXTENDED)
+    if blob is None:
+        raise NoSuchThing(
+            f"job {job} has nothing to extend the simulation by: it found {document['verdict']}"
+        )
+    return Response(await doors.do(doors.blobs.read, blob), media_type="application/json")

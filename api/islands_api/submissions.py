@@ -1,0 +1,93 @@
+"""Submissions: a job of any kind is checked, accepted once, and answered with where it is."""
+
+from typing import Annotated, Any
+
+from fastapi import Header
+
+from islands.errors import IslandsError
+from islands_api.auth import Caller
+from islands_api.documents import Document, job_document
+from islands_api.doors import Doors
+from islands_api.schemas import DiscrepancyRequest, JobRequest
+from islands_service.admission import Doubt, admit
+from islands_service.inspection import inspected
+from islands_service.jobs import Job, Submission
+from islands_service.records import named
+
+#: Where jobs of every kind are.
+JOBS = "/v1/jobs"
+
+#: What every answer that shows a job says beside it.
+ETAG = {"description": "The job's version, for `If-None-Match`.", "schema": {"type": "string"}}
+ACCEPTED: dict[int | str, dict[str, Any]] = {
+    202: {
+        "description": "Accepted. With `Idempotent-Replayed: true` it is the job that the key named before.",
+        "headers": {
+            "ETag": ETAG,
+            "Location": {"description": "Where the job is.", "schema": {"type": "string"}},
+            "Retry-After": {"description": "Seconds after which to look.", "schema": {"type": "string"}},
+        },
+    }
+}
+
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        min_length=1,
+        max_length=255,
+        description="Send the same one again to be sure: it is one job.",
+    ),
+]
+
+Request = JobRequest | DiscrepancyRequest
+
+
+async def accept(doors: Doors, caller: Caller, request: Request, kind: str, key: str | None) -> Document:
+    """Accept a job, and say where it is.
+
+    Raises
+    ------
+    IslandsError
+        It could only fail, or its owner may not have it now.
+    """
+    submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
+    job, new = await _submitted(doors, request, submission)
+    if new:
+        doors.measures.accepted.inc()
+    headers = {"Location": f"{JOBS}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
+    if not new:
+        headers["Idempotent-Replayed"] = "true"
+    return Document(job_document(job), 202, headers)
+
+
+def etag(job: Job) -> str:
+    """Return what a job is known by as it is now."""
+    return f'"{job.version}"'
+
+
+async def _submitted(doors: Doors, request: Request, submission: Submission) -> tuple[Job, bool]:
+    before, doubts = await doors.do(_admitted, doors, request, submission)
+    if before is not None:
+        return before, False
+    for doubt in doubts:
+        with named(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
+            async with doors.inspections:
+                await inspected(
+                    path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
+                )
+    return await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
+
+
+def _admitted(doors: Doors, request: Request, submission: Submission) -> tuple[Job | None, tuple[Doubt, ...]]:
+    """Return what is in doubt about a submission, or the job that it is already.
+
+    That is looked for only where it spares an inspection or a refusal: what was accepted once stays so, even
+    if its data set was deleted since. All others are told by `Jobs.submit`, in the transaction that accepts.
+    """
+    try:
+        doubts = admit(request, submission.owner, doors.store, doors.settings)
+    except IslandsError:
+        if (before := doors.store.jobs.accepted(submission)) is not None:
+            return before, ()
+        raise
+    return doors.store.jobs.accepted(submission) if doubts else None, doubts

@@ -1,0 +1,80 @@
+"""A model linked once: it runs free again and again, with other parameters and on other inputs."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+from islands.kernels.machine import Program
+from islands.kernels.simulate import WIDTHS, Layout, simulate
+from islands.model.regressor import Regressor
+from islands.program.linker import link
+from islands.simulation.predictors import bound_from
+
+#: A single run stands in the first lane of the narrowest row.
+_WIDTH = WIDTHS[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkedModel:
+    """Regressors of a model, linked: what `free_run` makes anew for each simulation is made once here.
+
+    Attributes
+    ----------
+    regressors : tuple of Regressor
+    warm_up : int
+        Samples before the first that is predicted: the deepest lag.
+    """
+
+    regressors: tuple[Regressor, ...]
+    warm_up: int = field(init=False)
+    _program: Program = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warm_up", max(item.maximum_lag for item in self.regressors))
+        object.__setattr__(self, "_program", link(self.regressors))
+
+    def __reduce__(self) -> tuple[type["LinkedModel"], tuple[tuple[Regressor, ...]]]:
+        # A program holds addresses of this process: another one links anew.
+        return LinkedModel, (self.regressors,)
+
+    def free_run(
+        self, theta: NDArray[np.float64], u: NDArray[np.float64], start: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Simulate one recording from its first samples on.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (regressors,)
+        u : ndarray, shape (samples, inputs)
+        start : ndarray, shape (warm_up,)
+            The measured output before the first prediction.
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+            To the last bit what `free_run` predicts of a record whose output is missing behind the start: NaN
+            in the warm-up, and from where the run diverged.
+
+        Raises
+        ------
+        RecordError
+            The input is no longer than the warm-up.
+        """
+        samples, inputs = u.shape
+        if samples <= self.warm_up:
+            raise RecordError(f"the input has {samples} samples and the warm-up takes {self.warm_up}")
+        # One row lies a sample behind the other, as one step ahead: the lanes behind the first run on later
+        # samples, and nobody asks for them.
+        signals = np.zeros((1 + inputs, samples + _WIDTH))
+        signals[0, : self.warm_up] = start
+        signals[1:, :samples] = u.T
+        single, length = np.ones(1, np.int64), np.array([samples - self.warm_up])
+        cut = Layout(signals, 0 * single, single, 1, self.warm_up * single, length, _WIDTH, self.warm_up, 0.0)
+        bound = bound_from(start, complete=False)
+        diverged, predicted = np.empty(1, np.int64), np.full(samples, np.nan)
+        simulate(self._program, theta, cut, bound, np.inf, True, np.empty(1), diverged, predicted)
+        if diverged[0] >= 0:
+            predicted[self.warm_up + diverged[0] :] = np.nan
+        return predicted

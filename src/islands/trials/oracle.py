@@ -1,0 +1,82 @@
+"""The oracle: who is told the names of what is hidden, and only has to fit."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from islands.discrepancy.calibration import Calibrated, Target, calibrate
+from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.effect import Effect
+from islands.discrepancy.effects import core_shape, in_order
+from islands.discrepancy.preparation import effects_for
+
+#: Starts of each effect that are fitted, of those that promise most.
+_STARTS = 3
+
+#: Part of the error by which the oracle's has to be smaller, or there is no gain to have a share of.
+_LEAST = 0.01
+
+
+def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str, float]) -> float | None:
+    """Return what a diagnosis gained on the locked samples, relative to the oracle.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    names : sequence of str
+        What is hidden.
+    tolerance : mapping
+        What the diagnosis was given.
+
+    Returns
+    -------
+    float or None
+        None where the oracle gains next to nothing, or has no names for it either.
+    """
+    target = Target(found.record.y, np.arange(found.record.samples) < found.fitted, None, tolerance)
+    simulation = found.base.simulation
+    effects = effects_for(simulation.core, simulation.scene, tolerance)
+    told = found.base
+    # That its own form is wrong is no gain of a cause: both are held against the model with that mended.
+    for form in (effect for effect in effects if effect.name == core_shape.NAME):
+        told = _fitted(told, form, target)
+    before = _error(found, told)
+    for name in names:
+        alike = [effect for effect in effects if effect.name.partition(":")[0] == name]
+        if not alike:
+            return None
+        told = min((_fitted(told, effect, target) for effect in alike), key=lambda fit: fit.mean_square)
+    if told.noise.order:
+        told = calibrate(told.simulation, Target(target.y, target.seen, told.noise, tolerance), told.values)
+    after, best = _error(found, found.best), _error(found, told)
+    return (before - after) / (before - best) if best < (1.0 - _LEAST) * before else None
+
+
+def _error(found: Diagnosis, fit: Calibrated) -> float:
+    """Return the RMSE over the locked samples."""
+    return float(np.sqrt(np.mean((found.record.y - fit.output)[found.fitted :] ** 2)))
+
+
+def _fitted(fit: Calibrated, effect: Effect, target: Target) -> Calibrated:
+    """Return a simulation with one more effect in it, fitted from the starts that promise most."""
+    old, scene = fit.simulation, fit.simulation.scene
+    extended = old.with_effects(in_order((*old.effects, effect)))
+    part, own = extended.part(effect), len(old.core.parameters)
+    residual = target.residual(fit.output)
+    starts = []
+    for point in effect.grid(scene, target.y - fit.output):
+        start = extended.nominal
+        start[:own] = fit.values[:own]
+        for each in old.effects:
+            start[extended.part(each)] = fit.values[old.part(each)]
+        start[part] = point
+        response = target.observed(extended.simulate(start) - fit.output)
+        size = float(response @ response)
+        if not 0.0 < size < np.inf:
+            continue
+        along = float(response @ residual)
+        start[part][: effect.linear] *= along / size
+        starts.append((along**2 / size if effect.linear else 2 * along - size, start))
+    best = sorted(starts, key=lambda each: -each[0])[:_STARTS]
+    fits = [calibrate(extended, target, start) for _, start in best]
+    return min((each for each in fits if np.isfinite(each.mean_square)), key=lambda each: each.mean_square)

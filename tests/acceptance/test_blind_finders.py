@@ -1,0 +1,161 @@
+"""A finder that always says the same fails the tests that hide something: they are tests.
+
+Each mutant says what it says of whatever is asked; the checks of `test_hidden` are run on it.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import product
+
+import pytest
+from acceptance import test_hidden as checks
+
+from islands.discrepancy import preparation
+from islands.discrepancy.effects import CATALOGUE
+from islands.trials.hide.piezo import PIEZO
+from islands.trials.trial import Outcome, Trial
+
+Finder = Callable[[Trial], Outcome]
+
+
+def said(trial: Trial, *names: str, verdict: str | None = None) -> Outcome:
+    """Return what somebody says of a trial; of noise he knows what there is."""
+    noise = ("coloured-noise",) if trial.pole else ()
+    found = verdict or ("named" if names or noise else "nothing")
+    return Outcome(
+        trial, 1.0, found, names, noise, tuple(() for _ in names), names[:3], 1.0 if names else 0.0
+    )
+
+
+def knowing(trial: Trial) -> Outcome:
+    """Say what is hidden, and "unknown" where it has no name: no check may fail on that."""
+    if any(name in PIEZO.unknown for name in trial.effects):
+        return said(trial, verdict="unknown")
+    return said(trial, *trial.effects)
+
+
+def silent(trial: Trial) -> Outcome:
+    return said(trial)
+
+
+def always(name: str) -> Finder:
+    return lambda trial: said(trial, name)
+
+
+def permuted(trial: Trial) -> Outcome:
+    """Call everything by the next name of the list."""
+    known = list(PIEZO.known)
+    following = dict(zip(known, known[1:] + known[:1], strict=True))
+    right = knowing(trial)
+    return replace(right, named=tuple(following.get(name, known[0]) for name in right.named))
+
+
+def unsure(trial: Trial) -> Outcome:
+    return said(trial, verdict="unknown")
+
+
+def cases() -> Iterator[tuple[str, Callable[[], None]]]:
+    """Return every check of `test_hidden` with every argument that it is run with."""
+    for title, check in vars(checks).items():
+        if title.startswith("test_"):
+            for asked in arguments(check):
+                yield f"{title}{list(asked.values())}", partial(check, **asked)
+
+
+def arguments(check: Callable[..., None]) -> Iterator[dict[str, object]]:
+    """Return what the marks of a check say that it is run with."""
+    choices = []
+    for mark in getattr(check, "pytestmark", []):
+        names, values = mark.args
+        if isinstance(names, str):
+            choices.append([{names: value} for value in values])
+        else:
+            choices.append([dict(zip(names, each, strict=True)) for each in values])
+    for choice in product(*choices):
+        yield {name: value for each in choice for name, value in each.items()}
+
+
+CASES = dict(cases())
+
+
+def failures(finder: Finder, monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    """Return the checks that fail with a finder in the place of ours."""
+    monkeypatch.setattr(checks, "carried_out", finder)
+    failed = set()
+    for name, check in CASES.items():
+        try:
+            check()
+        except (AssertionError, IndexError):
+            failed.add(name)
+    return failed
+
+
+@pytest.fixture(scope="module")
+def hidden() -> dict[str, tuple[str, ...]]:
+    """Return what every check hides."""
+    seen: list[Trial] = []
+
+    def watching(trial: Trial) -> Outcome:
+        seen.append(trial)
+        return knowing(trial)
+
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        assert failures(watching, monkeypatch) == set()
+    return {name: trial.effects for name, trial in zip(CASES, seen, strict=True)}
+
+
+def test_everything_is_hidden_somewhere(hidden: dict[str, tuple[str, ...]]) -> None:
+    assert {(name,) for name in PIEZO.known} < set(hidden.values())
+
+
+def test_a_silent_finder_fails_all_but_the_clean_records(
+    hidden: dict[str, tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert failures(silent, monkeypatch) == {case for case, effects in hidden.items() if effects}
+
+
+@pytest.mark.parametrize("name", PIEZO.known)
+def test_one_who_always_says_the_same_fails_nearly_everywhere(
+    name: str, hidden: dict[str, tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failed = failures(always(name), monkeypatch)
+    assert failed == {case for case, effects in hidden.items() if effects != (name,)}
+
+
+def test_permuted_names_fail_wherever_there_are_names(
+    hidden: dict[str, tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    named = {case for case, effects in hidden.items() if effects and not set(effects) & set(PIEZO.unknown)}
+    assert failures(permuted, monkeypatch) == named
+
+
+def test_one_who_never_names_anything_fails_wherever_there_are_names(
+    hidden: dict[str, tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nameless = {case for case, effects in hidden.items() if set(effects) & set(PIEZO.unknown)}
+    assert failures(unsure, monkeypatch) == set(CASES) - nameless
+
+
+#: Effects that act one after the other on the output: their names may be exchanged.
+EXCHANGED = ("offset", "linear-drift", "jump", "thermal-drift")
+
+
+@pytest.mark.parametrize("name", ["jump", "thermal-drift"])
+def test_with_names_exchanged_in_the_catalogue_the_true_finder_fails(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not its words are changed here, but what it looks with."""
+    checks.test_a_hidden_effect_is_found(name, (1.5, 5.0))
+    wrong = dict(CATALOGUE)
+    for one, other in zip(EXCHANGED, EXCHANGED[1:] + EXCHANGED[:1], strict=True):
+        wrong[one] = replace(CATALOGUE[other], name=one)
+    monkeypatch.setattr(preparation, "CATALOGUE", wrong)
+    with pytest.raises(AssertionError):
+        checks.test_a_hidden_effect_is_found(name, (1.5, 5.0))
+
+
+def test_without_effects_in_the_catalogue_the_true_finder_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(preparation, "CATALOGUE", {})
+    with pytest.raises(AssertionError):
+        checks.test_a_hidden_effect_is_found("jump", (1.5, 5.0))

@@ -1,0 +1,95 @@
+"""The page of a discrepancy job, while a coordinator that the test plays carries it out."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from played import claimed, stored
+from screen import Screen
+from service_processes import Service
+
+from islands_service.blobs import Blobs
+from islands_service.jobs import EXTENDED, REPORT, JobState, Outcome, Report
+
+pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+
+WORDS = "The simulation lacks something <b>that has a name</b>.\n  thermal-drift: k = 1 um/K\nThe RMSE falls."
+
+SUMMARY = {"verdict": "named", "effects": ["thermal-drift"], "reduction_percent": 64.3, "words": WORDS}
+
+PAGE = b"<!DOCTYPE html><title>piezo.csv: named</title><h1>piezo.csv against bouc-wen-piezo</h1>"
+
+
+def diagnosed(desk: Service, **summary: Any) -> Outcome:
+    """What a diagnosis brings; its report is on the disk."""
+    blobs = Blobs(desk.folder / "blobs")
+    artefacts = {REPORT: blobs.write(PAGE), EXTENDED: blobs.write(b"{}")}
+    return Outcome(JobState.SUCCEEDED, {}, summary={**SUMMARY, **summary}, artefacts=artefacts)
+
+
+def submitted(desk: Service, **changes: Any) -> str:
+    spec = {"dataset": desk.dataset, "input": "u_V", "output": "y_um", "tolerance": {"dp": 0.01}}
+    simulation = {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}
+    answer = desk.ask("POST", "/v1/discrepancies", json={**spec, "simulation": simulation, **changes})
+    assert answer.status_code == 202, answer.text
+    return str(answer.json()["id"])
+
+
+def test_a_diagnosis_is_followed_and_says_what_it_found(
+    quiet: Callable[..., Screen], desk: Service, expect: Any, tmp_path: Path
+) -> None:
+    job = submitted(desk, name="piezo")
+    page = quiet(desk.url).go(f"#/jobs/{job}")
+    with stored(desk) as store:
+        lease = claimed(store, job)
+        store.leases.report(lease, Report({"phase": "looking for each of 32 effects"}))
+        expect(page.locator(".stand .words")).to_have_text("looking for each of 32 effects")
+        store.leases.finish(lease, diagnosed(desk))
+    expect(page.locator(".stand .words")).to_have_text("named: thermal-drift")
+    findings = page.locator(".findings")
+    expect(findings.locator("p")).to_have_text([line.strip() for line in WORDS.split("\n")])
+    assert findings.locator("b").count() == 0
+    assert page.locator("figure.chart").count() == 0
+    facts = page.locator(".about .facts").first
+    expect(facts).to_contain_text("bouc-wen-piezo: dp = 1.5")
+    expect(facts).to_contain_text("Tolerance of dp1 %")
+    with page.context.expect_page() as opened:
+        page.get_by_role("link", name="Read the report").click()
+    expect(opened.value.get_by_role("heading", level=1)).to_have_text("piezo.csv against bouc-wen-piezo")
+    with page.expect_download() as taken:
+        page.get_by_role("button", name="Save the report").click()
+    taken.value.save_as(tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_bytes() == PAGE
+    with page.expect_download() as taken:
+        page.get_by_role("button", name="Save the mended simulation").click()
+    assert taken.value.suggested_filename == f"extended-{job[:8]}.json"
+
+
+def test_a_long_finding_does_not_leave_a_narrow_screen(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    job = submitted(desk)
+    with stored(desk) as store:
+        effects = ["thermal-drift", "rate-dependent-loop", "second-hysteresis"]
+        store.leases.finish(claimed(store, job), diagnosed(desk, effects=effects))
+    page = quiet(desk.url, width=380).go(f"#/jobs/{job}")
+    for place in (f"#/jobs/{job}", "#/jobs"):
+        page.goto(f"{desk.url}/{place}")
+        expect(page.locator(".words", has_text="second-hysteresis").first).to_be_visible()
+        wide, seen = (page.evaluate(f"document.documentElement.{each}Width") for each in ("scroll", "client"))
+        assert wide <= seen
+
+
+def test_the_list_says_what_was_found(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+    jobs = [submitted(desk, name=name) for name in ("one", "two")]
+    nothing = {"verdict": "nothing", "effects": [], "reduction_percent": None}
+    with stored(desk) as store:
+        store.leases.finish(claimed(store, jobs[0]), diagnosed(desk))
+        store.leases.finish(claimed(store, jobs[1]), diagnosed(desk, **nothing))
+    page = quiet(desk.url).go()
+    for job, words in zip(jobs, ("named: thermal-drift", "nothing"), strict=True):
+        expect(page.locator(f"tr[data-job='{job}'] .words")).to_have_text(words)
+    page.get_by_role("link", name="two").first.click()
+    expect(page.get_by_role("button", name="Save the report")).to_be_visible()
+    assert page.get_by_role("button", name="Save the mended simulation").count() == 0

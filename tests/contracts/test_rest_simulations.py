@@ -1,0 +1,80 @@
+"""Which simulations a service takes: extended ones and linear ones, and no program of anybody's."""
+
+import json
+
+import pytest
+from service import problem_of
+from simulated_records import extension
+
+from islands.io.simulation_spec import PhysicalSpec
+
+
+def extended(core=None, **changes):
+    """Return an extended simulation as a diagnosis writes it."""
+    document = extension(
+        PhysicalSpec(kind="second-order", parameters={"m": 1.0, "c": 2.0, "k": 30.0}),
+        name="cubic-stiffness",
+        site="coordinate and rate",
+        parameters={"k": {"value": 2.0, "unit": "N/m^3"}},
+    )
+    document = {**document, "kind": "extended", "schema": "islands.extended/1", **changes}
+    return document if core is None else {**document, "core": core}
+
+
+def submitted(service, order, simulation):
+    return service.client.post("/v1/discrepancies", json={**order, "simulation": simulation})
+
+
+ACCEPTED = {
+    "extended": extended(),
+    "extended twice": extended(extended()),
+    "extended linear": extended(
+        {"kind": "linear", "order": 1, "numerator": [0.1, 0.0], "denominator": [0.9]}
+    ),
+    "in finer steps": extended(hold="zero-order", times=4),
+    "linear": {"kind": "linear", "order": 2},
+    "linear, delayed": {"kind": "linear", "order": 0, "delay": 3},
+    "linear, given": {
+        "kind": "linear",
+        "order": 1,
+        "numerator": [0.1, 0.0],
+        "denominator": [0.9],
+        "level": 1.0,
+    },
+    "second-order": {"kind": "second-order", "parameters": {"m": 2.0}},
+    "rigid-axis": {"kind": "rigid-axis"},
+    "cascaded-tanks": {"kind": "cascaded-tanks"},
+}
+
+
+@pytest.mark.parametrize("case", ACCEPTED)
+def test_a_simulation_of_ours_is_accepted_as_it_was_said(service, order, case):
+    answer = submitted(service, order, ACCEPTED[case])
+    assert answer.status_code == 202, answer.text
+    assert answer.json()["spec"]["simulation"] == ACCEPTED[case]
+
+
+PROGRAM = {"kind": "python", "path": "model.py", "function": "run"}
+REFUSED = {
+    "a program": (PROGRAM, "/simulation: Input tag 'python'"),
+    "a program in an extension": (extended(PROGRAM), "Input tag 'python'"),
+    "a program two deep": (extended(extended(PROGRAM)), "Input tag 'python'"),
+    "too high an order": ({"kind": "linear", "order": 11}, "/simulation/linear/order: "),
+    "a delay below zero": ({"kind": "linear", "order": 1, "delay": -1}, "/simulation/linear/delay: "),
+    "too few coefficients": ({"kind": "linear", "order": 2, "numerator": [1.0]}, "order 2 takes 3 and 2"),
+    "too many steps": (extended(times=1000), "/simulation/extended/times: "),
+    "another version": (extended(schema="islands.extended/2"), "/simulation/extended/schema: "),
+    "no scales": (extended(scales={}), "/simulation/extended/scales/"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_none_of_ours_is_refused_at_the_door(service, order, case):
+    simulation, words = REFUSED[case]
+    answer = service.client.post(
+        "/v1/discrepancies",
+        content=json.dumps({**order, "simulation": simulation}).encode(),
+        headers={"Content-Type": "application/json"},
+    )
+    assert words in problem_of(answer, 422, "invalid-request")
+    assert service.client.get("/v1/jobs").json()["items"] == []

@@ -1,0 +1,84 @@
+"""Discrepancy jobs of a service that runs: what was hidden is found, whatever happens meanwhile."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from front_door import succeed
+from processes import eventually, kill
+from service import HIDDEN, KNOWN, held, hidden
+from service_processes import Service, serving
+
+pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+
+#: Seconds of a record that takes a while to analyse.
+LONG = 150.0
+
+COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--simulation", "bouc-wen-piezo")
+TOLERANCES = [word for name, value in KNOWN.items() for word in ("--tolerance", f"{name}={value}")]
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    with serving(tmp_path_factory.mktemp("diagnoses") / "data") as running:
+        yield running
+
+
+def submitted(service: Service, folder: Path, seconds: float) -> str:
+    files = {"file": ("hidden.csv", hidden(folder, seconds))}
+    dataset = service.ask("POST", "/v1/datasets", files=files).json()["id"]
+    order = held(dataset, channels=["T_K"], tolerance=KNOWN)
+    answer = service.ask("POST", "/v1/discrepancies", json=order)
+    assert answer.status_code == 202, answer.text
+    return str(answer.json()["id"])
+
+
+def found(service: Service, job: str) -> tuple[dict[str, Any], bytes, bytes]:
+    """Wait for a job, and return all that it brought but the time that it took."""
+    ended = service.ended(job)
+    assert ended["state"] == "succeeded", ended
+    document, report, extended = (
+        service.ask("GET", f"/v1/jobs/{job}{of}") for of in ("/result", "/report", "/extended")
+    )
+    result = document.json()
+    assert result.pop("wall_s") > 0
+    return result, report.content, extended.content
+
+
+def test_what_was_hidden_is_found_as_by_the_command_line(service: Service, tmp_path: Path) -> None:
+    hidden(tmp_path)
+    where = ("--url", service.url)
+    said = succeed("jobs", "diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--watch", *where)
+    assert f"{HIDDEN}: k = " in said
+    (job,) = json.loads(succeed("jobs", "list", "--json", *where))["items"]
+    assert (job["kind"], job["summary"]["effects"]) == ("discrepancy", [HIDDEN])
+    succeed("jobs", "result", job["id"], "--out", tmp_path / "there", *where)
+    succeed("diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--out", tmp_path / "here")
+    results = [json.loads((tmp_path / each / "discrepancy.json").read_text()) for each in ("there", "here")]
+    assert [result.pop("wall_s") > 0 for result in results] == [True, True]
+    assert results[0] == results[1]
+    assert [effect["name"] for effect in results[0]["effects"]] == [HIDDEN]
+    for name in ("extended.json", "report.html"):
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+
+
+def test_a_killed_coordinator_costs_time_and_nothing_else(service: Service, tmp_path: Path) -> None:
+    undisturbed = found(service, submitted(service, tmp_path, LONG))
+    job = submitted(service, tmp_path, LONG)
+    eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
+    kill(service.one("coordinator"))
+    assert found(service, job) == undisturbed
+    assert service.job(job)["attempt"] == 2
+
+
+def test_a_running_diagnosis_is_cancelled_within_seconds_and_begins_anew(
+    service: Service, tmp_path: Path
+) -> None:
+    job = submitted(service, tmp_path, LONG)
+    eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
+    assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202
+    assert service.ended(job, seconds=5.0)["state"] == "cancelled"
+    assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
+    assert [effect["name"] for effect in found(service, job)[0]["effects"]] == [HIDDEN]

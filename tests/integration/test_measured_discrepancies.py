@@ -1,0 +1,103 @@
+"""What is named on measured records of which the cause is known, and what that is worth on unseen ones."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from benchmarks.measured_discrepancies import CASES, DATA, errors
+
+import islands
+from islands.discrepancy.decision import Finding
+from islands.discrepancy.diagnosis import Diagnosis
+
+pytestmark = [pytest.mark.measured, pytest.mark.timeout(600)]
+
+
+@cache
+def diagnosed(name: str) -> Diagnosis:
+    """Diagnose a record of the benchmark; skip the test where it is absent."""
+    case = CASES[name]
+    try:
+        record = case.record()
+    except FileNotFoundError as error:
+        pytest.skip(f"needs a measured record in {DATA} ({error.filename}): set ISLANDS_DATA_DIR")
+    return islands.diagnose(record, case.simulation)
+
+
+def causes(found: Diagnosis) -> tuple[Finding, ...]:
+    """Return what was named beside the noise."""
+    return tuple(each for each in found.effects if each.eta is not None)
+
+
+def names(found: Diagnosis) -> list[str]:
+    return [each.name for each in causes(found)]
+
+
+def missed(name: str) -> dict[str, list[float]]:
+    """Return the errors on records that nothing has seen: before, and with what was found."""
+    found = diagnosed(name)
+    return errors(CASES[name], found.record, found)
+
+
+def test_silverbox_has_a_cubic_spring() -> None:
+    found = diagnosed("silverbox")
+    assert names(found)[0] == "cubic-stiffness"
+    # The best published: 0.36, 0.26 and 0.32 mV.
+    after = {name: row[1] for name, row in missed("silverbox").items()}
+    assert after["multisine"] < 0.30
+    assert after["arrow"] < 0.40
+    assert after["arrow_noextrap"] < 0.33
+    before = {name: row[0] for name, row in missed("silverbox").items()}
+    assert min(before[name] / after[name] for name in after) > 10
+
+
+def test_the_bouc_wen_benchmark_has_a_hysteresis_and_nothing_else() -> None:
+    found = diagnosed("bouc-wen")
+    assert names(found) == ["second-hysteresis"]
+    before, after = missed("bouc-wen")["multisine"]
+    assert before > 100.0
+    assert after < 1.0
+
+
+def test_the_bouc_wen_benchmark_is_what_its_authors_have_made() -> None:
+    """Noel and Schoukens 2016: mass 2, alpha 5e4, beta gamma 800, beta delta -1100."""
+    found = diagnosed("bouc-wen")
+    element = found.effects[0].parameters
+    own = [parameter.name for parameter in found.best.simulation.core.parameters]
+    mass = float(found.best.values[own.index("m")])
+    official = {"k": 5e4, "chi": 800.0, "g": -1100.0}
+    for name, value in official.items():
+        assert element[name].value == pytest.approx(value, rel=0.01), name
+    assert mass == pytest.approx(2.0, rel=0.01)
+
+
+def test_the_tanks_overflow() -> None:
+    found = diagnosed("tanks")
+    assert "state-clip" in names(found)
+    assert len(names(found)) > 1
+    before, after = missed("tanks")["val"]
+    assert before > 0.6
+    assert after < 0.30
+
+
+@pytest.mark.parametrize("which", [2, 5])
+def test_a_damper_has_a_hysteresis_or_dry_friction(which: int) -> None:
+    found = diagnosed(f"damper 0.8712 V {which}")
+    assert names(found)[0] in ("second-hysteresis", "coulomb-friction")
+    assert found.gain is not None
+    assert found.gain.reduction_percent > 50
+
+
+@pytest.mark.parametrize("name", ["furnace", "dryer"])
+def test_a_model_without_a_delay_lacks_one(name: str) -> None:
+    first = causes(diagnosed(name))[0]
+    assert "delay" in (first.name, *first.equivalents)
+
+
+@pytest.mark.parametrize("name", ["furnace, delayed", "dryer, delayed"])
+def test_with_the_delay_in_it_no_cause_is_named(name: str) -> None:
+    """These are linear: nothing nonlinear hides in them."""
+    found = diagnosed(name)
+    assert names(found) == []
+    assert found.gain is None
+    assert np.isfinite(found.noise_floor)

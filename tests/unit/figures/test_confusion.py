@@ -1,0 +1,112 @@
+"""The confusion matrix: what stands where, in which colour, and that it can be read."""
+
+from collections.abc import Mapping
+from io import BytesIO
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from islands.figures.confusion import draw_confusion
+from islands.figures.style import FRAME, RESIDUAL, SIMULATED, save
+from islands.trials.hide.piezo import PIEZO
+
+COUNTS: Mapping[tuple[str, str], int] = {
+    ("delay", "delay"): 4,
+    ("delay", "offset"): 4,
+    ("offset", "offset"): 6,
+    ("offset", ""): 2,
+    ("ripple", "unknown"): 3,
+    ("ripple", "delay"): 1,
+    ("", ""): 20,
+}
+NAMES = ("offset", "delay", "jump")
+
+
+def rows(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.axes[0].get_yticklabels()]
+
+
+def columns(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.axes[0].get_xticklabels()]
+
+
+@pytest.fixture(scope="module")
+def figure() -> Figure:
+    return draw_confusion(COUNTS, NAMES, "a title")
+
+
+def test_names_stand_in_their_order_and_what_has_none_at_the_end(figure: Figure) -> None:
+    assert rows(figure) == ["offset", "delay", "ripple", "nothing"]
+    assert columns(figure) == ["offset", "delay", "unknown", "nothing"]
+
+
+def test_every_count_stands_in_its_cell(figure: Figure) -> None:
+    cells = {
+        (
+            rows(figure)[int(text.get_position()[1])],
+            columns(figure)[int(text.get_position()[0])],
+        ): text.get_text()
+        for text in figure.axes[0].texts
+    }
+    assert cells == {
+        (hidden or "nothing", called or "nothing"): str(n) for (hidden, called), n in COUNTS.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("cell", "colour", "share"),
+    [
+        (("delay", "delay"), RESIDUAL, 0.5),
+        (("delay", "offset"), SIMULATED, 0.5),
+        (("offset", "nothing"), FRAME, 0.25),
+        (("ripple", "unknown"), RESIDUAL, 0.75),
+        (("ripple", "delay"), SIMULATED, 0.25),
+        (("nothing", "nothing"), RESIDUAL, 1.0),
+    ],
+)
+def test_colours_say_right_wrong_or_nothing(
+    figure: Figure, cell: tuple[str, str], colour: str, share: float
+) -> None:
+    patches = {
+        (rows(figure)[int(each.get_y())], columns(figure)[int(each.get_x())]): each.get_facecolor()[:3]
+        for each in figure.axes[0].patches
+    }
+    tint = 0.25 + 0.75 * share
+    assert patches[cell] == pytest.approx(1 - tint * (1 - np.array(to_rgb(colour))))
+
+
+def test_a_catalogue_of_names_can_be_read() -> None:
+    """No name is cut off, none runs into its neighbour, and no number leaves its cell."""
+    names = [*PIEZO.known, *(f"another-effect-{number}" for number in range(5))]
+    every = {(name, name): 100 for name in names} | {("", ""): 300, ("ripple", "unknown"): 50}
+    figure = draw_confusion(every, names, "every name of the catalogue")
+    figure.draw_without_rendering()
+    axes, page = figure.axes[0], figure.bbox
+    cell = axes.get_window_extent().width / len(columns(figure))
+    for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
+        box = label.get_window_extent()
+        assert page.x0 <= box.x0, label
+        assert box.x1 <= page.x1, label
+        assert box.y1 <= page.y1, label
+    assert all(label.get_window_extent().height <= cell for label in axes.get_yticklabels())
+    assert all(text.get_window_extent().width <= cell for text in axes.texts)
+    assert min(label.get_fontsize() for label in axes.get_yticklabels()) >= 6.0
+
+
+def test_the_title_does_not_touch_the_names(figure: Figure) -> None:
+    figure.draw_without_rendering()
+    title = figure._suptitle.get_window_extent()
+    assert all(label.get_window_extent().y1 < title.y0 for label in figure.axes[0].get_xticklabels())
+
+
+def test_the_same_counts_give_the_same_file() -> None:
+    first, again = BytesIO(), BytesIO()
+    for stream in (first, again):
+        save(draw_confusion(COUNTS, NAMES), stream)
+    assert first.getvalue() == again.getvalue()
+
+
+def test_nothing_counted_is_an_empty_matrix() -> None:
+    assert rows(draw_confusion({}, NAMES)) == []
