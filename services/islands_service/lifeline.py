@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
 #: Seconds between two signs of life.
@@ -37,7 +38,36 @@ def lifeline(descriptor: int | None) -> Iterator[None]:
         thread.join()
 
 
-def stop_on_signals(stopping: Event) -> None:
+class Wish:
+    """The wish to stop: signal handlers and threads make it, the main thread waits for it.
+
+    Not an `Event`: what sets one in a signal handler waits for ever where the signal has interrupted `wait`,
+    which holds the lock. A queue's ``put`` may interrupt its own ``get``.
+    """
+
+    def __init__(self) -> None:
+        self._made = False
+        self._bell: SimpleQueue[None] = SimpleQueue()
+
+    def make(self) -> None:
+        """Make the wish; again and at any moment, also from a signal handler."""
+        self._made = True
+        self._bell.put(None)
+
+    @property
+    def made(self) -> bool:
+        """Whether it has been made: it is not taken back."""
+        return self._made
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until it is made, or for so long; whether it is."""
+        if not self._made:
+            with suppress(Empty):
+                self._bell.get(timeout=seconds)
+        return self._made
+
+
+def stop_on_signals(stopping: Wish) -> None:
     """Turn SIGTERM and Ctrl-C into a wish to stop. Ray takes SIGTERM for itself: call it again after Ray."""
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stopping.set())
+        signal.signal(number, lambda *_: stopping.make())

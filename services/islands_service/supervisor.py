@@ -15,12 +15,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.lifeline import stop_on_signals
+from islands_service.lifeline import Wish, stop_on_signals
 
 #: Seconds between two looks at the children.
 _LOOK = 0.05
@@ -125,7 +124,7 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     int
         0, or `MISCONFIGURED` where a child says that it cannot run so, and never has.
     """
-    stopping = Event()
+    stopping = Wish()
     stop_on_signals(stopping)
     # Ray asks whoever talks to it for a token.
     environment = {"RAY_AUTH_TOKEN": secrets.token_hex(16), **environment}

@@ -5,11 +5,10 @@ import os
 import secrets
 import socket
 import sys
-from threading import Event
 
 from islands.errors import IslandsError
 from islands_service.coordinator.loop import Coordinator
-from islands_service.lifeline import lifeline, stop_on_signals
+from islands_service.lifeline import Wish, lifeline, stop_on_signals
 from islands_service.logs import configure_logs
 from islands_service.settings import service_settings
 
@@ -23,7 +22,7 @@ def main() -> int:
         "--name", default=f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(3)}", help="unique"
     )
     name = parser.parse_args().name
-    stopping = Event()
+    stopping = Wish()
     try:
         settings = service_settings()
         configure_logs(settings.log_format, "coordinator")

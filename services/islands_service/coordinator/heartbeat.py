@@ -11,6 +11,7 @@ import structlog
 
 from islands.errors import IslandsError
 from islands_service.jobs import JobState, Lease, LeaseLost, Outcome
+from islands_service.lifeline import Wish
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 
@@ -44,11 +45,11 @@ class Heartbeat:
     lease : Lease
     seconds : float
         Of the lease.
-    stopping : Event
+    stopping : Wish
         Set when the coordinator is to stop.
     """
 
-    def __init__(self, store: Store, lease: Lease, seconds: float, stopping: Event) -> None:
+    def __init__(self, store: Store, lease: Lease, seconds: float, stopping: Wish) -> None:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
         self._over = Event()
         self._lost = self._cancelled = False
@@ -82,7 +83,7 @@ class Heartbeat:
             raise LeaseLost(f"job {self._lease.job.id} is not ours any more")
         if self._cancelled:
             raise JobCancelled(f"job {self._lease.job.id} is cancelled")
-        if self._stopping.is_set():
+        if self._stopping.made:
             raise CoordinatorStopping("the coordinator is to stop")
 
     @contextmanager

@@ -4,7 +4,6 @@ import traceback
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, closing, suppress
 from functools import partial
-from threading import Event
 from time import monotonic, time
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -15,7 +14,7 @@ from islands.errors import IslandsError
 from islands_service.blobs import Blobs
 from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
 from islands_service.jobs import DISCREPANCY, IDENTIFICATION, JobState, Lease, LeaseLost, Outcome, Report
-from islands_service.lifeline import stop_on_signals
+from islands_service.lifeline import Wish, stop_on_signals
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -67,11 +66,11 @@ class Coordinator:
     settings : ServiceSettings
     name : str
         No two living coordinators have the same.
-    stopping : Event
+    stopping : Wish
         Set to have it stop: its job goes back to the queue, with its last checkpoint.
     """
 
-    def __init__(self, settings: ServiceSettings, name: str, stopping: Event) -> None:
+    def __init__(self, settings: ServiceSettings, name: str, stopping: Wish) -> None:
         self._settings, self._name, self._stopping = settings, name, stopping
         self._store = Store(settings.url)
         self._blobs = Blobs(settings.blobs)
@@ -90,7 +89,7 @@ class Coordinator:
         """
         log.info("coordinator started", name=self._name)
         with self._store, self._ray, closing(self._traces):
-            while not self._stopping.is_set():
+            while not self._stopping.made:
                 if self._ready():
                     self._next()
 

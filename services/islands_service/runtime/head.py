@@ -9,12 +9,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Event
 
 import ray
 
 from islands.errors import IslandsError
-from islands_service.lifeline import sign_of_life, stop_on_signals
+from islands_service.lifeline import Wish, sign_of_life, stop_on_signals
 from islands_service.runtime.cluster import cluster
 from islands_service.settings import service_settings
 
@@ -28,7 +27,7 @@ _VITAL = ("gcs_server", "raylet")
 def main() -> int:
     """Start Ray, say where it is, and stay until SIGTERM, or until Ray is lost."""
     settings = service_settings()
-    stopping = Event()
+    stopping = Wish()
     stop_on_signals(stopping)
     try:
         with cluster(None):

@@ -5,7 +5,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator
-from threading import Event, Thread
+from threading import Thread
 from types import MappingProxyType
 from typing import Any
 
@@ -29,6 +29,7 @@ from islands_service.jobs import (
     Report,
     Submission,
 )
+from islands_service.lifeline import Wish
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -50,18 +51,18 @@ class Alone(Coordinator):
 @pytest.fixture
 def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
     """Run a coordinator in a thread; it is told to stop at the end."""
-    stopping = Event()
+    stopping = Wish()
     threads = []
 
     def run(kind: type[Coordinator] = Alone, name: str = "me") -> Thread:
         thread = Thread(target=kind(settings, name, stopping).run)
-        thread.stop = stopping.set  # type: ignore[attr-defined]
+        thread.stop = stopping.make  # type: ignore[attr-defined]
         thread.start()
         threads.append(thread)
         return thread
 
     yield run
-    stopping.set()
+    stopping.make()
     for thread in threads:
         thread.join(10.0)
         assert not thread.is_alive()
@@ -244,7 +245,7 @@ def test_a_lost_cluster_ends_the_coordinator_and_gives_the_job_back_as_an_attemp
         raise ClusterError("no more")
 
     working(monkeypatch, lost)
-    doomed = Alone(settings, "me", Event())
+    doomed = Alone(settings, "me", Wish())
     doomed._connected = True
     with pytest.raises(ClusterError, match="no more"):
         doomed.run()
@@ -346,7 +347,7 @@ def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
 ) -> None:
     """A coordinator may stand still between two steps of a sweep, for longer than a blob may be unnamed."""
     monkeypatch.setattr(loop, "ORPHAN", 0.1)
-    sweeping = Alone(settings, "me", Event())
+    sweeping = Alone(settings, "me", Wish())
     named_blobs = sweeping._store.retention.named_blobs
     written: list[str] = []
 
@@ -365,7 +366,7 @@ def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
 HANGING = """
 import sys, time
 from pathlib import Path
-from threading import Event
+from islands_service.lifeline import Wish
 from islands_service.coordinator import heartbeat
 from islands_service.coordinator.loop import Coordinator
 from islands_service.settings import ServiceSettings
@@ -378,7 +379,7 @@ class Engine:
 class Alone(Coordinator):
     def _wait_for_ray(self, *_): pass
     def _engine(self, _): return Engine()
-Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", Event()).run()
+Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", Wish()).run()
 """
 
 
