@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter, MaxNLocator, StrMethodFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
 from islands.discrepancy.diagnosis import Diagnosis
@@ -239,8 +239,13 @@ def _spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
         axes.plot(frequency[1:], np.sqrt(density[1:]), color=colour, lw=1.0)
     axes.set(xscale="log", yscale="log", xlabel="frequency (Hz)")
     for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(LogFormatter())  # where there is less than a decade
+        # Powers of ten alone would be one label or none.
+        if high < 100.0 * low:
+            subs = (2.0, 5.0) if high > 10.0 * low else (2.0, 3.0, 5.0, 7.0)
+            axis.set_minor_locator(LogLocator(subs=subs))
+            axis.set_minor_formatter(StrMethodFormatter("{x:g}"))
     axes.set_ylabel(label("residual", f"{record.output_unit or '1'}/Hz^0.5"))
 
 

@@ -24,13 +24,13 @@ from islands.validation.residual_tests import residual_tests
 LONG_TITLE = "What a report may want to say over a figure, with the name of a record and of a model, is long"
 
 
-def record(samples: int, inputs: int = 1, scale: float = 1.0, **changes: object) -> Dataset:
+def record(samples: int, inputs: int = 1, scale: float = 1.0, dt: float = 1e-3, **changes: object) -> Dataset:
     rng = np.random.default_rng(7)
     time = np.arange(samples)
     u = np.column_stack([np.sin(time / (15 + channel)) for channel in range(inputs)])
     y = scale * (np.sin(time / 15 - 0.3) + 0.05 * rng.standard_normal(samples))
     names, units = tuple(f"u{channel}_V" for channel in range(inputs)), ("V",) * inputs
-    return Dataset(scale * u, y, 1e-3, names, "y_um", units, "um", **changes)
+    return Dataset(scale * u, y, dt, names, "y_um", units, "um", **changes)
 
 
 def leaking(pole: float) -> Model:
@@ -38,9 +38,9 @@ def leaking(pole: float) -> Model:
 
 
 @cache
-def diagnosis(samples: int, scale: float = 1.0):
+def diagnosis(samples: int, scale: float, dt: float):
     """Return a diagnosis of a column that lacks an offset."""
-    made = record(samples, scale=scale)
+    made = record(samples, scale=scale, dt=dt)
     noise = np.random.default_rng(8).standard_normal(samples)
     simulated = made.y - scale * (0.3 + 0.05 * noise)
     return islands.diagnose(made, "column:y_sim", columns={"y_sim": simulated})
@@ -65,11 +65,10 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "residuals of two inputs": lambda: draw_residual_correlations(residual_tests(TWO.y, TWO.u)),
     "residuals of a constant": lambda: draw_residual_correlations(residual_tests(SHORT.y, 0 * SHORT.u)),
     **{
-        f"{name} of a diagnosis, {samples} samples": lambda draw=draw, samples=samples, scale=scale: draw(
-            diagnosis(samples, scale)
-        )
+        f"{name} of a diagnosis, {of[0]} samples": lambda draw=draw, of=of: draw(diagnosis(*of))
         for name, draw in DISCREPANCY_FIGURES.items()
-        for samples, scale in ((400, 1.0), (2000, 12_345.0))
+        # The third one's spectrum has little more than a decade.
+        for of in ((400, 1.0, 1e-3), (2000, 12_345.0, 1e-3), (300, 1.0, 9.0))
     },
 }
 
