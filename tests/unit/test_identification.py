@@ -69,13 +69,20 @@ def data():
 
 
 @pytest.fixture(scope="module")
-def states():
-    return []
+def search(data):
+    """Return a search's result, and what was told of it meanwhile."""
+    states = []
+    return identify(data, **BUDGET, seed=5, progress=into(states)), states
 
 
 @pytest.fixture(scope="module")
-def result(data, states):
-    return identify(data, **BUDGET, seed=5, progress=into(states))
+def result(search):
+    return search[0]
+
+
+@pytest.fixture(scope="module")
+def states(search):
+    return search[1]
 
 
 def into(states):
