@@ -296,7 +296,7 @@ def test_a_million_islands_are_refused_before_memory_is_taken_for_them(service):
     tracemalloc.stop()
     assert detail == "islands is at most 256 on this service, got 1000000"
     assert taken < 2_000_000
-    assert seconds < 0.5
+    assert seconds < 2.0
 
 
 @pytest.mark.parametrize(

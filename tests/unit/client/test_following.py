@@ -131,11 +131,11 @@ def test_waiting_ends_in_time_though_the_service_hangs(
     connect: Any, scripted: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transport, "GRACE", 0.1)
-    server = scripted((200, {}, b"{}"), delay=1.0)
+    server = scripted((200, {}, b"{}"), delay=2.5)
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=r"job 0 is not known to have ended after 0.2 s"):
         connect(server.url).wait("0", 0.2)
-    assert time.monotonic() - began < 0.9
+    assert time.monotonic() - began < 2.4
 
 
 def test_a_service_that_is_away_for_too_long_ends_the_waiting(connect: Any, me: Any, wire: Any) -> None:

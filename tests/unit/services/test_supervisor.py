@@ -135,7 +135,7 @@ def test_who_ends_at_once_waits_twice_as_long_every_time_up_to_a_limit(supervise
     # And the start of an interpreter, which takes a few hundredths.
     expected = [0.2, 0.4, 0.4, 0.4, 0.4]
     assert all(wait >= least for wait, least in zip(waits, expected, strict=False)), waits
-    assert min(waits[2:]) < 0.6, waits
+    assert min(waits[2:]) < 0.8, waits
 
 
 def test_who_has_lived_long_enough_is_started_again_at_once(supervised: Start) -> None:
@@ -143,7 +143,7 @@ def test_who_has_lived_long_enough_is_started_again_at_once(supervised: Start) -
     running = supervised(role("doors", script), _PROVEN=0.2, _BACKOFF=2.0)
     running.started(3)
     ends, starts = running.entries("end"), running.entries("start")
-    assert min(start[0] - end[0] for end, start in zip(ends, starts[1:], strict=False)) < 1.0
+    assert min(start[0] - end[0] for end, start in zip(ends, starts[1:], strict=False)) < 2.0
 
 
 def test_who_has_lived_long_enough_is_no_more_suspicious_than_at_first(supervised: Start) -> None:
@@ -152,7 +152,7 @@ def test_who_has_lived_long_enough_is_no_more_suspicious_than_at_first(supervise
     times = [at for at, *_ in running.started(6)]
     waits = [after - before for before, after in pairwise(times)]
     assert waits[2] > 0.8  # the third end at once in a row
-    assert waits[4] < 0.8  # the first after a life
+    assert waits[4] < 1.5  # the first after a life, and not the fourth in a row
 
 
 def test_who_says_nothing_any_more_is_taken_for_hanging(supervised: Start) -> None:
@@ -173,9 +173,9 @@ def test_a_stopped_process_hangs_however_often_it_spoke_before(supervised: Start
 
 
 def test_who_gives_signs_of_life_is_left_alone(supervised: Start) -> None:
-    running = supervised(role("doors", patience=0.3))
+    running = supervised(role("doors", patience=1.0))
     running.started()
-    time.sleep(1.0)
+    time.sleep(2.0)
     assert len(running.entries("start")) == 1
     assert running.end() == ""
 
@@ -225,7 +225,7 @@ def test_who_cannot_go_on_without_another_is_started_again_with_it(supervised: S
 
 
 def test_where_one_says_that_it_cannot_run_so_all_end_and_so_does_the_supervisor(supervised: Start) -> None:
-    refusing = role("doors", "note('start'); sign(); time.sleep(0.5); sys.exit(2)")
+    refusing = role("doors", "note('start'); sign(); time.sleep(1.5); sys.exit(2)")
     running = supervised(refusing, role("work"))
     assert "started again" not in running.said()
     assert running.process.returncode == 2
@@ -313,7 +313,7 @@ def test_a_file_that_says_how_a_child_is_reached_goes_with_the_child(
     pid = running.started()[0][3]
     address.write_text("where it was")
     os.kill(pid, signal.SIGKILL)
-    eventually(lambda: not address.exists(), seconds=1.0)
+    eventually(lambda: not address.exists(), seconds=3.5)
 
 
 def test_children_have_one_secret_for_ray_and_every_service_another(
