@@ -24,7 +24,7 @@ import os, signal, sys
 from islands_service.store import Store, connections
 from islands_service.store.changes import change
 from islands_service.store.database import StoreUnavailable
-connections.SETTINGS = ("idle_in_transaction_session_timeout = '1s'",)
+connections.SETTINGS = ("idle_in_transaction_session_timeout = '4s'",)
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", -1.0)
 def stand(connection):
