@@ -65,10 +65,12 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "residuals of two inputs": lambda: draw_residual_correlations(residual_tests(TWO.y, TWO.u)),
     "residuals of a constant": lambda: draw_residual_correlations(residual_tests(SHORT.y, 0 * SHORT.u)),
     **{
-        f"{name} of a diagnosis, {of[0]} samples": lambda draw=draw, of=of: draw(diagnosis(*of))
+        f"{name} of a diagnosis, {of[0]} samples of {of[2]:g} s": lambda draw=draw, of=of: draw(
+            diagnosis(*of)
+        )
         for name, draw in DISCREPANCY_FIGURES.items()
         # The third one's spectrum has little more than a decade.
-        for of in ((400, 1.0, 1e-3), (2000, 12_345.0, 1e-3), (300, 1.0, 9.0))
+        for of in ((400, 1.0, 1e-3), (2000, 12_345.0, 1e-3), (400, 1.0, 7.0))
     },
 }
 
