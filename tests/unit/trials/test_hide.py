@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.trials.hide import forces
+from islands.trials.hide import forces, records
 from islands.trials.hide.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
 from islands.trials.hide.piezo import PIEZO, Piezo
 from islands.trials.hide.records import SCALE, Hiding, hide
@@ -138,5 +138,15 @@ def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
 
 
 def test_a_misfit_that_no_strength_has_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"delay has no strength with a misfit within"):
+    with pytest.raises(ValueError, match=r"delay cannot be hidden with a misfit within"):
         hidden("tanks", "delay", band=(1e6, 1e7))
+
+
+def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
+    asked = {"seed": 6, "band": (0.3, 2.0)}
+    found = hidden("piezo", "output-saturation", **asked)  # type: ignore[arg-type]
+    assert 0.3 <= found.misfit <= 2.0
+    monkeypatch.setattr(records, "_RECORDS", 1)
+    with pytest.raises(ValueError, match="cannot be hidden"):
+        hidden("piezo", "output-saturation", **asked)  # type: ignore[arg-type]

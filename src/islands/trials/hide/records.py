@@ -24,8 +24,9 @@ SCALE = ("sensor-gain", "input-gain", "wrong-parameter")
 _BEYOND = 0.01
 
 #: How far below its least strength an effect may be to come into a band, and a gain above its most, in
-#: logarithms; halvings of the interval of strengths until its misfit is there, and draws of all else.
-_BELOW, _ABOVE, _TRIES, _DRAWS = 3.0, 1.5, 14, 5
+#: logarithms; halvings of the interval of strengths until its misfit is there; draws of all else of an
+#: effect, and then of the record.
+_BELOW, _ABOVE, _TRIES, _DRAWS, _RECORDS = 3.0, 1.5, 14, 5, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,18 +85,28 @@ def hide(
         simulation that cannot be calibrated: then gains and parameters can be seen in full.
     free : bool
         Nothing is stated of the simulation's parameters: what they can take up is no misfit.
+
+    Raises
+    ------
+    ValueError
+        No strength of an effect has a misfit within the band, in any of several records.
     """
-    driven = system.drive(rng, seconds or system.seconds)
-    truth = system.truth
-    for name, spread in system.spread.items() if apart else ():
-        factor = float(np.exp(spread * rng.standard_normal()))
-        truth = altered(truth, **{name: getattr(truth, name) * factor})
-    seen = _Seen(system, driven, truth, free)
     entries = {**system.known, **system.unknown}
-    affected = truth
-    for name in names:
-        scale = free or (apart and name in SCALE)
-        affected = _hidden(entries[name], scale, rng, truth, affected, seen, band, variant)
+    for _ in range(_RECORDS):
+        driven = system.drive(rng, seconds or system.seconds)
+        truth = system.truth
+        for name, spread in system.spread.items() if apart else ():
+            factor = float(np.exp(spread * rng.standard_normal()))
+            truth = altered(truth, **{name: getattr(truth, name) * factor})
+        seen = _Seen(system, driven, truth, free)
+        affected: Truth | None = truth
+        for name in names:
+            scale = free or (apart and name in SCALE)
+            affected = affected and _hidden(entries[name], scale, rng, truth, affected, seen, band, variant)
+        if affected is not None:
+            break
+    else:
+        raise ValueError(f"{' and '.join(names)} cannot be hidden with a misfit within {band} sigma")
     y = seen.clean if affected is truth else seen.of(affected)
     noise = seen.sigma * _noise(rng, y.size, pole)
     record = Dataset(
@@ -176,14 +187,18 @@ def _hidden(
     seen: _Seen,
     band: tuple[float, float] | None,
     variant: bool,
-) -> Truth:
+) -> Truth | None:
+    """Return a truth with an effect hidden in it too; None where that cannot be seen in this record.
+
+    Such as a limit that only the locked part comes near.
+    """
     forms = (variant and entry.forms[entry.usual :]) or entry.forms[: entry.usual]
     for _ in range(_DRAWS):
         form = forms[int(rng.integers(len(forms)))]
         hidden = _sought(entry, form, scale, rng, truth, seen, band)
         if hidden is not None:
             return hidden(affected)
-    raise ValueError(f"{entry.name} has no strength with a misfit within {band} sigma")
+    return None
 
 
 def _sought(
