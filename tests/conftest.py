@@ -1,13 +1,8 @@
-"""What every test may use: generators (`strategies.py`), one hypothesis profile, compiled kernels, databases.
-
-In importlib mode pytest puts no test folder on the path, so the generators' folder is put there here.
-"""
+"""Fixtures and settings of all tests: the hypothesis profile, compiled kernels, databases."""
 
 import os
 import shutil
-import sys
 from contextlib import ExitStack
-from pathlib import Path
 
 # Before NumPy is imported: the workers have the cores, and threads of its linear algebra would wait for them.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -16,8 +11,6 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from islands.warm_up import warm_up
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 # A kernel compiles in its first example, and the machine may be busy: neither is a failure of a law.
 settings.register_profile(
@@ -35,7 +28,7 @@ def pytest_configure(config):
 @pytest.fixture(scope="session")
 def postgres():
     """What makes databases on a PostgreSQL: one server for all tests of a process."""
-    from databases import databases
+    from support.databases import databases
 
     with databases() as maker:
         yield maker
@@ -44,9 +37,8 @@ def postgres():
 @pytest.fixture(scope="session")
 def prepared_postgres(postgres):
     """The URL of a database with our tables. To make one takes a quarter of a second: it is used again."""
-    from databases import database
-
     from islands_service.store import Store
+    from support.databases import database
 
     with database(postgres) as url:
         Store(url).close()
@@ -74,7 +66,7 @@ def _prepared_sqlite(request):
 
 
 def _postgresql(request):
-    from databases import database
+    from support.databases import database
 
     stack = ExitStack()
     request.addfinalizer(stack.close)
@@ -82,7 +74,7 @@ def _postgresql(request):
 
 
 def _prepared_postgresql(request):
-    from databases import emptied
+    from support.databases import emptied
 
     return emptied(request.getfixturevalue("prepared_postgres"))
 

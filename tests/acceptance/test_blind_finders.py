@@ -9,8 +9,8 @@ from functools import partial
 from itertools import product
 
 import pytest
-from acceptance import test_hidden as checks
 
+from acceptance import test_hidden as checks
 from islands.discrepancy import preparation
 from islands.discrepancy.effects import CATALOGUE
 from islands.trials.hide.piezo import PIEZO

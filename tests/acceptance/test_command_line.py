@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from front_door import fail, succeed
+
+from support.front_door import fail, succeed
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from front_door import fail, succeed
 
 from islands.io.records import write_record
 from islands.trials.hide.records import hide
+from support.front_door import fail, succeed
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
 

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from front_door import fail, succeed
-from simulated_records import made
 
 from islands.discrepancy.calibration import Target, held_against
 from islands.discrepancy.effects import CATALOGUE
@@ -17,6 +15,8 @@ from islands.discrepancy.extended import Extended
 from islands.discrepancy.preparation import fitted_samples, scene_of
 from islands.io.extensions import extended_json
 from islands.io.records import write_record
+from support.front_door import fail, succeed
+from support.simulated_records import made
 
 #: A stiffness of the third power, in V / um^3.
 STRENGTH = 3e-5

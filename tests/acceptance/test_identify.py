@@ -7,7 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from front_door import BUDGET, COLUMNS, ISLANDS, fail, found, stored, succeed, write_hysteresis
+
+from support.front_door import BUDGET, COLUMNS, ISLANDS, fail, found, stored, succeed, write_hysteresis
 
 
 @pytest.fixture(scope="module")

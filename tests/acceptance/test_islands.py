@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from front_door import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
 
 from islands_service.engines import ENGINES
+from support.front_door import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
 
 pytestmark = pytest.mark.xdist_group("ray")
 

@@ -11,7 +11,8 @@ import zlib
 import numpy as np
 import pytest
 from numpy.lib import format as npy
-from service import (
+
+from support.service import (
     columns,
     csv,
     kept,

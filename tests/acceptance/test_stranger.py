@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from front_door import write_hysteresis
-from service_processes import Service, serving
 
-ROOT = Path(__file__).parents[2]
+from support.front_door import write_hysteresis
+from support.repository import ROOT
+from support.service_processes import Service, serving
 
 #: What the page calls the service, the data set and the job.
 ADDRESS, DATASET, JOB = "http://127.0.0.1:8000", "672083eb...-csv", "b93d8227..."

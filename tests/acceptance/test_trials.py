@@ -4,7 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-from front_door import fail, succeed
+
+from support.front_door import fail, succeed
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

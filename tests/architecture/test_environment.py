@@ -4,11 +4,10 @@ To write into it is another thing: it tells libraries, and processes that are st
 """
 
 import ast
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from support.repository import ROOT
 
 READER = "services/islands_service/settings.py"
 

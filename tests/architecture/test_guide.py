@@ -2,7 +2,6 @@
 
 import re
 from inspect import getmodule
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ from islands.discrepancy.detectors import DETECTORS
 from islands.discrepancy.effect import Scene
 from islands.discrepancy.effects import CATALOGUE, OF_EACH, sentence
 from islands.io.simulation_spec import KINDS
+from support.repository import DOCS
 
-DOCS = Path(__file__).parents[2] / "docs"
 GUIDE = (DOCS / "discrepancy.md").read_text()
 
 #: A row of the catalogue: what stands behind a name and its family.

@@ -22,8 +22,8 @@ from islands.model.primitives import PRIMITIVES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES
+from support.repository import ROOT
 
-ROOT = Path(__file__).parents[2]
 FOLDERS = ("src", "services", "api")
 SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 

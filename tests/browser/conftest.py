@@ -4,18 +4,14 @@ Without playwright or Chromium these tests are skipped. Fixtures live as long as
 event loop running in this thread meanwhile, and other modules' tests may need one of their own.
 """
 
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from service_processes import Service, serving
 
-# As the folder above does it: in importlib mode pytest puts no test folder on the path.
-sys.path.append(str(Path(__file__).parent))
-
-from screen import Screen
+from support.screen import Screen
+from support.service_processes import Service, serving
 
 CHROMIUM = Path("/usr/bin/chromium")
 

@@ -6,8 +6,9 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from screen import Screen
-from service_processes import Service
+
+from support.screen import Screen
+from support.service_processes import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

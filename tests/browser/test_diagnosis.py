@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from played import claimed, stored
-from screen import Screen
-from service_processes import Service
 
 from islands_service.blobs import Blobs
 from islands_service.jobs import EXTENDED, REPORT, JobState, Outcome, Report
+from support.played import claimed, stored
+from support.screen import Screen
+from support.service_processes import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

@@ -5,12 +5,12 @@ from math import sqrt
 from typing import Any
 
 import pytest
-from played import advance, claimed, squared_error, stored
-from processes import eventually
-from screen import Screen
-from service_processes import Service
 
 from islands_service.jobs import JobState, Outcome
+from support.played import advance, claimed, squared_error, stored
+from support.processes import eventually
+from support.screen import Screen
+from support.service_processes import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

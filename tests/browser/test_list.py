@@ -4,11 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from played import advance, claimed, stored
-from screen import Screen
-from service_processes import Service
 
 from islands_service.jobs import JobState, Outcome
+from support.played import advance, claimed, stored
+from support.screen import Screen
+from support.service_processes import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from played import advance, claimed, squared_error, stored
-from processes import eventually, kill
-from screen import Screen
-from service_processes import Service
+
+from support.played import advance, claimed, squared_error, stored
+from support.processes import eventually, kill
+from support.screen import Screen
+from support.service_processes import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from processes import eventually
-from reading import unreadable
-from screen import Screen
-from service_processes import Service, serving
 
 from islands_service.store import Store
+from support.processes import eventually
+from support.reading import unreadable
+from support.screen import Screen
+from support.service_processes import Service, serving
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

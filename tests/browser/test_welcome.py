@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from front_door import ISLANDS, write_hysteresis
-from played import claimed, stored
-from processes import eventually
-from reading import unreadable
-from screen import Screen
-from service_processes import Service
 
 from islands_service.jobs import JobState, Outcome
+from support.front_door import ISLANDS, write_hysteresis
+from support.played import claimed, stored
+from support.processes import eventually
+from support.reading import unreadable
+from support.screen import Screen
+from support.service_processes import Service
 
 pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
 

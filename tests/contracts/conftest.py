@@ -3,7 +3,8 @@
 import shutil
 
 import pytest
-from service import emptied, held, kept, served
+
+from support.service import emptied, held, kept, served
 
 
 @pytest.fixture(scope="module")

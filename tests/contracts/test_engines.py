@@ -8,7 +8,6 @@ from dataclasses import replace
 from math import inf
 
 import pytest
-from searches import exactly, record
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
@@ -21,6 +20,7 @@ from islands.evolution.settings import Settings
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.expression import Lagged
 from islands_service.engines import ENGINES
+from support.searches import exactly, record
 
 SETTINGS = Settings(
     population=16,

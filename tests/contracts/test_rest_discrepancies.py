@@ -7,10 +7,10 @@ import subprocess
 import sys
 
 import pytest
-from service import HIDDEN, diagnosed, held, hidden, identified, kept, parsed, problem_of, served
-from stores import LONG, claimed
 
 from islands_service.jobs import DISCREPANCY, JobState, Outcome, Report
+from support.service import HIDDEN, diagnosed, held, hidden, identified, kept, parsed, problem_of, served
+from support.stores import LONG, claimed
 
 TERM = {"regressor": "y(k-1)", "parameter": 0.5}
 

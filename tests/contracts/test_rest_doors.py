@@ -5,10 +5,10 @@ import shutil
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
-from service import kept, problem_of, queued, served, spec
-from stores import FOUND, claimed
 
 from islands_service.jobs import JobState, Report
+from support.service import kept, problem_of, queued, served, spec
+from support.stores import FOUND, claimed
 
 
 @pytest.fixture

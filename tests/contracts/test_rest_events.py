@@ -6,14 +6,14 @@ import time
 
 import httpx
 import pytest
-from processes import eventually
-from service import PATIENCE, emptied, parsed, problem_of, queued, served
-from stores import CANCELLED, FAILED, FOUND, brought_on, claimed
 
 from islands_api import hub
 from islands_api.auth import LOCAL
 from islands_api.routes import events as routes
 from islands_service.store import leases
+from support.processes import eventually
+from support.service import PATIENCE, emptied, parsed, problem_of, queued, served
+from support.stores import CANCELLED, FAILED, FOUND, brought_on, claimed
 
 
 @pytest.fixture(scope="module")

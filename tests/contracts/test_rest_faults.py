@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import httpx
 import pytest
-from databases import server
-from processes import eventually
-from service import PATIENCE, csv, identified, parsed, problem_of, queued, served, spec
 from sqlalchemy import update
-from stores import FOUND, claimed
 
 from islands_api.routes import figures
 from islands_service.store.tables import models, results
+from support.databases import server
+from support.processes import eventually
+from support.service import PATIENCE, csv, identified, parsed, problem_of, queued, served, spec
+from support.stores import FOUND, claimed
 
 #: Bytes of a small disk.
 DISK = 6_000_000

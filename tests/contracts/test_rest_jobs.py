@@ -5,11 +5,11 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from service import kept, problem_of, queued, spec
-from stores import FOUND, brought_on, claimed, job_in
 
 from islands_api.auth import LOCAL
 from islands_service.jobs import JobState, Report, Submission
+from support.service import kept, problem_of, queued, spec
+from support.stores import FOUND, brought_on, claimed, job_in
 
 MANY = 16
 

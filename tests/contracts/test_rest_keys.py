@@ -5,10 +5,10 @@ import socket
 import time
 
 import pytest
-from service import PATIENCE, csv, held, kept, problem_of, queued, served, spec
 
 from islands_api.routes import events
 from islands_service.store.keys import SCOPES
+from support.service import PATIENCE, csv, held, kept, problem_of, queued, served, spec
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from service import csv, emptied, npz, problem_of, served, spec
+
+from support.service import csv, emptied, npz, problem_of, served, spec
 
 #: A record whose names are as strange as a table of text can have them.
 STRANGE = ['u "in" V', "y\nout", "v;|\tw", "größe 😀", "<b>&amp;", "u+1"]

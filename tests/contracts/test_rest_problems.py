@@ -2,16 +2,16 @@
 
 import re
 import shutil
-from pathlib import Path
 
 import httpx
 import pytest
 from fastapi.responses import StreamingResponse
-from service import PROBLEM, problem_of, queued, served
 
 from islands_api.problems import PROBLEMS
 from islands_service.blobs import NoSuchBlob
 from islands_service.store.database import StoreInDoubt
+from support.repository import DOCS
+from support.service import PROBLEM, problem_of, queued, served
 
 FORM = {"type", "title", "status", "detail", "request_id"}
 
@@ -233,7 +233,7 @@ def test_every_type_of_problem_is_explained_where_it_points_to(service):
 
 
 def test_every_type_of_problem_stands_in_the_page_of_the_service():
-    page = (Path(__file__).parents[2] / "docs" / "service.md").read_text()
+    page = (DOCS / "service.md").read_text()
     rows = re.findall(r"^\| `([a-z-]+)` \| (\d{3}) \| (.+) \|$", page, re.MULTILINE)
     assert set(rows) == {(each.type, str(int(each.status)), each.title) for each in PROBLEMS.values()}
 

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 
 import pytest
-from service import identified, served
-from stores import FAILED
+
+from support.service import identified, served
+from support.stores import FAILED
 
 #: Phases of a run, the operations that it leaves out or takes alone, and the seconds that it may take. The
 #: first and the last end by themselves; what is deleted could not be looked at any more.

@@ -7,12 +7,23 @@ import xml.etree.ElementTree as ET
 
 import pytest
 from jsonschema import Draft202012Validator
-from service import columns, csv, diagnosed, hidden, identified, kept, problem_of, queued, served, spec
 
 from islands.figures.gallery import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands_api.routes.figures import MODEL_FIGURES
 from islands_api.routes.figures import SEARCH_FIGURES as NAMED
+from support.service import (
+    columns,
+    csv,
+    diagnosed,
+    hidden,
+    identified,
+    kept,
+    problem_of,
+    queued,
+    served,
+    spec,
+)
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@
 import json
 
 import pytest
-from service import problem_of
-from simulated_records import extension
 
 from islands.io.simulation_spec import PhysicalSpec
+from support.service import problem_of
+from support.simulated_records import extension
 
 
 def extended(core=None, **changes):

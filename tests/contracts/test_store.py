@@ -8,7 +8,16 @@ import time
 from functools import partial
 
 import pytest
-from stores import (
+
+from islands_service.jobs import (
+    ACTIVE,
+    TERMINAL,
+    IdempotencyConflict,
+    JobState,
+    QuotaExceeded,
+)
+from islands_service.store import Store
+from support.stores import (
     ALICE,
     BOB,
     FAILED,
@@ -23,15 +32,6 @@ from stores import (
     several,
     submitted,
 )
-
-from islands_service.jobs import (
-    ACTIVE,
-    TERMINAL,
-    IdempotencyConflict,
-    JobState,
-    QuotaExceeded,
-)
-from islands_service.store import Store
 
 LOOK = """
 import json, sys

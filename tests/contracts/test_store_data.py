@@ -6,7 +6,13 @@ from hashlib import sha256
 
 import pytest
 from sqlalchemy import update
-from stores import (
+
+from islands.errors import SettingsError
+from islands_service.jobs import TERMINAL, JobState, QuotaExceeded
+from islands_service.store.datasets import DatasetInUse, NoSuchDataset, dataset_id
+from islands_service.store.keys import PREFIX, SCOPES, NoSuchKey
+from islands_service.store.tables import datasets, jobs
+from support.stores import (
     ALICE,
     BLOB,
     BOB,
@@ -23,12 +29,6 @@ from stores import (
     several,
     submitted,
 )
-
-from islands.errors import SettingsError
-from islands_service.jobs import TERMINAL, JobState, QuotaExceeded
-from islands_service.store.datasets import DatasetInUse, NoSuchDataset, dataset_id
-from islands_service.store.keys import PREFIX, SCOPES, NoSuchKey
-from islands_service.store.tables import datasets, jobs
 
 PREVIEW = {"columns": [{"name": "u µ", "unit": "V", "mean": 0.1}], "warnings": []}
 READ = frozenset({"read"})

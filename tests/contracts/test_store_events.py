@@ -4,7 +4,11 @@ import threading
 
 import pytest
 from sqlalchemy import update
-from stores import (
+
+from islands_service.jobs import JobState, WrongState
+from islands_service.store.leases import ATTEMPTS
+from islands_service.store.tables import jobs
+from support.stores import (
     ALICE,
     EXPIRED,
     FAILED,
@@ -19,10 +23,6 @@ from stores import (
     several,
     submitted,
 )
-
-from islands_service.jobs import JobState, WrongState
-from islands_service.store.leases import ATTEMPTS
-from islands_service.store.tables import jobs
 
 
 def test_everything_that_happens_to_a_job_is_an_event_and_its_number_is_the_jobs_version(store):

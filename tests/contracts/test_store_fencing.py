@@ -3,7 +3,9 @@
 from functools import partial
 
 import pytest
-from stores import (
+
+from islands_service.jobs import JobState, LeaseLost, Report
+from support.stores import (
     ALICE,
     CANCELLED,
     EXPIRED,
@@ -18,8 +20,6 @@ from stores import (
     several,
     submitted,
 )
-
-from islands_service.jobs import JobState, LeaseLost, Report
 
 #: All that a coordinator may do under a lease.
 WRITES = {

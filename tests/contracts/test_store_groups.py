@@ -5,7 +5,14 @@ from contextlib import suppress
 
 import pytest
 from sqlalchemy import insert, select, text
-from stores import (
+
+from islands_service.jobs import NoSuchJob
+from islands_service.store import Store
+from islands_service.store import database as database_module
+from islands_service.store.changes import change, record
+from islands_service.store.database import GROUP, StoreError
+from islands_service.store.tables import keys
+from support.stores import (
     ALICE,
     MANY,
     asked,
@@ -18,13 +25,6 @@ from stores import (
     submitted,
     waiting,
 )
-
-from islands_service.jobs import NoSuchJob
-from islands_service.store import Store
-from islands_service.store import database as database_module
-from islands_service.store.changes import change, record
-from islands_service.store.database import GROUP, StoreError
-from islands_service.store.tables import keys
 
 
 class OwnFault(Exception):

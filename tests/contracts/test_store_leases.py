@@ -4,7 +4,9 @@ import itertools
 import random
 from contextlib import ExitStack
 
-from stores import (
+from islands_service.jobs import TERMINAL, JobState, Report
+from islands_service.store.leases import ATTEMPTS
+from support.stores import (
     ALICE,
     BOB,
     EXPIRED,
@@ -20,9 +22,6 @@ from stores import (
     several,
     submitted,
 )
-
-from islands_service.jobs import TERMINAL, JobState, Report
-from islands_service.store.leases import ATTEMPTS
 
 CLAIM = """
 import sys

@@ -4,7 +4,12 @@ import time
 
 import pytest
 from sqlalchemy import update
-from stores import (
+
+from islands_service.jobs import JobState, NoSuchJob, WrongState
+from islands_service.store.datasets import NoSuchDataset
+from islands_service.store.jobs import PAGE
+from islands_service.store.tables import jobs as jobs_table
+from support.stores import (
     ALICE,
     BOB,
     FAILED,
@@ -16,11 +21,6 @@ from stores import (
     kinds,
     submitted,
 )
-
-from islands_service.jobs import JobState, NoSuchJob, WrongState
-from islands_service.store.datasets import NoSuchDataset
-from islands_service.store.jobs import PAGE
-from islands_service.store.tables import jobs as jobs_table
 
 QUEUED, RUNNING, SUCCEEDED, FAILED_, CANCELLED = JobState
 

@@ -4,7 +4,10 @@ import threading
 
 import pytest
 from sqlalchemy import event
-from stores import (
+
+from islands_service.jobs import JobState, LeaseLost, NoSuchJob, Outcome, Report
+from islands_service.store import leases as leases_module
+from support.stores import (
     ALICE,
     BLOB,
     CANCELLED,
@@ -18,9 +21,6 @@ from stores import (
     several,
     submitted,
 )
-
-from islands_service.jobs import JobState, LeaseLost, NoSuchJob, Outcome, Report
-from islands_service.store import leases as leases_module
 
 
 class Unwritable:

@@ -6,8 +6,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from front_door import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
-from processes import actors, alive, descendants, eventually, kill
+
+from support.front_door import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
+from support.processes import actors, alive, descendants, eventually, kill
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

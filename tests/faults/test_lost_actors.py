@@ -7,9 +7,7 @@ from threading import Event, Thread
 
 import pytest
 import ray
-from processes import actors, alive, eventually, kill
 from ray.exceptions import NodeDiedError, ObjectLostError, OutOfMemoryError
-from searches import SMALL, exactly, record
 
 from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
@@ -17,6 +15,8 @@ from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
 from islands_service.runtime import crew
 from islands_service.runtime.cluster import LOST, ClusterError
+from support.processes import actors, alive, eventually, kill
+from support.searches import SMALL, exactly, record
 
 pytestmark = pytest.mark.xdist_group("ray")
 

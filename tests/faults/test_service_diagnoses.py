@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from front_door import succeed
-from processes import eventually, kill
-from service import HIDDEN, KNOWN, held, hidden
-from service_processes import Service, serving
+
+from support.front_door import succeed
+from support.processes import eventually, kill
+from support.service import HIDDEN, KNOWN, held, hidden
+from support.service_processes import Service, serving
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

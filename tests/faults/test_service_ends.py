@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from processes import alive, descendants, eventually, kill
-from service_processes import Service, serving
+
+from support.processes import alive, descendants, eventually, kill
+from support.service_processes import Service, serving
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

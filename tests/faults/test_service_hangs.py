@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-from processes import alive, eventually
-from service_processes import QUICK, Service, serving
+
+from support.processes import alive, eventually
+from support.service_processes import QUICK, Service, serving
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from processes import alive, descendants, eventually, kill
-from service_processes import ROLES, SPEC, Service, serving
 
 from islands.evolution.engine import SerialEngine
 from islands.identification import identify
 from islands.io.records import read_record
 from islands.io.results import result_document
+from support.processes import alive, descendants, eventually, kill
+from support.service_processes import ROLES, SPEC, Service, serving
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from support.repository import BENCHMARKS
+
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 
-SOAK = Path(__file__).parents[1] / "benchmarks" / "service_soak.py"
+SOAK = BENCHMARKS / "service_soak.py"
 
 KILLS = 15
 

@@ -8,11 +8,11 @@ from threading import Timer
 
 import pytest
 import trustme
-from front_door import succeed
-from processes import eventually, kill
-from service_processes import free_port, serving, started
 
 from islands_api.__main__ import listening
+from support.front_door import succeed
+from support.processes import eventually, kill
+from support.service_processes import free_port, serving, started
 
 pytestmark = pytest.mark.slow
 

@@ -8,13 +8,13 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from processes import eventually, kill
-from stores import ALICE, BLOB, LONG, asked, at_once, brought_on, child, claimed, kinds, submitted
 
 from islands_service.blobs import Blobs
 from islands_service.jobs import Report
 from islands_service.store import Store
 from islands_service.store.database import StoreFull
+from support.processes import eventually, kill
+from support.stores import ALICE, BLOB, LONG, asked, at_once, brought_on, child, claimed, kinds, submitted
 
 SUBMIT = """
 import sys

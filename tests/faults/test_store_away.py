@@ -7,16 +7,16 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
-from databases import answers, emptied, server
-from stores import ALICE, EXPIRED, LONG, brought_on, child, claimed, kinds, submitted
 
 from islands_service.jobs import JobState, LeaseLost
 from islands_service.store import Store
 from islands_service.store.changes import change, record
 from islands_service.store.database import StoreUnavailable
+from support.databases import answers, emptied, server
+from support.repository import ROOT
+from support.stores import ALICE, EXPIRED, LONG, brought_on, child, claimed, kinds, submitted
 
 #: Stands still in the middle of a transaction.
 STAND = """
@@ -61,8 +61,8 @@ def test_on_postgresql_a_process_that_stands_still_in_the_middle_of_a_write_lets
 CUT = """
 import subprocess, sys, time
 sys.path.insert(0, sys.argv[1])
-from databases import server
-from stores import ALICE, submitted
+from support.databases import server
+from support.stores import ALICE, submitted
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailable
 def network(state):
@@ -194,7 +194,7 @@ def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebo
 )
 def test_a_postgresql_behind_a_cut_network_is_told_in_seconds_and_used_again_afterwards(mortals):
     """Nothing comes back from there, not even a refusal: TCP by itself would wait for many minutes."""
-    tests = Path(__file__).parents[1]
+    tests = ROOT / "tests"
     command = ["unshare", "--net", sys.executable, "-c", CUT, tests]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr

@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import pytest
 import ray
-from processes import descendants, eventually, kill
 from ray.cluster_utils import Cluster
-from searches import SMALL, exactly, record
 
 from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.runtime.cluster import cluster
 from islands_service.runtime.ray_engine import RayEngine
+from support.processes import descendants, eventually, kill
+from support.searches import SMALL, exactly, record
 
 pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
 

@@ -1,0 +1,266 @@
+"""What the discrepancy analysis says of measured records, beside published figures.
+
+    python benchmarks/measured_discrepancies.py [NAME ...] [--clean N] [--injected N] [--json FILE]
+
+A simulation that is known to lack something is held against a part of each record. What is then named is put
+into the simulation, and that is run on parts of the record, or on records of their own, that nothing above
+has seen. Surrogates have the noise of a record and nothing that the simulation lacks, or one effect that was
+put in. The records are looked for in $ISLANDS_DATA_DIR.
+"""
+
+import argparse
+import csv
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(library, "1")
+
+import numpy as np  # noqa: E402 - after what it reads
+
+import islands  # noqa: E402
+from islands.discrepancy.self_test import probed  # noqa: E402
+from islands.discrepancy.surrogates import Probe, injections, surrogates_of  # noqa: E402
+from islands.io.extensions import extended_document  # noqa: E402
+from islands.io.simulations import simulation  # noqa: E402
+
+NAIVE = Path(__file__).parents[1] / "tests" / "support" / "naive_damper.py"
+DATA = Path(os.environ.get("ISLANDS_DATA_DIR", Path(__file__).parents[2] / "shared/data"))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A record, a naive simulation of it, and what the extended one is then run on.
+
+    Attributes
+    ----------
+    record : callable
+        Makes the record that is diagnosed.
+    simulation : str
+    tests : mapping of str to callable
+        Records that nothing has seen; ``skip`` first samples of each are not counted.
+    skip : int
+    scale, unit : float, str
+        Of the errors as they are printed.
+    published : str
+    """
+
+    record: Callable[[], islands.Dataset]
+    simulation: str
+    tests: dict[str, Callable[[], islands.Dataset]]
+    skip: int = 0
+    scale: float = 1.0
+    unit: str = ""
+    published: str = ""
+
+
+def dataset(u, y, dt, units=("", "")):
+    return islands.Dataset(
+        u=np.asarray(u, dtype=float)[:, None],
+        y=np.asarray(y, dtype=float),
+        dt=dt,
+        input_names=("u",),
+        input_units=units[:1],
+        output_name="y",
+        output_unit=units[1],
+    )
+
+
+def columns(name: str) -> dict[str, np.ndarray]:
+    with (DATA / name).open() as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def silverbox(part: str, length: int | None = None):
+    def record():
+        stored = np.load(DATA / "silverbox.npz")
+        start, stop = stored[f"idx_{part}"]
+        stop = stop if length is None else start + length
+        # The means of the whole recording are those of its electronics: 6 mV at the input.
+        u, y = (stored[name] - stored[name].mean() for name in ("u", "y"))
+        return dataset(u[start:stop], y[start:stop], 1 / 610.35, ("V", "V"))
+
+    return record
+
+
+def bouc_wen(part: str, length: int | None = None):
+    def record():
+        stored = np.load(DATA / "boucwen_benchmark.npz")
+        u, y = stored[f"u_{part}_N"], stored[f"y_{part}_m"]
+        return dataset(u[:length], y[:length], 1 / 750, ("N", "m"))
+
+    return record
+
+
+def tanks(part: str):
+    def record():
+        found = columns("cascaded_tanks.csv")
+        u, y = (found[f"{name}_{part}_V"].astype(float) for name in "uy")
+        return dataset(u, y, 4.0, ("V", "V"))
+
+    return record
+
+
+def damper(volt: float, which: int):
+    def record():
+        found = columns("mrdamper_labcontrol.csv")
+        here = np.abs(found["volt_V"].astype(float) - volt) < 1e-6
+        test = sorted(set(found["test"][here]))[which]
+        chosen = here & (found["test"] == test)
+        x, force = (found[name][chosen].astype(float) for name in ("dist_mm", "force_N"))
+        return dataset(x, force, 0.01, ("mm", "N"))
+
+    return record
+
+
+def furnace():
+    found = columns("gas_furnace.csv")
+    u, y = (found[name].astype(float) for name in ("u_gasrate_ft3min", "y_CO2_pct"))
+    return dataset(u, y, 9.0, ("ft3/min", "%"))
+
+
+def dryer():
+    found = columns("daisy_hairdryer.csv")
+    u, y = (found[name].astype(float) for name in ("u_V", "y_temp"))
+    return dataset(u, y, 0.08, ("V", "V"))
+
+
+def piezo():
+    found = columns("piezo_micromanipulator_150V_1Hz.csv")
+    time_s, u, y = (found[name].astype(float) for name in ("t_s", "u_V", "y_um"))
+    kept = np.flatnonzero(time_s > 5.0)[::10][:4000]
+    return dataset(u[kept] - u[kept].mean(), y[kept] - y[kept].mean(), 2e-3, ("V", "um"))
+
+
+CASES = {
+    "silverbox": Case(
+        silverbox("train", 8000),
+        "second-order",
+        {name: silverbox(f"test_{name}") for name in ("multisine", "arrow", "arrow_noextrap")},
+        50,
+        1e3,
+        "mV",
+        "best published 0.36 / 0.26 / 0.32",
+    ),
+    "bouc-wen": Case(
+        bouc_wen("train", 8000),
+        "second-order",
+        {"multisine": bouc_wen("test_multisine"), "sinesweep": bouc_wen("test_sinesweep")},
+        0,
+        1e6,
+        "um",
+        "best published 12 (multisine)",
+    ),
+    "tanks": Case(tanks("est"), "cascaded-tanks", {"val": tanks("val")}, 50, 1.0, "V", "0.18 to 0.59"),
+    "furnace": Case(furnace, "linear:1", {}),
+    "furnace, delayed": Case(furnace, "linear:1:3", {}),
+    "dryer": Case(dryer, "linear:2", {}),
+    "dryer, delayed": Case(dryer, "linear:2:2", {}),
+    "piezo 150 V": Case(piezo, "linear:0", {}),
+    **{
+        f"damper {volt:g} V {which}": Case(damper(volt, which), f"python:{NAIVE}:force", {}, unit="N")
+        for volt in (0.0, 0.8712, 1.98, 3.212)
+        for which in (2, 5)
+    },
+}
+
+
+def errors(case: Case, record: islands.Dataset, found) -> dict[str, list[float]]:
+    """Return the RMSE on each test, of the simulation alone and with what was found in it."""
+    rows = {}
+    for name, made in case.tests.items():
+        test = made()
+        rows[name] = []
+        for fit in (found.base, found.best):
+            y = islands.simulated(extended_document(fit, record), test)
+            rows[name].append(case.scale * float(np.sqrt(np.mean((test.y - y)[case.skip :] ** 2))))
+    return rows
+
+
+def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> dict:
+    """Return what is said of surrogates of a record: clean ones, and ones with an effect put in.
+
+    Effects take turns, each with a misfit of one to three standard deviations of what the best simulation
+    leaves, so that it is more than half of what is wrong.
+    """
+    core = simulation(case.simulation, found.record)
+    source = surrogates_of(found, core, {})
+    called = [probed(source, Probe(None, seed)).called for seed in range(clean)]
+    rng, told = np.random.default_rng(1), []
+    names = rng.permutation(sorted(source.effects)).tolist()
+    while names and len(told) < injected:
+        strong = [
+            each for each in injections(source, source.effects[names.pop()], rng) if 1.0 < each.misfit < 4.0
+        ]
+        if strong:
+            answer = probed(source, Probe(strong[0], len(told)))
+            told.append((strong[0].cause, answer.called, answer.recognised))
+    return {"clean": called, "injected": told}
+
+
+def measured(case: Case, clean: int = 0, injected: int = 0) -> dict:
+    record = case.record()
+    began, cpu = time.perf_counter(), time.process_time()
+    found = islands.diagnose(record, case.simulation)
+    wall, busy = time.perf_counter() - began, time.process_time() - cpu
+    gain = found.gain
+    return {
+        "samples": record.samples,
+        "simulation": case.simulation,
+        "verdict": str(found.verdict),
+        "names": [each.name for each in found.effects if each.eta is not None],
+        "equivalents": [list(each.equivalents) for each in found.effects if each.eta is not None],
+        "candidates": [each.name for each in found.candidates[:3]],
+        "locked": None
+        if gain is None
+        else [case.scale * gain.before.rmse, case.scale * gain.after.rmse, *gain.ci95],
+        "floor": case.scale * found.noise_floor,
+        "tests": errors(case, record, found),
+        "unit": case.unit,
+        "published": case.published,
+        "surrogates": probes(case, found, clean, injected),
+        "wall_s": wall,
+        "cpu_s": busy,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help=", ".join(CASES))
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--clean", type=int, default=0, help="clean surrogates of each record")
+    parser.add_argument("--injected", type=int, default=0, help="surrogates of each with an effect put in")
+    asked = parser.parse_args()
+    rows = {}
+    for name in asked.names or CASES:
+        row = rows[name] = measured(CASES[name], asked.clean, asked.injected)
+        print(f"{name} ({row['simulation']}, {row['samples']} samples, {row['cpu_s']:.0f} s of CPU)")
+        names, first = ", ".join(row["names"]) or "-", ", ".join(row["candidates"])
+        print(f"    {row['verdict']}: {names}   (ladder: {first})")
+        if row["locked"] is not None:
+            before, after, low, high = row["locked"]
+            print(f"    locked {before:.4g} -> {after:.4g} {row['unit']} ({low:.0f} to {high:.0f} % less)")
+        for test, (before, after) in row["tests"].items():
+            print(f"    {test}: {before:.4g} -> {after:.4g} {row['unit']}")
+        said = row["surrogates"]
+        if said["clean"]:
+            print(f"    clean surrogates: {Counter(said['clean'])}")
+        if said["injected"]:
+            first = sum(hidden == called for hidden, called, _ in said["injected"])
+            among = sum(recognised for *_, recognised in said["injected"])
+            print(f"    put in: {len(said['injected'])}, named first {first}, among the names {among}")
+            print(f"        {[each[:2] for each in said['injected'] if each[0] != each[1]]}")
+        if row["published"]:
+            print(f"    {row['published']}")
+    if asked.json:
+        asked.json.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()

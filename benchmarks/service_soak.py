@@ -1,0 +1,249 @@
+"""A soak: processes of a service are killed at random while jobs come, go and are cancelled.
+
+    python benchmarks/service_soak.py [--kills 500] [--seed 0] [--json FILE]
+
+At the end nothing that was accepted may be lost, nothing done twice, and every result has to be, byte for
+byte, that of the same job before the first kill. The exit status is 1 where that is not so.
+"""
+
+import argparse
+import json
+import os
+import random
+import sys
+import tempfile
+import time
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from support.processes import alive, kill
+from support.service_processes import TERMINAL, Service, serving
+
+#: Who is killed, and how often in relation to the others. What needs Ray needs seconds after its loss.
+VICTIMS = {"island": 10, "api": 4, "coordinator": 2, "raylet": 0.3, "gcs": 0.3, "head": 0.3}
+
+#: Seconds between two kills, on a machine that takes so many seconds for a job; on one that is slower or busy
+#: they are longer, or nothing would come on between two of them.
+PAUSE, JOB = (0.5, 2.0), 3.0
+
+#: Different jobs, their generations, and how many wait or run at a time.
+SEEDS, GENERATIONS, ACTIVE = 5, 40, 4
+
+#: Shares of the jobs that are cancelled, and of the cancelled ones that are resumed.
+CANCELLED, RESUMED = 0.3, 0.5
+
+#: Seconds that everything may take to end once nobody is killed any more.
+CALM = 600.0
+
+
+@dataclass
+class Found:
+    """What a soak has brought; the last three are to be 0."""
+
+    kills: dict[str, int] = field(default_factory=Counter)
+    jobs: int = 0
+    states: dict[str, int] = field(default_factory=Counter)
+    resubmitted: int = 0
+    given_up_and_resumed: int = 0
+    most_attempts: int = 0
+    seconds_of_a_job: float = 0.0
+    seconds: float = 0.0
+    load: float = 0.0
+    lost: int = 0
+    duplicated: int = 0
+    different: int = 0
+
+    @property
+    def good(self) -> bool:
+        return self.lost == self.duplicated == self.different == 0
+
+
+class Killer(Thread):
+    """Kills one process after the other until it has killed so many."""
+
+    def __init__(self, service: Service, kills: int, chance: random.Random, found: Found) -> None:
+        super().__init__(name="killer", daemon=True)
+        self._service, self._left, self._chance, self._found = service, kills, chance, found
+        self.over = Event()
+
+    def run(self) -> None:
+        slower = max(1.0, self._found.seconds_of_a_job / JOB)
+        while self._left and not self.over.wait(slower * self._chance.uniform(*PAUSE)):
+            (role,) = self._chance.choices(list(VICTIMS), list(VICTIMS.values()))
+            if pids := self._service.pids(role):
+                with suppress(ProcessLookupError):
+                    kill(self._chance.choice(pids))
+                    self._found.kills[role] += 1
+                    self._left -= 1
+        self.over.set()
+
+
+class Soak:
+    """A client that submits jobs and remembers every promise that it was given.
+
+    Attributes
+    ----------
+    promised : dict
+        The id that was given for every idempotency key.
+    """
+
+    def __init__(self, service: Service, chance: random.Random, found: Found) -> None:
+        self._service, self._chance, self._found = service, chance, found
+        self.promised: dict[str, str] = {}
+        self._seeds: dict[str, int] = {}
+        self._open: set[str] = set()
+        self._to_cancel: set[str] = set()
+        self._cancelled: set[str] = set()
+        self._expected: dict[int, bytes] = {}
+
+    def prepare(self) -> None:
+        """Have every job carried out once without any disturbance."""
+        jobs = {seed: self._submit(f"undisturbed {seed}", seed) for seed in range(SEEDS)}
+        self._expected = {0: self._service.found(jobs[0])}  # and Ray has started
+        began = time.monotonic()
+        self._expected = {seed: self._service.found(job) for seed, job in jobs.items()}
+        self._found.seconds_of_a_job = (time.monotonic() - began) / (SEEDS - 1)
+        assert len(set(self._expected.values())) > 1
+        self._open.clear()
+
+    def step(self) -> None:
+        """Bring in new jobs, ask for some twice, cancel some, and look who has ended."""
+        while len(self._open) < ACTIVE:
+            number = len(self.promised)
+            job = self._submit(f"job {number}", number % SEEDS)
+            if self._chance.random() < CANCELLED:
+                self._to_cancel.add(job)
+        self._ask_again(self._chance.choice(list(self.promised)))
+        for job in sorted(self._open):
+            self._look(job)
+
+    def finish(self) -> None:
+        """Wait for all that is still open."""
+        until = time.monotonic() + CALM
+        while self._open and time.monotonic() < until:
+            for job in sorted(self._open):
+                self._look(job)
+            time.sleep(0.1)
+
+    def judge(self) -> None:
+        """Hold what there is against what was promised."""
+        listed = self._listed()
+        known = set(self.promised.values())
+        self._found.jobs = len(known)
+        self._found.lost = len(known - listed.keys()) + len(self._open)
+        self._found.duplicated = len(listed.keys() - known) + len(self.promised) - len(known)
+        for key, job in self.promised.items():
+            self._judge(key, job, listed.get(job))
+
+    def _judge(self, key: str, job: str, document: dict[str, Any] | None) -> None:
+        if document is None:
+            return
+        state = document["state"]
+        self._found.states[state] += 1
+        self._found.most_attempts = max(self._found.most_attempts, document["attempt"])
+        if state == "succeeded":
+            same = self._service.models(job) == self._expected[self._seeds[job]]
+            self._found.different += not (same and self._once(job))
+        elif not (state == "cancelled" and job in self._cancelled):
+            print(f"{key} is {state}: {document['problem']}")
+            self._found.lost += 1
+
+    def _once(self, job: str) -> bool:
+        """Whether a job's events have no gap, and it has succeeded once."""
+        text = self._service.ask("GET", f"/v1/jobs/{job}/events").text
+        events = [
+            dict(line.split(": ", 1) for line in each.splitlines()) for each in text.split("\n\n") if each
+        ]
+        numbers = [int(event["id"]) for event in events]
+        kinds = [event["event"] for event in events]
+        return numbers == list(range(1, len(events) + 1)) and kinds.count("succeeded") == 1
+
+    def _submit(self, key: str, seed: int) -> str:
+        job = self._service.submit(GENERATIONS, key=key, seed=seed)
+        self.promised[key], self._seeds[job] = job, seed
+        self._open.add(job)
+        return job
+
+    def _ask_again(self, key: str) -> None:
+        job = self.promised[key]
+        again = self._service.submit(GENERATIONS, key=key, seed=self._seeds[job])
+        self._found.resubmitted += 1
+        self._found.duplicated += again != job
+
+    def _look(self, job: str) -> None:
+        state = (document := self._service.job(job))["state"]
+        if state not in TERMINAL:
+            if job in self._to_cancel and self._chance.random() < 0.3:
+                self._to_cancel.discard(job)
+                self._cancelled.add(job)
+                self._service.ask("POST", f"/v1/jobs/{job}/cancel")
+        elif state == "failed" and document["problem"]["type"] == "no-progress":
+            self._found.given_up_and_resumed += 1
+            self._service.ask("POST", f"/v1/jobs/{job}/resume")
+        elif state == "cancelled" and job in self._cancelled and self._chance.random() < RESUMED:
+            self._cancelled.discard(job)
+            self._service.ask("POST", f"/v1/jobs/{job}/resume")
+        else:
+            self._open.discard(job)
+
+    def _listed(self) -> dict[str, dict[str, Any]]:
+        found: dict[str, dict[str, Any]] = {}
+        cursor: dict[str, str] = {}
+        while True:
+            page = self._service.ask("GET", "/v1/jobs", params={"limit": "200", **cursor}).json()
+            found |= {job["id"]: job for job in page["items"]}
+            if page["next"] is None:
+                return found
+            cursor = {"cursor": page["next"]}
+
+
+def soak(folder: Path, kills: int, seed: int) -> Found:
+    """Kill so many processes of a service, and say what became of its jobs."""
+    found, began = Found(), time.monotonic()
+    with serving(folder, patience=CALM) as service:
+        client = Soak(service, random.Random(seed), found)
+        client.prepare()
+        killer = Killer(service, kills, random.Random(seed + 1), found)
+        killer.start()
+        told = 0
+        while not killer.over.wait(0.1):
+            client.step()
+            if sum(found.kills.values()) >= told + 20:
+                told = sum(found.kills.values())
+                print(
+                    f"{told} kills, {len(client.promised)} jobs, {time.monotonic() - began:.0f} s", flush=True
+                )
+        client.finish()
+        client.judge()
+        assert alive([service.process.pid])
+    found.seconds = time.monotonic() - began
+    found.load = os.getloadavg()[1]
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--kills", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--folder", type=Path, help="Keep the service's data and its log there.")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="islands-soak-", ignore_cleanup_errors=True) as temporary:
+        folder = given.folder or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        found = soak(folder / "data", given.kills, given.seed)
+    for name, value in vars(found).items():
+        print(f"{name.replace('_', ' '):24s} {dict(value) if isinstance(value, dict) else value}")
+    if given.json:
+        given.json.write_text(json.dumps(vars(found), indent=2))
+    return 0 if found.good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

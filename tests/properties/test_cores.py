@@ -1,0 +1,163 @@
+"""Laws of every simulation that can be diagnosed: what it says is true; effects at rest do nothing in it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.core import Core
+from islands.discrepancy.cores import (
+    between,
+    bouc_wen_piezo,
+    cascaded_tanks,
+    column,
+    extension,
+    linear,
+    narx,
+    program,
+    rigid_axis,
+    second_order,
+)
+from islands.discrepancy.effect import Effect, Site
+from islands.discrepancy.extended import Extended
+from islands.discrepancy.preparation import effects_for, fitted_samples, scene_of
+from islands.discrepancy.scene import Scene
+from support.simulated_records import made
+
+#: By name, what each has to be; the held one is within the extension.
+KINDS = {
+    "bouc-wen-piezo": bouc_wen_piezo.BoucWenPiezoCore,
+    "second-order": second_order.SecondOrderCore,
+    "rigid-axis": rigid_axis.RigidAxisCore,
+    "cascaded-tanks": cascaded_tanks.CascadedTanksCore,
+    "linear": linear.LinearCore,
+    "model": narx.NarxCore,
+    "column": column.ColumnCore,
+    "python": program.ProgramCore,
+    "held": between.Between,
+    "extended": extension.ExtensionCore,
+}
+
+
+@pytest.fixture(params=KINDS)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture
+def core(name: str) -> Core:
+    found = made()[name].core
+    return found.core if name == "held" else found
+
+
+@pytest.fixture
+def scene(name: str, core: Core) -> Scene:
+    record = made()[name].record
+    return scene_of(record, core, fitted_samples(record))
+
+
+@pytest.fixture
+def alone(core: Core, scene: Scene) -> Extended:
+    return Extended(core, (), scene)
+
+
+def effects(core: Core, scene: Scene) -> list[Effect]:
+    """Return all that can enter: gains and parameters as well, where every parameter is trusted."""
+    free = effects_for(core, scene, {})
+    trusted = effects_for(core, scene, {each.name: 0.1 for each in core.parameters if not each.initial})
+    return list({each.name: each for each in (*free, *trusted)}.values())
+
+
+def test_every_core_is_here() -> None:
+    modules = {path.stem for path in Path(between.__file__).parent.glob("*.py")}
+    here = {kind.__module__.rpartition(".")[2] for kind in KINDS.values()}
+    assert modules - {"__init__", "coordinates", "around"} == here
+
+
+def test_it_is_what_it_says(name: str, core: Core) -> None:
+    assert isinstance(core, KINDS[name])
+    assert core.name
+    assert set(core.sites) <= set(Site)
+    assert isinstance(core.integrates, bool)
+
+
+def test_a_simulation_has_a_value_for_every_sample(alone: Extended, scene: Scene) -> None:
+    simulated = alone.simulate(alone.nominal)
+    assert simulated.shape == scene.u.shape
+    assert simulated.dtype == np.float64
+    assert np.isfinite(simulated).all()
+
+
+def test_the_same_input_gives_the_same_bits(name: str, alone: Extended, core: Core, scene: Scene) -> None:
+    u = scene.u.copy()
+    first = alone.simulate(alone.nominal)
+    again = Extended(core, (), scene)
+    assert np.array_equal(again.simulate(again.nominal), first)
+    other = Extended(made()[name].core if name != "held" else core, (), scene)
+    assert np.array_equal(other.simulate(other.nominal), first)
+    assert np.array_equal(scene.u, u)
+
+
+def test_nominal_values_are_within_bounds_and_can_move(alone: Extended) -> None:
+    lower, upper = alone.bounds
+    assert np.isfinite(alone.nominal).all()
+    assert (lower <= alone.nominal).all()
+    assert (alone.nominal <= upper).all()
+    assert (lower < upper).all()
+    assert (alone.scales > 0.0).all()
+
+
+def test_every_parameter_changes_the_output(name: str, alone: Extended) -> None:
+    at_rest = alone.simulate(alone.nominal)
+    for place, parameter in enumerate(alone.parameters):
+        values = alone.nominal
+        values[place] += alone.scales[place]
+        changed = alone.simulate(np.minimum(values, alone.bounds[1])) - at_rest
+        assert np.isfinite(changed).all(), parameter
+        assert np.max(np.abs(changed)) > 0.0, parameter
+
+
+def test_names_are_unique(core: Core, scene: Scene) -> None:
+    names = [each.name for each in core.parameters]
+    assert len(set(names)) == len(names)
+    found = effects_for(core, scene, {})
+    assert len({each.name for each in found}) == len(found)
+    for effect in effects(core, scene):
+        own = [each.name for each in effect.parameters(scene)]
+        assert len(set(own)) == len(own), effect.name
+
+
+def test_the_frame_has_scales(core: Core, scene: Scene) -> None:
+    frame = scene.frame
+    assert min(frame.peak, frame.rate, frame.force, frame.sharp) > 0.0
+    assert frame.unit
+    assert frame.force_unit
+    assert frame.sense in (-1.0, 1.0)
+    assert frame.least == (0.0 if frame.dissipates else -np.inf)
+
+
+def test_an_effect_at_rest_does_nothing(core: Core, alone: Extended, scene: Scene) -> None:
+    at_rest = alone.simulate(alone.nominal)
+    found = effects(core, scene)
+    assert found
+    for effect in found:
+        extended = alone.with_effects([effect])
+        assert np.array_equal(extended.simulate(extended.nominal), at_rest), effect.name
+
+
+def test_an_effect_enters_where_the_core_lets_it(core: Core, alone: Extended, scene: Scene) -> None:
+    """At the first point of its grid every one of them does something that is a number."""
+    at_rest = alone.simulate(alone.nominal)
+    residual = 0.01 * scene.output_peak * np.sin(2 * np.pi * 7.3 * scene.time)
+    for effect in effects(core, scene):
+        extended = alone.with_effects([effect])
+        lower, upper = extended.bounds
+        changes = []
+        for point in effect.grid(scene, residual):
+            values = extended.nominal
+            values[extended.part(effect)] = point
+            assert (lower <= values).all(), effect.name
+            assert (values <= upper).all(), effect.name
+            changes.append(np.max(np.abs(extended.simulate(values) - at_rest)))
+        assert np.isfinite(changes).any(), effect.name
+        assert np.nanmax(changes) > 0.0, effect.name

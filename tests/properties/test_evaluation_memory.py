@@ -1,0 +1,132 @@
+"""Laws of an evaluator's memory: every cache keeps to its limit, and says what it takes."""
+
+import gc
+import tracemalloc
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from islands.estimation.constraints import CONSTRAINTS
+from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.individual import Individual
+from islands.evolution.island import first_generation, step
+from islands.evolution.rng import Purpose, Stream
+from islands.evolution.variation import random_gene
+from islands.evolution.vocabulary import Vocabulary
+from islands.model.expression import Lagged
+from islands.model.parsing import parse
+from support.searches import SMALL, evolved, islands_of, record
+
+LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)
+
+
+def test_every_cache_stays_within_its_limit_but_for_one_generation():
+    evaluator = Evaluator(record(), SMALL, LIMITS)
+    # A generation's genes and their regressors, its individuals, and those that tournaments settle.
+    generation = {
+        "pairs": 0,
+        "genes": SMALL.population * SMALL.max_terms * 6_000,
+        "structures": 2 * SMALL.population * 2_000,
+    }
+    island, _ = first_generation(0, 3, evaluator)
+    emptied = dict.fromkeys(generation, 0)
+    for _ in range(40):
+        before = evaluator.memory
+        island, _ = step(island, evaluator)
+        for name, (taken, limit) in evaluator.memory.items():
+            assert limit == getattr(LIMITS, name)
+            assert 0 < taken <= limit + generation[name]
+            emptied[name] += taken < before[name][0]
+    # The law says nothing where nobody comes near the limit.
+    assert all(emptied.values()), emptied
+    assert repr(island) == repr(evolved(40))
+
+
+def test_with_its_own_limits_an_evaluator_takes_no_more_memory_however_long_it_is_at_work():
+    """Measured, not said."""
+    evaluator = Evaluator(record(), SMALL, LIMITS)
+    islands_of(evaluator, 30)
+    tracemalloc.start()
+    try:
+        course = []
+        for seed in range(4):
+            islands_of(evaluator, 15, seed=seed)
+            gc.collect()
+            course.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert max(course) < 3 * (LIMITS.genes + LIMITS.structures)
+
+
+@pytest.fixture
+def traced():
+    """The growth of memory from here on."""
+    # A function that no kernel has called yet is compiled, and that is not a gene's.
+    Vocabulary(CONSTRAINTS["none"], [parse("tanh(exp(y(k-1)))")])
+    gc.collect()
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+
+    def growth():
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0] - before
+
+    yield growth
+    tracemalloc.stop()
+
+
+HIGH = replace(SMALL, max_height=5, initial_height=5)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [HIGH, replace(HIGH, constraints="none", structure="free", primitives=("mul", "tanh", "exp", "add"))],
+    ids=["paper", "free"],
+)
+def test_genes_take_what_a_vocabulary_says(traced, setting):
+    vocabulary = Vocabulary(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
+    draw = Stream(7, 0, 0, Purpose.INITIAL)
+    for _ in range(1500):
+        vocabulary.number(random_gene(setting, 2, draw))
+    taken = traced()
+    assert vocabulary.bytes > 1_000_000
+    assert vocabulary.bytes / 2.5 < taken < vocabulary.bytes * 2.5
+
+
+def test_structures_take_what_an_evaluator_says(traced):
+    setting = replace(SMALL, max_terms=6, constraints="none", structure="free")
+    evaluator = Evaluator(record(), setting)
+    genes = [parse(text) for lag in range(1, 11) for text in (f"u(k-{lag})", f"y(k-{lag})*u(k-1)")]
+    evaluator.evaluate([(Individual((each,)), False) for each in genes])
+    structures = [chosen for size in (2, 3, 5, 6) for chosen in list(combinations(genes, size))[:400]]
+    rng = np.random.default_rng(0)
+    population = [(Individual(chosen), bool(rng.integers(2))) for chosen in structures]
+    said, before = evaluator.memory["structures"][0], traced()
+    evaluator.evaluate(population)
+    said, taken = evaluator.memory["structures"][0] - said, traced() - before
+    assert said > 1_000_000
+    assert said / 2.5 < taken < said * 2.5
+
+
+def test_the_table_of_pairs_is_as_large_as_its_limit_lets_it_be():
+    for limit in (1 << 15, 1 << 18):
+        evaluator = Evaluator(record(), SMALL, Limits(pairs=limit))
+        assert evaluator.memory["pairs"] == (0, limit)
+        table = evaluator._pairs
+        assert sum(array.nbytes for array in table[:2]) == limit
+    assert set(Evaluator(record(), SMALL).memory) == {"pairs", "genes", "structures"}
+
+
+def test_whatever_the_limit_a_single_individual_finds_room():
+    """Of 60 genes and y(k) there are 1891 pairs; the smallest table has 1024 places."""
+    texts = [f"y(k-{1 + place % 10})*u(k-{1 + place // 10})" for place in range(60)]
+    setting = replace(SMALL, constraints="none", structure="free", max_terms=60, fitness="one-step")
+    large = [(Individual(tuple(map(parse, texts))), True)]
+    expected = Evaluator(record(), setting).evaluate(large)
+    assert expected[0][0].outcome
+    evaluator = Evaluator(record(), setting, Limits(pairs=0))
+    for _ in range(3):
+        evaluator.evaluate([(Individual((Lagged(0), parse(texts[0]))), False)])
+        assert repr(evaluator.evaluate(large)[0]) == repr(expected[0])

@@ -1,0 +1,60 @@
+"""A coordinator that does what a test says: the page is shown states that a search would pass in a moment."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import sqrt
+from typing import Any
+
+from islands_service.jobs import Lease, Report
+from islands_service.store import Store
+from support.service_processes import Service
+
+#: Seconds of a lease: longer than any test.
+_LONG = 3600.0
+
+GENERATIONS = 500
+
+
+@contextmanager
+def stored(service: Service) -> Iterator[Store]:
+    """The service's own store."""
+    with Store(f"sqlite:///{service.folder / 'islands.db'}") as store:
+        yield store
+
+
+def claimed(store: Store, job: str) -> Lease:
+    """Take a job, and before it all that wait in front of it."""
+    while (lease := store.leases.claim("test", _LONG)) is not None:
+        if lease.job.id == job:
+            return lease
+    raise AssertionError(f"job {job} does not wait")
+
+
+def squared_error(generation: int, island: int) -> float:
+    """A mean squared error that falls as a search's does."""
+    return 1e-3 * (1 + island) / (1 + generation / 20)
+
+
+def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2) -> None:
+    """Report the generations from the first to the last one."""
+    points = tuple(
+        (
+            at,
+            60 * (at + 1),
+            {str(size): squared_error(at, 0) * 2 ** (5 - size) for size in range(1, 6)},
+            tuple(squared_error(at, island) for island in range(islands)),
+        )
+        for at in range(first, last + 1)
+    )
+    progress: dict[str, Any] = {
+        "phase": "search",
+        "generation": last,
+        "generations": GENERATIONS,
+        "evaluations": 60 * (last + 1),
+        "evaluations_per_second": 3000.0,
+        "seconds_left": (GENERATIONS - last) / 50,
+        "best_error": sqrt(squared_error(last, 0)),
+        "best_by_size": {"5": sqrt(squared_error(last, 0))},
+        "islands": [sqrt(squared_error(last, island)) for island in range(islands)],
+    }
+    store.leases.report(lease, Report(progress, points, after=first - 1))

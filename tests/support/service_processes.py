@@ -1,0 +1,199 @@
+"""`islands serve` as processes: started on a free port, asked over HTTP, its roles found in /proc, ended."""
+
+import os
+import signal
+import socket
+import ssl
+import subprocess
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import httpx
+
+from support.front_door import ISLANDS, write_hysteresis
+from support.processes import alive, descendants, eventually
+
+#: What the command line of every role holds. The actors and the two servers are Ray's own processes.
+ROLES = {
+    "api": "-m islands_api",
+    "coordinator": "-m islands_service.coordinator",
+    "head": "-m islands_service.runtime.head",
+    "raylet": "raylet/raylet ",
+    "gcs": "gcs/gcs_server ",
+    "island": "ray::IslandActor",
+}
+
+TERMINAL = ("succeeded", "failed", "cancelled")
+
+#: A search with some hundred epochs, each a few milliseconds long.
+SPEC = {
+    "inputs": ["u_V"],
+    "output": "y_um",
+    "seed": 2,
+    "settings": {"population": 30, "max_terms": 5, "shooting": 200, "islands": 2, "migrate_every": 1},
+}
+
+#: Frequent checkpoints: a test does not live long.
+QUICK = {"ISLANDS_CHECKPOINT_EVERY": "0.5", "ISLANDS_RATE": "0"}
+
+
+def free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port: int = free.getsockname()[1]
+        return port
+
+
+def started(*options: object, log: IO[str] | None = None, **environment: str) -> subprocess.Popen[str]:
+    """Start ``islands serve``: what it says goes to a file, or can be read from its ``stderr``."""
+    return subprocess.Popen(
+        [ISLANDS, "serve", *map(str, options)],
+        env={**os.environ, **QUICK, **environment},
+        stdout=subprocess.DEVNULL,
+        stderr=log or subprocess.PIPE,
+        text=True,
+    )
+
+
+class Service:
+    """A service that runs, and a client that comes back where it was cut off."""
+
+    def __init__(
+        self,
+        process: subprocess.Popen[str],
+        url: str,
+        folder: Path,
+        tls: ssl.SSLContext | None = None,
+        patience: float = 60.0,
+    ) -> None:
+        self.process, self.url, self.folder, self.patience = process, url, folder, patience
+        self.log = folder.with_suffix(".log")
+        self.client = httpx.Client(base_url=url, timeout=30.0, verify=tls or True, trust_env=False)
+        self._dataset = ""
+
+    def ask(self, method: str, path: str, **asked: Any) -> httpx.Response:
+        """Ask until somebody answers: a connection that is refused or cut is tried again."""
+        deadline = time.monotonic() + self.patience
+        while True:
+            try:
+                answer = self.client.request(method, path, **asked)
+                if answer.status_code != 503:
+                    return answer
+            except httpx.TransportError:
+                if time.monotonic() > deadline:
+                    raise
+            assert time.monotonic() < deadline, self.log.read_text()
+            time.sleep(0.02)
+
+    def ready(self) -> None:
+        assert self.ask("GET", "/readyz").status_code == 200
+
+    def pids(self, role: str) -> list[int]:
+        """The processes of a role that live, of this service alone, eldest first."""
+        found = descendants(self.process.pid)
+        return alive(sorted(pid for pid, line in found.items() if ROLES[role] in line))
+
+    def one(self, role: str) -> int:
+        """A process of a role, as soon as there is one."""
+        found: list[int] = eventually(lambda: self.pids(role))  # type: ignore[assignment]
+        return found[0]
+
+    @property
+    def dataset(self) -> str:
+        """The data set that all jobs are about."""
+        if not self._dataset:
+            path = self.folder.with_suffix(".csv")
+            if not path.exists():
+                write_hysteresis(path)
+            answer = self.ask("POST", "/v1/datasets", files={"file": (path.name, path.read_bytes())})
+            assert answer.status_code in (200, 201), answer.text
+            self._dataset = answer.json()["id"]
+        return self._dataset
+
+    def submit(self, generations: int, key: str | None = None, **changes: Any) -> str:
+        spec = {**SPEC, "dataset": self.dataset, **changes}
+        spec["settings"] = {**SPEC["settings"], "generations": generations, **changes.get("settings", {})}  # type: ignore[dict-item]
+        headers = {} if key is None else {"Idempotency-Key": key}
+        answer = self.ask("POST", "/v1/jobs", json=spec, headers=headers)
+        assert answer.status_code == 202, answer.text
+        identity: str = answer.json()["id"]
+        return identity
+
+    def job(self, job: str) -> dict[str, Any]:
+        answer = self.ask("GET", f"/v1/jobs/{job}")
+        assert answer.status_code == 200, answer.text
+        document: dict[str, Any] = answer.json()
+        return document
+
+    def generation(self, job: str) -> int:
+        return int((self.job(job)["progress"] or {}).get("generation", 0))
+
+    def under_way(self, job: str, generation: int = 10) -> int:
+        """Wait until a job is past a generation, and return where it is."""
+        return int(str(eventually(lambda: (at := self.generation(job)) >= generation and at)))
+
+    def ended(self, job: str, seconds: float = 120.0) -> dict[str, Any]:
+        """Wait until a job has ended, and return it."""
+        deadline, tag = time.monotonic() + seconds, ""
+        while True:
+            answer = self.ask(
+                "GET", f"/v1/jobs/{job}", params={"wait": 5}, headers={"If-None-Match": tag} if tag else {}
+            )
+            if answer.status_code == 200:
+                document: dict[str, Any] = answer.json()
+                tag = answer.headers["etag"]
+                if document["state"] in TERMINAL:
+                    return document
+            assert time.monotonic() < deadline, (self.job(job), self.log.read_text())
+
+    def models(self, job: str) -> bytes:
+        """What ``GET /v1/jobs/{id}/models`` answers, byte for byte."""
+        answer = self.ask("GET", f"/v1/jobs/{job}/models")
+        assert answer.status_code == 200, answer.text
+        return answer.content
+
+    def found(self, job: str) -> bytes:
+        """Wait until a job has succeeded, and return its models."""
+        ended = self.ended(job)
+        assert ended["state"] == "succeeded", ended
+        return self.models(job)
+
+    def stop(self, seconds: float = 60.0) -> int:
+        """End it by SIGTERM, and return its exit status."""
+        self.process.terminate()
+        return self.process.wait(seconds)
+
+
+@contextmanager
+def serving(
+    folder: Path,
+    *options: object,
+    port: int | None = None,
+    tls: ssl.SSLContext | None = None,
+    environment: Mapping[str, str] | None = None,
+    patience: float = 60.0,
+) -> Iterator[Service]:
+    """Run a service on a data folder; when the block ends, it and all that it has started are gone."""
+    port = port or free_port()
+    with folder.with_suffix(".log").open("a") as log:
+        process = started("--data-dir", folder, "--port", port, *options, log=log, **environment or {})
+    service = Service(process, f"http{'s' if tls else ''}://127.0.0.1:{port}", folder, tls, patience)
+    children: dict[int, str] = {}
+    try:
+        service.ready()
+        yield service
+        children = descendants(process.pid)
+    finally:
+        service.client.close()
+        if process.poll() is None:
+            children = {**children, **descendants(process.pid)}
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(60)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+    eventually(lambda: not alive(children), seconds=120.0)

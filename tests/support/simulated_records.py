@@ -1,0 +1,147 @@
+"""One simulation of every kind, each with a short record that it could have made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.core import Core
+from islands.io.simulation_spec import (
+    ColumnSpec,
+    LinearSpec,
+    LocalExtendedSpec,
+    LocalSpec,
+    ModelSpec,
+    PhysicalSpec,
+    ProgramSpec,
+)
+from islands.io.simulations import simulation
+
+#: A function of the user's own, in a file.
+PROGRAM = Path(__file__).with_name("naive_damper.py")
+
+#: Samples of a record, and seconds between two.
+SAMPLES, DT = 600, 0.01
+
+MODEL = {
+    "schema": "islands.model/1",
+    "inputs": ["u_V"],
+    "output": "y_um",
+    "terms": [
+        {"regressor": "y(k-1)", "parameter": 0.8},
+        {"regressor": "u(k-1)", "parameter": 0.15},
+        {"regressor": "u(k-2)*u(k-2)", "parameter": 0.002},
+    ],
+}
+
+
+@dataclass(frozen=True)
+class Made:
+    """A simulation as it is asked for, and a record."""
+
+    spec: LocalSpec
+    record: Dataset
+    columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    @property
+    def core(self) -> Core:
+        return simulation(self.spec, self.record, self.columns)
+
+
+def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:
+    """Return five sines that have no common period within the record."""
+    t = dt * np.arange(samples)
+    return sum(
+        size * np.sin(2 * np.pi * f * t + p)
+        for size, f, p in ((20, 0.31, 1), (12, 0.83, 2), (8, 1.37, 3), (5, 2.9, 4), (3, 5.3, 5))
+    )
+
+
+def recorded(
+    u: NDArray[np.float64], y: NDArray[np.float64], dt: float = DT, units: tuple[str, str] = ("V", "um")
+) -> Dataset:
+    return Dataset(
+        u=np.asarray(u)[:, None],
+        y=np.asarray(y),
+        dt=dt,
+        input_names=(f"u_{units[0]}",),
+        input_units=units[:1],
+        output_name=f"y_{units[1]}",
+        output_unit=units[1],
+    )
+
+
+def with_a_degree_of_freedom(u: NDArray[np.float64], m: float, c: float, k: float) -> NDArray[np.float64]:
+    """Return the motion of ``m x'' + c x' + k x = u`` from rest, the input running straight."""
+    _, x, _ = scipy.signal.lsim(([1.0], [m, c, k]), u, DT * np.arange(u.size))
+    return np.asarray(x)
+
+
+@cache
+def made() -> Mapping[str, Made]:
+    """Return all of them, by name."""
+    u = wave()
+    rng = np.random.default_rng(11)
+    along = with_a_degree_of_freedom(u, 0.5, 4.0, 200.0)
+    moved = with_a_degree_of_freedom(u, 2.0, 6.0, 0.0)
+    level = 5.0 + scipy.signal.lfilter([0.02], [1, -0.98], np.abs(u) / 10)
+    plain = recorded(u, 0.8 * u + 0.01 * rng.standard_normal(u.size))
+    oscillator = recorded(u, along, units=("N", "m"))
+    spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
+    return {
+        "bouc-wen-piezo": Made(PhysicalSpec(kind="bouc-wen-piezo"), plain),
+        "second-order": Made(spring, oscillator),
+        "rigid-axis": Made(
+            PhysicalSpec(kind="rigid-axis", parameters={"m": 2.0, "c": 6.0, "F": 1.0}),
+            recorded(u, moved, units=("N", "m")),
+        ),
+        "cascaded-tanks": Made(
+            PhysicalSpec(kind="cascaded-tanks", parameters={"k1": 2.0, "k2": 2.0, "k3": 1.0}),
+            recorded(np.abs(u) / 10, level),
+        ),
+        "linear": Made(
+            LinearSpec(
+                kind="linear", order=1, delay=2, numerator=(0.1, 0.05), denominator=(0.85,), level=0.3
+            ),
+            plain,
+        ),
+        "model": Made(ModelSpec(kind="model", model=MODEL, name="m"), plain),
+        "column": Made(ColumnSpec(kind="column", column="theirs"), plain, {"theirs": 0.8 * u}),
+        "python": Made(
+            ProgramSpec(kind="python", path=str(PROGRAM), function="force", parameters={"c": 0.1}), plain
+        ),
+        "held": Made(
+            LocalExtendedSpec.model_validate({**extension(spring), "hold": "zero-order", "times": 4}),
+            oscillator,
+        ),
+        "extended": Made(
+            LocalExtendedSpec.model_validate(
+                extension(spring, name="cubic-stiffness", parameters={"k": {"value": 50.0}})
+            ),
+            oscillator,
+        ),
+    }
+
+
+def extension(core: LocalSpec, **effect: object) -> dict[str, object]:
+    """Return the document of an extension of an oscillator."""
+    frame = {"unit": "m", "peak": 0.2, "rate": 0.5, "force_unit": "N", "force": 40.0}
+    return {
+        "inputs": ["u_N"],
+        "output": "y_m",
+        "core": core.model_dump(),
+        "effects": [effect] if effect else [],
+        "scales": {
+            "dt": DT,
+            "input_peak": 40.0,
+            "output_peak": 0.2,
+            "fitted_s": 0.75 * SAMPLES * DT,
+            "duration_s": SAMPLES * DT,
+            "frame": {**frame, "sense": -1.0, "dissipates": True, "sharp": 0.02},
+        },
+    }

@@ -1,0 +1,65 @@
+"""An entry of the catalogue that does not do what it says is named, with what to do about it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.discrepancy import preparation
+from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.diagnosis import diagnose
+from islands.discrepancy.effect import Effect
+from islands.discrepancy.effects import CATALOGUE
+from islands.errors import SettingsError
+from support.simulated_records import recorded, wave
+
+
+@pytest.fixture(scope="module")
+def record() -> Dataset:
+    u = wave()
+    y = 0.8 * u + 0.5 + 0.05 * np.random.default_rng(0).standard_normal(u.size)
+    return recorded(u, y)
+
+
+def raises(*_arguments: object) -> None:
+    raise RuntimeError("out of order")
+
+
+GOOD = CATALOGUE["offset"]
+BROKEN: dict[str, tuple[Effect, str]] = {
+    "its form raises": (replace(GOOD, form=raises), "its form fails: RuntimeError: out of order"),
+    "its form gives another length": (
+        replace(GOOD, form=lambda y, _values, _scene: y[:-1]),
+        r"its form gives \(599,\) for \(600,\)",
+    ),
+    "its form gives no numbers": (
+        replace(GOOD, form=lambda y, _values, _scene: ["a"] * y.size),
+        "its form fails: ValueError",
+    ),
+    "its grid raises": (replace(GOOD, grid=raises), "its grid fails: RuntimeError: out of order"),
+    "its grid has too many values": (
+        replace(GOOD, grid=lambda _scene, _residual: ((1.0, 2.0),)),
+        "its grid has to give 1 values at each point",
+    ),
+    "its grid has none": (
+        replace(GOOD, grid=lambda _scene, _residual: ((),)),
+        "its grid has to give 1 values",
+    ),
+    "its map of the input raises": (replace(CATALOGUE["delay"], form=raises), "its form fails"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_effect_is_named(record: Dataset, monkeypatch: pytest.MonkeyPatch, case: str) -> None:
+    effect, why = BROKEN[case]
+    monkeypatch.setattr(preparation, "CATALOGUE", {effect.name: effect, "jump": CATALOGUE["jump"]})
+    with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {why}") as refused:
+        diagnose(record, BoucWenPiezoCore())
+    assert str(refused.value).endswith(".py or take it out of the catalogue")
+
+
+def test_a_grid_without_points_leaves_an_effect_out(record: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = replace(GOOD, grid=lambda _scene, _residual: ())
+    monkeypatch.setattr(preparation, "CATALOGUE", {effect.name: effect, "jump": CATALOGUE["jump"]})
+    assert {each.name for each in diagnose(record, BoucWenPiezoCore()).candidates} <= {"jump"}

@@ -1,0 +1,231 @@
+"""The exported C: compiled as the strictest of its readers compile it, it simulates what the kernel does."""
+
+import ctypes
+import json
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import islands
+from islands.benchmark.compiler import compiled, compiler
+from islands.data.dataset import Dataset
+from islands.errors import ModelError
+from islands.io.export import export
+from islands.io.export.parts import functions
+from islands.model.primitives import PRIMITIVES, primitive
+from islands.simulation.predictors import free_run, one_step_ahead
+from islands.systems.published_models import PUBLISHED
+from support.programs import (
+    CASES,
+    HOSTILE_NAMES,
+    OF_THE_LIBRARY,
+    SAMPLES,
+    at_the_edges,
+    bits,
+    model,
+    record,
+    record_of,
+)
+from support.strategies import models
+
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler is called cc")
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-pedantic", "-Werror")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("c")
+
+
+def pointer(signal, sample=0):
+    return ctypes.cast(signal.ctypes.data + 8 * sample, ctypes.POINTER(ctypes.c_double))
+
+
+def simulated(exported, data, folder, y=None):
+    """Run the compiled ``simulate``; behind the first samples, y holds NaN before."""
+    y = data.y.copy() if y is None else y
+    y[exported.maximum_lag :] = np.nan
+    inputs = [np.ascontiguousarray(column) for column in data.u.T]
+    simulate = compiled(export(exported, "c"), FLAGS, folder).simulate
+    simulate.restype = None
+    simulate(*map(pointer, inputs), pointer(y), ctypes.c_size_t(data.samples))
+    return y
+
+
+def of_the_library(exported):
+    return any(entry.name in OF_THE_LIBRARY for entry in functions(exported))
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", CASES)
+def test_the_compiled_program_simulates_as_the_kernel_does(name, folder):
+    exported, data = CASES[name], record_of(name)
+    ours, theirs, lag = free_run(exported, data), simulated(exported, data, folder), exported.maximum_lag
+    assert ours.outcome
+    assert bits(theirs[:lag]) == bits(data.y[:lag])
+    if of_the_library(exported):
+        np.testing.assert_allclose(theirs[lag:], ours.y[lag:], rtol=1e-13)
+    else:
+        assert bits(theirs[lag:]) == bits(ours.y[lag:])
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", PRIMITIVES)
+def test_a_compiled_primitive_is_the_kernels_at_every_jump_and_limit(name, folder):
+    exported, data = at_the_edges(name)
+    ours, theirs = free_run(exported, data, bound=np.inf).y[1:], simulated(exported, data, folder)[1:]
+    if name in OF_THE_LIBRARY:
+        np.testing.assert_array_max_ulp(theirs, ours, maxulp=4)
+    else:
+        assert bits(theirs) == bits(ours)
+
+
+@needs_compiler
+@settings(max_examples=25)
+@given(models(), st.integers(0, 2**32 - 1))
+def test_the_compiled_program_is_the_model_bit_for_bit(folder, random_model, seed):
+    assume(not of_the_library(random_model))
+    data = record(2, seed)
+    run = free_run(random_model, data)
+    # A diverging free run ends at the bound; C goes on to infinity.
+    assume(run.outcome)
+    lag = random_model.maximum_lag
+    assert bits(simulated(random_model, data, folder)[lag:]) == bits(run.y[lag:])
+
+
+@needs_compiler
+def test_an_input_at_rest_leaves_no_minus_zero(folder):
+    at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
+    assert bits(simulated(model({"u(k-1)": -0.5, "y(k-1)": -0.25}), at_rest, folder)) == [0] * 9
+
+
+@needs_compiler
+def test_predict_is_one_step_ahead_and_reads_nothing_but_its_past(folder):
+    data, exported = record(), PUBLISHED["12"].model
+    predict = compiled(export(exported, "c"), FLAGS, folder).predict
+    predict.restype = ctypes.c_double
+    predicted = []
+    for k in range(3, SAMPLES):
+        seen = [np.full(SAMPLES, np.nan) for _ in range(2)]
+        for signal, whole in zip(seen, (data.y, data.u[:, 0]), strict=True):
+            signal[k - 3 : k] = whole[k - 3 : k]
+        predicted.append(predict(*(pointer(signal, k) for signal in seen)))
+    assert bits(predicted) == bits(one_step_ahead(exported, data).y[3:])
+
+
+@needs_compiler
+@pytest.mark.parametrize("samples", [0, 1, 2, 3, 5])
+def test_the_first_samples_and_what_lies_behind_the_last_are_left_as_they_are(samples, folder):
+    exported = PUBLISHED["12"].model
+    data, y = record(), np.arange(1.0, 9.0)
+    simulate = compiled(export(exported, "c"), FLAGS, folder).simulate
+    simulate.restype = None
+    simulate(pointer(data.u[:, 0].copy()), pointer(y), ctypes.c_size_t(samples))
+    written = slice(3, max(samples, 3))
+    assert np.delete(y, written).tolist() == np.delete(np.arange(1.0, 9.0), written).tolist()
+    assert not np.isin(y[written], np.arange(1.0, 9.0)).any()
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", HOSTILE_NAMES)
+def test_a_columns_name_cannot_break_the_file(name, folder):
+    exported = islands.model_of([(islands.parse("u(k-1)"), 2.0)], (name,), name)
+    data = Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
+    assert simulated(exported, data, folder).tolist() == [0.5, 2.0]
+
+
+@pytest.mark.parametrize("kind", ["c", "matlab"])
+@pytest.mark.parametrize("name", HOSTILE_NAMES)
+def test_a_columns_name_is_read_back_from_its_line_of_the_comment(name, kind):
+    text = export(islands.model_of([(islands.parse("u(k-1)"), 2.0)], (name,), name), kind)
+    assert text.isascii()
+    (line,) = (line for line in text.split("\n") if "Inputs u = " in line)
+    for signal in ("Inputs u = ", "output y = "):
+        found, _ = json.JSONDecoder().raw_decode(line, line.index(signal) + len(signal))
+        assert found == name
+    assert line.endswith("; sampling time any.")
+
+
+def test_the_file_says_what_the_model_is():
+    text = export(PUBLISHED["12"].model, "c")
+    comment = text[: text.index("*/")]
+    assert "NARX model: y(k) = 1*y(k-1) - 0.000246*" in comment
+    assert 'Inputs u = "u_V"; output y = "y_um"; sampling time 0.001 s.' in comment
+    assert "-ffp-contract=off" in comment
+    assert "exp, log, sin, cos and tanh" in comment
+    assert max(map(len, text.splitlines())) <= 110
+    assert "enum { MAXIMUM_LAG = 3 };" in text
+    assert "double predict(const double *y, const double *u)" in text
+
+
+@pytest.mark.parametrize(("kind", "mark"), [("c", " *"), ("matlab", "%")])
+def test_a_long_equation_is_broken_between_its_parts_alone(kind, mark):
+    exported = model(
+        {"*".join(f"u(k-{lag})" for lag in range(1, 30)): 0.5, "y(k-1)*u(k-1)^2": -0.25, "1": 1.0}
+    )
+    lines = export(exported, kind).splitlines()
+    first = next(index for index, line in enumerate(lines) if "NARX model:" in line)
+    broken = lines[first : lines.index(mark, first)]
+    assert len(broken) > 2
+    text = " ".join(line.removeprefix(mark).strip() for line in broken)
+    assert text == f"NARX model: {export(exported, 'plain')}"
+
+
+def test_the_functions_stand_once_and_only_where_they_are_needed():
+    text = export(model({"y(k-1)*sign(u(k-1))": 1.0, "sign(u(k-2))": 2.0}), "c")
+    assert text.count("static double") == 1
+    assert "total += 2.0*f_sign(u[-2]);" in text
+    assert "static double" not in export(model({"y(k-1)": 1.0}), "c")
+
+
+# A user's own primitives.
+
+
+def saturation(a):
+    return a / (1.0 + abs(a))
+
+
+def blend(a, b):
+    return 0.25 * a - b if a > 0.5 else b
+
+
+OWN = {
+    "saturation": primitive("saturation", saturation, c="return a / (1.0 + fabs(a));"),
+    # Names of the language and of the program itself.
+    "double": primitive("double", saturation, c="double size = fabs(a);\nreturn a / (1.0 + size);"),
+    "predict": primitive("predict", blend, c="return a > 0.5 ? 0.25 * a - b : b;"),
+    "f_sign": primitive("f_sign", blend, c="if (a > 0.5)\n    return 0.25 * a - b;\nreturn b;"),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", OWN)
+def test_a_users_own_primitive_is_compiled_with_the_body_that_was_given(name, folder):
+    arguments = "u(k-1), y(k-1)" if OWN[name].arity == 2 else "u(k-1)"
+    exported = model({f"{name}({arguments})*sign(u(k-2))": 0.3, "y(k-2)": 0.2}, primitives=PRIMITIVES | OWN)
+    assert bits(simulated(exported, record(), folder)[2:]) == bits(free_run(exported, record()).y[2:])
+
+
+@pytest.mark.parametrize(
+    ("kind", "given"),
+    [("c", "c='return a / (1.0 + fabs(a));'"), ("matlab", "matlab='r = a / (1 + abs(a));'")],
+)
+def test_a_users_own_primitive_without_a_body_is_refused_with_advice(kind, given):
+    known = PRIMITIVES | {"own": primitive("own", saturation)}
+    with pytest.raises(ModelError) as caught:
+        export(model({"own(u(k-1))": 1.0}, primitives=known), kind)
+    assert str(caught.value) == (
+        "primitive 'own' has no text in this language: give the body of its function when you make it, "
+        f"primitive('own', ..., {given})"
+    )
+
+
+@pytest.mark.parametrize("name", ["σ", "a" * 61])
+@pytest.mark.parametrize("kind", ["c", "matlab"])
+def test_a_primitive_whose_name_is_none_in_the_language_is_refused(name, kind):
+    known = PRIMITIVES | {name: primitive(name, saturation, c="return a;", matlab="r = a;")}
+    with pytest.raises(ModelError, match="name it with at most 60 of the characters A-Z, a-z, 0-9 and _"):
+        export(model({f"{name}(u(k-1))": 1.0}, primitives=known), kind)

@@ -1,0 +1,140 @@
+"""Inner products are those of the columns, to the last bit, and the columns are never held."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.kernels.columns import columns
+from islands.kernels.gram import gram, inner_products
+from islands.kernels.sums import CHUNK, dot
+from islands.model.expression import Lagged
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.program.columns import arranged
+from islands.program.linker import link
+from support.oracles import side_by_side
+
+#: The constant is one on rows behind a segment's end, too: they must not count.
+TEXTS = [
+    "1",
+    "y(k-1)",
+    "u(k-3)",
+    "y(k-1)*u(k-1)^2*y(k-2)*u(k-2)",
+    "sign(u(k-1) - u(k-2))",
+    "1/(2 + abs(y(k-1)))",
+]
+TERMS = [*(regressor(parse(text))[1] for text in TEXTS), Lagged(0, 0)]
+SQUARE = np.array([(i, j) for i in range(len(TERMS)) for j in range(len(TERMS))])
+WARM_UP = 3
+
+#: Rows of the segments: a short record, whole chunks, and segments that end anywhere in a chunk.
+ROWS = [
+    (1,),
+    (40,),
+    (CHUNK,),
+    (CHUNK + 1,),
+    (CHUNK - 1, 1),
+    (CHUNK, CHUNK),
+    (100, 100, 100),
+    (10, 1, 700, 3),
+]
+
+
+def record(rows, seed=7):
+    """Signals of segments with so many rows, each behind a warm-up of its own."""
+    begin = np.cumsum((0, *(count + WARM_UP for count in rows)))
+    signals = np.random.default_rng(seed).normal(size=(2, int(begin[-1])))
+    return arranged(signals, list(zip(begin[:-1] + WARM_UP, rows, strict=True)), WARM_UP)
+
+
+def products_of(terms, rows, pairs):
+    out = np.full(len(pairs), np.nan)
+    inner_products(link(terms), rows, np.asarray(pairs), out)
+    return out
+
+
+def gram_of(terms, rows):
+    out = np.full((len(terms), len(terms)), np.nan)
+    gram(link(terms), rows, out)
+    return out
+
+
+def columns_of(terms, rows):
+    out = np.empty((len(terms), rows.count))
+    columns(link(terms), rows, out)
+    return out
+
+
+@pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
+@pytest.mark.parametrize("rows", ROWS)
+def test_some_pairs_have_the_numbers_that_all_together_have(rows, terms):
+    square = np.array([(i, j) for i in range(len(terms)) for j in range(len(terms))])
+    some = products_of(terms, record(rows), square[::-1])[::-1]
+    assert np.array_equal(some.reshape(len(terms), len(terms)), gram_of(terms, record(rows)))
+
+
+@pytest.mark.parametrize("rows", ROWS)
+def test_every_entry_is_the_inner_product_of_two_filled_columns_bit_for_bit(rows):
+    found, psi = gram_of(TERMS, record(rows)), side_by_side(columns_of(TERMS, record(rows)), rows)
+    for i, one in enumerate(psi):
+        for j, other in enumerate(psi):
+            assert found[i, j] == dot(one, 0, other, 0, one.size)
+
+
+@given(st.lists(st.integers(1, 600), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
+def test_the_order_begins_anew_in_every_segment_whatever_their_lengths(rows, seed):
+    data = record(rows, seed)
+    psi = side_by_side(columns_of(TERMS, data), rows)
+    expected = [[dot(one, 0, other, 0, one.size) for other in psi] for one in psi]
+    assert np.array_equal(gram_of(TERMS, data), expected)
+
+
+@pytest.mark.parametrize("rows", ROWS)
+def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
+    psi, found = columns_of(TERMS, record(rows)), gram_of(TERMS, record(rows))
+    for i, a in enumerate(psi.tolist()):
+        for j, b in enumerate(psi.tolist()):
+            products = [left * right for left, right in zip(a, b, strict=True)]
+            assert abs(found[i, j] - math.fsum(products)) <= 1e-15 * math.fsum(map(abs, products))
+
+
+def test_a_gram_matrix_is_symmetric_and_has_no_negative_direction():
+    found = gram_of(TERMS, record((10, 1, 700, 3)))
+    assert np.array_equal(found, found.T)
+    assert np.linalg.eigvalsh(found).min() > 0
+
+
+def test_an_entry_does_not_depend_on_the_terms_beside_it():
+    data = record((300, 500))
+    together = gram_of(TERMS, data)
+    for i in range(len(TERMS)):
+        for j in range(len(TERMS)):
+            assert products_of([TERMS[i], TERMS[j]], data, [(0, 1)])[0] == together[i, j]
+
+
+place = st.integers(0, len(TERMS) - 1)
+
+
+@given(st.lists(st.tuples(place, st.lists(place, min_size=1, max_size=9)), min_size=1, max_size=6))
+def test_an_entry_does_not_depend_on_the_pairs_beside_it(drawn):
+    """Neighbours that share their first term are computed four at a time, others alone."""
+    data = record((300, 40))
+    pairs = [(one, other) for one, others in drawn for other in others]
+    together = gram_of(TERMS, data)
+    assert products_of(TERMS, data, pairs).tolist() == [together[pair] for pair in pairs]
+
+
+def test_more_pairs_than_a_pass_over_the_record_takes_are_all_computed():
+    data = record((5, 2))
+    one = products_of(TERMS, data, SQUARE)
+    repeats = (1 << 20) // len(SQUARE) + 2
+    many = products_of(TERMS, data, np.tile(SQUARE, (repeats, 1)))
+    assert many.size > 1 << 20
+    assert np.array_equal(many, np.tile(one, repeats))
+
+
+def test_no_pairs_are_no_numbers():
+    assert products_of(TERMS, record((5,)), np.empty((0, 2), np.int64)).size == 0

@@ -1,0 +1,117 @@
+"""A model is canonical regressors in order, with one parameter each."""
+
+import pytest
+from hypothesis import given
+
+from islands.errors import ModelError
+from islands.model.expression import Constant
+from islands.model.model import Model, canonical_order, model_of
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.model.text import plain
+from support.strategies import models
+
+
+def items(*texts):
+    return tuple(regressor(parse(text))[1] for text in texts)
+
+
+def terms(**parameters):
+    return [(parse(text), parameter) for text, parameter in parameters.items()]
+
+
+def test_a_model_has_a_regressor():
+    with pytest.raises(ModelError, match="a model has at least one regressor"):
+        Model(())
+
+
+@pytest.mark.parametrize("texts", [("u(k-1)", "y(k-1)"), ("y(k-1)", "y(k-1)"), ("1", "y(k-1)")])
+def test_regressors_out_of_order_or_repeated_are_refused(texts):
+    with pytest.raises(ModelError, match="stand in the order of their content, each once"):
+        Model(items(*texts))
+
+
+def test_canonical_order_sorts_and_drops_repetitions():
+    ordered = canonical_order(items("3", "y(k-1)*u(k-1)", "u(k-2)", "y(k-1)", "u(k-1)*y(k-1)"))
+    assert [plain(item.expression) for item in ordered] == ["y(k-1)", "u(k-2)", "y(k-1)*u(k-1)", "1"]
+    assert Model(tuple(ordered)).size == 4
+
+
+@pytest.mark.parametrize("name", ["theta", "standard_errors"])
+def test_another_number_of_parameters_than_regressors_is_refused(name):
+    with pytest.raises(ModelError, match=f"3 {name} for 2 regressors"):
+        Model(items("y(k-1)", "u(k-1)"), **{name: (1.0, 2.0, 3.0)})
+
+
+def test_an_input_that_the_model_does_not_have_is_refused():
+    with pytest.raises(ModelError, match=r"reads input 3 and has 2: \('volts', 'load'\)"):
+        Model(items("y(k-1)", "u3(k-1)"), input_names=("volts", "load"))
+    assert Model(items("y(k-1)", "u2(k-1)"), input_names=("volts", "load")).inputs == 2
+
+
+def test_a_model_of_a_constant_alone_needs_no_history():
+    model = Model(items("1"), (2.5,))
+    assert (model.size, model.maximum_lag, model.parameters) == (1, 0, (2.5,))
+
+
+def test_the_deepest_lag_of_all_regressors_is_the_models():
+    assert Model(items("y(k-2)", "u(k-11)", "y(k-3)*u(k-4)")).maximum_lag == 11
+
+
+def test_a_model_without_parameters_says_so():
+    with pytest.raises(ModelError, match="the model has no parameters yet: estimate them first"):
+        _ = Model(items("y(k-1)")).parameters
+
+
+def test_with_parameters_gives_a_model_of_its_own():
+    bare = Model(items("y(k-1)", "u(k-1)"), dt=0.5, output_name="x")
+    made = bare.with_parameters([1, 2], [0.1, 0.2])
+    assert (made.theta, made.standard_errors) == ((1.0, 2.0), (0.1, 0.2))
+    assert (made.dt, made.output_name, made.regressors) == (0.5, "x", bare.regressors)
+    assert bare.theta is None
+    assert made.with_parameters([3, 4]).standard_errors is None
+    with pytest.raises(ModelError, match="1 theta for 2 regressors"):
+        bare.with_parameters([1.0])
+
+
+def test_model_of_moves_factors_into_the_parameters_and_merges_equal_terms():
+    made = model_of(
+        [
+            (parse("2*u(k-1)*y(k-1)"), 0.5),
+            (parse("phi1(u(k-2), u(k-1))"), 0.25),
+            (parse("y(k-1)*q1(u(k))"), 3.0),
+            (parse("phi1(u(k-4), u(k-4))"), 9.0),
+            (parse("-4"), 0.125),
+        ],
+        dt=0.01,
+    )
+    assert [plain(item.expression) for item in made.regressors] == ["y(k-1)*u(k-1)", "u(k-1) - u(k-2)", "1"]
+    assert made.theta == (4.0, -0.25, -0.5)
+    assert (made.dt, made.input_names, made.output_name) == (0.01, ("u",), "y")
+
+
+def test_model_of_terms_that_cancel_keeps_a_parameter_of_zero():
+    made = model_of([(parse("u(k-1) - u(k-2)"), 1.0), (parse("u(k-2) - u(k-1)"), 1.0)])
+    assert made.theta == (0.0,)
+
+
+def test_model_of_nothing_but_zero_terms_is_refused():
+    with pytest.raises(ModelError, match="a model has at least one regressor"):
+        model_of([(parse("phi2(u(k-1), u(k-1))"), 1.0), (Constant(0.0), 2.0)])
+
+
+def test_model_of_a_term_that_looks_ahead_is_refused():
+    with pytest.raises(ModelError, match="reads the past alone: channel 1 has lag 0"):
+        model_of([(parse("y(k-1)"), 1.0), (parse("u(k)"), 1.0)])
+
+
+@given(models(inputs=2))
+def test_a_model_made_of_its_own_terms_is_the_same_model(model):
+    again = model_of(
+        [(item.expression, theta) for item, theta in zip(model.regressors, model.parameters, strict=True)][
+            ::-1
+        ],
+        model.input_names,
+    )
+    assert again == model
+    assert hash(again) == hash(model)

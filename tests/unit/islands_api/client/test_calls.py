@@ -1,0 +1,389 @@
+"""Calls of the client against the real application: what is sent, what comes back, what a refusal becomes."""
+
+import asyncio
+import inspect
+import json
+from dataclasses import fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import islands_api
+from islands.errors import IslandsError, SettingsError
+from islands.evolution.settings import Settings
+from islands_api.client import AsyncClient, Client, ServiceError, calls, discrepancies
+from islands_api.client.calls import Call
+from islands_api.documents import job_document
+from islands_api.schemas import DatasetView, JobPage, JobRequest, JobView
+from islands_service.jobs import JobState
+from support.service import Service, csv, kept, queued
+from support.stores import FAILED, FOUND
+
+SPEC = {"inputs": ["u_V"], "output": "y_um"}
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    path = tmp_path / "Messung 1 'ä'.csv"
+    path.write_bytes(csv())
+    return path
+
+
+# The two clients.
+
+
+def test_both_clients_have_the_same_calls() -> None:
+    def of(kind: type) -> dict[str, list[str]]:
+        return {
+            name: list(inspect.signature(method).parameters)
+            for name, method in vars(kind).items()
+            if inspect.isfunction(method) and not name.startswith("_")
+        }
+
+    assert of(Client) == of(AsyncClient)
+    assert inspect.signature(Client.__init__).parameters == inspect.signature(AsyncClient.__init__).parameters
+    assert all(
+        inspect.iscoroutinefunction(method) or inspect.isasyncgenfunction(method)
+        for name, method in vars(AsyncClient).items()
+        if inspect.isfunction(method) and not name.startswith("_")
+    )
+
+
+def test_the_package_names_what_a_program_needs() -> None:
+    assert islands_api.Client is Client
+    assert islands_api.AsyncClient is AsyncClient
+    assert islands_api.ServiceError is ServiceError
+    with pytest.raises(AttributeError, match="has no attribute 'Klient'"):
+        _ = islands_api.Klient
+
+
+# Data sets.
+
+
+def test_an_uploaded_record_comes_back_with_what_is_in_it(client: Any, record: Path) -> None:
+    dataset = client.upload(record, ["u_V"], "y_um")
+    assert isinstance(dataset, DatasetView)
+    assert dataset.name == record.name
+    assert [column.name for column in dataset.preview.columns] == ["t_s", "u_V", "y_um"]
+    assert dataset.preview.columns[1].unit == "V"
+    assert (dataset.preview.samples, dataset.preview.time) == (200, "t_s")
+    assert dataset.preview.dt == pytest.approx(0.01)
+    assert dataset.bytes == record.stat().st_size
+    assert abs((datetime.now(UTC) - dataset.created).total_seconds()) < 60
+    assert client.datasets().items[0] == dataset
+
+
+def test_an_upload_is_checked_as_the_job_that_it_is_for(client: Any, me: Any, tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    path.write_bytes(csv(y_um={8: "nan"}))
+    with pytest.raises(ServiceError) as caught:
+        client.upload(path, "u_V", "y_um")
+    assert (caught.value.status, caught.value.type) == (422, "/problems/invalid-record")
+    assert "record.csv, line 8, column y_um" in caught.value.detail
+    assert [dataset.id for dataset in client.datasets().items] == [me.dataset]
+
+
+def test_an_upload_sends_all_that_is_given() -> None:
+    for inputs in ("u_V", ["u_V"], ("u_V",)):  # a name alone is one input, not an input a letter
+        assert calls.upload("r.csv", inputs, "y_um", 0.0).data == {
+            "inputs": ["u_V"],
+            "output": "y_um",
+            "dt": 0.0,
+        }
+    assert calls.upload("r.csv").data == {}
+
+
+@pytest.mark.parametrize("path", ["nowhere.csv", "."])
+def test_a_record_that_cannot_be_read_is_an_error_of_its_file(client: Any, path: str) -> None:
+    with pytest.raises(OSError, match=r"nowhere\.csv|Is a directory"):
+        client.upload(path)
+
+
+def test_pages_of_data_sets_and_jobs_follow_each_other(client: Any, service: Service, me: Any) -> None:
+    kept(service.store, me.owner, b"another")
+    for pages in (client.datasets, lambda **given: client.jobs(state="queued", **given)):
+        for _ in range(2):
+            client.submit(me.dataset, **SPEC)
+        first = pages(limit=1)
+        second = pages(cursor=first.next, limit=1)
+        assert first.next is not None
+        assert len(first.items) == len(second.items) == 1
+        assert first.items[0].id != second.items[0].id
+
+
+def test_a_data_set_goes_when_no_job_needs_it(client: Any, me: Any) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    with pytest.raises(ServiceError) as caught:
+        client.delete_dataset(me.dataset)
+    assert caught.value.type == "/problems/dataset-in-use"
+    client.cancel(job)
+    assert client.delete_dataset(me.dataset) is None
+    assert client.datasets().items == ()
+
+
+# Jobs.
+
+
+def test_a_job_says_what_was_submitted(client: Any, me: Any) -> None:
+    given = {"preset": "narx", "seed": 7, "dt": 0.5, "rows": None, "name": "tank, 2 islands", "priority": 3}
+    job = client.submit(
+        me.dataset, "u_V", "y_um", **{**given, "dt": None}, validation=0.4, islands=2, shifts=(1, 2)
+    )
+    assert isinstance(job, JobView)
+    assert (job.state, job.version, job.attempt) == (JobState.QUEUED, 1, 0)
+    assert (job.name, job.priority) == ("tank, 2 islands", 3)
+    assert job.spec == {
+        "dataset": me.dataset,
+        "inputs": ["u_V"],
+        "output": "y_um",
+        "preset": "narx",
+        "seed": 7,
+        "validation": 0.4,
+        "settings": {"islands": 2, "shifts": [1, 2]},
+    }
+    assert client.job(job) == client.job(job.id) == job
+    assert client.jobs().items == (job,)
+    assert isinstance(client.jobs(), JobPage)
+
+
+@pytest.mark.parametrize(
+    ("given", "stored"),
+    [
+        (None, None),
+        (0.4, 0.4),
+        ("0-csv", {"dataset": "0-csv"}),
+        ({"dataset": "0-csv", "rows": "5:"}, {"dataset": "0-csv", "rows": "5:"}),
+    ],
+)
+def test_validation_is_a_share_a_data_set_or_rows_of_one(given: Any, stored: Any) -> None:
+    body = calls.submit("1-csv", ["u_V"], "y_um", validation=given).json
+    assert body.get("validation") == stored
+    JobRequest.model_validate(body)
+
+
+def test_a_call_takes_ids_and_values_alike(client: Any, service: Service, me: Any) -> None:
+    other = kept(service.store, me.owner, b"another")
+    record, validation = client.datasets().items[1], client.datasets().items[0]
+    assert (record.id, validation.id) == (me.dataset, other)
+    job = client.submit(record, **SPEC, validation=validation)
+    assert job.spec["dataset"] == me.dataset
+    assert job.spec["validation"] == {"dataset": other}
+    assert client.cancel(job).id == client.job(job.id).id
+
+
+def test_no_setting_of_a_search_is_hidden_by_an_argument() -> None:
+    taken = set(inspect.signature(calls.submit).parameters) - {"settings"}
+    assert not taken & {each.name for each in fields(Settings)}
+
+
+def test_every_submission_has_a_key_of_its_own_unless_one_is_given(client: Any, me: Any) -> None:
+    one, other = (client.submit(me.dataset, **SPEC) for _ in range(2))
+    assert one.id != other.id
+    assert client.submit(me.dataset, **SPEC, idempotency_key="mine").id not in (one.id, other.id)
+    again = client.submit(me.dataset, **SPEC, idempotency_key="mine")
+    assert again.id == client.submit(me.dataset, **SPEC, idempotency_key="mine").id
+    with pytest.raises(ServiceError) as caught:
+        client.submit(me.dataset, **SPEC, seed=9, idempotency_key="mine")
+    assert (caught.value.status, caught.value.type) == (422, "/problems/idempotency-conflict")
+    with pytest.raises(ServiceError, match="idempotency-key"):
+        client.submit(me.dataset, **SPEC, idempotency_key="")
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"target_error": float("nan")}, {"validation": float("inf")}, {"idempotency_key": "schlüssel"}]
+)
+def test_what_cannot_be_sent_is_refused_before_it_is(wrong: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match=r"NaN or infinite|a line of ASCII"):
+        calls.submit("0-csv", ["u_V"], "y_um", **wrong)
+
+
+def test_a_discrepancy_job_says_what_was_submitted(client: Any, me: Any) -> None:
+    simulation = {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}
+    job = client.diagnose(
+        me.dataset,
+        "u_V",
+        "y_um",
+        simulation,
+        tolerance={"dp": 0.01},
+        seed=7,
+        rows=None,
+        name="piezo",
+        priority=3,
+        idempotency_key="mine",
+    )
+    assert (job.kind, job.state, job.name, job.priority) == ("discrepancy", "queued", "piezo", 3)
+    wanted = {"dataset": me.dataset, "input": "u_V", "output": "y_um", "seed": 7}
+    assert job.spec == {**wanted, "simulation": simulation, "tolerance": {"dp": 0.01}}
+    assert client.job(job) == job
+    again = client.diagnose(me.dataset, "u_V", "y_um", "bouc-wen-piezo")
+    assert again.spec["simulation"] == {"kind": "bouc-wen-piezo", "parameters": {}}
+    for call in (client.report, client.extended, client.result):
+        with pytest.raises(ServiceError, match="wait until it has succeeded"):
+            call(again)
+    with pytest.raises(ServiceError, match="only those of the kind identification"):
+        client.models(again)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("pendulum", "unknown simulation 'pendulum'"),
+        ("model:none.json", "none.json cannot be read"),
+        ("python:model.py:run", "a service runs no code of others"),
+    ],
+)
+def test_a_simulation_that_cannot_be_sent_is_refused_before_it_is(text: str, why: str) -> None:
+    with pytest.raises(IslandsError, match=why):
+        discrepancies.diagnose("0-csv", "u_V", "y_um", text)
+
+
+def test_a_model_file_goes_along(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    path.write_text('{"terms": []}')
+    body = discrepancies.diagnose("0-csv", "u_V", "y_um", f"model:{path}", channels="T_K").json
+    assert body["channels"] == ["T_K"]
+    assert body["simulation"] == {"kind": "model", "model": {"terms": []}, "name": "model model.json"}
+
+
+def test_a_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    assert client.cancel(job).state == JobState.CANCELLED
+    assert client.resume(job).state == JobState.QUEUED
+    client.cancel(job)
+    assert client.delete(job) is None
+    with pytest.raises(ServiceError) as caught:
+        client.job(job)
+    assert (caught.value.status, caught.value.type) == (404, "/problems/no-such-job")
+
+
+def test_cancelling_what_is_cancelled_changes_nothing(client: Any, me: Any) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    cancelled = client.cancel(job)
+    assert client.cancel(job) == cancelled
+
+
+def test_a_finished_job_is_not_cancelled_and_a_waiting_one_not_resumed(
+    client: Any, service: Service, me: Any, claimed: Any
+) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    for wrong in (client.resume, client.delete):
+        with pytest.raises(ServiceError) as caught:
+            wrong(job)
+        assert (caught.value.status, caught.value.type) == (409, "/problems/wrong-state")
+    service.store.leases.finish(claimed(job), FOUND)
+    with pytest.raises(ServiceError, match=f"job {job.id} is succeeded: there is nothing to cancel"):
+        client.cancel(job)
+
+
+def test_a_failed_job_says_why(client: Any, service: Service, me: Any, claimed: Any) -> None:
+    job = client.submit(me.dataset, **SPEC)
+    service.store.leases.finish(claimed(job), FAILED)
+    assert client.job(job).problem == {"type": "broken", "detail": "it broke"}
+    assert client.jobs(state="failed").items[0].id == job.id
+
+
+# Problems.
+
+
+@pytest.mark.parametrize(
+    ("wrong", "status", "kind", "told"),
+    [
+        ({"islands": 0}, 422, "invalid-settings", "islands is at least 1, got 0"),
+        ({"preset": "magic"}, 422, "invalid-settings", "unknown preset 'magic'"),
+        ({"validation": 1.5}, 422, "invalid-request", "validation"),
+        ({"hue": "red"}, 422, "invalid-request", "hue"),
+        ({"output": "z"}, 422, "invalid-record", "z"),
+        ({"dataset": "0-csv"}, 404, "no-such-dataset", "0-csv"),
+    ],
+)
+def test_a_problem_is_raised_as_what_it_is(
+    client: Any, me: Any, wrong: dict[str, Any], status: int, kind: str, told: str
+) -> None:
+    with pytest.raises(ServiceError) as caught:
+        client.submit(**{"dataset": me.dataset, **SPEC, **wrong})
+    error = caught.value
+    assert (error.status, error.type) == (status, f"/problems/{kind}")
+    assert told in error.detail
+    assert str(error) == error.detail == error.document["detail"]
+    assert error.document["request_id"]
+    assert client.jobs().items == ()
+
+
+@pytest.mark.parametrize("identity", ["..", "../datasets", "a/b", "a?wait=30", "ä", "", "x" * 65, "%2e%2e"])
+def test_whatever_is_taken_for_an_id_is_part_of_a_path_and_no_more(client: Any, identity: str) -> None:
+    for call in (client.job, client.models, client.delete, client.cancel):
+        with pytest.raises(ServiceError) as caught:
+            call(identity)
+        assert caught.value.status in (404, 405, 422)
+
+
+@pytest.mark.parametrize(
+    ("status", "headers", "body", "told"),
+    [
+        (500, {}, b"<html>oh</html>", "HTTP 500 Internal Server Error: <html>oh</html>"),
+        (400, {}, b'["a", "list"]', 'HTTP 400 Bad Request: ["a", "list"]'),
+        (404, {}, b"{}", "HTTP 404"),
+        (301, {"Location": "https://elsewhere/"}, b"", "301 Moved Permanently: look at https://elsewhere/"),
+        (200, {}, b"<html>hello</html>", "is no islands service, or one of another version"),
+        (200, {}, b'{"items": 5}', "is no islands service, or one of another version"),
+    ],
+)
+def test_an_answer_of_something_else_is_no_answer(
+    connect: Any, scripted: Any, status: int, headers: dict[str, str], body: bytes, told: str
+) -> None:
+    server = scripted((status, headers, body))
+    client = connect(server.url, retry=0.0)
+    for call in (client.jobs, lambda: client.result("0")) if status != 200 else (client.jobs,):
+        with pytest.raises(ServiceError) as caught:
+            call()
+        assert told in str(caught.value)
+        assert (caught.value.status, caught.value.type) == (status, "about:blank")
+
+
+@pytest.mark.parametrize("body", [b"<html>", b"[[1]]", b"5"])
+def test_a_result_is_a_document(connect: Any, scripted: Any, body: bytes) -> None:
+    with pytest.raises(ServiceError, match="is no islands service"):
+        connect(scripted((200, {}, body)).url).result("0")
+
+
+def test_what_a_newer_service_adds_comes_along(
+    connect: Any, scripted: Any, service: Service, me: Any
+) -> None:
+    document = {**job_document(queued(service.store, me.owner)), "mood": "good"}
+    job = connect(scripted((200, {}, json.dumps(document).encode())).url).job("0")
+    assert job.mood == "good"
+    assert set(JobView.model_fields) == set(document) - {"mood"}
+
+
+# At once.
+
+
+def test_many_calls_go_on_at_once(service: Service, me: Any) -> None:
+    async def submit_all() -> list[JobView]:
+        async with AsyncClient(service.url, me.secret) as client:
+            one = calls.submit(me.dataset, ["u_V"], "y_um", idempotency_key="one")
+            return await asyncio.gather(*(client.call(one) for _ in range(16)))
+
+    assert len({job.id for job in asyncio.run(submit_all())}) == 1
+
+
+def test_a_closed_client_is_closed(service: Service, me: Any) -> None:
+    with Client(service.url, me.secret) as client:
+        client.jobs()
+    with pytest.raises(RuntimeError, match="closed"):
+        client.jobs()
+
+
+def test_a_call_that_may_not_be_repeated_says_so() -> None:
+    made: list[Call[Any]] = [
+        calls.cancel("0"),
+        calls.resume("0"),
+        calls.delete("0"),
+        calls.delete_dataset("0"),
+    ]
+    assert [call.repeatable for call in made] == [True, False, False, False]
+    assert all(
+        call.repeatable for call in (calls.job("0"), calls.submit("0", ["u"], "y"), calls.upload("r.csv"))
+    )

@@ -1,0 +1,186 @@
+"""Keys and certificates: a key is sent and never shown, and a service is what its certificate says."""
+
+import shutil
+import ssl
+import threading
+import time
+import traceback
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trustme
+import uvicorn
+
+from islands.errors import SettingsError
+from islands_api.app import create_app
+from islands_api.client import ServiceError, Unreachable
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from support.service import PATIENCE, Service, kept, served
+
+#: What must not be seen anywhere.
+SECRET = "islands_this-is-nobody-s-key-and-secret-all-the-same"
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Path) -> Iterator[Service]:
+    """A service that asks everybody for a key."""
+    folder = tmp_path_factory.mktemp("guarded")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    with served(folder, rate=0, require_keys=True) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def authority() -> trustme.CA:
+    return trustme.CA()
+
+
+@pytest.fixture(scope="module")
+def secure(
+    tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Path, authority: trustme.CA
+) -> Iterator[int]:
+    """The port of a service that speaks TLS, with a certificate of a private authority for 127.0.0.1."""
+    folder = tmp_path_factory.mktemp("secure")
+    shutil.copyfile(prepared_sqlite, folder / "islands.db")
+    settings = ServiceSettings(data_dir=folder)
+    issued = authority.issue_cert("127.0.0.1")
+    issued.private_key_pem.write_to_path(folder / "key.pem")
+    for each in issued.cert_chain_pems:
+        each.write_to_path(folder / "cert.pem", append=True)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            create_app(settings, Store(settings.url)),
+            port=0,
+            log_level="critical",
+            timeout_graceful_shutdown=1,
+            ssl_certfile=folder / "cert.pem",
+            ssl_keyfile=folder / "key.pem",
+        )
+    )
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    until = time.monotonic() + PATIENCE
+    while not server.started:
+        assert thread.is_alive()
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    try:
+        yield server.servers[0].sockets[0].getsockname()[1]
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+def shown(error: BaseException) -> str:
+    """All that a program would print of an error."""
+    return "".join(traceback.format_exception(error)) + repr(error) + repr(vars(error))
+
+
+# Keys.
+
+
+def test_a_key_opens_what_is_its_owner_s(connect: Any, guarded: Service) -> None:
+    _, one = guarded.store.keys.create("one", frozenset({"read", "write"}))
+    _, other = guarded.store.keys.create("other", frozenset({"read"}))
+    owner = guarded.store.keys.find(one).owner  # type: ignore[union-attr]
+    job = connect(guarded.url, one).submit(kept(guarded.store, owner), ["u_V"], "y_um")
+    # A key that was read from a file has the end of its line with it.
+    assert connect(guarded.url, f" {one}\r\n").job(job) == job
+    with pytest.raises(ServiceError) as caught:
+        connect(guarded.url, other).job(job)
+    assert caught.value.type == "/problems/no-such-job"
+    with pytest.raises(ServiceError) as caught:
+        connect(guarded.url, other).cancel(job)
+    assert (caught.value.status, caught.value.type) == (403, "/problems/scope-missing")
+
+
+@pytest.mark.parametrize(
+    ("key", "told"), [(None, "this service needs a key"), (SECRET, "the key is unknown")]
+)
+def test_who_has_no_key_is_told_so(connect: Any, guarded: Service, key: str | None, told: str) -> None:
+    with pytest.raises(ServiceError, match=told) as caught:
+        connect(guarded.url, key).jobs()
+    assert (caught.value.status, caught.value.type) == (401, "/problems/no-key")
+    with pytest.raises(ServiceError, match=told):
+        list(connect(guarded.url, key).events("0"))
+
+
+@pytest.mark.parametrize(
+    "key", ["", "  ", f"{SECRET}\nX-Other: 1", f"{SECRET} {SECRET}", f"{SECRET}ü", f"\0{SECRET}"]
+)
+def test_what_is_no_key_is_refused_without_showing_it(connect: Any, key: str) -> None:
+    with pytest.raises(SettingsError, match="give it as 'islands keys create' printed it") as caught:
+        connect("http://127.0.0.1:9", key)
+    assert SECRET not in shown(caught.value)
+
+
+def test_a_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted: Any) -> None:
+    server = scripted((500, {}, b"oh"))
+    clients = [
+        connect(guarded.url, SECRET),
+        connect(server.url, SECRET),
+        connect("http://127.0.0.1:9", SECRET, retry=0.0),
+        connect(scripted((200, {}, b"<html>")).url, SECRET),
+    ]
+    for client in clients:
+        for call in (client.jobs, partial(client.wait, "0")):
+            with pytest.raises((ServiceError, Unreachable)) as caught:
+                call()
+            assert SECRET not in shown(caught.value)
+        assert SECRET not in repr(client) + str(client) + repr(vars(getattr(client, "client", client)))
+    assert {headers["Authorization"] for *_, headers in server.asked} == {f"Bearer {SECRET}"}
+    assert all(headers["User-Agent"].startswith("islands/") for *_, headers in server.asked)
+    assert SECRET not in str(guarded.logs)
+
+
+def test_without_a_key_none_is_sent(connect: Any, scripted: Any) -> None:
+    server = scripted((200, {}, b'{"items": []}'))
+    connect(server.url).jobs()
+    assert "Authorization" not in server.asked[0][2]
+
+
+# Certificates.
+
+
+def test_a_private_authority_is_trusted_when_its_file_is_given(
+    connect: Any, secure: int, authority: trustme.CA, tmp_path: Path
+) -> None:
+    path = tmp_path / "authority.pem"
+    authority.cert_pem.write_to_path(path)
+    context = ssl.create_default_context(cafile=path)
+    for verify in (str(path), path, context, False):
+        assert connect(f"https://127.0.0.1:{secure}", verify=verify).jobs().items == ()
+
+
+def test_an_authority_in_the_environment_is_trusted(
+    connect: Any, secure: int, authority: trustme.CA, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    authority.cert_pem.write_to_path(tmp_path / "authority.pem")
+    monkeypatch.setenv("SSL_CERT_FILE", str(tmp_path / "authority.pem"))
+    assert connect(f"https://127.0.0.1:{secure}", verify=True).jobs().items == ()
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+def test_a_certificate_that_does_not_hold_is_refused_at_once(
+    connect: Any, secure: int, authority: trustme.CA, tmp_path: Path, name: str
+) -> None:
+    # Of an authority that nobody knows; of one that is known, for another name.
+    path = tmp_path / "authority.pem"
+    (authority if name == "localhost" else trustme.CA()).cert_pem.write_to_path(path)
+    client = connect(f"https://{name}:{secure}", SECRET, verify=str(path), retry=60.0)
+    for call in (client.jobs, lambda: list(client.events("0"))):
+        with pytest.raises(
+            Unreachable, match=r"the certificate of the service at .* is not trusted"
+        ) as caught:
+            call()
+        assert "SSL_CERT_FILE" in str(caught.value)
+        assert SECRET not in shown(caught.value)
+
+
+def test_an_authority_s_file_that_is_not_there_is_told_of(connect: Any, tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        connect("https://127.0.0.1:9", verify=str(tmp_path / "none.pem"))

@@ -1,0 +1,211 @@
+"""Bodies of requests: what cannot be read is refused as that, whatever it is, and nothing is made of it."""
+
+import http.client
+import json
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from islands_api.bodies import read_json
+from islands_api.problems import Unreadable
+from support.service import PROBLEM, csv, kept, problem_of, spec
+
+JSON_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)
+
+#: What is no JSON, or not as we take it, and what is said of it.
+DAMAGED = {
+    b"": "Expecting value in line 1, column 1",
+    b"{": "Expecting property name",
+    b'{"a": 1]': "line 1, column 8",
+    b'{"a": 1}\n{': "Extra data in line 2, column 1",
+    b"\xff\xfe\x00": "is no JSON",
+    b'{"a": "\xe4"}': "is no JSON",
+    b'{"a": NaN}': "NaN is no number there: leave the entry out",
+    b"[Infinity]": "Infinity is no number",
+    b"[-Infinity]": "-Infinity is no number",
+    b'{"seed": 1, "dt": 1, "seed": 2}': "'seed' stands in it twice",
+    b'{"settings": {"islands": 1, "islands": 2}}': "'islands' stands in it twice",
+    b"[" * 100_000: "nested too deeply",
+    b'{"a":' * 100_000: "nested too deeply",
+    b"[" * 100_000 + b"]" * 100_000: "nested too deeply",
+    b"9" * 100_000: "a number in it has 100000 digits",
+}
+
+
+@settings(max_examples=20)
+@given(JSON_VALUES)
+def test_json_is_read_as_it_was_written(value):
+    assert read_json(json.dumps(value).encode()) == value
+
+
+@pytest.mark.parametrize("body", DAMAGED, ids=lambda body: repr(body[:20]))
+def test_what_is_no_json_is_refused(body):
+    with pytest.raises(Unreadable) as refused:
+        read_json(body)
+    assert DAMAGED[body] in refused.value.detail
+
+
+def sent(service, body, media="application/json", path="/v1/jobs"):
+    headers = {} if media is None else {"Content-Type": media}
+    return service.client.post(path, content=body, headers=headers)
+
+
+@pytest.mark.parametrize("body", [b"{", b'{"a": NaN}', b'{"a": 1, "a": 2}', b"[" * 100_000, b"\xff"])
+def test_a_damaged_body_is_a_bad_request(service, body):
+    assert problem_of(sent(service, body), 400, "bad-request").startswith("the body is")
+
+
+@pytest.mark.parametrize("body", [b"", b"null", b"[]", b"7", b'"text"', b"{}"])
+def test_json_that_is_no_job_is_invalid(service, body):
+    problem_of(sent(service, body), 422, "invalid-request")
+
+
+@pytest.mark.parametrize("media", [None, "text/plain", "application/xml", "multipart/form-data", "json", ";"])
+def test_a_job_is_sent_as_json(service, media):
+    order = json.dumps(spec(kept(service.store))).encode()
+    detail = problem_of(sent(service, order, media), 415, "unsupported-media-type")
+    assert detail == f"the body is {media or 'of no type'}: send it as application/json"
+
+
+def test_a_charset_beside_json_does_no_harm(service):
+    order = json.dumps(spec(kept(service.store))).encode()
+    assert sent(service, order, "Application/JSON; charset=utf-8").status_code == 202
+
+
+def test_what_is_wrong_is_said_of_every_field_up_to_twenty(service):
+    order = {f"field{index}": index for index in range(10_000)}
+    answer = service.submit(**order)
+    detail = problem_of(answer, 422, "invalid-request")
+    errors = answer.json()["errors"]
+    assert len(errors) == 20
+    assert detail.endswith("and 9983 more")
+    assert errors[0] == {"pointer": "/dataset", "detail": "Field required"}
+    assert len(answer.content) < 5000
+
+
+def test_names_are_escaped_in_pointers(service):
+    answer = service.submit(**spec("0-csv", **{"a/b~c": 1}))
+    problem_of(answer, 422, "invalid-request")
+    assert answer.json()["errors"][0]["pointer"] == "/a~1b~0c"
+
+
+def test_a_job_of_two_megabytes_is_refused_before_it_is_read(service):
+    began = time.monotonic()
+    detail = problem_of(sent(service, b" " * 2_000_000), 413, "too-large")
+    assert detail == "the request has more than 1000000 bytes, the most that is taken here"
+    assert time.monotonic() - began < 5.0
+
+
+def test_who_announces_too_much_need_not_send_it(service):
+    connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=10)
+    try:
+        connection.putrequest("POST", "/v1/jobs")
+        connection.putheader("Content-Type", "application/json")
+        connection.putheader("Content-Length", "2000000")
+        connection.endheaders()
+        assert connection.getresponse().status == 413
+    finally:
+        connection.close()
+
+
+def chunked(service, path, media, chunks, piece):
+    """Send a body that does not say how long it is; return the status, the media type, and the document."""
+    connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=20)
+    try:
+        connection.putrequest("POST", path)
+        connection.putheader("Content-Type", media)
+        connection.putheader("Transfer-Encoding", "chunked")
+        connection.endheaders()
+        try:
+            for _ in range(chunks):
+                connection.send(b"%x\r\n%s\r\n" % (len(piece), piece))
+            connection.send(b"0\r\n\r\n")
+        except (BrokenPipeError, ConnectionResetError):
+            pass  # it has said no before the end
+        answer = connection.getresponse()
+        return answer.status, answer.headers["content-type"], json.loads(answer.read())
+    finally:
+        connection.close()
+
+
+def test_a_body_without_a_length_is_counted_as_it_comes(service):
+    status, media, document = chunked(service, "/v1/jobs", "application/json", 12, b" " * 100_000)
+    assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
+
+
+def test_an_upload_without_a_length_is_counted_as_it_comes(tmp_path):
+    from support.service import served
+
+    head = b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\n'
+    with served(tmp_path, max_upload=300_000) as small:
+        status, media, document = chunked(
+            small, "/v1/datasets", "multipart/form-data; boundary=x", 6, head + b"1" * 100_000
+        )
+        assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
+        assert document["detail"] == "the request has more than 400000 bytes, the most that is taken here"
+        assert not [path for path in small.settings.blobs.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize(
+    ("body", "media", "status", "words"),
+    [
+        (b"x", "text/csv", 415, "send it as multipart/form-data"),
+        (b"x", "multipart/form-data", 400, "Missing boundary"),
+        (b"x", "multipart/form-data; boundary=y", 400, "send the record as the part 'file' of a form"),
+        (b"--y--\r\n", "multipart/form-data; boundary=y", 422, "/file: Field required"),
+        (
+            b'--y\r\nContent-Disposition: form-data; name="file"\r\n\r\nt,u\r\n--y--\r\n',
+            "multipart/form-data; boundary=y",
+            422,
+            "/file: it is no file: send one with its name",
+        ),
+        (
+            b'--y\r\nContent-Disposition: form-data; name="file"; filename="' + b"x" * 10_240,
+            "multipart/form-data; boundary=y",
+            400,
+            "under a name of at most 200 characters",
+        ),
+        (b"--y\r\nContent-Disposition: \xff\r\n\r\n", "multipart/form-data; boundary=y", 400, "of a form"),
+    ],
+)
+def test_a_form_that_is_none_is_refused(service, body, media, status, words):
+    kind = {400: "bad-request", 415: "unsupported-media-type", 422: "invalid-request"}[status]
+    assert words in problem_of(sent(service, body, media, "/v1/datasets"), status, kind)
+
+
+@pytest.mark.parametrize(
+    ("form", "words"),
+    [
+        ({"dt": "-1"}, "/dt: Input should be greater than 0"),
+        ({"dt": "0"}, "/dt: Input should be greater than 0"),
+        ({"dt": "nan"}, "/dt: Input should be a finite number"),
+        ({"dt": "inf"}, "/dt: Input should be a finite number"),
+        ({"dt": "0,1"}, "/dt: Input should be a valid number"),
+        ({"inputs": ["u_V"] * 17}, "/inputs: List should have at most 16 items"),
+        ({"inputs": [""]}, "/inputs/0: String should have at least 1 character"),
+        ({"output": "y" * 201}, "/output: String should have at most 200 characters"),
+    ],
+)
+def test_a_form_says_what_of_it_cannot_be_used(service, form, words):
+    assert words in problem_of(service.upload(csv(), **form), 422, "invalid-request")
+
+
+@pytest.mark.timeout(20)
+def test_a_name_that_stands_twice_is_found_among_as_many_as_a_body_holds():
+    """A look at every name for each of them would keep all other requests waiting for minutes."""
+    names = [f"{number:x}" for number in range(120_000)]
+    body = json.dumps(dict.fromkeys(names)).encode()[:-1] + b', "1d4bf": 1}'
+    with pytest.raises(Unreadable, match="'1d4bf' stands in it twice"):
+        read_json(body)
+
+
+def test_a_long_name_that_stands_twice_is_not_sent_back_whole():
+    name = "n" * 100_000
+    with pytest.raises(Unreadable) as refused:
+        read_json(f'{{"{name}": 1, "{name}": 2}}'.encode())
+    assert len(refused.value.detail) < 100

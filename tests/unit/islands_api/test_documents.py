@@ -1,0 +1,76 @@
+"""Documents: what is written by hand is what the schemas say, and is JSON whatever is in it."""
+
+import json
+import math
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from islands_api.documents import Document, dataset_document, job_document, json_text
+from islands_api.schemas import DatasetView, JobRequest, JobView
+from islands_service.jobs import Report
+from support.service import kept, queued
+
+FLOATS = st.recursive(
+    st.floats() | st.text() | st.integers(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)
+
+
+def no_constant(text):
+    raise AssertionError(f"{text} is not JSON")
+
+
+@settings(max_examples=20)
+@given(FLOATS)
+def test_what_is_written_is_json(content):
+    try:
+        text = Document(content).body.decode()
+    except UnicodeEncodeError:
+        return
+    assert text == json_text(content)
+    json.loads(text, parse_constant=no_constant)
+
+
+def test_what_json_has_is_written_exactly():
+    content = {"a": [0.1, 1e-300, 2**60, None, True, "ü\u2028"], "b": {"c": -0.0}}
+    assert json.loads(json_text(content)) == content
+
+
+@pytest.mark.parametrize("number", [math.inf, -math.inf, math.nan])
+def test_a_number_that_json_has_not_is_null(number):
+    assert json.loads(json_text({"a": (1.0, number), "b": number})) == {"a": [1.0, None], "b": None}
+
+
+def test_a_job_is_written_as_its_schema_says(service):
+    document = job_document(queued(service.store))
+    assert list(document) == list(JobView.model_fields)
+    view = JobView.model_validate(document)
+    assert view.created.timestamp() == pytest.approx(time.time(), abs=60)
+    assert {**document, "created": None, "updated": None} == {**dict(view), "created": None, "updated": None}
+
+
+def test_a_data_set_is_written_as_its_schema_says(service):
+    document = dataset_document(service.store.datasets.get("local", kept(service.store)))
+    assert list(document) == list(DatasetView.model_fields)
+    DatasetView.model_validate(document)
+
+
+def test_progress_without_an_end_does_not_hide_the_job(service):
+    """An error may be infinite; the page with that job, and all others on it, is shown nevertheless."""
+    job = queued(service.store, priority=1)
+    lease = service.store.leases.claim("test", 60.0)
+    service.store.leases.report(lease, Report({"best_error": math.inf, "islands": [math.nan, 0.5]}))
+    for path in ("/v1/jobs", f"/v1/jobs/{job.id}"):
+        answer = service.client.get(path)
+        assert answer.status_code == 200, answer.text
+        assert '"best_error":null,"islands":[null,0.5]' in answer.text
+    assert service.client.post(f"/v1/jobs/{job.id}/cancel").json()["progress"]["best_error"] is None
+
+
+def test_the_examples_are_valid():
+    for schema in (JobRequest, JobView):
+        for example in schema.model_config["json_schema_extra"]["examples"]:
+            schema.model_validate(example)

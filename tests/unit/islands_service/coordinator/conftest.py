@@ -1,0 +1,81 @@
+"""A job in a store, without Ray: what an identification is carried out with, and what it brings alone."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from islands.evolution.engine import SerialEngine
+from islands.identification import identify
+from islands.io.records import read_record
+from islands.io.records.preview import preview
+from islands.io.results import result_document
+from islands.io.states import history_document
+from islands_service.blobs import Blobs
+from islands_service.jobs import Job, Submission
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from support.front_door import write_hysteresis
+from support.stores import ALICE
+
+SETTINGS = {
+    "population": 10,
+    "generations": 30,
+    "max_terms": 4,
+    "max_height": 3,
+    "shooting": 200,
+    "islands": 2,
+    "migrate_every": 1,
+}
+SEED = 2
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = write_hysteresis(tmp_path_factory.mktemp("record") / "record.csv")
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:801]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(record: Path) -> tuple[list[Any], list[Any]]:
+    """The models, and the history, of the job in one process that nobody disturbs."""
+    states = []
+    found = identify(
+        read_record(record, ["u_V"], "y_um"),
+        seed=SEED,
+        progress=lambda state, _: states.append(state),
+        engine=SerialEngine(),
+        **SETTINGS,
+    )
+    models = json.loads(json.dumps(result_document(found.findings)["models"]))
+    return models, json.loads(json.dumps(history_document(states[-1].history)))
+
+
+@pytest.fixture
+def settings(prepared_sqlite: Path, tmp_path: Path) -> ServiceSettings:
+    (tmp_path / "islands.db").write_bytes(prepared_sqlite.read_bytes())
+    return ServiceSettings(data_dir=tmp_path, lease=1.0)
+
+
+@pytest.fixture
+def store(settings: ServiceSettings) -> Iterator[Store]:
+    with Store(settings.url) as opened:
+        yield opened
+
+
+@pytest.fixture
+def blobs(settings: ServiceSettings) -> Blobs:
+    return Blobs(settings.blobs)
+
+
+@pytest.fixture
+def job(store: Store, blobs: Blobs, record: Path) -> Job:
+    data = record.read_bytes()
+    described = asdict(preview(record))
+    dataset, _ = store.datasets.add(ALICE, "record.csv", ".csv", blobs.write(data), len(data), described)
+    spec = {"dataset": dataset.id, "inputs": ["u_V"], "output": "y_um", "seed": SEED, "settings": SETTINGS}
+    return store.jobs.submit(Submission(ALICE, spec))[0]

@@ -1,0 +1,144 @@
+"""A discrepancy job: what it tells, what it brings, and that it brings the same however often it begins."""
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from islands.errors import RecordError, SettingsError
+from islands.evolution.engine import SerialEngine
+from islands.io.records.preview import preview
+from islands_service.blobs import Blobs
+from islands_service.coordinator.discrepancy import discrepancy
+from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.coordinator.loop import problem_of
+from islands_service.jobs import DISCREPANCY, EXTENDED, REPORT, Job, JobState, Lease, Outcome, Submission
+from islands_service.store import Store
+from islands_service.store.database import StoreUnavailable
+from support.service import HIDDEN, KNOWN, held, hidden
+from support.stores import ALICE
+
+Submit = Callable[..., Job]
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("hidden")
+    hidden(folder)
+    return folder / "hidden.csv"
+
+
+@pytest.fixture
+def submit(store: Store, blobs: Blobs, measured: Path) -> Submit:
+    """What submits a job on the record in which something is hidden."""
+    data, described = measured.read_bytes(), asdict(preview(measured))
+    dataset, _ = store.datasets.add(ALICE, "hidden.csv", ".csv", blobs.write(data), len(data), described)
+
+    def submitted(**changes: Any) -> Job:
+        spec = held(dataset.id, **{"channels": ["T_K"], "tolerance": KNOWN, **changes})
+        return store.jobs.submit(Submission(ALICE, spec, DISCREPANCY))[0]
+
+    return submitted
+
+
+def claim(store: Store) -> Lease:
+    lease = store.leases.claim("me", 60.0)
+    assert lease is not None
+    return lease
+
+
+def carried_out(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> Outcome:
+    return discrepancy(lease, store, blobs, SerialEngine(), check, 1.0, map)
+
+
+def phases(store: Store, job: Job) -> list[str]:
+    return [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
+
+
+def without_time(outcome: Outcome) -> Outcome:
+    document, summary = dict(outcome.document or {}), dict(outcome.summary or {})
+    assert document.pop("wall_s") == summary.pop("wall_s") > 0.0
+    return replace(outcome, document=document, summary=summary)
+
+
+class Interruption:
+    """A check that raises at its n-th call."""
+
+    def __init__(self, at: int) -> None:
+        self.left = at
+
+    def __call__(self) -> None:
+        self.left -= 1
+        if self.left == 0:
+            raise JobCancelled("enough")
+
+
+def test_the_same_job_brings_the_same_bytes_however_often_it_is_interrupted(
+    store: Store, blobs: Blobs, submit: Submit
+) -> None:
+    job = submit()
+    first = without_time(carried_out(claim(store), store, blobs))
+    told = phases(store, job)
+    assert (first.document or {})["effects"][0]["name"] == HIDDEN
+    assert set(first.artefacts) == {REPORT, EXTENDED}
+    for at in (1, 3, len(told)):
+        with pytest.raises(JobCancelled):
+            carried_out(claim(store), store, blobs, Interruption(at))
+    # Blobs are named by what is in them: the report and the extended simulation are the same, too.
+    assert without_time(carried_out(claim(store), store, blobs)) == first
+    assert phases(store, job)[-len(told) :] == told
+
+
+def test_a_column_is_a_simulation_too(store: Store, blobs: Blobs, submit: Submit) -> None:
+    """The neighbour's voltage, of all columns, is no simulation: that it is wrong is said, and by what."""
+    job = submit(simulation={"kind": "column", "column": "w_V"}, tolerance={})
+    outcome = carried_out(claim(store), store, blobs)
+    document = outcome.document or {}
+    assert document["simulation"] == "column w_V"
+    assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
+    assert document["verdict"] != "nothing"
+    assert phases(store, job)[-1] == "writing the report"
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "words"),
+    [
+        ({"rows": "0:99"}, RecordError, "99 samples, and a diagnosis takes "),
+        ({"tolerance": {"mass": 0.1}}, SettingsError, "has no parameter 'mass'"),
+        (
+            {"simulation": {"kind": "bouc-wen-piezo", "parameters": {"mass": 1.0}}},
+            SettingsError,
+            "there is no parameter mass",
+        ),
+    ],
+)
+def test_what_the_record_or_the_simulation_does_not_allow_is_the_jobs_problem(
+    store: Store, blobs: Blobs, submit: Submit, changes: dict[str, Any], kind: type, words: str
+) -> None:
+    submit(**changes)
+    with pytest.raises(kind, match=words) as caught:
+        carried_out(claim(store), store, blobs)
+    expected = {RecordError: "invalid-record", SettingsError: "invalid-settings"}[kind]
+    assert problem_of(caught.value)["type"] == expected
+
+
+class Away:
+    """Leases of a store that cannot be reached when something is to be told."""
+
+    def __init__(self, store: Store) -> None:
+        self._store, self.leases = store, self
+
+    def report(self, *_: object) -> None:
+        raise StoreUnavailable("the database does not answer")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._store, name)
+
+
+def test_reports_that_fail_cost_nothing(store: Store, blobs: Blobs, submit: Submit) -> None:
+    job = submit()
+    outcome = carried_out(claim(store), Away(store), blobs)
+    assert outcome.state == JobState.SUCCEEDED
+    assert phases(store, job) == []

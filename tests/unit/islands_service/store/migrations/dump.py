@@ -1,0 +1,52 @@
+"""Writes a revision's dump: a tiny database with something in every table, as today's code fills it.
+
+After adding a revision, run this file once and commit the dump. An existing dump is never rewritten, because
+databases of that revision exist outside.
+"""
+
+import sqlite3
+import sys
+import tempfile
+from contextlib import closing
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[4]))
+
+from islands_service.store import Store
+from islands_service.store.schema import HEAD
+from support.stores import ALICE, BLOB, BOB, FAILED, FOUND, brought_on, claimed, submitted
+
+FOLDER = Path(__file__).parent
+
+
+def fill(store: Store) -> None:
+    """Put something into every table, and every state of a job."""
+    store.keys.create("revoked", frozenset({"read", "write"}), ALICE, seconds=3600.0)
+    store.keys.revoke(store.keys.all()[0].id)
+    store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, {"columns": [{"name": "u", "unit": "µm"}]})
+    for outcome, owner in ((FOUND, ALICE), (FAILED, BOB)):
+        submitted(store, owner, name="it's done; really", idempotency_key="k")
+        lease = claimed(store)
+        store.leases.report(lease, brought_on(3))
+        store.leases.finish(lease, outcome)
+        store.results.keep(lease.job.id, {"pareto.svg": BLOB})
+    store.jobs.cancel(ALICE, submitted(store).id)
+    submitted(store, priority=-7)
+    store.leases.report(claimed(store), brought_on(5))
+    submitted(store, BOB, priority=100, spec={"value": 0.1 + 0.2})
+
+
+def main() -> None:
+    target = FOLDER / f"{HEAD}.sql"
+    if target.exists():
+        raise SystemExit(f"{target} is there: what it shows is out in the world")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "islands.db"
+        with Store(f"sqlite:///{path}") as store:
+            fill(store)
+        with closing(sqlite3.connect(path)) as connection:
+            target.write_text("\n".join(connection.iterdump()) + "\n")
+
+
+if __name__ == "__main__":
+    main()

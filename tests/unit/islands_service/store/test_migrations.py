@@ -1,0 +1,234 @@
+"""Migrations: every revision there ever was becomes today's tables, with what was in it."""
+
+import sqlite3
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import MetaData, create_engine, inspect, select, text
+
+from islands_service.jobs import JobState
+from islands_service.store import Store
+from islands_service.store.database import Database, StoreError
+from islands_service.store.schema import HEAD, configuration, prepare, revision, upgrade
+from islands_service.store.tables import metadata
+from support.stores import ALICE, BOB, asked, child, contents, kinds, submitted
+
+#: What `migrations/dump.py` wrote when a revision was the last one.
+DUMPS = Path(__file__).with_name("migrations")
+
+REVISIONS = sorted(path.stem for path in DUMPS.glob("*.sql"))
+
+PREPARE = """
+import sys
+import alembic.command
+from islands_service.store import Store
+print("ready", flush=True)
+for url in sys.argv[1:]:
+    sys.stdin.readline()
+    Store(url).close()
+    print("prepared", flush=True)
+"""
+
+MODULES = """
+import sys
+from islands_service.store import Store
+with Store(sys.argv[1]) as store:
+    store.jobs.page("alice")
+print(*(name for name in sys.modules if name.partition(".")[0] in ("alembic", "mako")))
+"""
+
+
+def restored(number, path):
+    """Make the database that a dump was taken of."""
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript((DUMPS / f"{number}.sql").read_text())
+
+
+def tables_of(connection):
+    found = MetaData()
+    found.reflect(connection)
+    return {table.name: table for table in found.sorted_tables if table.name != "alembic_version"}
+
+
+def rows(connection, columns=None):
+    """Return what is in all tables, or in some columns of them, by name."""
+    found = {}
+    for name, table in tables_of(connection).items():
+        names = sorted(set(table.c.keys()) & set(columns[name]) if columns else table.c.keys())
+        taken = connection.execute(select(*(table.c[each] for each in names))).mappings()
+        found[name] = sorted((dict(row) for row in taken), key=repr)
+    return found
+
+
+@pytest.fixture(params=REVISIONS)
+def old(request, empty_database, tmp_path):
+    """A database of an earlier revision with rows in all tables: its URL, and the rows."""
+    source = tmp_path / "source.db"
+    restored(request.param, source)
+    reading, target = create_engine(f"sqlite:///{source}"), Database(empty_database)
+    with reading.connect() as there:
+        kept = rows(there)
+        with target.alone() as here:
+            upgrade(here, request.param)
+            for name, table in tables_of(here).items():
+                if kept[name]:
+                    here.execute(table.insert(), kept[name])
+    reading.dispose()
+    target.close()
+    return empty_database, kept
+
+
+def test_the_code_is_written_for_the_last_revision():
+    script = ScriptDirectory.from_config(configuration())
+    assert script.get_heads() == [HEAD]
+    # One line, numbered.
+    numbers = [each.revision for each in script.walk_revisions()][::-1]
+    assert numbers == [f"{number:04d}" for number in range(1, len(numbers) + 1)]
+
+
+def test_there_is_a_dump_of_every_revision():
+    script = ScriptDirectory.from_config(configuration())
+    missing = {each.revision for each in script.walk_revisions()} - set(REVISIONS)
+    assert not missing, f"python {DUMPS / 'dump.py'}"
+
+
+@pytest.mark.parametrize("number", REVISIONS)
+def test_a_revision_never_changes(number, tmp_path):
+    """Databases of it are out in the world, and what they look like is in its dump."""
+
+    def shape(path):
+        with closing(sqlite3.connect(path)) as connection:
+            query = "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%' ORDER BY 1, 2"
+            return connection.execute(query).fetchall()
+
+    restored(number, tmp_path / "then.db")
+    database = Database(f"sqlite:///{tmp_path / 'now.db'}")
+    with database.alone() as connection:
+        upgrade(connection, number)
+    database.close()
+    assert shape(tmp_path / "now.db") == shape(tmp_path / "then.db")
+
+
+def test_the_migrations_make_the_tables_that_the_code_knows(empty_database):
+    with Store(empty_database) as store, store.database.read() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), metadata) == []
+        found = inspect(connection)
+        for table in metadata.sorted_tables:
+            key = found.get_pk_constraint(table.name)
+            assert (key["name"], key["constrained_columns"]) == (
+                f"pk_{table.name}",
+                [column.name for column in table.primary_key],
+            )
+            for foreign in found.get_foreign_keys(table.name):
+                assert foreign["options"] == {"ondelete": "CASCADE"}
+
+
+def test_what_an_old_database_holds_is_kept(old):
+    url, kept = old
+    with Store(url) as store, store.database.read() as connection:
+        assert revision(connection) == HEAD
+        columns = {name: found[0].keys() if found else () for name, found in kept.items()}
+        assert rows(connection, columns) == kept
+        assert all(kept.values()), "a dump has something in every table"
+
+
+def test_an_old_database_is_worked_with_as_a_new_one(old):
+    url, _ = old
+    with Store(url) as store:
+        mine = {job.state: job for job in store.jobs.page(ALICE).jobs}
+        theirs = {job.state: job for job in store.jobs.page(BOB).jobs}
+        assert set(mine) == {JobState.SUCCEEDED, JobState.CANCELLED, JobState.RUNNING}
+        assert set(theirs) == {JobState.FAILED, JobState.QUEUED}
+        for job in (*mine.values(), *theirs.values()):
+            assert kinds(store, job.id)[0] == "queued"
+        done = mine[JobState.SUCCEEDED]
+        assert [model.file for model in store.results.models(done.id)] == ["first", "second"]
+        assert store.results.history(done.id) == [[3, 30, {"3": 0.25}, [0.5, None]]]
+        assert store.datasets.page(ALICE)[0][0].name == "Bühne.csv"
+        assert store.keys.all()[0].revoked is not None
+        assert theirs[JobState.QUEUED].spec == {"value": 0.1 + 0.2}
+        lease = store.leases.claim("today", 60.0)
+        assert lease.job.id == theirs[JobState.QUEUED].id
+        store.jobs.resume(BOB, theirs[JobState.FAILED].id)
+        store.jobs.delete(ALICE, done.id)
+        failed = theirs[JobState.FAILED]
+        again, new = store.jobs.submit(asked(BOB, spec=failed.spec, name=failed.name, idempotency_key="k"))
+        assert (again.id, new) == (failed.id, False)
+
+
+def test_a_new_database_holds_nothing(empty_database):
+    with Store(empty_database) as store:
+        assert not any(contents(store).values())
+        submitted(store)
+
+
+def test_to_prepare_again_changes_nothing(database):
+    with Store(database) as store:
+        submitted(store)
+        before = contents(store)
+        prepare(store.database)
+        with store.database.alone() as connection:
+            upgrade(connection)
+        assert contents(store) == before
+
+
+def test_processes_that_prepare_the_same_new_databases_at_once_all_succeed(empty_database, tmp_path):
+    urls = [empty_database]
+    if empty_database.startswith("sqlite"):
+        urls += [f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(4)]
+    with ExitStack() as stack:
+        processes = [stack.enter_context(child(PREPARE, *urls)) for _ in range(3)]
+        for process in processes:
+            assert process.stdout.readline() == "ready\n"
+        for _ in urls:
+            for process in processes:
+                process.stdin.write("\n")
+                process.stdin.flush()
+            assert [process.stdout.readline() for process in processes] == ["prepared\n"] * 3
+    for url in urls:
+        with Store(url) as store:
+            submitted(store)
+
+
+def test_a_database_that_is_up_to_date_needs_no_alembic(database):
+    """It takes a quarter of a second to import."""
+    with child(MODULES, database) as process:
+        said, _ = process.communicate(timeout=60)
+    assert said == "\n"
+
+
+def test_a_database_of_a_newer_version_is_refused_and_stays_as_it_is(empty_database):
+    with Store(empty_database) as store:
+        submitted(store)
+        before = contents(store)
+        store.database.write(
+            lambda connection: connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+        )
+        with pytest.raises(StoreError, match=r"has revision 9999, .* made by a newer one"):
+            Store(empty_database)
+        assert contents(store) == before
+        with store.database.read() as connection:
+            assert revision(connection) == "9999"
+
+
+def test_a_migration_that_is_interrupted_leaves_nothing(empty_database):
+    made = Database(empty_database)
+
+    def interrupted():
+        with made.alone() as connection:
+            upgrade(connection)
+            assert revision(connection) == HEAD
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    with made.read() as connection:
+        assert inspect(connection).get_table_names() == []
+    prepare(made)
+    with made.read() as connection:
+        assert revision(connection) == HEAD
+    made.close()

@@ -1,0 +1,129 @@
+"""Queries: what is asked often reads an index, however many jobs there are."""
+
+import json
+import random
+import shutil
+
+import pytest
+from sqlalchemy import event, insert, text
+
+from islands_service.jobs import JobState
+from islands_service.store import Store
+from islands_service.store.tables import jobs
+from support.stores import ALICE, BOB, EXPIRED, LONG, asked
+
+JOBS = 2000
+
+#: What is asked, and the index that SQLite is to take for its slowest part.
+ASKED = {
+    "claim": (lambda store: store.leases.claim("first", LONG), "ix_jobs_state_priority_created"),
+    "quota": (lambda store: store.jobs.submit(asked(), 10**6), "ix_jobs_owner_state_created_id"),
+    "key": (lambda store: store.jobs.submit(asked(idempotency_key="k")), "sqlite_autoindex_jobs_2"),
+    "page": (lambda store: store.jobs.page(ALICE), "ix_jobs_owner_created_id"),
+    "next page": (lambda store: store.jobs.page(ALICE, None, (5.0, "f")), "ix_jobs_owner_created_id"),
+    "page of a state": (
+        lambda store: store.jobs.page(ALICE, JobState.FAILED),
+        "ix_jobs_owner_state_created_id",
+    ),
+    "next of a state": (
+        lambda store: store.jobs.page(ALICE, JobState.FAILED, (5.0, "f")),
+        "ix_jobs_owner_state_created_id",
+    ),
+    "events": (lambda store: store.jobs.events("0" * 32, 3), "sqlite_autoindex_events_1"),
+    "versions": (lambda store: store.jobs.versions(["0" * 32] * 50), "sqlite_autoindex_jobs_1"),
+    "history": (lambda store: store.results.history("0" * 32, 3), "sqlite_autoindex_points_1"),
+    "models": (lambda store: store.results.models("0" * 32, 1), "sqlite_autoindex_models_1"),
+    "key of a secret": (lambda store: store.keys.find("islands_"), "sqlite_autoindex_keys_2"),
+    "data sets": (lambda store: store.datasets.page(ALICE), "sqlite_autoindex_datasets_1"),
+}
+
+
+def rows(count):
+    rng = random.Random(5)
+    for number in range(count):
+        yield {
+            "id": f"{rng.getrandbits(128):032x}",
+            "owner": rng.choice([ALICE, BOB]),
+            "kind": "identification",
+            "name": "",
+            "spec": json.dumps({"seed": number}),
+            "request_sha256": "0" * 64,
+            "priority": rng.choice([-1, 0, 0, 0, 1]),
+            "state": rng.choice(["queued", "running", *["succeeded"] * 8]),
+            "lease_until": EXPIRED,
+            "created": float(number),
+            "updated": float(number),
+        }
+
+
+def filled(store):
+    store.database.write(lambda connection: connection.execute(insert(jobs), list(rows(JOBS))))
+    return store
+
+
+@pytest.fixture
+def full(store):
+    """A store with many jobs, most of them finished."""
+    return filled(store)
+
+
+@pytest.fixture
+def sqlite(prepared_sqlite, tmp_path):
+    """The same in SQLite alone: it chooses its plans without looking at how much there is."""
+    with Store(f"sqlite:///{shutil.copyfile(prepared_sqlite, tmp_path / 'islands.db')}") as store:
+        yield filled(store)
+
+
+def plans(store, ask):
+    """Return how the database carries out what is asked, a text for every statement."""
+    engine, seen = store.database.engine, []
+
+    def executed(connection, cursor, statement, parameters, context, many):
+        if statement.startswith(("SELECT", "UPDATE", "DELETE")) and "advisory" not in statement:
+            seen.append((statement, parameters))
+
+    event.listen(engine, "before_cursor_execute", executed)
+    try:
+        ask(store)
+    finally:
+        event.remove(engine, "before_cursor_execute", executed)
+    found = []
+    with store.database.read() as connection:
+        if connection.dialect.name == "postgresql":
+            # Of a table that fits into a few pages it would read all: ask for what it does of a large one.
+            connection.execute(text("SET LOCAL enable_seqscan = off"))
+        word = "EXPLAIN QUERY PLAN " if connection.dialect.name == "sqlite" else "EXPLAIN "
+        for statement, parameters in seen:
+            answer = connection.exec_driver_sql(word + statement, parameters)
+            found.append("\n".join(str(row[-1]) for row in answer))
+    return found
+
+
+@pytest.mark.parametrize("ask", ASKED)
+def test_what_is_asked_often_reads_an_index(full, ask):
+    found = plans(full, ASKED[ask][0])
+    assert found
+    for plan in found:
+        assert "SCAN " not in plan  # SQLite's word for reading a whole table
+        assert "Seq Scan" not in plan
+
+
+@pytest.mark.parametrize("ask", ASKED)
+def test_it_is_the_index_that_was_made_for_it(sqlite, ask):
+    action, index = ASKED[ask]
+    assert any(index in plan for plan in plans(sqlite, action))
+
+
+@pytest.mark.parametrize(
+    "ask", ["page", "next page", "page of a state", "next of a state", "events", "history"]
+)
+def test_what_is_read_in_order_is_not_sorted(sqlite, ask):
+    assert "TEMP B-TREE" not in "\n".join(plans(sqlite, ASKED[ask][0]))
+
+
+def test_a_quota_is_counted_in_the_index_alone(sqlite):
+    assert any("COVERING INDEX ix_jobs_owner_state" in plan for plan in plans(sqlite, ASKED["quota"][0]))
+
+
+def test_a_page_takes_one_statement_whatever_it_holds(sqlite):
+    assert len(plans(sqlite, lambda store: store.jobs.page(ALICE, limit=200))) == 1
