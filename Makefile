@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test slow lint bench wheel clean
+.PHONY: setup demo test ci nightly lint bench wheel clean
 
 setup: .venv/ready
 
@@ -16,11 +16,23 @@ setup: .venv/ready
 demo: setup
 	$(BIN)/islands demo --out demo-out
 
-test: setup
-	$(BIN)/pytest -n 2 --dist loadgroup
+# By file, since fixtures of modules are costly, and in the order of collection, which has the long files first.
+PYTEST := $(BIN)/pytest --dist loadfile --no-loadscope-reorder
 
-slow: setup
-	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or measured or browser"
+# Bytecode of rewritten assertions is kept between runs, whatever the environment says: it halves the collection.
+unexport PYTHONDONTWRITEBYTECODE
+
+# Three workers on two cores: some tests wait for other processes.
+test: setup
+	$(PYTEST) -n 3
+
+# What CI runs besides `make test`: browser, PostgreSQL, one kill of each kind, one trial of each family.
+ci: setup
+	$(PYTEST) -n 2 -m ci
+
+# Everything else, and thorough examples for the properties.
+nightly: setup
+	$(PYTEST) -n 2 --hypothesis-profile thorough -m "nightly or hypothesis"
 
 lint: setup
 	$(BIN)/ruff format --check .

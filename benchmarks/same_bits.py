@@ -21,7 +21,7 @@ os.environ.setdefault("RAY_AUTH_TOKEN", "0123456789abcdef0123456789abcdef")
 
 from islands.io.records import write_record
 from islands.systems.catalogue import make_record
-from support.front_door import COLUMNS, ISLANDS
+from support.command_line import COLUMNS, ISLANDS
 from support.processes import actors, eventually
 
 JOB = ("--preset", "paper-case1", "--population", "100", "--generations", "120", "--islands", "3")

@@ -8,12 +8,12 @@ import shutil
 
 import pytest
 
-from support.front_door import fail, succeed
+from support.command_line import fail, succeed
 
 KINDS = {"poly", "general", "gp"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_quick_benchmark_measures_every_side(tmp_path):
     written, figures = tmp_path / "new" / "bench.json", tmp_path / "figures"
     shown = succeed("bench", "--quick", "--json", written, "--out", figures)

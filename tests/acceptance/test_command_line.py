@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from support.front_door import fail, succeed
+from support.command_line import fail, succeed
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -9,7 +9,7 @@ import pytest
 
 from islands.io.records import write_record
 from islands.trials.hide.records import hide
-from support.front_door import fail, succeed
+from support.command_line import fail, succeed
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
 
@@ -100,8 +100,7 @@ def test_a_self_test_says_what_the_record_could_show(beside: Path) -> None:
     assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("ray")
+@pytest.mark.nightly
 def test_a_self_test_is_the_same_on_all_cores(beside: Path) -> None:
     (_, alone), (_, together) = (
         self_tested(beside, f"workers-{workers}", "--workers", workers) for workers in (1, 2)

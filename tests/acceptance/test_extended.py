@@ -15,7 +15,7 @@ from islands.discrepancy.extended import Extended
 from islands.discrepancy.preparation import fitted_samples, scene_of
 from islands.io.extensions import extended_json
 from islands.io.records import write_record
-from support.front_door import fail, succeed
+from support.command_line import fail, succeed
 from support.simulated_records import made
 
 #: A stiffness of the third power, in V / um^3.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from support.front_door import BUDGET, COLUMNS, ISLANDS, fail, found, stored, succeed, write_hysteresis
+from support.command_line import BUDGET, COLUMNS, ISLANDS, fail, found, stored, succeed, write_hysteresis
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 
 from islands_service.engines import ENGINES
-from support.front_door import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
-
-pytestmark = pytest.mark.xdist_group("ray")
+from support.command_line import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
 
 ISLANDS = (
     *("--generations", 12, "--islands", 3, "--topology", "bidirectional-ring"),

@@ -10,7 +10,7 @@ import islands
 from islands.discrepancy.decision import Finding
 from islands.discrepancy.diagnosis import Diagnosis
 
-pytestmark = [pytest.mark.measured, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 
 
 @cache

@@ -10,7 +10,7 @@ import pytest
 import islands
 from support.repository import measured_record
 
-pytestmark = pytest.mark.measured
+pytestmark = pytest.mark.nightly
 
 
 # Silverbox: an electronic Duffing oscillator. Its input is band-limited and sampled at the same instants as

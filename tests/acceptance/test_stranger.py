@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from support.front_door import write_hysteresis
+from support.command_line import write_hysteresis
 from support.repository import ROOT
 from support.service_processes import Service, serving
 
@@ -26,7 +26,7 @@ ADDRESS, DATASET, JOB = "http://127.0.0.1:8000", "672083eb...-csv", "b93d8227...
 
 WAYS = ("curl", "Python", "Command line")
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("ray"), pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(900)]
 
 needs_curl = pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from support.front_door import fail, succeed
+from support.command_line import fail, succeed
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 
 def test_trials_are_counted_and_the_same_each_time(tmp_path: Path) -> None:
@@ -66,7 +66,6 @@ def test_most_of_what_is_hidden_is_found(
     succeed(
         *("trials", "--core", core, "--count", 2, "--clean", 10, "--pairs", 8, "--open-set", 2),
         *("--seed", 910_100, "--json", tmp_path / "trials.json"),
-        seconds=1500.0,
     )
     told = json.loads((tmp_path / "trials.json").read_text())["cores"][core]
     found = {share["name"]: 100 * share["count"] / share["of"] for share in told["shares"] if share["of"]}

@@ -10,7 +10,7 @@ import pytest
 from support.screen import Screen
 from support.service_processes import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 CHART = """async ({ options, series }) => {
   const { lineChart } = await import("/dashboard/chart.js");

@@ -12,7 +12,7 @@ from support.played import claimed, stored
 from support.screen import Screen
 from support.service_processes import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 WORDS = "The simulation lacks something <b>that has a name</b>.\n  thermal-drift: k = 1 um/K\nThe RMSE falls."
 

@@ -12,7 +12,7 @@ from support.processes import eventually
 from support.screen import Screen
 from support.service_processes import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7 <b>column y</b> is empty"}
 

@@ -11,7 +11,7 @@ from support.reading import unreadable
 from support.screen import Screen
 from support.service_processes import Service, serving
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from support.played import advance, claimed, stored
 from support.screen import Screen
 from support.service_processes import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 HOSTILE = "<script>document.title='taken'</script><img src=x onerror=\"document.title='taken'\">"
 

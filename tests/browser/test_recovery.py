@@ -13,7 +13,7 @@ from support.processes import eventually, kill
 from support.screen import Screen
 from support.service_processes import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from support.reading import unreadable
 from support.screen import Screen
 from support.service_processes import Service, serving
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 #: What the page may take on its way: its files, and the list with what it shows. A job's history and models
 #: come on top; they grow with the search.

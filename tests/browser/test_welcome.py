@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 
 from islands_service.jobs import JobState, Outcome
-from support.front_door import ISLANDS, write_hysteresis
+from support.command_line import ISLANDS, write_hysteresis
 from support.played import claimed, stored
 from support.processes import eventually
 from support.reading import unreadable
 from support.screen import Screen
 from support.service_processes import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.xdist_group("ray")]
+pytestmark = pytest.mark.ci
 
 
 @pytest.fixture(scope="module")

@@ -43,9 +43,6 @@ SETTINGS = Settings(
 #: The first populations, two epochs of two generations, a third, and what is left.
 GENERATIONS = [0, 2, 4, 6, 7]
 
-pytestmark = pytest.mark.xdist_group("ray")
-
-
 def never():
     return False
 

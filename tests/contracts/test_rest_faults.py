@@ -211,13 +211,13 @@ def spoilt(service, table, **values):
     return f"/v1/jobs/{job}/models/1/figures/loop.svg"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_figure_that_cannot_be_drawn_says_why_in_words_for_people(drawing):
     detail = problem_of(drawing.client.get(spoilt(drawing, models, file="{}")), 500, "failed")
     assert "cannot be drawn: model 1" in detail
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_defect_of_drawing_stands_in_the_log_alone_and_is_not_met_again_at_once(drawing):
     path = spoilt(drawing, results, document='{"settings": {"islands": 1}}')
     drawing.logs.clear()
@@ -228,7 +228,7 @@ def test_a_defect_of_drawing_stands_in_the_log_alone_and_is_not_met_again_at_onc
     assert entry["reason"].endswith("KeyError: 'search'")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_lost_record_and_a_database_that_is_away_are_told_as_such_where_a_figure_is_wanted(drawing):
     path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
     doors = drawing.app.state.doors
@@ -273,7 +273,7 @@ def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
     failures.refuse("a", 1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_process_that_draws_may_take_only_so_much(tmp_path):
     """It reads the files of strangers, too."""
     script = (

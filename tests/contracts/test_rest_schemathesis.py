@@ -95,7 +95,7 @@ def working(store):
         worker.join()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(find_spec("schemathesis") is None, reason="pip install schemathesis")
 @pytest.mark.parametrize("run", RUNS)
 def test_nobody_finds_an_answer_that_is_not_documented(folder, tmp_path, run):

@@ -228,7 +228,7 @@ def test_a_figure_that_there_is_not_is_not_drawn(service, finished, path):
     assert "take one of" in detail
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_figure_is_drawn_once_and_kept(service, document, finished):
     for of in ("", "/models/1"):
         names = service.client.get(f"/v1/jobs/{finished}{of}/figures").json()["items"]
@@ -247,7 +247,7 @@ def test_every_figure_is_drawn_once_and_kept(service, document, finished):
     assert "script" not in report.headers["content-security-policy"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_figure_of_a_record_that_is_gone_says_what_is_missing(service):
     job = identified(service)
     dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]

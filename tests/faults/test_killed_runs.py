@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from support.front_door import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
+from support.command_line import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
 from support.processes import actors, alive, descendants, eventually, kill
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 JOB = (*COLUMNS, *BUDGET, "--islands", "2", "--migrate-every", "1")
 

@@ -18,8 +18,6 @@ from islands_service.runtime.cluster import LOST, ClusterError
 from support.processes import actors, alive, eventually, kill
 from support.searches import SMALL, exactly, record
 
-pytestmark = pytest.mark.xdist_group("ray")
-
 SETTINGS = replace(
     SMALL, islands=3, generations=8, migrate_every=1, migrants=2, topology="bidirectional-ring"
 )
@@ -100,7 +98,7 @@ def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_repla
         found.dismiss()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_actors_that_die_again_and_again_end_the_search_with_advice(posed, engine):
     """Too little memory, for example: nobody wants that to go on for days."""
     over = Event()

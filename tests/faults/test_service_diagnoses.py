@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from support.front_door import succeed
+from support.command_line import succeed
 from support.processes import eventually, kill
 from support.service import HIDDEN, KNOWN, held, hidden
 from support.service_processes import Service, serving
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 #: Seconds of a record that takes a while to analyse.
 LONG = 150.0

@@ -9,7 +9,7 @@ import pytest
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import Service, serving
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 LONG = 600
 

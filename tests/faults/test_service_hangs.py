@@ -14,7 +14,7 @@ import pytest
 from support.processes import alive, eventually
 from support.service_processes import QUICK, Service, serving
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 LONG = 600
 

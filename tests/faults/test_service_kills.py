@@ -13,7 +13,7 @@ from islands.io.results import result_document
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 #: Generations of the job that is disturbed, and of one that waits behind it.
 LONG, SHORT = 600, 5

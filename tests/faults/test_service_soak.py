@@ -9,7 +9,7 @@ import pytest
 
 from support.repository import BENCHMARKS
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 SOAK = BENCHMARKS / "service_soak.py"
 

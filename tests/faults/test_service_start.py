@@ -10,11 +10,11 @@ import pytest
 import trustme
 
 from islands_api.__main__ import listening
-from support.front_door import succeed
+from support.command_line import succeed
 from support.processes import eventually, kill
 from support.service_processes import free_port, serving, started
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 #: None of these is about Ray.
 DOORS = {"ISLANDS_COORDINATORS": "0"}

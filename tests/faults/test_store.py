@@ -121,7 +121,7 @@ def test_what_a_killed_process_has_acknowledged_is_there(database, lines):
             assert (again.id, new) == (job, False)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_process_that_is_killed_again_and_again_loses_nothing(database):
     acknowledged = []
     for turn in range(15):

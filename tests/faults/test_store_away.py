@@ -187,7 +187,7 @@ def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebo
             store.leases.beat(lease, LONG)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(
     os.getuid() != 0 or shutil.which("unshare") is None or shutil.which("ip") is None,
     reason="a network to cut needs root, unshare and ip",

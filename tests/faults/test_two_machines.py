@@ -15,7 +15,7 @@ from islands_service.runtime.ray_engine import RayEngine
 from support.processes import descendants, eventually, kill
 from support.searches import SMALL, exactly, record
 
-pytestmark = [pytest.mark.xdist_group("ray"), pytest.mark.slow]
+pytestmark = pytest.mark.nightly
 
 SETTINGS = replace(SMALL, islands=4, generations=8, migrate_every=1, migrants=2, topology="torus")
 

@@ -78,7 +78,7 @@ def test_counts_times_and_peak_are_those_on_paper(estimation, validation):
 
 def test_values_pinned_when_the_record_was_first_rebuilt(estimation, validation):
     # Free of this repository's filter and of the transcription above: a changed SciPy shows. The notebook's
-    # filter, of order five at 0.002 of the Nyquist rate, amplifies the last bit of the linear algebra to 2.5e-4,
+    # filter, of order five at 0.002 of Nyquist, amplifies the last bit of the linear algebra to 2.5e-4,
     # and that bit differs between processors.
     assert estimation.u[0, 0] == pytest.approx(-6.6788, abs=1e-3)
     assert estimation.y[0] == pytest.approx(-10.7255, abs=1e-3)

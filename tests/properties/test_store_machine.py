@@ -291,7 +291,7 @@ def test_on_sqlite_the_store_is_a_dictionary(prepared_sqlite, tmp_path, monkeypa
     play(new, monkeypatch, examples=10, steps=40)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_on_sqlite_the_store_is_a_dictionary_for_long(prepared_sqlite, tmp_path, monkeypatch):
     numbers = count()
 
@@ -301,6 +301,6 @@ def test_on_sqlite_the_store_is_a_dictionary_for_long(prepared_sqlite, tmp_path,
     play(new, monkeypatch, examples=40, steps=60)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_on_postgresql_the_store_is_a_dictionary(prepared_postgres, monkeypatch):
     play(lambda: emptied(prepared_postgres), monkeypatch, examples=20, steps=40)

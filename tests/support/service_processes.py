@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import httpx
 
-from support.front_door import ISLANDS, write_hysteresis
+from support.command_line import ISLANDS, write_hysteresis
 from support.processes import alive, descendants, eventually
 
 #: What the command line of every role holds. The actors and the two servers are Ray's own processes.

@@ -25,6 +25,17 @@ COMMANDS = (
 class Commands(TyperGroup):
     """Imports a command when it is called for: one that asks a service about its jobs needs no kernels."""
 
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; report an error in one line and exit with 2, or 130 where it was interrupted."""
+        try:
+            return super().invoke(ctx)
+        except (IslandsError, OSError) as error:
+            errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
+            sys.exit(2)
+        except KeyboardInterrupt:
+            errors.print("stopped")
+            sys.exit(130)
+
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
         """Return the names in the table's order."""
         return list(COMMANDS)
@@ -62,11 +73,4 @@ def main() -> None:
     # would wait for each other, and sums depend on how many they are. NumPy is not imported yet.
     for name in THREADS:
         os.environ.setdefault(name, "1")
-    try:
-        app()
-    except (IslandsError, OSError) as error:
-        errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        errors.print("stopped")
-        sys.exit(130)
+    app()

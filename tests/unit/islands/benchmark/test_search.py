@@ -75,7 +75,7 @@ def test_rates_are_counts_over_times():
     assert run.amortised_ms == 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("warm", [False, True])
 def test_processes_run_the_same_searches_as_this_one(piezo, warm):
     seconds, runs = run_apart(piezo, SMALL, [0, 1], warm)

@@ -96,7 +96,7 @@ def digest(folder, processor=None):
     return results, registers
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.timeout(900)
 @pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="names of x86 processors")
 def test_bits_do_not_depend_on_the_processor(tmp_path):

@@ -26,7 +26,7 @@ from islands_service.blobs import Blobs
 from islands_service.coordinator.identification import identification
 from islands_service.jobs import DISCREPANCY, EXTENDED, REPORT, JobState, Lease, Outcome, Submission
 from islands_service.specification import Identification
-from support.front_door import ISLANDS
+from support.command_line import ISLANDS
 from support.processes import eventually
 from support.service import Service, csv, held, kept, queued, served
 from support.stores import FAILED, LONG, at_once, brought_on

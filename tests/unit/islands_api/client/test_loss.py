@@ -210,7 +210,7 @@ def test_a_refusal_is_not_asked_again(connect: Any, scripted: Any, status: int) 
     assert len(server.asked) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_who_asks_too_much_is_served_when_the_service_says(connect: Any, tmp_path: Any) -> None:
     with served(tmp_path / "busy", rate=2.0, burst=1) as busy:
         _, secret = busy.store.keys.create("test", frozenset({"read"}))

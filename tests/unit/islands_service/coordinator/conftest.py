@@ -18,7 +18,7 @@ from islands_service.blobs import Blobs
 from islands_service.jobs import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from support.front_door import write_hysteresis
+from support.command_line import write_hysteresis
 from support.stores import ALICE
 
 SETTINGS = {

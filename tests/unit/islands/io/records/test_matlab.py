@@ -251,7 +251,7 @@ def test_scipys_samples_of_matlab_4_to_7_4_hold_the_same_numbers_here():
     assert compared > 30
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave: apt-get install octave")
 @pytest.mark.parametrize("option", ["-v4", "-v6", "-v7"])
 def test_what_octave_saves_is_read(tmp_path, option):

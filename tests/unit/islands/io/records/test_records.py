@@ -345,7 +345,7 @@ def test_every_known_suffix_is_lower_case_with_its_dot():
 # Measured records
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 def test_the_piezo_record_is_sampled_at_a_fifth_of_a_millisecond():
     record = read_record(measured_record("piezo_micromanipulator_150V_1Hz.csv"), ["u_V"], "y_um")
     assert record.dt == pytest.approx(2e-4, rel=1e-6)
@@ -354,7 +354,7 @@ def test_the_piezo_record_is_sampled_at_a_fifth_of_a_millisecond():
     assert (record.u[-1, 0], record.y[-1]) == (-118.05964, -13.938904)
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 def test_silverbox_is_read_with_the_sampling_frequency_that_it_states():
     file = measured_record("silverbox.npz")
     record = read_record(file, ["u"], "y", rows=slice(40650, 105712))
@@ -365,7 +365,7 @@ def test_silverbox_is_read_with_the_sampling_frequency_that_it_states():
         assert record.y[0] == arrays["y"][40650]
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "inputs", "output", "dt", "samples", "step"),
     [
@@ -382,7 +382,7 @@ def test_the_measured_records_are_read(name, inputs, output, dt, samples, step):
     assert record.dt == pytest.approx(step, rel=1e-9)
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 def test_the_two_parts_of_the_buck_converter_follow_one_another_in_time():
     file = measured_record("buck_converter.csv")
     whole = read_record(file, ["u_V"], "y_V")
@@ -393,7 +393,7 @@ def test_the_two_parts_of_the_buck_converter_follow_one_another_in_time():
     assert validation.y[0] == 15.6
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 def test_the_hair_dryer_needs_its_sampling_time():
     with pytest.raises(
         RecordError, match=r"daisy_hairdryer\.csv has no time column .* --dt \(library: dt=\)"
@@ -401,7 +401,7 @@ def test_the_hair_dryer_needs_its_sampling_time():
         read_record(measured_record("daisy_hairdryer.csv"), ["u_V"], "y_temp")
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 def test_the_tests_of_the_damper_are_told_apart_by_their_time():
     file = measured_record("mrdamper_labcontrol.csv")
     with pytest.raises(RecordError, match=r"line 3003, column t_s jumps back to 0 from 30: .*islands\.join"):
@@ -409,7 +409,7 @@ def test_the_tests_of_the_damper_are_told_apart_by_their_time():
     assert read_record(file, ["dist_mm"], "force_N", rows=slice(0, 3001)).dt == pytest.approx(0.01)
 
 
-@pytest.mark.measured
+@pytest.mark.nightly
 def test_the_mirrors_arrays_of_many_realisations_are_refused_with_their_shape():
     with pytest.raises(RecordError, match=r"u_100mV_train has the shape \(8192, 3, 6, 2\)"):
         read_record(measured_record("fsm_piezo.npz"), ["u_100mV_train"], "y_um_100mV_train")

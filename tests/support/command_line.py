@@ -1,13 +1,13 @@
-"""The command line as a process: what every acceptance test knocks at."""
+"""The command line in this process, and the records that its tests identify."""
 
 import csv
 import json
-import subprocess
 import sysconfig
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from typer.testing import CliRunner, Result
 
 ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
 
@@ -44,20 +44,23 @@ def found(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in paths}
 
 
-def islands(*arguments: object, seconds: float = 240.0) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [ISLANDS, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=seconds
-    )
+def islands(*arguments: object) -> Result:
+    """Run a command in this process, where its kernels are loaded; `ISLANDS` is for tests of the process."""
+    from islands_api.cli.app import app
+
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
 
 
-def succeed(*arguments: object, seconds: float = 240.0) -> str:
-    done = islands(*arguments, seconds=seconds)
-    assert done.returncode == 0, done.stderr
+def succeed(*arguments: object) -> str:
+    """Run a command that succeeds; return its standard output."""
+    done = islands(*arguments)
+    assert done.exit_code == 0, done.stderr
     return done.stdout
 
 
 def fail(*arguments: object) -> str:
+    """Run a command that refuses its arguments; return its standard error."""
     done = islands(*arguments)
-    assert done.returncode == 2, (done.returncode, done.stdout, done.stderr)
+    assert done.exit_code == 2, (done.exit_code, done.stdout, done.stderr)
     assert "Traceback" not in done.stderr
     return done.stderr
