@@ -1,50 +1,42 @@
-"""The whole house through its front door: processes, files, messages."""
+"""The commands fit, simulate, show and systems: files, numbers, messages."""
 
 import csv
 import importlib.util
 import json
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from islands.io.records import write_record
+from islands.systems.bouc_wen import consistent_estimation, consistent_validation
 from support.command_line import fail, succeed
-
-Run = Callable[..., subprocess.CompletedProcess[str]]
+from support.undrawn import undrawn_figures
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record of the consistent piezo, cut to 20 s, and what ``islands fit`` makes of it."""
-    base = tmp_path_factory.mktemp("house")
-    succeed(
-        "systems",
-        "make",
-        "bouc-wen-piezo",
-        "--variant",
-        "consistent",
-        "--part",
-        "estimation",
-        "--out",
-        base / "long.csv",
-    )
-    succeed(
-        "systems",
-        "make",
-        "bouc-wen-piezo",
-        "--variant",
-        "consistent",
-        "--part",
-        "validation",
-        "--out",
-        base / "sine.csv",
-    )
-    fit = ["fit", base / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:20000"]
-    succeed(*fit, "--validation", base / "sine.csv", "--max-terms", 6, "--out", base / "fit")
+def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six seconds of the consistent piezo to estimate on, and three to validate on."""
+    base = tmp_path_factory.mktemp("piezo")
+    write_record(consistent_estimation(4, 6.0), base / "long.csv")
+    write_record(consistent_validation(3.0), base / "sine.csv")
     return base
+
+
+def fit(base: Path, out: str) -> None:
+    succeed(
+        *("fit", base / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:5000"),
+        *("--validation", base / "sine.csv", "--max-terms", 6, "--out", base / out),
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(records: Path) -> Path:
+    """The records, and what ``islands fit`` makes of the first 5 s; its figures are not drawn."""
+    with undrawn_figures():
+        fit(records, "fit")
+    return records
 
 
 @pytest.fixture(scope="module")
@@ -52,16 +44,18 @@ def result(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "fit" / "result.json").read_text())
 
 
-def test_systems_are_listed_and_made(folder: Path) -> None:
+def test_systems_are_listed_and_made(tmp_path: Path) -> None:
     assert "bouc-wen-piezo" in succeed("systems", "list")
-    with (folder / "sine.csv").open() as stream:
+    asked = ("bouc-wen-piezo", "--variant", "consistent", "--part", "validation")
+    succeed("systems", "make", *asked, "--out", tmp_path / "sine.csv")
+    with (tmp_path / "sine.csv").open() as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == ["t_s", "u_V", "y_um"]
     assert len(rows) == 20_001
 
 
 def test_a_result_says_what_was_read_searched_and_found(result: dict[str, Any]) -> None:
-    assert result["record"]["samples"] == 20_000
+    assert result["record"]["samples"] == 5_000
     assert result["record"]["dt"] == pytest.approx(1e-3, rel=1e-9)
     assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
     assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
@@ -96,13 +90,27 @@ def test_the_folder_holds_models_figures_and_a_summary(folder: Path, result: dic
     assert result["models"][0]["equation"] in (folder / "fit" / "summary.txt").read_text()
 
 
+def same_files(one: Path, other: Path) -> None:
+    """Compare two results to the bit; ``result.json`` holds how long a search took."""
+    paths = [path for path in sorted(one.rglob("*")) if path.is_file() and path.name != "result.json"]
+    assert len(paths) > 8
+    for path in paths:
+        assert path.read_bytes() == (other / path.relative_to(one)).read_bytes(), path.name
+
+
 def test_the_same_fit_gives_the_same_models_bit_for_bit(folder: Path) -> None:
-    fit = ["fit", folder / "long.csv", "--input", "u_V", "--output", "y_um", "--rows", "0:20000"]
-    succeed(*fit, "--validation", folder / "sine.csv", "--max-terms", 6, "--out", folder / "again")
-    for path in sorted((folder / "fit").rglob("*")):
-        if path.is_file() and path.name != "result.json":
-            twin = folder / "again" / path.relative_to(folder / "fit")
-            assert path.read_bytes() == twin.read_bytes(), path.name
+    with undrawn_figures():
+        fit(folder, "again")
+    same_files(folder / "fit", folder / "again")
+
+
+@pytest.mark.ci
+def test_the_same_fit_draws_the_same_figures_bit_for_bit(records: Path) -> None:
+    for out in ("drawn", "drawn again"):
+        fit(records, out)
+    same_files(records / "drawn", records / "drawn again")
+    for path in (records / "drawn" / "figures").iterdir():
+        assert path.stat().st_size > 5_000, path.name
 
 
 @pytest.mark.parametrize(("mode", "missing"), [("one-step", 3), ("shooting", 3), ("free-run", 3)])
@@ -114,7 +122,7 @@ def test_simulate_writes_a_row_for_every_sample(folder: Path, mode: str, missing
     assert "ok" in text
     table = np.genfromtxt(out, delimiter=",", names=True)
     assert table.dtype.names == ("time", "y_sim")
-    assert len(table) == 20_000
+    assert len(table) == 3_000
     assert np.isnan(table["y_sim"][:missing]).all()
     assert np.isfinite(table["y_sim"][missing:]).all()
     measured = np.genfromtxt(folder / "sine.csv", delimiter=",", names=True)
