@@ -1,29 +1,39 @@
-"""``islands diagnose`` through its front door."""
+"""The command diagnose: what it writes, what it says, what it refuses."""
 
 import json
 import re
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from islands.discrepancy.core import Core
+from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.self_test import NOTHING, Answer, SelfTest, self_test
+from islands.discrepancy.spread import Spread
+from islands.discrepancy.surrogates import Probe
 from islands.io.records import write_record
 from islands.trials.hide.records import hide
 from support.command_line import fail, succeed
+from support.undrawn import undrawn_figures
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record in which the sensor follows a temperature, and what is said of it."""
+    """A record in which the sensor follows a temperature, and what is said of it; no figure is drawn."""
     base = tmp_path_factory.mktemp("diagnosis")
-    hidden = hide(["thermal-drift"], np.random.default_rng(4), seconds=24.0, band=(1.0, 4.0))
+    hidden = hide(["thermal-drift"], np.random.default_rng(4), seconds=6.0, band=(1.0, 4.0))
     write_record(hidden.record, base / "piezo.csv")
-    succeed(
-        *("diagnose", base / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo"),
-        *("--tolerance", "A=0.02", "--tolerance", "dp=0.01", "--out", base / "out"),
-    )
+    with undrawn_figures():
+        succeed(
+            *("diagnose", base / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo"),
+            *("--tolerance", "A=0.02", "--tolerance", "dp=0.01", "--out", base / "out"),
+        )
     return base
 
 
@@ -54,6 +64,19 @@ def test_the_report_is_one_file_that_says_it_in_words(folder: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
 
 
+@pytest.mark.ci
+def test_the_figures_of_the_report_are_drawn(beside: Path) -> None:
+    succeed(
+        *("diagnose", beside / "record.csv", "--input", "u_V", "--output", "y_um"),
+        *("--simulation", "column:theirs_um", "--out", beside / "drawn"),
+    )
+    drawn = re.findall(
+        r'src="data:image/svg\+xml;base64,([^"]+)"', (beside / "drawn/report.html").read_text()
+    )
+    assert len(drawn) == 4
+    assert min(map(len, drawn)) > 10_000
+
+
 @pytest.fixture(scope="module")
 def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short record with somebody else's simulation in a column, which lacks an offset."""
@@ -71,31 +94,58 @@ def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def self_tested(base: Path, out: str, *options: object) -> tuple[str, dict]:
     """Diagnose with a self-test; return what was said, and the document."""
-    said = succeed(
-        *("diagnose", base / "record.csv", "--input", "u_V", "--output", "y_um"),
-        *("--simulation", "column:theirs_um", "--self-test", *options, "--out", base / out),
-    )
+    with undrawn_figures():
+        said = succeed(
+            *("diagnose", base / "record.csv", "--input", "u_V", "--output", "y_um"),
+            *("--simulation", "column:theirs_um", "--self-test", *options, "--out", base / out),
+        )
     return said, json.loads((base / out / "discrepancy.json").read_text())
 
 
-def test_a_self_test_says_what_the_record_could_show(beside: Path) -> None:
-    said, document = self_tested(beside, "one", "--workers", 1)
+def answered(_analyse: object, probes: Sequence[Probe]) -> Iterator[Answer]:
+    """Answer probes without an analysis: what is larger than a third of the noise is named."""
+    for probe in probes:
+        named = probe.injection is not None and probe.injection.misfit > 0.33
+        yield Answer("offset" if named else NOTHING, named, 1.0)
+
+
+def quick_self_test(
+    found: Diagnosis, core: Core, tolerance: dict, seed: int, _run: Spread, **asked: Any
+) -> SelfTest:
+    return self_test(found, core, tolerance, seed, answered, **asked)
+
+
+@pytest.mark.parametrize(
+    ("clean", "effects", "quick"),
+    [
+        pytest.param(40, None, True, id="answered"),
+        pytest.param(4, ("offset",), False, id="small", marks=pytest.mark.ci),
+        pytest.param(40, None, False, id="whole", marks=pytest.mark.nightly),
+    ],
+)
+def test_a_self_test_says_what_the_record_could_show(
+    beside: Path, clean: int, effects: tuple[str, ...] | None, quick: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tested = partial(quick_self_test if quick else self_test, effects=effects, clean=clean)
+    monkeypatch.setattr("islands_api.cli.diagnose.self_test", tested)
+    out = f"self-test-{clean}-{quick}"
+    said, document = self_tested(beside, out, "--workers", 1)
     assert [effect["name"] for effect in document["effects"]] == ["offset"]
     limits = document["detection_limits"]
-    assert {"offset", "viscous", "jump", "sensor-lag"} <= set(limits)
+    assert set(effects or ("offset", "viscous", "jump", "sensor-lag")) <= set(limits)
     assert set(limits["offset"]) == {"strength", "unit", "misfit_sigma"}
     assert limits["offset"]["unit"] == "um"
     # An offset's misfit is the offset itself.
     assert limits["offset"]["strength"] == pytest.approx(0.1 * limits["offset"]["misfit_sigma"], rel=0.2)
     assert limits["offset"]["strength"] < document["effects"][0]["parameters"]["c"]["value"]
     alarms = document["false_alarm_rate"]
-    assert alarms["of"] == 40
+    assert alarms["of"] == clean
     assert alarms["ci95"][0] <= alarms["value"] <= alarms["ci95"][1]
     assert alarms["value"] < 0.2
-    assert document["p_value"] == pytest.approx(1 / 41)
-    assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == 40
-    assert "Of 40 records like this one with nothing wrong in them" in said
-    text = (beside / "one/report.html").read_text()
+    assert document["p_value"] == pytest.approx(1 / (clean + 1))
+    assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == clean
+    assert f"Of {clean} records like this one with nothing wrong in them" in said
+    text = (beside / out / "report.html").read_text()
     assert "smallest strength that was named" in text
     assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
 
@@ -110,16 +160,8 @@ def test_a_self_test_is_the_same_on_all_cores(beside: Path) -> None:
 
 
 def test_a_result_is_not_written_over_unasked(folder: Path) -> None:
-    asked = (
-        "diagnose",
-        folder / "piezo.csv",
-        *COLUMNS,
-        "--simulation",
-        "bouc-wen-piezo",
-        "--out",
-        folder / "out",
-    )
-    assert "holds a result already" in fail(*asked)
+    asked = ("diagnose", folder / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo")
+    assert "holds a result already" in fail(*asked, "--out", folder / "out")
 
 
 @pytest.mark.parametrize(
@@ -134,7 +176,9 @@ def test_a_result_is_not_written_over_unasked(folder: Path) -> None:
         (("--simulation", "bouc-wen-piezo", "--input", "T_K"), "is driven by one input"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_in_a_line(folder: Path, options: tuple[str, ...], why: str) -> None:
+def test_an_impossible_diagnosis_is_refused_in_a_line(
+    folder: Path, options: tuple[str, ...], why: str
+) -> None:
     said = fail("diagnose", folder / "piezo.csv", *COLUMNS, *options, "--out", folder / "other")
     assert why in said
     assert "Traceback" not in said
