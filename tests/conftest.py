@@ -55,6 +55,28 @@ def prepared_sqlite(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="session")
+def serve(prepared_sqlite, tmp_path_factory):
+    """What serves a prepared database: in a new folder unless one is given, with settings of its own."""
+    from support.service import served
+
+    def serve(folder=None, /, **changes):
+        folder = folder or tmp_path_factory.mktemp("service")
+        shutil.copyfile(prepared_sqlite, folder / "islands.db")
+        return served(folder, **changes)
+
+    return serve
+
+
+@pytest.fixture(scope="session")
+def ray_address(tmp_path_factory):
+    """The address of one Ray for all tests of a process. A test may kill actors there, but not Ray itself."""
+    from support.ray_head import ray_head
+
+    with ray_head(tmp_path_factory.mktemp("ray")) as address:
+        yield address
+
+
 def _sqlite(request):
     return f"sqlite:///{request.getfixturevalue('tmp_path') / 'islands.db'}"
 
@@ -77,6 +99,21 @@ def _prepared_postgresql(request):
     from support.databases import emptied
 
     return emptied(request.getfixturevalue("prepared_postgres"))
+
+
+@pytest.fixture
+def sqlite_database(request):
+    """The URL of an SQLite file with our tables and nothing in them."""
+    return _prepared_sqlite(request)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """What mounts a disk of so many bytes; where nothing can be mounted the test skips."""
+    from support.disks import mounted
+
+    with ExitStack() as stack:
+        yield lambda size, **options: stack.enter_context(mounted(tmp_path / "disk", size, **options))
 
 
 @pytest.fixture(params=[_prepared_sqlite, _prepared_postgresql], ids=["sqlite", "postgresql"])

@@ -1,17 +1,13 @@
 """A running service for the contracts of its doors: one a file, emptied before every test."""
 
-import shutil
-
 import pytest
 
-from support.service import emptied, held, kept, served
+from support.service import emptied, held, kept
 
 
 @pytest.fixture(scope="module")
-def shared(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
+def shared(serve):
+    with serve() as running:
         yield running
 
 

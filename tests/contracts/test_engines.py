@@ -1,6 +1,7 @@
 """What every engine owes: the same epochs, bit for bit, wherever it starts and however it carries them out.
 
-A new engine joins the table of engines and is held to all of it.
+A new engine joins the table of engines and is held to all of it. On Ray the laws about one course are fast,
+since they share its actors.
 """
 
 from collections import Counter
@@ -43,6 +44,17 @@ SETTINGS = Settings(
 #: The first populations, two epochs of two generations, a third, and what is left.
 GENERATIONS = [0, 2, 4, 6, 7]
 
+
+#: On Ray a search that is resumed in the middle is enough for every change.
+RESUMED = [pytest.mark.nightly, pytest.mark.ci, pytest.mark.nightly, pytest.mark.nightly]
+
+
+def elsewhere(mark):
+    """Mark a law that starts actors of its own, two seconds of CPU, on every engine but the serial one."""
+    engines = [pytest.param(name, marks=() if name == "serial" else mark) for name in ENGINES]
+    return pytest.mark.parametrize("name", engines, indirect=True, scope="module")
+
+
 def never():
     return False
 
@@ -53,15 +65,29 @@ def posed():
 
 
 @pytest.fixture(params=ENGINES, scope="module")
-def engine(request):
-    with ENGINES[request.param](None, print) as started:
+def name(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def engine(request, name):
+    address = request.getfixturevalue("ray_address") if name == "ray" else None
+    with ENGINES[name](address, print) as started:
         yield started
 
 
 @pytest.fixture(scope="module")
-def course(engine, posed):
+def courses():
+    """The course of every engine that has run, whatever the order of the tests."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def course(name, engine, posed, courses):
     """Every epoch of three islands, never stopped: every engine's is held against every other engine's."""
-    return list(engine.run(posed, founded(3, 7), never))
+    if name not in courses:
+        courses[name] = list(engine.run(posed, founded(3, 7), never))
+    return courses[name]
 
 
 def archipelagos(epochs):
@@ -91,6 +117,7 @@ def test_an_engine_does_what_the_islands_do_one_by_one(course, posed):
         assert epoch.steps == tuple(each.steps for each in epochs)
 
 
+@elsewhere(pytest.mark.nightly)
 def test_migration_makes_a_difference(course, engine, posed):
     alone = replace(posed, settings=replace(SETTINGS, topology="isolated"))
     isolated = archipelagos(engine.run(alone, founded(3, 7), never))
@@ -100,12 +127,22 @@ def test_migration_makes_a_difference(course, engine, posed):
     assert all(emigrants(island, SETTINGS) for island in course[1].archipelago.islands)
 
 
-@pytest.mark.parametrize("stop", range(4))
+@pytest.mark.parametrize(
+    ("name", "stop"),
+    [
+        pytest.param(name, stop, marks=() if name == "serial" else RESUMED[stop])
+        for name in ENGINES
+        for stop in range(4)
+    ],
+    indirect=["name"],
+    scope="module",
+)
 def test_resumed_from_any_epoch_equals_never_stopped(engine, course, posed, stop):
     resumed = engine.run(posed, course[stop].archipelago, never)
     assert archipelagos(resumed) == archipelagos(course)[stop + 1 :]
 
 
+@elsewhere(pytest.mark.nightly)
 def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, course, posed, tmp_path):
     paths = tmp_path / "never-stopped.json", tmp_path / "resumed.json", tmp_path / "stop.json"
     write_checkpoint(course[1].archipelago, paths[2], {})
@@ -119,6 +156,7 @@ def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, cour
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
+@elsewhere(pytest.mark.nightly)
 def test_an_engine_may_run_twice_and_be_left_between(engine, course, posed):
     first = engine.run(posed, founded(3, 7), never)
     assert next(first).archipelago == course[0].archipelago
@@ -130,12 +168,14 @@ def test_from_the_last_epoch_there_is_nothing_to_do(engine, course, posed):
     assert list(engine.run(posed, course[-1].archipelago, never)) == []
 
 
+@elsewhere(pytest.mark.nightly)
 def test_more_generations_go_on_where_fewer_ended(engine, course, posed):
     shorter = replace(posed, settings=replace(SETTINGS, generations=4))
     *_, stopped = engine.run(shorter, founded(3, 7), never)
     assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
 
 
+@elsewhere(pytest.mark.nightly)
 def test_a_run_that_ended_between_two_stops_goes_on_to_the_same_stops(engine, course, posed):
     shorter = replace(posed, settings=replace(SETTINGS, generations=5))
     *_, stopped = engine.run(shorter, founded(3, 7), never)
@@ -143,6 +183,7 @@ def test_a_run_that_ended_between_two_stops_goes_on_to_the_same_stops(engine, co
     assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
 
 
+@elsewhere(pytest.mark.ci)
 def test_told_to_stop_an_engine_ends_and_what_it_yielded_stands(engine, course, posed):
     seen = []
     for epoch in engine.run(posed, founded(3, 7), lambda: len(seen) == 2):
@@ -151,6 +192,7 @@ def test_told_to_stop_an_engine_ends_and_what_it_yielded_stands(engine, course, 
     assert list(engine.run(posed, founded(3, 7), lambda: True)) == []
 
 
+@elsewhere(pytest.mark.nightly)
 def test_another_seed_is_another_run(engine, course, posed):
     other = next(iter(engine.run(posed, founded(3, 8), never))).archipelago
     assert [island.population for island in other.islands] != [
@@ -189,6 +231,7 @@ def test_the_hall_of_an_archipelago_is_gathered_from_its_islands(course):
     assert Archipelago().hall.entries == ()
 
 
+@elsewhere(pytest.mark.ci)
 def test_what_is_wrong_with_a_problem_comes_out_as_it_is(engine, posed):
     """Not as a lost actor that is replaced again and again."""
     for wrong in (
@@ -200,6 +243,7 @@ def test_what_is_wrong_with_a_problem_comes_out_as_it_is(engine, posed):
         assert type(raised.value) is RecordError
 
 
+@elsewhere(pytest.mark.ci)
 def test_more_islands_than_processors_share_them(engine, posed):
     many = replace(posed, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2))
     *_, last = engine.run(many, founded(9, 1), never)

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import subprocess
 import sys
 
@@ -24,12 +23,10 @@ MODEL = {
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory, prepared_sqlite):
+def finished(serve):
     """A service with a job that has found what was hidden, and that job."""
-    folder = tmp_path_factory.mktemp("finished")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
-        yield running, diagnosed(running, hidden(folder))
+    with serve() as running:
+        yield running, diagnosed(running, hidden(running.settings.data_dir))
 
 
 def submitted(service, headers=None, /, **order):

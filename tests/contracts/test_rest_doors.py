@@ -1,21 +1,19 @@
 """Doors: who may knock at all, what Prometheus reads, and what the service says of itself."""
 
 import json
-import shutil
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from islands_service.jobs import JobState, Report
-from support.service import kept, problem_of, queued, served, spec
+from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, claimed
 
 
 @pytest.fixture
-def far(tmp_path, prepared_sqlite):
+def far(serve):
     """A service that others can reach, and that needs keys."""
-    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
-    with served(tmp_path, host="0.0.0.0") as running:
+    with serve(host="0.0.0.0") as running:
         yield running
 
 

@@ -1,6 +1,5 @@
 """Events over REST: every one, in order, once; also for those who are cut off, and until the end."""
 
-import shutil
 import threading
 import time
 
@@ -12,15 +11,13 @@ from islands_api.auth import LOCAL
 from islands_api.routes import events as routes
 from islands_service.store import leases
 from support.processes import eventually
-from support.service import PATIENCE, emptied, parsed, problem_of, queued, served
+from support.service import PATIENCE, emptied, parsed, problem_of, queued
 from support.stores import CANCELLED, FAILED, FOUND, brought_on, claimed
 
 
 @pytest.fixture(scope="module")
-def shared(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
+def shared(serve):
+    with serve() as running:
         yield running
         assert not [entry for entry in running.logs if entry["event"] == "defect"]
 

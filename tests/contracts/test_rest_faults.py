@@ -1,7 +1,6 @@
 """Faults behind the doors: a full disk and a lost database are told as such, and what was accepted stays."""
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -17,43 +16,15 @@ from sqlalchemy import update
 from islands_api.routes import figures
 from islands_service.store.tables import models, results
 from support.databases import server
+from support.disks import filled
 from support.processes import eventually
 from support.service import PATIENCE, csv, identified, parsed, problem_of, queued, served, spec
 from support.stores import FOUND, claimed
 
-#: Bytes of a small disk.
-DISK = 6_000_000
-
 
 @pytest.fixture
-def disk(tmp_path):
-    """A disk of a few megabytes."""
-    if os.getuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("a small disk takes root, to mount one: run these tests as root")
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={DISK},nr_inodes=400", "islands-test", folder],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if mounted.returncode != 0:
-        pytest.skip(f"no small disk can be mounted here: {mounted.stderr.strip()}")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
-
-
-def fill(folder):
-    """Leave no byte free; return what to delete to make room."""
-    path = folder / "filler"
-    with path.open("wb", buffering=0) as stream:
-        try:
-            while True:
-                stream.write(bytes(4096))
-        except OSError:
-            pass
-    return path
+def disk(small_disk):
+    return small_disk(6_000_000, nr_inodes=400)
 
 
 def wordy(word):
@@ -61,12 +32,11 @@ def wordy(word):
     return csv(20_000).replace(b"y_um", word)
 
 
-def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, prepared_sqlite):
-    shutil.copyfile(prepared_sqlite, disk / "islands.db")
-    with served(disk) as service:
+def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, serve):
+    with serve(disk) as service:
         dataset = service.upload(csv()).json()["id"]
         job = service.submit(**spec(dataset)).json()
-        filler = fill(disk)
+        filler = filled(disk)
         refused = [
             service.upload(wordy(b"y_mm")),
             *(service.submit(**spec(dataset, name="x" * 200, seed=seed)) for seed in range(300)),
@@ -91,22 +61,20 @@ def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, prepa
         assert not list(service.settings.blobs.glob("*.part"))
 
 
-def test_no_room_for_a_figure_is_told_as_such(disk, prepared_sqlite):
-    shutil.copyfile(prepared_sqlite, disk / "islands.db")
-    with served(disk) as service:
+def test_no_room_for_a_figure_is_told_as_such(disk, serve):
+    with serve(disk) as service:
         path = f"/v1/jobs/{identified(service)}/models/1/figures/loop.svg"
-        filler = fill(disk)
+        filler = filled(disk)
         assert "make room" in problem_of(service.client.get(path), 507, "storage-full")
         filler.unlink()
         assert service.client.get(path).status_code == 200
 
 
-def test_no_room_to_receive_an_upload_is_told_as_such(disk, tmp_path, prepared_sqlite, monkeypatch):
+def test_no_room_to_receive_an_upload_is_told_as_such(disk, serve, monkeypatch):
     """The framework keeps what is more than a megabyte in the system's temporary folder."""
-    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
-    with served(tmp_path) as service:
+    with serve() as service:
         monkeypatch.setattr(tempfile, "tempdir", str(disk))
-        filler = fill(disk)
+        filler = filled(disk)
         detail = problem_of(service.upload(csv() + b"\n" * 2_000_000), 507, "storage-full")
         assert "make room" in detail
         filler.unlink()
@@ -194,11 +162,9 @@ def test_text_of_strangers_is_kept_by_postgresql_as_by_sqlite(tmp_path, prepared
 
 
 @pytest.fixture(scope="module")
-def drawing(tmp_path_factory, prepared_sqlite):
+def drawing(serve):
     """A service whose figures cannot be drawn: what stands in their way is put there by each test."""
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
+    with serve() as running:
         yield running
 
 

@@ -1,6 +1,5 @@
 """Keys: without one nothing is seen, with one what is its owner's and its scopes allow, and not too fast."""
 
-import shutil
 import socket
 import time
 
@@ -8,14 +7,12 @@ import pytest
 
 from islands_api.routes import events
 from islands_service.store.keys import SCOPES
-from support.service import PATIENCE, csv, held, kept, problem_of, queued, served, spec
+from support.service import PATIENCE, csv, held, kept, problem_of, queued, spec
 
 
 @pytest.fixture(scope="module")
-def shared(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder, require_keys=True, rate=0.0, max_active=3, max_stored=20_000) as running:
+def shared(serve):
+    with serve(require_keys=True, rate=0.0, max_active=3, max_stored=20_000) as running:
         yield running
 
 
@@ -178,9 +175,8 @@ def test_an_owner_has_so_many_bytes_and_no_more(service):
 
 
 @pytest.fixture
-def strict(tmp_path, prepared_sqlite):
-    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
-    with served(tmp_path, require_keys=True, rate=2.0, burst=20) as running:
+def strict(serve):
+    with serve(require_keys=True, rate=2.0, burst=20) as running:
         yield running
 
 
@@ -216,9 +212,8 @@ def test_an_address_guesses_so_often(strict, wrong, least):
     assert strict.client.get("/healthz").status_code == 200
 
 
-def test_a_wrong_key_is_told_so_however_small_the_burst(tmp_path, prepared_sqlite):
-    shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
-    with served(tmp_path, require_keys=True, rate=2.0, burst=3) as few:
+def test_a_wrong_key_is_told_so_however_small_the_burst(serve):
+    with serve(require_keys=True, rate=2.0, burst=3) as few:
         wrong = {"Authorization": "Bearer islands_guess"}
         problem_of(few.client.get("/v1/jobs", headers=wrong), 401, "no-key")
         problem_of(few.client.get("/v1/jobs", headers=wrong), 429, "too-many-requests")

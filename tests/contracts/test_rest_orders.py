@@ -1,22 +1,19 @@
 """Orders over REST on a real record: what its columns, rows and times allow is accepted, and nothing else."""
 
 import asyncio
-import shutil
 from dataclasses import replace
 
 import pytest
 
-from support.service import csv, emptied, npz, problem_of, served, spec
+from support.service import csv, emptied, npz, problem_of, spec
 
 #: A record whose names are as strange as a table of text can have them.
 STRANGE = ['u "in" V', "y\nout", "v;|\tw", "größe 😀", "<b>&amp;", "u+1"]
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
+def service(serve):
+    with serve() as running:
         yield emptied(running)
 
 

@@ -1,7 +1,6 @@
 """Problems: what is not a success has one form, says what to do, and shows nothing of our insides."""
 
 import re
-import shutil
 
 import httpx
 import pytest
@@ -11,16 +10,14 @@ from islands_api.problems import PROBLEMS
 from islands_service.blobs import NoSuchBlob
 from islands_service.store.database import StoreInDoubt
 from support.repository import DOCS
-from support.service import PROBLEM, problem_of, queued, served
+from support.service import PROBLEM, problem_of, queued
 
 FORM = {"type", "title", "status", "detail", "request_id"}
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
+def service(serve):
+    with serve() as running:
         running.app.add_api_route("/defect", defect)
         running.app.add_api_route("/late", late, methods=["POST"])
         running.app.add_api_route("/half", half)

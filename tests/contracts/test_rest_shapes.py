@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -21,16 +20,13 @@ from support.service import (
     kept,
     problem_of,
     queued,
-    served,
     spec,
 )
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory, prepared_sqlite):
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder) as running:
+def service(serve):
+    with serve() as running:
         yield running
 
 

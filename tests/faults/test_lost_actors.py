@@ -44,11 +44,14 @@ def told():
 
 
 @pytest.fixture
-def engine(told):
-    with ENGINES["ray"](None, told.append) as started:
+def engine(ray_address, told):
+    with ENGINES["ray"](ray_address, told.append) as started:
         yield started
+    # The next test counts its own actors alone.
+    eventually(lambda: not actors())
 
 
+@pytest.mark.ci
 def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine, told):
     found = []
     for epoch in engine.run(posed, founded(3, SEED), never):
@@ -62,6 +65,7 @@ def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine
     assert told.count("an actor was lost: its islands go on from their last epoch") == 3
 
 
+@pytest.mark.nightly
 def test_losing_all_actors_at_once_changes_nothing(posed, undisturbed, engine, told):
     found = []
     for epoch in engine.run(posed, founded(3, SEED), never):
@@ -73,6 +77,7 @@ def test_losing_all_actors_at_once_changes_nothing(posed, undisturbed, engine, t
     assert len(told) == min(3, len(os.sched_getaffinity(0)))
 
 
+@pytest.mark.nightly
 def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_replaced(
     posed, engine, told, monkeypatch
 ):
@@ -119,6 +124,7 @@ def test_actors_that_die_again_and_again_end_the_search_with_advice(posed, engin
         murderer.join()
 
 
+@pytest.mark.ci
 def test_a_search_that_ends_leaves_no_actor_behind(posed, engine):
     epochs = engine.run(posed, founded(3, SEED), never)
     next(epochs)
@@ -133,6 +139,7 @@ def test_a_loss_is_a_loss_whatever_ray_calls_it(kind):
     assert issubclass(kind, LOST)
 
 
+@pytest.mark.ci
 def test_a_ray_that_is_there_is_left_alone(engine):
     with pytest.raises(ClusterError, match="on a Ray already"), ENGINES["ray"](None, print):
         pass

@@ -1,11 +1,8 @@
 """Stores whose process is killed, whose disk is full, whose server goes away: what was accepted stays."""
 
-import os
 import shutil
 import sqlite3
-import subprocess
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 
@@ -13,8 +10,21 @@ from islands_service.blobs import Blobs
 from islands_service.jobs import Report
 from islands_service.store import Store
 from islands_service.store.database import StoreFull
+from support.disks import filled
 from support.processes import eventually, kill
-from support.stores import ALICE, BLOB, LONG, asked, at_once, brought_on, child, claimed, kinds, submitted
+from support.stores import (
+    ALICE,
+    BLOB,
+    LONG,
+    asked,
+    at_once,
+    brought_on,
+    child,
+    claimed,
+    kinds,
+    standing,
+    submitted,
+)
 
 SUBMIT = """
 import sys
@@ -46,24 +56,6 @@ while True:
     store.leases.report(lease, report)
     print(generation, flush=True)
     generation += 1
-"""
-
-#: Stands still in the middle of a transaction.
-STAND = """
-import os, signal, sys
-from islands_service.store import Store, connections
-from islands_service.store.changes import change
-connections.SETTINGS = ("idle_in_transaction_session_timeout = '1s'",)
-store = Store(sys.argv[1])
-lease = store.leases.claim("first", -1.0)
-def stand(connection):
-    change(connection, lease.job.id, progress='{"half": true}')
-    print("standing", flush=True)
-    os.kill(os.getpid(), signal.SIGSTOP)
-try:
-    store.database.write(stand)
-except Exception as error:
-    print(type(error).__name__, flush=True)
 """
 
 #: May write no file larger than so many bytes: what a quota of a file system does, for whoever is not root.
@@ -150,15 +142,10 @@ def test_a_killed_coordinator_leaves_whole_reports(database, reports):
     intact(database)
 
 
-def standing(database):
-    return child(STAND, database)
-
-
 def test_a_process_that_is_killed_in_the_middle_of_a_write_holds_nobody_up(database):
     with Store(database) as store:
         job = submitted(store)
-        with standing(database) as process:
-            assert process.stdout.readline() == "standing\n"
+        with standing(database, seconds=60) as process:
             kill(process.pid)
         # PostgreSQL has to notice first that nobody is there any more.
         lease = eventually(lambda: store.leases.claim("second", LONG))
@@ -168,32 +155,8 @@ def test_a_process_that_is_killed_in_the_middle_of_a_write_holds_nobody_up(datab
 
 
 @pytest.fixture
-def disk(tmp_path):
-    """A folder on a small disk of its own."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", folder]
-    done = subprocess.run(command, capture_output=True, text=True, check=False) if os.getuid() == 0 else None
-    if done is None or done.returncode != 0:
-        why = "not root" if done is None else done.stderr.strip()
-        pytest.skip(f"a full disk needs a small one to be mounted ({why}): run it as root")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
-
-
-def filled(disk: Path, leave: int = 0) -> Path:
-    """Fill a disk, and return the file that fills it."""
-    path = disk / "filler"
-    with path.open("wb", buffering=0) as stream:
-        free = os.statvfs(disk)
-        size = free.f_bavail * free.f_frsize - leave
-        stream.write(bytes(max(size, 0)))
-        try:
-            while leave == 0:
-                stream.write(bytes(4096))
-        except OSError:
-            pass
-    return path
+def disk(small_disk):
+    return small_disk(DISK)
 
 
 def until_full(store, jobs):

@@ -15,46 +15,32 @@ from islands_service.store import Store
 from islands_service.store.changes import change, record
 from islands_service.store.database import StoreUnavailable
 from support.databases import answers, emptied, server
+from support.processes import eventually
 from support.repository import ROOT
-from support.stores import ALICE, EXPIRED, LONG, brought_on, child, claimed, kinds, submitted
+from support.stores import ALICE, EXPIRED, LONG, brought_on, claimed, kinds, standing, submitted
 
-#: Stands still in the middle of a transaction.
-STAND = """
-import os, signal, sys
-from islands_service.store import Store, connections
-from islands_service.store.changes import change
-from islands_service.store.database import StoreUnavailable
-connections.SETTINGS = ("idle_in_transaction_session_timeout = '4s'",)
-store = Store(sys.argv[1])
-lease = store.leases.claim("first", -1.0)
-def stand(connection):
-    change(connection, lease.job.id, progress='{"half": true}')
-    print("standing", flush=True)
-    os.kill(os.getpid(), signal.SIGSTOP)
-try:
-    store.database.write(stand)
-except Exception as error:
-    # Whether the line is found dead before the commit or in it is a matter of moments.
-    print("refused" if isinstance(error, StoreUnavailable) else repr(error), flush=True)
-"""
+
+def test_on_postgresql_a_job_in_the_middle_of_a_write_is_passed_over(prepared_postgres):
+    database = emptied(prepared_postgres)
+    with Store(database) as store:
+        submitted(store)
+        with standing(database, seconds=60):
+            assert store.leases.claim("second", LONG) is None
+            other = submitted(store)
+            assert claimed(store).job.id == other.id
 
 
 def test_on_postgresql_a_process_that_stands_still_in_the_middle_of_a_write_lets_go(prepared_postgres):
     database = emptied(prepared_postgres)
-    with Store(database) as store, child(STAND, database) as process:
+    with Store(database) as store:
         job = submitted(store)
-        assert process.stdout.readline() == "standing\n"
-        # Its row is locked: whoever claims passes over it, and nobody waits.
-        assert store.leases.claim("second", LONG) is None
-        other = submitted(store)
-        assert claimed(store).job.id == other.id
-        deadline = time.monotonic() + 20
-        while (lease := store.leases.claim("second", LONG)) is None or lease.job.id != job.id:
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        os.kill(process.pid, signal.SIGCONT)
-        assert process.stdout.readline() == "refused\n"
-        assert store.jobs.get(ALICE, job.id).progress is None
+        with standing(database, seconds=1) as process:
+            # The server ends the transaction of the process that stands still.
+            assert eventually(lambda: store.leases.claim("second", LONG)).job.id == job.id
+            os.kill(process.pid, signal.SIGCONT)
+            # The connection is found dead before the commit, or in it.
+            assert process.stdout.readline().startswith("StoreUnavailable")
+            assert store.jobs.get(ALICE, job.id).progress is None
 
 
 #: Runs in a network of its own, and cuts it.

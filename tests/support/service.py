@@ -8,7 +8,6 @@ import hashlib
 import io
 import json
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -84,21 +83,38 @@ def served(folder: Path, /, **changes: Any) -> Iterator[Service]:
         yield Service(url, client, app, store, settings, logs)
 
 
+class _Server(uvicorn.Server):
+    """A server that says when it listens."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self.listens = threading.Event()
+
+    async def startup(self, sockets: Any = None) -> None:
+        try:
+            await super().startup(sockets)
+        finally:
+            self.listens.set()
+
+
 @contextmanager
-def listening(app: FastAPI) -> Iterator[str]:
-    """Have an application answer at a URL."""
+def listening(app: FastAPI, **options: Any) -> Iterator[str]:
+    """Have an application answer at a URL; the options are uvicorn's."""
     config = uvicorn.Config(
-        app, port=0, log_level="critical", access_log=False, timeout_graceful_shutdown=1, server_header=False
+        app,
+        port=0,
+        log_level="critical",
+        access_log=False,
+        timeout_graceful_shutdown=1,
+        server_header=False,
+        **options,
     )
-    server = uvicorn.Server(config)
+    server = _Server(config)
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
-        until = time.monotonic() + PATIENCE
-        while not server.started:
-            assert thread.is_alive()
-            assert time.monotonic() < until, "the server does not start"
-            time.sleep(0.005)
+        assert server.listens.wait(PATIENCE)
+        assert server.started, "the server does not start"
         yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
     finally:
         server.should_exit = True

@@ -116,6 +116,35 @@ def at_once(actions: list[Callable[[], Any]]) -> list[Any]:
     return results
 
 
+#: Takes the first job, changes it, and stops in the middle of the transaction, until SIGCONT. A signal to the
+#: whole process is handled by any of its threads, and this one, the writer, might commit before.
+_STANDING = """
+import signal, sys, threading
+from islands_service.store import Store, connections
+from islands_service.store.changes import change
+connections.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
+store = Store(sys.argv[1])
+lease = store.leases.claim("first", -1.0)
+def stand(connection):
+    change(connection, lease.job.id, progress='{"half": true}')
+    print("standing", flush=True)
+    signal.pthread_kill(threading.get_ident(), signal.SIGSTOP)
+try:
+    store.database.write(stand)
+except Exception as error:
+    print(repr(error), flush=True)
+"""
+
+
+@contextmanager
+def standing(database: str, seconds: int) -> Iterator[subprocess.Popen[str]]:
+    """Run a process that has stopped inside a write; PostgreSQL ends its transaction after some seconds."""
+    with child(_STANDING, database, str(seconds)) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "standing\n"
+        yield process
+
+
 @contextmanager
 def several(database: str, count: int = 4) -> Iterator[list[Store]]:
     """Open a database several times, as processes do: each store has a writer and connections of its own."""

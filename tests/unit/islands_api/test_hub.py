@@ -21,10 +21,8 @@ def quick(monkeypatch):
 
 
 @pytest.fixture
-def store(tmp_path, prepared_sqlite):
-    path = tmp_path / "islands.db"
-    path.write_bytes(prepared_sqlite.read_bytes())
-    with Store(f"sqlite:///{path}") as opened:
+def store(sqlite_database):
+    with Store(sqlite_database) as opened:
         yield opened
 
 

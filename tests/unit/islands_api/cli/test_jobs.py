@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -28,7 +27,7 @@ from islands_service.jobs import DISCREPANCY, EXTENDED, REPORT, JobState, Lease,
 from islands_service.specification import Identification
 from support.command_line import ISLANDS
 from support.processes import eventually
-from support.service import Service, csv, held, kept, queued, served
+from support.service import Service, csv, held, kept, queued
 from support.stores import FAILED, LONG, at_once, brought_on
 
 Run = Callable[..., tuple[int, str, str]]
@@ -62,10 +61,8 @@ FIGURES = ("record", "front", "convergence", "islands", "free-run", "loop", "hol
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Path) -> Iterator[Service]:
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder, rate=0) as running:
+def service(serve: Any) -> Iterator[Service]:
+    with serve(rate=0) as running:
         yield running
 
 

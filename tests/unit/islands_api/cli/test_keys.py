@@ -5,6 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ from islands_api.cli.app import main
 from islands_api.client import Client, ServiceError
 from islands_service.store.keys import SCOPES, Key
 from support.processes import eventually
-from support.service import Service, served
+from support.service import Service
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -20,11 +21,9 @@ ALL = ("--scope", "read", "--scope", "write", "--scope", "metrics")
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Path) -> Iterator[Service]:
+def service(serve: Any) -> Iterator[Service]:
     """A service that asks everybody for a key."""
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder, rate=0, require_keys=True) as running:
+    with serve(rate=0, require_keys=True) as running:
         yield running
 
 

@@ -5,7 +5,6 @@ The coordinator's part is played by the tests: they claim a job in the store, te
 
 import asyncio
 import inspect
-import shutil
 import socket
 import ssl
 import threading
@@ -22,7 +21,7 @@ import pytest
 
 from islands_api.client import AsyncClient, Client, transport
 from islands_service.jobs import Lease
-from support.service import Service, kept, served
+from support.service import Service, kept
 from support.stores import LONG
 
 LOOPBACK = "127.0.0.1"
@@ -65,11 +64,9 @@ class Awaited:
 
 
 @pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Any) -> Iterator[Service]:
+def service(serve: Any) -> Iterator[Service]:
     """A service that limits no rate. Each test has an owner of its own in it."""
-    folder = tmp_path_factory.mktemp("service")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder, rate=0) as running:
+    with serve(rate=0) as running:
         yield running
 
 

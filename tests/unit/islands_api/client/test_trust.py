@@ -2,8 +2,6 @@
 
 import shutil
 import ssl
-import threading
-import time
 import traceback
 from collections.abc import Iterator
 from functools import partial
@@ -12,25 +10,22 @@ from typing import Any
 
 import pytest
 import trustme
-import uvicorn
 
 from islands.errors import SettingsError
 from islands_api.app import create_app
 from islands_api.client import ServiceError, Unreachable
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from support.service import PATIENCE, Service, kept, served
+from support.service import Service, kept, listening
 
 #: What must not be seen anywhere.
 SECRET = "islands_this-is-nobody-s-key-and-secret-all-the-same"
 
 
 @pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Path) -> Iterator[Service]:
+def guarded(serve: Any) -> Iterator[Service]:
     """A service that asks everybody for a key."""
-    folder = tmp_path_factory.mktemp("guarded")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    with served(folder, rate=0, require_keys=True) as running:
+    with serve(rate=0, require_keys=True) as running:
         yield running
 
 
@@ -45,34 +40,14 @@ def secure(
 ) -> Iterator[int]:
     """The port of a service that speaks TLS, with a certificate of a private authority for 127.0.0.1."""
     folder = tmp_path_factory.mktemp("secure")
-    shutil.copyfile(prepared_sqlite, folder / "islands.db")
-    settings = ServiceSettings(data_dir=folder)
     issued = authority.issue_cert("127.0.0.1")
     issued.private_key_pem.write_to_path(folder / "key.pem")
     for each in issued.cert_chain_pems:
         each.write_to_path(folder / "cert.pem", append=True)
-    server = uvicorn.Server(
-        uvicorn.Config(
-            create_app(settings, Store(settings.url)),
-            port=0,
-            log_level="critical",
-            timeout_graceful_shutdown=1,
-            ssl_certfile=folder / "cert.pem",
-            ssl_keyfile=folder / "key.pem",
-        )
-    )
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    until = time.monotonic() + PATIENCE
-    while not server.started:
-        assert thread.is_alive()
-        assert time.monotonic() < until
-        time.sleep(0.005)
-    try:
-        yield server.servers[0].sockets[0].getsockname()[1]
-    finally:
-        server.should_exit = True
-        thread.join()
+    certificate = {"ssl_certfile": folder / "cert.pem", "ssl_keyfile": folder / "key.pem"}
+    settings = ServiceSettings(data_dir=Path(shutil.copyfile(prepared_sqlite, folder / "islands.db")).parent)
+    with listening(create_app(settings, Store(settings.url)), **certificate) as url:
+        yield int(url.rpartition(":")[2])
 
 
 def shown(error: BaseException) -> str:

@@ -2,7 +2,6 @@
 
 import json
 import random
-import shutil
 
 import pytest
 from sqlalchemy import event, insert, text
@@ -68,9 +67,9 @@ def full(store):
 
 
 @pytest.fixture
-def sqlite(prepared_sqlite, tmp_path):
+def sqlite(sqlite_database):
     """The same in SQLite alone: it chooses its plans without looking at how much there is."""
-    with Store(f"sqlite:///{shutil.copyfile(prepared_sqlite, tmp_path / 'islands.db')}") as store:
+    with Store(sqlite_database) as store:
         yield filled(store)
 
 

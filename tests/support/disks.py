@@ -1,0 +1,41 @@
+"""Disks of a few megabytes, which a test can fill."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+
+@contextmanager
+def mounted(folder: Path, size: int, **options: object) -> Iterator[Path]:
+    """Mount a disk of so many bytes at a new folder; where nothing can be mounted the test skips."""
+    if os.getuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("a small disk takes root, to mount one: run these tests as root")
+    folder.mkdir()
+    settings = ",".join(f"{name}={value}" for name, value in {"size": size, **options}.items())
+    command = ["mount", "-t", "tmpfs", "-o", settings, "islands-test", folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        pytest.skip(f"no small disk can be mounted here: {done.stderr.strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
+def filled(disk: Path, leave: int = 0) -> Path:
+    """Fill a disk but for so many bytes; return the file that fills it."""
+    path = disk / "filler"
+    with path.open("wb", buffering=0) as stream:
+        free = os.statvfs(disk)
+        stream.write(bytes(max(free.f_bavail * free.f_frsize - leave, 0)))
+        try:
+            while leave == 0:
+                stream.write(bytes(4096))
+        except OSError:
+            pass
+    return path

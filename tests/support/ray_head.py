@@ -1,0 +1,33 @@
+"""A Ray of a test session: a process of its own, which tests connect to by its address."""
+
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from support.processes import eventually
+
+
+@contextmanager
+def ray_head(folder: Path) -> Iterator[str]:
+    """Start the head process of the service, and yield the address of its Ray."""
+    # Ray reads the token once in a process: every Ray that this process connects to has the same one.
+    token = os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
+    environment = {**os.environ, "ISLANDS_DATA_DIR": str(folder), "RAY_AUTH_TOKEN": token}
+    # The head ends with this process, also when this process is killed.
+    mortal = [setpriv, "--pdeathsig", "TERM"] if (setpriv := shutil.which("setpriv")) else []
+    command = [*mortal, sys.executable, "-m", "islands_service.runtime.head"]
+    address = folder / "ray-address"
+    with (folder / "head.log").open("w") as log:
+        head = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+    try:
+        eventually(lambda: address.exists() or head.poll() is not None, seconds=120.0)
+        assert head.poll() is None, (folder / "head.log").read_text()
+        yield address.read_text()
+    finally:
+        head.terminate()
+        head.wait(60)
