@@ -1,26 +1,48 @@
-"""``islands identify`` through its front door: processes, signals, files."""
+"""The command identify: a search, its files, an interruption and its resumption."""
 
 import json
 import signal
 import subprocess
-import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from support.command_line import BUDGET, COLUMNS, ISLANDS, fail, found, stored, succeed, write_hysteresis
+from support.processes import eventually
+from support.undrawn import undrawn_figures
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record of 4000 samples and what six generations make of it, the last fifth kept for a test."""
-    base = tmp_path_factory.mktemp("house")
+    """A record of 4000 samples and what six generations make of it, the last fifth kept for a test.
+
+    Its figures are not drawn.
+    """
+    base = tmp_path_factory.mktemp("hysteresis")
     write_hysteresis(base / "record.csv")
-    succeed(
-        *("identify", base / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
-        *("--test", 0.2, "--out", base / "whole"),
-    )
+    with undrawn_figures():
+        succeed(
+            *("identify", base / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
+            *("--test", 0.2, "--out", base / "whole"),
+        )
     return base
+
+
+def with_generations(document: dict[str, Any], generations: int, out: Path) -> None:
+    """Give a run that has ended another last generation: its budget is not part of its random numbers."""
+    document["about"]["job"]["changes"].update(generations=generations, max_evaluations=0)
+    (out / "checkpoint.json").write_text(json.dumps(document))
+
+
+def found_the_same(one: Path, other: Path) -> None:
+    """Compare all that two runs say of their searches, except for their times."""
+    assert found(one) == found(other)
+    searches = [stored(out)["search"] for out in (one, other)]
+    for name in ("generations", "evaluations", "duplicates", "outcomes", "feasible_share", "full_set"):
+        assert searches[0][name] == searches[1][name], name
+    for name in ("test.json", "figures/convergence.svg"):
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
 def test_one_command_turns_a_record_into_constrained_models(folder: Path) -> None:
@@ -51,6 +73,21 @@ def test_the_folder_holds_models_figures_and_a_checkpoint(folder: Path) -> None:
     assert shown.strip() in (folder / "whole/summary.txt").read_text()
 
 
+def test_a_run_that_its_budget_ended_goes_on_to_the_same_models(folder: Path) -> None:
+    out = folder / "budget"
+    with undrawn_figures():
+        succeed(
+            *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", 6),
+            *("--max-evaluations", 90, "--test", 0.2, "--out", out),
+        )
+        assert stored(out)["search"]["ended_by"] == "evaluations"
+        assert stored(out)["search"]["generations"] < 6
+        with_generations(json.loads((out / "checkpoint.json").read_text()), 6, out)
+        succeed("identify", "--resume", out)
+    found_the_same(out, folder / "whole")
+
+
+@pytest.mark.ci
 def test_ctrl_c_writes_a_result_and_a_checkpoint_and_resume_goes_on_to_the_same_models(folder: Path) -> None:
     out = folder / "stopped"
     running = subprocess.Popen(
@@ -63,10 +100,8 @@ def test_ctrl_c_writes_a_result_and_a_checkpoint_and_resume_goes_on_to_the_same_
         text=True,
     )
     try:
-        deadline = time.monotonic() + 60
         # The first populations are kept at once.
-        while not (out / "checkpoint.json").exists() and time.monotonic() < deadline:
-            time.sleep(0.02)
+        eventually(lambda: (out / "checkpoint.json").exists() or running.poll() is not None)
         running.send_signal(signal.SIGINT)
         said, complained = running.communicate(timeout=60)
     finally:
@@ -80,22 +115,16 @@ def test_ctrl_c_writes_a_result_and_a_checkpoint_and_resume_goes_on_to_the_same_
     stopped_at = result["search"]["generations"]
     assert stopped_at == document["islands"][0]["generation"] < 1_000_000
 
-    # Few generations more, instead of a million: the budget of a run is not part of its random numbers.
+    # Few generations more, instead of a million.
     last = stopped_at + 2
-    document["about"]["job"]["changes"]["generations"] = last
-    (out / "checkpoint.json").write_text(json.dumps(document))
+    with_generations(document, last, out)
     succeed("identify", "--resume", out)
     never = folder / "never-stopped"
     succeed(
         *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", last),
         *("--test", 0.2, "--out", never),
     )
-    assert found(out) == found(never)
-    one, other = stored(out)["search"], stored(never)["search"]
-    for name in ("generations", "evaluations", "duplicates", "outcomes", "feasible_share", "full_set"):
-        assert one[name] == other[name], name
-    assert (out / "test.json").read_bytes() == (never / "test.json").read_bytes()
-    assert (out / "figures/convergence.svg").read_bytes() == (never / "figures/convergence.svg").read_bytes()
+    found_the_same(out, never)
 
 
 def test_a_record_that_changed_is_refused_on_resume(folder: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.lib import format as npy
 
+from islands_api import auth
 from support.service import (
     columns,
     csv,
@@ -145,11 +146,15 @@ def test_a_zip_bomb_ends_the_process_that_reads_it_and_nothing_else(service):
 
 
 def test_a_gzip_bomb_is_cut_off_at_the_limit(service):
-    packed = gzip.compress(b"t_s,u_V,y_um\n" + b"0" * 10_000_000) * 400
-    began = time.monotonic()
-    detail = problem_of(service.upload(packed, "a.csv.gz"), 413, "too-large")
+    member = gzip.compress(b"t_s,u_V,y_um\n" + b"0" * 10_000_000)
+    began = time.process_time()
+    gzip.decompress(member)
+    one = time.process_time() - began
+    began = time.process_time()
+    detail = problem_of(service.upload(400 * member, "a.csv.gz"), 413, "too-large")
     assert detail == "a.csv has more than 50 MB unpacked, the most that is taken here"
-    assert time.monotonic() - began < 5.0
+    # Five members reach the limit; the whole file would take the time of four hundred.
+    assert time.process_time() - began < 200 * one
     assert nothing_stored(service)
 
 
@@ -291,13 +296,11 @@ def test_a_million_islands_are_refused_before_memory_is_taken_for_them(service):
     order = spec(kept(service.store), settings={"islands": 1_000_000, "topology": "fully-connected"})
     service.submit(**order)
     tracemalloc.start()
-    began = time.monotonic()
     detail = problem_of(service.submit(**order), 422, "invalid-settings")
-    taken, seconds = tracemalloc.get_traced_memory()[1], time.monotonic() - began
+    taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert detail == "islands is at most 256 on this service, got 1000000"
     assert taken < 2_000_000
-    assert seconds < 2.0
 
 
 @pytest.mark.parametrize(
@@ -354,11 +357,11 @@ def test_an_expired_key_opens_nothing(service):
     assert answer.headers["www-authenticate"] == 'Bearer realm="islands"'
 
 
-def test_a_revoked_key_opens_nothing_a_second_later(service):
+def test_a_revoked_key_opens_nothing_a_second_later(service, monkeypatch):
     header = service.key()
     assert service.client.get("/v1/jobs", headers=header).status_code == 200
     (key,) = [key for key in service.store.keys.all() if key.revoked is None and not key.expired][-1:]
     service.store.keys.revoke(key.id)
-    time.sleep(1.0)
+    monkeypatch.setattr(auth, "monotonic", lambda: time.monotonic() + 1.0)
     answer = service.client.get("/v1/jobs", headers=header)
     assert "the key was revoked" in problem_of(answer, 401, "no-key")
