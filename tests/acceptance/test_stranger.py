@@ -26,7 +26,7 @@ ADDRESS, DATASET, JOB = "http://127.0.0.1:8000", "672083eb...-csv", "b93d8227...
 
 WAYS = ("curl", "Python", "Command line")
 
-pytestmark = [pytest.mark.nightly, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.timeout(900)
 
 needs_curl = pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
 
@@ -117,6 +117,7 @@ def holds(models: list[dict[str, object]]) -> None:
         assert metrics["r2"] > 0.99, part
 
 
+@pytest.mark.nightly
 @needs_curl
 def test_by_curl(stranger: Stranger, jobs: dict[str, str]) -> None:
     upload, submit, follow, models, exported, figure, report = commands(block("curl"))
@@ -145,6 +146,7 @@ def test_by_curl(stranger: Stranger, jobs: dict[str, str]) -> None:
     assert page.count("data:image/svg+xml") >= 6
 
 
+@pytest.mark.nightly
 def test_by_python(stranger: Stranger, jobs: dict[str, str]) -> None:
     said = stranger.run(sys.executable, "-c", block("Python"))
     jobs["Python"] = stranger.newest
@@ -162,6 +164,7 @@ def test_by_python(stranger: Stranger, jobs: dict[str, str]) -> None:
     assert "function " in said.partition(best)[2]
 
 
+@pytest.mark.nightly
 def test_by_the_command_line(stranger: Stranger, jobs: dict[str, str]) -> None:
     submit, listed, result = commands(block("Command line"))
     said = stranger.shell(submit)
@@ -177,6 +180,7 @@ def test_by_the_command_line(stranger: Stranger, jobs: dict[str, str]) -> None:
         assert (stranger.folder / "result" / name).stat().st_size > 0, name
 
 
+@pytest.mark.nightly
 def test_every_way_finds_the_same_bytes(stranger: Stranger, jobs: dict[str, str]) -> None:
     # Another worker may have gone them.
     if "curl" not in jobs and shutil.which("curl") is not None:
@@ -192,6 +196,7 @@ def test_every_way_finds_the_same_bytes(stranger: Stranger, jobs: dict[str, str]
     holds(json.loads(answers[0])["items"])
 
 
+@pytest.mark.ci
 @needs_curl
 def test_the_commands_of_the_readme_are_accepted(stranger: Stranger) -> None:
     text = section("README.md", "As a service")
