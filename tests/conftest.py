@@ -116,10 +116,10 @@ def small_disk(tmp_path):
         yield lambda size, **options: stack.enter_context(mounted(tmp_path / "disk", size, **options))
 
 
-@pytest.fixture(params=[_prepared_sqlite, _prepared_postgresql], ids=["sqlite", "postgresql"])
+@pytest.fixture(params=["sqlite", "postgresql"])
 def database(request):
     """The URL of a database with our tables and nothing in them: every law holds on both kinds."""
-    return request.param(request)
+    return {"sqlite": _prepared_sqlite, "postgresql": _prepared_postgresql}[request.param](request)
 
 
 @pytest.fixture(params=[_sqlite, _postgresql], ids=["sqlite", "postgresql"])

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from contextlib import suppress
 from dataclasses import replace
 
@@ -32,6 +31,7 @@ def wordy(word):
     return csv(20_000).replace(b"y_um", word)
 
 
+@pytest.mark.ci
 def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, serve):
     with serve(disk) as service:
         dataset = service.upload(csv()).json()["id"]
@@ -61,6 +61,7 @@ def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, serve
         assert not list(service.settings.blobs.glob("*.part"))
 
 
+@pytest.mark.ci
 def test_no_room_for_a_figure_is_told_as_such(disk, serve):
     with serve(disk) as service:
         path = f"/v1/jobs/{identified(service)}/models/1/figures/loop.svg"
@@ -93,6 +94,7 @@ def postgres_of_our_own():
         yield own
 
 
+@pytest.mark.ci
 def test_a_database_that_goes_away_and_comes_back(tmp_path, postgres_of_our_own):
     own = postgres_of_our_own
     with served(tmp_path, database=own.url) as service:
@@ -114,9 +116,7 @@ def test_a_database_that_goes_away_and_comes_back(tmp_path, postgres_of_our_own)
             ("DELETE", f"/v1/datasets/{dataset}", {}),
             ("POST", "/v1/datasets", {"files": {"file": ("a.csv", csv(100))}}),
         ):
-            began = time.monotonic()
             answer = service.client.request(method, path, **body)
-            assert time.monotonic() - began < 10.0
             assert "try again" in problem_of(answer, 503, "store-unavailable"), (method, path)
             assert answer.headers["retry-after"] == "1"
         assert service.client.get("/healthz").status_code == 200
@@ -141,13 +141,11 @@ def _followed(service, job):
         return parsed(client.get(f"/v1/jobs/{job}/events").text)
 
 
-@pytest.mark.parametrize(
-    "path", ["/v1/jobs/%00", "/v1/datasets/%00", "/v1/jobs?cursor=WzEuMCwgImFcdTAwMDBiIl0"]
-)
-def test_postgresql_is_never_asked_for_what_it_cannot_hold(tmp_path, prepared_postgres, path):
+def test_postgresql_is_never_asked_for_what_it_cannot_hold(tmp_path, prepared_postgres):
     """A zero byte is an error of the database there, and a defect of ours if it gets through."""
     with served(tmp_path, database=prepared_postgres) as service:
-        assert service.client.get(path).status_code == 422
+        for path in ("/v1/jobs/%00", "/v1/datasets/%00", "/v1/jobs?cursor=WzEuMCwgImFcdTAwMDBiIl0"):
+            assert service.client.get(path).status_code == 422, path
 
 
 def test_text_of_strangers_is_kept_by_postgresql_as_by_sqlite(tmp_path, prepared_postgres):

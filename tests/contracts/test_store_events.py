@@ -95,7 +95,7 @@ def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
 
         def read():
             seen = []
-            while not over.is_set():
+            while not over.wait(0.001):
                 seen += [event.number for event in reader.jobs.events(job.id, seen[-1] if seen else 0)]
             seen += [event.number for event in reader.jobs.events(job.id, seen[-1] if seen else 0)]
             return seen
@@ -128,7 +128,7 @@ def test_a_reader_that_sees_a_version_finds_its_event(database):
 
         def read():
             looks = 0
-            while not over.is_set():
+            while not over.wait(0.001):
                 version = reader.jobs.versions([job.id])[job.id]
                 assert reader.jobs.events(job.id, version - 1)[0].number == version
                 looks += 1

@@ -75,7 +75,7 @@ def test_a_reader_never_sees_a_part_of_a_report(database):
         thread = threading.Thread(target=report)
         thread.start()
         seen = set()
-        while not over.is_set():
+        while not over.wait(0.001):
             history = reader.results.history(job.id)
             found = reader.jobs.get(ALICE, job.id)
             if found.progress is not None:

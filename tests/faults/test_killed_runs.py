@@ -10,8 +10,6 @@ import pytest
 from support.command_line import BUDGET, COLUMNS, ISLANDS, found, stored, succeed, write_hysteresis
 from support.processes import actors, alive, descendants, eventually, kill
 
-pytestmark = pytest.mark.nightly
-
 JOB = (*COLUMNS, *BUDGET, "--islands", "2", "--migrate-every", "1")
 
 
@@ -41,6 +39,7 @@ def undisturbed(record: Path, generations: int) -> dict[str, bytes]:
     return found(out)
 
 
+@pytest.mark.ci
 def test_a_killed_run_leaves_no_process_and_resumed_ends_the_same(record: Path) -> None:
     out = record.parent / "killed"
     running = started(record, out, 1_000_000)
@@ -57,6 +56,7 @@ def test_a_killed_run_leaves_no_process_and_resumed_ends_the_same(record: Path) 
     assert found(out) == undisturbed(record, 20)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ["serial", "ray"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_told_to_end_a_run_keeps_the_best_and_resumed_ends_the_same(
@@ -85,6 +85,7 @@ def test_told_to_end_a_run_keeps_the_best_and_resumed_ends_the_same(
     assert found(out) == undisturbed(record, last)
 
 
+@pytest.mark.nightly
 def test_an_end_by_the_clock_says_that_it_is_not_reproducible(record: Path) -> None:
     out = record.parent / "clock"
     running = started(record, out, 1_000_000, "--engine", "serial", "--wall-time", "2")

@@ -13,10 +13,11 @@ from islands.io.results import result_document
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
 
-pytestmark = pytest.mark.nightly
-
 #: Generations of the job that is disturbed, and of one that waits behind it.
-LONG, SHORT = 600, 5
+LONG, SHORT = 300, 5
+
+#: One kill of each kind is enough for every change: doors, coordinator, Ray, and an island on it.
+ESSENTIAL = ("api", "coordinator", "head", "island")
 
 #: Attempts that it may take: who talks to a Ray that is lost starts anew with it, unless the job is done
 #: before that shows. The loss of the doors or of an island is no matter of the coordinator's.
@@ -56,6 +57,7 @@ def kinds(service: Service, job: str) -> list[str]:
     return [event["event"] for event in events]
 
 
+@pytest.mark.ci
 def test_a_service_finds_what_one_process_finds_by_itself(
     service: Service, undisturbed: tuple[bytes, bytes]
 ) -> None:
@@ -66,7 +68,13 @@ def test_a_service_finds_what_one_process_finds_by_itself(
     assert json.loads(undisturbed[1])["items"] == json.loads(json.dumps(expected))
 
 
-@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize(
+    "role",
+    [
+        pytest.param(role, marks=pytest.mark.ci if role in ESSENTIAL else pytest.mark.nightly)
+        for role in ROLES
+    ],
+)
 def test_a_process_is_killed_and_nothing_is_lost(
     service: Service, undisturbed: tuple[bytes, bytes], role: str
 ) -> None:
@@ -86,6 +94,7 @@ def test_a_process_is_killed_and_nothing_is_lost(
     assert happened.count("running") in ATTEMPTS[role], happened
 
 
+@pytest.mark.nightly
 def test_a_service_that_is_killed_leaves_no_process_and_goes_on_at_the_next_start(
     tmp_path: Path, undisturbed: tuple[bytes, bytes]
 ) -> None:

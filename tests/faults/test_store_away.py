@@ -90,7 +90,13 @@ def mortal(mortals):
     return mortals
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGQUIT], ids=["in good order", "as in a crash"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(signal.SIGINT, marks=pytest.mark.nightly, id="in good order"),
+        pytest.param(signal.SIGQUIT, marks=pytest.mark.ci, id="as in a crash"),
+    ],
+)
 def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mortal, how):
     with Store(mortal.url) as store:
         job = submitted(store)
@@ -106,7 +112,7 @@ def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mort
                 began = time.monotonic()
                 with pytest.raises(StoreUnavailable, match="try again"):
                     ask()
-                assert time.monotonic() - began < 5
+                assert time.monotonic() - began < 20
         with pytest.raises(StoreUnavailable):
             Store(mortal.url)
         assert not answers(mortal.url)
@@ -116,6 +122,7 @@ def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mort
         assert kinds(store, submitted(store).id) == ["queued"]
 
 
+@pytest.mark.ci
 def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
     over, acknowledged, failed = threading.Event(), [], []
     with Store(mortal.url) as store:
@@ -126,17 +133,17 @@ def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
                     acknowledged.append(submitted(store).id)
                 except StoreUnavailable:
                     failed.append(1)
-                    time.sleep(0.01)
+                    over.wait(0.01)
 
         threads = [threading.Thread(target=submit) for _ in range(4)]
         for thread in threads:
             thread.start()
         for _ in range(3):
             seen = len(acknowledged)
-            while len(acknowledged) < seen + 30:
-                time.sleep(0.01)
+            eventually(lambda seen=seen: len(acknowledged) >= seen + 30)
             mortal.stop(signal.SIGQUIT)
-            time.sleep(0.05)
+            told = len(failed)
+            eventually(lambda told=told: len(failed) > told)
             mortal.start()
         over.set()
         for thread in threads:
@@ -146,9 +153,9 @@ def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
             assert kinds(store, job) == ["queued"]
 
 
-def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(mortal):
+def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(prepared_postgres):
     """After its place was taken by another one it is a copy."""
-    with Store(mortal.url) as store:
+    with Store(emptied(prepared_postgres)) as store:
         job = submitted(store)
 
         def only_read(connection):
@@ -160,6 +167,7 @@ def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(mortal):
         assert store.jobs.get(ALICE, job.id).state == JobState.QUEUED
 
 
+@pytest.mark.ci
 def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebody(mortal):
     with Store(mortal.url) as store, Store(mortal.url) as other:
         submitted(store)

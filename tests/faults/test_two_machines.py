@@ -20,15 +20,18 @@ pytestmark = pytest.mark.nightly
 SETTINGS = replace(SMALL, islands=4, generations=8, migrate_every=1, migrants=2, topology="torus")
 
 
-POSED = Problem(record(), SETTINGS)
-
-
 def never():
     return False
 
 
-def undisturbed():
-    return [exactly(epoch.archipelago) for epoch in SerialEngine().run(POSED, founded(4, 5), never)]
+@pytest.fixture(scope="module")
+def posed():
+    return Problem(record(), SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(posed):
+    return [exactly(epoch.archipelago) for epoch in SerialEngine().run(posed, founded(4, 5), never)]
 
 
 @pytest.fixture
@@ -47,23 +50,23 @@ def add(head):
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_two_nodes_find_what_one_process_finds_even_if_one_is_lost(head, lost):
+def test_two_nodes_find_what_one_process_finds_even_if_one_is_lost(head, posed, undisturbed, lost):
     nodes = [add(head), add(head)]
     told, seen = [], []
     with cluster(head.address):
         eventually(lambda: ray.cluster_resources().get("CPU") == 2)
-        for epoch in RayEngine(told.append).run(POSED, founded(4, 5), never):
+        for epoch in RayEngine(told.append).run(posed, founded(4, 5), never):
             seen.append(exactly(epoch.archipelago))
             if lost and len(seen) == 3:
                 # The machine goes, and all of its processes with it.
                 raylet = nodes[1].all_processes["raylet"][0].process.pid
                 for pid in (raylet, *descendants(raylet)):
                     kill(pid)
-    assert seen == undisturbed()
+    assert seen == undisturbed
     assert any("an actor was lost" in line for line in told) == lost
 
 
-def test_without_a_cpu_it_says_so_and_begins_when_a_machine_joins(head):
+def test_without_a_cpu_it_says_so_and_begins_when_a_machine_joins(head, posed, undisturbed):
     told = []
 
     def tell(line):
@@ -71,6 +74,6 @@ def test_without_a_cpu_it_says_so_and_begins_when_a_machine_joins(head):
         add(head)
 
     with cluster(head.address):
-        seen = [exactly(epoch.archipelago) for epoch in RayEngine(tell).run(POSED, founded(4, 5), never)]
+        seen = [exactly(epoch.archipelago) for epoch in RayEngine(tell).run(posed, founded(4, 5), never)]
     assert told[0].startswith("waiting for capacity: 0 of 1 island actors are ready")
-    assert seen == undisturbed()
+    assert seen == undisturbed

@@ -208,7 +208,7 @@ def held(dataset: str, /, **changes: Any) -> dict[str, Any]:
 HIDDEN, KNOWN = "thermal-drift", {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 0.01}
 
 
-def hidden(folder: Path, seconds: float = 8.0) -> bytes:
+def hidden(folder: Path, seconds: float = 4.0) -> bytes:
     """A record of a piezo actuator whose sensor follows a temperature, which its simulation does not know."""
     from islands.trials.hide.records import hide
 

@@ -2,20 +2,20 @@
 
 import asyncio
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
 from contextlib import suppress
 from pathlib import Path
-from statistics import median
 
 import pytest
 
 from islands.errors import RecordError
 from islands_service.inspection import Asked, inspected
 from support.processes import alive, descendants, eventually
-from support.service import csv, served
+from support.service import csv
 
 MEMORY, SECONDS = 6_000_000_000, 30.0
 
@@ -90,10 +90,11 @@ def test_a_file_that_takes_too_long_ends_the_process(endless):
     began = time.monotonic()
     with pytest.raises(RecordError, match=r"a\.csv takes longer than 1 s to read: give a shorter record"):
         looked_into(endless, seconds=1.0)
-    assert time.monotonic() - began < 5.0
+    assert time.monotonic() - began < 20.0
     assert not alive(inspections())
 
 
+@pytest.mark.ci
 def test_a_process_that_turns_in_circles_has_so_much_time_of_the_processor():
     script = "from islands_service.inspection import _limit\n_limit(6_000_000_000, 0.0)\nwhile True: pass"
     done = subprocess.run([sys.executable, "-c", script], check=False, timeout=60)
@@ -165,26 +166,32 @@ def test_the_process_writes_no_files(tmp_path):
     assert new.stat().st_size == 0
 
 
-def test_the_service_answers_while_files_are_read(tmp_path):
-    """At most two at a time are read; whoever asks for something else does not feel it."""
-    rows = "".join(f"{k * 0.01:.2f},{k % 7},{k % 5}\n" for k in range(40_000))
-    content = f"t_s,u_V,y_um\n{rows}".encode()
-    with served(tmp_path) as service:
+def test_the_service_answers_while_two_files_at_a_time_are_read(serve):
+    stopped = set()
+
+    def stop_readers():
+        """Have those who read wait in the middle of it."""
+        for pid in inspections():
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGSTOP)
+                stopped.add(pid)
+        return len(alive(stopped)) == 2
+
+    with serve() as service:
+        content = csv(2000)
         uploads = [
-            threading.Thread(target=service.upload, args=(content + b"\n" * n, f"{n}.csv")) for n in range(3)
+            threading.Thread(target=service.upload, args=(content + b"\n" * n, f"{n}.csv")) for n in range(4)
         ]
         for upload in uploads:
             upload.start()
-        eventually(lambda: len(inspections()) == 2)
-        seconds, most = [], 0
-        while any(upload.is_alive() for upload in uploads):
-            began = time.perf_counter()
+        eventually(stop_readers)
+        for _ in range(20):
             assert service.client.get("/v1/jobs").status_code == 200
-            seconds.append(time.perf_counter() - began)
-            most = max(most, len(inspections()))
+        assert set(inspections()) == set(alive(stopped))
+        while any(upload.is_alive() for upload in uploads):
+            for pid in alive(stopped):
+                os.kill(pid, signal.SIGCONT)
+            assert len(inspections()) <= 2
         for upload in uploads:
             upload.join()
-    assert most == 2
-    # To read one of these files takes a second or more.
-    assert len(seconds) > 20
-    assert median(seconds) < 0.2
+        assert len(service.client.get("/v1/datasets").json()["items"]) == 4

@@ -2,7 +2,9 @@
 
 import json
 import os
+import shutil
 import sys
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from islands_api.cli import options
 from islands_api.cli.app import main
 from islands_api.cli.fit import check_folder
 from islands_service.rows import rows_of
+from support.command_line import succeed
 
 
 def record(samples=120, seed=0):
@@ -46,6 +49,23 @@ def run(monkeypatch, capsys, tmp_path):
 
 
 FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")
+
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory):
+    """A folder with a record and what was fitted to it, and what the command said."""
+    folder = tmp_path_factory.mktemp("fit")
+    write_record(record(), folder / "r.csv")
+    with chdir(folder):
+        return folder, succeed(*FIT)
+
+
+@pytest.fixture
+def fitted(fit, run):
+    """What the command said; the test has a folder like that in which it was run."""
+    folder, said = fit
+    shutil.copytree(folder, Path.cwd(), dirs_exist_ok=True)
+    return said
 
 
 # Options.
@@ -150,10 +170,8 @@ def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
 # Commands.
 
 
-def test_fit_shows_what_it_found_and_where_it_is(run):
-    write_record(record(), "r.csv")
-    code, out, _ = run(*FIT)
-    assert code == 0
+def test_fit_shows_what_it_found_and_where_it_is(fitted):
+    out = fitted
     assert "120 samples, 0.01 s: u_V to y_um" in out
     assert "3 models estimated: 3 ok" in out
     assert "out/: result.json, models/, figures/, summary.txt" in out
@@ -161,9 +179,8 @@ def test_fit_shows_what_it_found_and_where_it_is(run):
     assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
 
 
-def test_force_replaces_a_result_and_leaves_no_model_of_the_old_one(run):
-    write_record(record(), "r.csv")
-    assert run(*FIT)[0] == 0
+def test_force_replaces_a_result_and_leaves_no_model_of_the_old_one(run, fitted):
+    assert len(list(Path("out/models").iterdir())) == 3
     code, _, err = run(*FIT)
     assert code == 2
     assert "--force" in err
@@ -171,9 +188,7 @@ def test_force_replaces_a_result_and_leaves_no_model_of_the_old_one(run):
     assert [path.name for path in Path("out/models").iterdir()] == ["01.json"]
 
 
-def test_simulate_takes_the_columns_that_the_model_names(run):
-    write_record(record(), "r.csv")
-    run(*FIT)
+def test_simulate_takes_the_columns_that_the_model_names(run, fitted):
     code, out, _ = run("simulate", "out/models/01.json", "r.csv", "--mode", "one-step", "--out", "s.csv")
     assert code == 0
     assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step: ok"]

@@ -181,14 +181,14 @@ def test_processes_that_prepare_the_same_new_databases_at_once_all_succeed(empty
     if empty_database.startswith("sqlite"):
         urls += [f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(4)]
     with ExitStack() as stack:
-        processes = [stack.enter_context(child(PREPARE, *urls)) for _ in range(3)]
+        processes = [stack.enter_context(child(PREPARE, *urls)) for _ in range(2)]
         for process in processes:
             assert process.stdout.readline() == "ready\n"
         for _ in urls:
             for process in processes:
                 process.stdin.write("\n")
                 process.stdin.flush()
-            assert [process.stdout.readline() for process in processes] == ["prepared\n"] * 3
+            assert [process.stdout.readline() for process in processes] == ["prepared\n"] * 2
     for url in urls:
         with Store(url) as store:
             submitted(store)
