@@ -17,7 +17,7 @@ from islands.discrepancy.spread import Spread
 from islands.discrepancy.surrogates import Probe
 from islands.io.records import write_record
 from islands.trials.hide.records import hide
-from support.command_line import fail, succeed
+from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel", "w_V")
@@ -81,14 +81,7 @@ def test_the_figures_of_the_report_are_drawn(beside: Path) -> None:
 def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short record with somebody else's simulation in a column, which lacks an offset."""
     base = tmp_path_factory.mktemp("self-test")
-    rng = np.random.default_rng(6)
-    time = 0.01 * np.arange(400)
-    u = 40 * np.sin(2 * np.pi * 1.1 * time) * np.sin(2 * np.pi * 0.3 * time + 1)
-    simulated = 0.8 * u + 0.001 * u**2
-    y = simulated + 0.3 + 0.1 * rng.standard_normal(time.size)
-    rows = np.column_stack([time, u, simulated, y])
-    header = "t_s,u_V,theirs_um,y_um"
-    np.savetxt(base / "record.csv", rows, fmt="%.6f", delimiter=",", header=header, comments="")
+    write_offset(base / "record.csv")
     return base
 
 

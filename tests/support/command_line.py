@@ -33,6 +33,18 @@ def write_hysteresis(path: Path) -> Path:
     return path
 
 
+def write_offset(path: Path) -> Path:
+    """Write a record of 400 samples, with a simulation in the column ``theirs_um`` that lacks an offset."""
+    rng = np.random.default_rng(6)
+    time = 0.01 * np.arange(400)
+    u = 40 * np.sin(2 * np.pi * 1.1 * time) * np.sin(2 * np.pi * 0.3 * time + 1)
+    simulated = 0.8 * u + 0.001 * u**2
+    y = simulated + 0.3 + 0.1 * rng.standard_normal(time.size)
+    rows = np.column_stack([time, u, simulated, y])
+    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header="t_s,u_V,theirs_um,y_um", comments="")
+    return path
+
+
 def stored(folder: Path) -> dict[str, Any]:
     """Return a folder's result."""
     return json.loads((folder / "result.json").read_text())

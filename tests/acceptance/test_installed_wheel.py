@@ -1,0 +1,134 @@
+"""The installed package, away from its sources: a dozen commands, each in a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from support.command_line import BUDGET, COLUMNS, ISLANDS, write_hysteresis, write_offset
+
+pytestmark = pytest.mark.ci
+
+#: Files that are no modules, by package: without one of them a report, a page or a type checker fails.
+DATA = {
+    "islands": ("py.typed",),
+    "islands_api": ("py.typed", "dashboard/index.html", "dashboard/islands.css", "dashboard/islands.js"),
+    "islands_service": ("templates/report.html", "templates/diagnosis.html"),
+}
+
+
+def run(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run the command as a process of its own, in a folder without sources."""
+    environment = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+    command = [str(ISLANDS), *map(str, arguments)]
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=240
+    )
+
+
+def succeed(*arguments: object, folder: Path) -> str:
+    done = run(*arguments, folder=folder)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a record of an actuator, of 5 s, and one of a hysteresis, of 1000 samples."""
+    base = tmp_path_factory.mktemp("user")
+    succeed("systems", "make", "bouc-wen-piezo", "--part", "validation", "--out", "long.csv", folder=base)
+    lines = (base / "long.csv").read_text().splitlines(keepends=True)
+    (base / "piezo.csv").write_text("".join(lines[:5001]))
+    lines = write_hysteresis(base / "hysteresis.csv").read_text().splitlines(keepends=True)
+    (base / "hysteresis.csv").write_text("".join(lines[:1001]))
+    return base
+
+
+@pytest.fixture(scope="module")
+def model(folder: Path) -> str:
+    """The best model of a fit."""
+    succeed("fit", "piezo.csv", *COLUMNS, "--max-terms", 4, "--out", "fit", folder=folder)
+    return "fit/models/01.json"
+
+
+def test_the_packages_are_installed_with_their_data(folder: Path) -> None:
+    for package, names in DATA.items():
+        for name in names:
+            assert files(package).joinpath(name).is_file(), (package, name)
+    program = "import islands; assert islands.read_record and islands.fit; print(islands.__file__)"
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True, timeout=120
+    )
+    assert Path(done.stdout.strip()).is_file()
+
+
+def test_the_help_lists_every_command(folder: Path) -> None:
+    said = succeed("--help", folder=folder)
+    for command in ("identify", "fit", "diagnose", "simulate", "show", "systems", "serve", "jobs", "keys"):
+        assert command in said
+
+
+@pytest.mark.parametrize(("group", "command"), [("keys", "create"), ("jobs", "submit")])
+def test_a_group_of_commands_has_help(folder: Path, group: str, command: str) -> None:
+    assert command in succeed(group, "--help", folder=folder)
+
+
+def test_systems_are_listed(folder: Path) -> None:
+    assert "bouc-wen-piezo" in succeed("systems", "list", folder=folder)
+
+
+def test_a_fit_writes_models_and_figures(folder: Path, model: str) -> None:
+    result = json.loads((folder / "fit/result.json").read_text())
+    assert result["models"][0]["physics"]["property_1"] is True
+    figures = sorted((folder / "fit/figures").glob("*.svg"))
+    assert len(figures) == 6
+    assert min(path.stat().st_size for path in figures) > 5_000
+    assert (folder / model).is_file()
+
+
+def test_a_model_is_shown_as_text_and_as_a_program_that_runs(folder: Path, model: str) -> None:
+    assert succeed("show", model, folder=folder).startswith("y(k) = ")
+    source = succeed("show", model, "--format", "python", folder=folder)
+    names: dict[str, object] = {}
+    exec(source, names)
+    assert callable(names["simulate"])
+
+
+def test_a_model_is_simulated(folder: Path, model: str) -> None:
+    said = succeed("simulate", model, "piezo.csv", "--out", "simulated.csv", folder=folder)
+    assert "ok" in said
+    assert len((folder / "simulated.csv").read_text().splitlines()) == 5_001
+
+
+def test_a_small_search_finds_models(folder: Path) -> None:
+    search = ("--generations", 2, "--engine", "serial", "--out", "found")
+    succeed("identify", "hysteresis.csv", *COLUMNS, *BUDGET, *search, folder=folder)
+    result = json.loads((folder / "found/result.json").read_text())
+    assert result["search"]["evaluations"] == 3 * 30
+    assert result["models"]
+
+
+def test_a_diagnosis_writes_a_report(folder: Path) -> None:
+    write_offset(folder / "offset.csv")
+    succeed(
+        *("diagnose", "offset.csv", *COLUMNS, "--simulation", "column:theirs_um", "--out", "diagnosis"),
+        folder=folder,
+    )
+    document = json.loads((folder / "diagnosis/discrepancy.json").read_text())
+    assert [effect["name"] for effect in document["effects"]] == ["offset"]
+    assert "<img " in (folder / "diagnosis/report.html").read_text()
+
+
+def test_a_file_that_is_no_record_is_refused_in_a_line(folder: Path) -> None:
+    (folder / "empty.csv").write_text("")
+    done = run("fit", "empty.csv", *COLUMNS, "--out", "never", folder=folder)
+    assert done.returncode == 2
+    assert "error: " in done.stderr
+    assert "empty.csv is empty" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (folder / "never").exists()
