@@ -1,6 +1,7 @@
 """Laws of abandonment: a search that gives up the hopeless finds what one finds that never gives up."""
 
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from math import inf
 
@@ -34,18 +35,36 @@ SETTINGS = {
 }
 
 
+#: At the fast level every kind of constraints, of fitness and of elite stands once or more.
+FAST = (
+    "hysteresis shooting copies",
+    "none one-step distinct",
+    "hysteresis free-run distinct",
+    "none shooting copies",
+)
+
+
 def abandoned(island):
     return [each for each in island.population if each.outcome.verdict is Verdict.ABANDONED]
 
 
-@pytest.fixture(params=SETTINGS, scope="module")
+@cache
+def course_of(name):
+    return islands_of(Evaluator(record(), SETTINGS[name]), GENERATIONS)
+
+
+@pytest.fixture(
+    params=[name if name in FAST else pytest.param(name, marks=pytest.mark.nightly) for name in SETTINGS]
+)
 def setting(request):
     return SETTINGS[request.param]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def course(setting):
-    return islands_of(Evaluator(record(), setting), GENERATIONS)
+    """The islands of a search; it is made once for a setting."""
+    (name,) = (name for name, each in SETTINGS.items() if each is setting)
+    return course_of(name)
 
 
 def test_halls_elites_and_genes_are_those_of_a_search_that_abandons_nobody(setting, course):

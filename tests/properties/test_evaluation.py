@@ -7,7 +7,6 @@ from math import inf
 
 import pytest
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from islands.evolution import evaluation
@@ -116,7 +115,6 @@ def test_the_individuals_of_these_laws_end_in_every_way():
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-@hypothesis_settings(max_examples=60)
 @given(st.sampled_from(LIMITS), st.lists(st.tuples(populations, bars_of_sizes), min_size=1, max_size=4))
 def test_whatever_was_evaluated_before_and_beside_it_an_individual_is_the_same_to_the_last_bit(
     name, limits, history

@@ -47,12 +47,12 @@ def test_every_cache_stays_within_its_limit_but_for_one_generation():
 def test_with_its_own_limits_an_evaluator_takes_no_more_memory_however_long_it_is_at_work():
     """Measured, not said."""
     evaluator = Evaluator(record(), SMALL, LIMITS)
-    islands_of(evaluator, 30)
+    islands_of(evaluator, 15)
     tracemalloc.start()
     try:
         course = []
-        for seed in range(4):
-            islands_of(evaluator, 15, seed=seed)
+        for seed in range(3):
+            islands_of(evaluator, 10, seed=seed)
             gc.collect()
             course.append(tracemalloc.get_traced_memory()[0])
     finally:
@@ -88,10 +88,10 @@ HIGH = replace(SMALL, max_height=5, initial_height=5)
 def test_genes_take_what_a_vocabulary_says(traced, setting):
     vocabulary = Vocabulary(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
     draw = Stream(7, 0, 0, Purpose.INITIAL)
-    for _ in range(1500):
+    for _ in range(700):
         vocabulary.number(random_gene(setting, 2, draw))
     taken = traced()
-    assert vocabulary.bytes > 1_000_000
+    assert vocabulary.bytes > 500_000
     assert vocabulary.bytes / 2.5 < taken < vocabulary.bytes * 2.5
 
 
@@ -100,13 +100,13 @@ def test_structures_take_what_an_evaluator_says(traced):
     evaluator = Evaluator(record(), setting)
     genes = [parse(text) for lag in range(1, 11) for text in (f"u(k-{lag})", f"y(k-{lag})*u(k-1)")]
     evaluator.evaluate([(Individual((each,)), False) for each in genes])
-    structures = [chosen for size in (2, 3, 5, 6) for chosen in list(combinations(genes, size))[:400]]
+    structures = [chosen for size in (2, 3, 5, 6) for chosen in list(combinations(genes, size))[:200]]
     rng = np.random.default_rng(0)
     population = [(Individual(chosen), bool(rng.integers(2))) for chosen in structures]
     said, before = evaluator.memory["structures"][0], traced()
     evaluator.evaluate(population)
     said, taken = evaluator.memory["structures"][0] - said, traced() - before
-    assert said > 1_000_000
+    assert said > 500_000
     assert said / 2.5 < taken < said * 2.5
 
 

@@ -193,8 +193,15 @@ def test_random_structures_get_what_the_oracle_says(constraints, fitness, ends):
     assert seen["well"] + seen["ill"] > 220
 
 
-@pytest.mark.parametrize("constraints", ["none", "hysteresis"])
-@pytest.mark.parametrize("rate", [100, 600])
+@pytest.mark.parametrize(
+    ("rate", "constraints"),
+    [
+        (600, "none"),
+        (100, "hysteresis"),
+        pytest.param(100, "none", marks=pytest.mark.nightly),
+        pytest.param(600, "hysteresis", marks=pytest.mark.nightly),
+    ],
+)
 def test_where_neighbouring_samples_hardly_differ_it_is_the_same(constraints, rate):
     setting = replace(SETTINGS, constraints=constraints)
     seen = held_against_the_oracle(of_few_clusters(200), record(900, inputs=2, rate=rate), setting)

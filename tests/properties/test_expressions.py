@@ -10,7 +10,7 @@ from copy import deepcopy
 from dataclasses import replace
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.errors import ModelError
@@ -35,7 +35,6 @@ def product(*factors):
     return Apply(MUL, factors)
 
 
-@settings(max_examples=300)
 @given(expressions(constants=any_number))
 def test_text_is_read_back_as_the_expression_that_was_written(expression):
     assert parse(plain(expression)) == expression
@@ -54,7 +53,6 @@ def test_two_inputs_are_read_back_with_their_numbers(expression):
     assert parse(text) == expression
 
 
-@settings(max_examples=200)
 @given(expressions())
 def test_canonical_form_is_idempotent(expression):
     factor, core = canonical(expression)
@@ -62,7 +60,6 @@ def test_canonical_form_is_idempotent(expression):
         assert canonical(core) == (1.0, core)
 
 
-@settings(max_examples=200)
 @given(expressions())
 def test_canonical_text_is_read_back_as_the_same_regressor(expression):
     _, item = regressor(expression)
@@ -70,7 +67,6 @@ def test_canonical_text_is_read_back_as_the_same_regressor(expression):
         assert regressor(parse(plain(item.expression))) == (1.0, item)
 
 
-@settings(max_examples=300)
 @given(expressions(), signals())
 def test_canonical_form_keeps_the_value(expression, signal):
     expected = settled_value(expression, signal)
@@ -228,7 +224,6 @@ def test_sorting_by_content_forgets_the_order_of_arrival(found, rng):
     assert sorted(found, key=content) == sorted(shuffled, key=content)
 
 
-@settings(max_examples=200)
 @given(expressions(constants=any_number))
 def test_latex_has_balanced_braces_and_brackets(expression):
     depth = 0

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset, join
@@ -128,7 +128,6 @@ def test_the_kernel_is_the_recursion_bit_for_bit(name, interval):
     assert same(found.y, recursion(MODELS[name], data, interval))
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_the_kernel_is_the_recursion_for_any_segments_intervals_and_warm_up(data):
     chosen, drawn, warm_up = drawn_records(data)
@@ -217,7 +216,6 @@ def test_an_interval_begins_with_the_one_step_ahead_prediction(name, interval):
 # Which samples are predicted.
 
 
-@settings(deadline=None, max_examples=40)
 @given(st.data())
 def test_every_sample_after_a_warm_up_is_predicted_and_no_other(data):
     chosen, drawn, warm_up = drawn_records(data)
@@ -266,7 +264,6 @@ def test_a_longer_warm_up_only_leaves_one_step_ahead_predictions_out(name):
 # Nothing looks ahead, nothing looks across a boundary.
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_the_present_and_the_future_leave_predictions_as_they_were(data):
     chosen, drawn, warm_up = drawn_records(data)
@@ -292,7 +289,6 @@ def test_the_past_does_not_leave_predictions_as_they_were():
         assert before[k] != after[k]
 
 
-@settings(deadline=None, max_examples=40)
 @given(st.data())
 def test_a_free_run_never_reads_the_output_after_its_warm_up(data):
     chosen, drawn, warm_up = drawn_records(data)
@@ -333,7 +329,6 @@ def begun(drawn, warm_up):
     return replace(drawn, y=np.where(np.arange(drawn.samples) < warm_up, drawn.y, np.nan))
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_a_linked_model_runs_free_as_the_model_does_with_any_parameters_on_any_input(data):
     chosen = MODELS[data.draw(st.sampled_from(list(MODELS)))]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +48,7 @@ class Made:
     record: Dataset
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def core(self) -> Core:
         return simulation(self.spec, self.record, self.columns)
 

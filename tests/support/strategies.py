@@ -9,6 +9,7 @@ import random
 from dataclasses import replace
 
 import numpy as np
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
@@ -167,3 +168,8 @@ def schedules(draw, least=1, most=9, latest=40):
 def schedule_text(pieces):
     (_, first), *others = pieces
     return ",".join([str(first), *(f"{begin}:{value}" for begin, value in others)])
+
+
+def part_of_the_examples(share):
+    """Settings of a costly property: one of so many examples of the profile, so that both profiles hold."""
+    return settings(max_examples=max(1, settings().max_examples // share))

@@ -28,8 +28,21 @@ def diagnosis(friction: float = 0.3, levels: int = 0, samples: int = 1200):
     return islands.diagnose(record, "column:y_sim", columns={"y_sim": simulated})
 
 
+@cache
+def of_the_residual():
+    """Return the figure of the residual before and after."""
+    return draw_residual(diagnosis())
+
+
+@cache
+def long():
+    """Return the figures of a diagnosis of a long record, by name."""
+    found = diagnosis(samples=7000)
+    return {name: draw(found) for name, draw in DISCREPANCY_FIGURES.items()}
+
+
 def test_the_residual_is_shown_against_all_that_it_should_not_know() -> None:
-    axes = draw_residual(diagnosis()).axes
+    axes = of_the_residual().axes
     assert [panel.get_xlabel() for panel in axes] == [
         "u (V)",
         "u (V)",
@@ -46,7 +59,7 @@ def test_the_residual_is_shown_against_all_that_it_should_not_know() -> None:
 
 
 def test_dry_friction_is_a_difference_between_the_directions_before_and_none_after() -> None:
-    lines = draw_residual(diagnosis()).axes[1].lines[:-1]
+    lines = of_the_residual().axes[1].lines[:-1]
     mean = {
         (line.get_color(), line.get_linestyle()): np.mean(line.get_ydata())
         for line in lines
@@ -60,7 +73,7 @@ def test_dry_friction_is_a_difference_between_the_directions_before_and_none_aft
 
 def test_the_spectrum_holds_the_residuals_mean_square() -> None:
     found = diagnosis()
-    before = draw_residual(found).axes[4].lines[0]
+    before = of_the_residual().axes[4].lines[0]
     frequency, density = before.get_xydata().T
     residual = found.record.y - found.base.output
     assert np.trapezoid(density**2, frequency) == pytest.approx(np.var(residual), rel=0.25)
@@ -74,8 +87,7 @@ def test_an_input_of_few_levels_has_as_many_cells_and_no_empty_one() -> None:
 
 
 def test_a_long_record_is_shown_as_a_whole_and_in_part() -> None:
-    long = diagnosis(samples=7000)
-    shown = DISCREPANCY_FIGURES["over-time"](long).axes
+    shown = long()["over-time"].axes
     whole, part = (np.ptp(shown[place].get_xlim()) for place in (0, 2))
     assert len(shown) == 4
     assert part < whole / 4
@@ -102,7 +114,7 @@ def test_the_ladder_is_coloured_where_something_is_named() -> None:
 @pytest.mark.parametrize("name", DISCREPANCY_FIGURES)
 def test_a_figure_is_small_enough_for_a_page(name: str, tmp_path) -> None:
     path = tmp_path / "figure.svg"
-    save(DISCREPANCY_FIGURES[name](diagnosis(samples=7000)), path)
+    save(long()[name], path)
     assert path.stat().st_size < 300_000
 
 

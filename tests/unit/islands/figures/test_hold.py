@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from islands.data.dataset import Dataset
@@ -33,6 +34,17 @@ LEAKING = model(y=0.99, du=0.15)
 BURSTING = model(y=1.01, du=0.15)
 
 
+@pytest.fixture(scope="module")
+def still(record: Dataset) -> Figure:
+    """The figure of a model that stays where it is; no test changes it."""
+    return draw_holds(STILL, record, "still")
+
+
+@pytest.fixture(scope="module")
+def bursting(record: Dataset) -> Figure:
+    return draw_holds(BURSTING, record)
+
+
 def held(axes: Axes) -> list[Line2D]:
     """Return the lines of the output at rest, one for each level."""
     lines = [line for line in axes.lines if len(line.get_xdata()) > 2 and line.get_xdata()[0] >= 0]
@@ -40,21 +52,20 @@ def held(axes: Axes) -> list[Line2D]:
     return lines
 
 
-def test_axes_are_the_input_and_the_output_while_loading_and_unloading(record):
-    figure = draw_holds(STILL, record, "still")
-    assert len(figure.axes) == 4
-    assert [axes.get_ylabel() for axes in figure.axes] == ["u (V)", "y (um)", "u (V)", "y (um)"]
-    assert [axes.get_xlabel() for axes in figure.axes[2:]] == 2 * ["time from the start of the hold (s)"]
-    assert figure.get_suptitle() == "still"
+def test_axes_are_the_input_and_the_output_while_loading_and_unloading(still):
+    assert len(still.axes) == 4
+    assert [axes.get_ylabel() for axes in still.axes] == ["u (V)", "y (um)", "u (V)", "y (um)"]
+    assert [axes.get_xlabel() for axes in still.axes[2:]] == 2 * ["time from the start of the hold (s)"]
+    assert still.get_suptitle() == "still"
 
 
-def test_the_inputs_levels_stand_on_its_axis_in_its_unit(record):
-    left = draw_holds(STILL, record).axes[0]
+def test_the_inputs_levels_stand_on_its_axis_in_its_unit(still):
+    left = still.axes[0]
     assert [text.get_text() for text in left.get_yticklabels()] == ["−6", "2", "10", "18", "26"]
 
 
-def test_time_is_in_seconds_from_the_first_sample_at_rest(record):
-    left, right, *_ = draw_holds(STILL, record).axes
+def test_time_is_in_seconds_from_the_first_sample_at_rest(still):
+    left, right, *_ = still.axes
     for line, level in zip(left.lines[:5], LEVELS, strict=True):
         time, u = line.get_data()
         assert (u[time >= 0] == level).all()
@@ -64,13 +75,12 @@ def test_time_is_in_seconds_from_the_first_sample_at_rest(record):
     assert right.get_xlim()[0] == pytest.approx(-2.9, abs=0.1)
 
 
-def test_a_continuum_of_equilibria_is_flat(record):
-    figure = draw_holds(STILL, record)
-    for axes, words in ((figure.axes[1], "after loading"), (figure.axes[3], "after unloading")):
+def test_a_continuum_of_equilibria_is_flat(still):
+    for axes, words in ((still.axes[1], "after loading"), (still.axes[3], "after unloading")):
         assert axes.get_title(loc="left") == f"{words}: largest drift below 0.01 % of the output range"
         for line in held(axes):
             assert np.ptp(line.get_ydata()[2:]) < 1e-9
-    ends = [line.get_ydata()[-1] for line in held(figure.axes[1])]
+    ends = [line.get_ydata()[-1] for line in held(still.axes[1])]
     assert np.diff(ends) == pytest.approx(4 * [0.15 * 8.0], rel=0.01)
 
 
@@ -92,17 +102,17 @@ def test_a_small_drift_is_said_with_its_digits(record):
     assert f"{largest:.2f} %" in title
 
 
-@pytest.mark.parametrize("bursting", [BURSTING, model(y=1.5, du=0.15), model(y=1e8, du=0.15, u=1.0)])
-def test_a_divergence_is_said_in_the_title_and_at_the_lines_end(bursting, record, tmp_path):
-    figure = draw_holds(bursting, record)
+@pytest.mark.parametrize("diverging", [BURSTING, model(y=1e8, du=0.15, u=1.0)])
+def test_a_divergence_is_said_in_the_title_and_at_the_lines_end(diverging, record, tmp_path):
+    figure = draw_holds(diverging, record)
     for axes in (figure.axes[1], figure.axes[3]):
         assert axes.get_title(loc="left").endswith("5 of 5 diverged")
         assert np.abs(axes.get_ylim()).max() < 12.0
     save(figure, tmp_path / "diverged.svg")
 
 
-def test_the_word_diverged_stands_where_a_line_ends(record):
-    right = draw_holds(BURSTING, record).axes[1]
+def test_the_word_diverged_stands_where_a_line_ends(bursting):
+    right = bursting.axes[1]
     assert {text.get_text() for text in right.texts} == {"diverged"}
     assert len(right.texts) < 5
     marks = [line for line in right.lines if line.get_marker() == "x"]

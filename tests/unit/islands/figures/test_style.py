@@ -95,6 +95,7 @@ def test_a_file_holds_no_date_no_image_and_no_font_of_this_machine(tmp_path):
         assert unwanted not in text
 
 
+@pytest.mark.ci
 def test_another_process_writes_the_same_bytes_and_never_loads_pyplot(tmp_path):
     code = """
 import hashlib, importlib.util, pkgutil, sys

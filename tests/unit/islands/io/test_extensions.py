@@ -145,9 +145,9 @@ def test_with_other_effects_in_it_it_is_extended_once_more(asked: Made) -> None:
 @pytest.mark.parametrize(
     ("kind", "name", "point"),
     [
-        ("bouc-wen-piezo", "even-nonlinearity", (1e-3,)),
         ("column", "jump", (1.0, 2.0)),
-        ("linear", "delay", (0.02,)),
+        pytest.param("bouc-wen-piezo", "even-nonlinearity", (1e-3,), marks=pytest.mark.nightly),
+        pytest.param("linear", "delay", (0.02,), marks=pytest.mark.nightly),
     ],
 )
 def test_diagnosed_again_it_lacks_nothing(kind: str, name: str, point: tuple[float, ...]) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import scipy
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -137,7 +137,6 @@ def spring(x, _rate, _z, numbers):
     return numbers[0] * x
 
 
-@settings(max_examples=20)
 @given(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.1, 9.0))
 def test_without_elements_it_is_linear(one: float, other: float, pitch: float) -> None:
     def second(t):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
@@ -34,7 +34,6 @@ def noise(samples, segments=(), inputs=1):
     return Dataset(rng.normal(size=(samples, inputs)), rng.normal(size=samples), 0.1, segments=segments)
 
 
-@settings(max_examples=60)
 @given(records(longest=30), st.lists(regressors(), min_size=1, max_size=3))
 def test_the_regressor_matrix_is_the_terms_value_on_every_row(record, terms):
     warm_up = max(item.maximum_lag for item in terms)
@@ -143,7 +142,6 @@ def test_the_gram_matrix_is_the_inner_products_of_the_columns_bit_for_bit(segmen
     np.testing.assert_array_equal(gram_matrix(terms, record, 3), products(terms, record, 3))
 
 
-@settings(max_examples=30)
 @given(records(longest=400), st.lists(regressors(height=2), min_size=1, max_size=3))
 def test_the_gram_matrix_is_the_inner_products_whatever_the_segments(record, terms):
     warm_up = max(item.maximum_lag for item in terms)

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
@@ -28,7 +28,7 @@ from support.programs import (
     record,
     record_of,
 )
-from support.strategies import models
+from support.strategies import models, part_of_the_examples
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler is called cc")
 
@@ -84,7 +84,7 @@ def test_a_compiled_primitive_is_the_kernels_at_every_jump_and_limit(name, folde
 
 
 @needs_compiler
-@settings(max_examples=25)
+@part_of_the_examples(3)  # each is compiled
 @given(models(), st.integers(0, 2**32 - 1))
 def test_the_compiled_program_is_the_model_bit_for_bit(folder, random_model, seed):
     assume(not of_the_library(random_model))

@@ -109,27 +109,28 @@ def test_a_columns_name_cannot_break_the_file(tmp_path):
     assert [y.tolist() for y in found] == [[0.5, 2.0]] * len(HOSTILE_NAMES)
 
 
+#: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and what Octave shows of what they return.
+CALLS = {
+    # A row or a column as the input is, and y0 of either.
+    "narx_model([4 8 12], [1 2])": "[1 2 2]",
+    "narx_model([4 8 12], [1; 2])": "[1 2 2]",
+    "narx_model([4; 8; 12], [1 2])": "[1;2;2]",
+    "narx_model([4 8 12 16], [1 2 77 77 77])": "[1 2 2 3]",
+    "narx_model([4 8], [1 2])": "[1 2]",
+    "narx_model(4, [1 2])": "1",
+    "size(narx_model(zeros(0, 1), [1 2]))": "[0 1]",
+    # Integers would round, and single numbers lose digits.
+    "narx_model(int8([1 8 12]), int8([1 3]))": "[1 3 1.75]",
+    "class(narx_model(single([4 8 12]), single([1 2])))": "double",
+}
+
+
 @needs_octave
-@pytest.mark.parametrize(
-    ("call", "shown"),
-    [
-        # y(k) = 0.5 y(k-1) + 0.25 u(k-2), a row or a column as the input is, and y0 of either.
-        ("narx_model([4 8 12], [1 2])", "[1 2 2]"),
-        ("narx_model([4 8 12], [1; 2])", "[1 2 2]"),
-        ("narx_model([4; 8; 12], [1 2])", "[1;2;2]"),
-        ("narx_model([4 8 12 16], [1 2 77 77 77])", "[1 2 2 3]"),
-        ("narx_model([4 8], [1 2])", "[1 2]"),
-        ("narx_model(4, [1 2])", "1"),
-        ("size(narx_model(zeros(0, 1), [1 2]))", "[0 1]"),
-        # Integers would round, and single numbers lose digits.
-        ("narx_model(int8([1 8 12]), int8([1 3]))", "[1 3 1.75]"),
-        ("class(narx_model(single([4 8 12]), single([1 2])))", "double"),
-    ],
-)
-def test_octave_takes_vectors_of_every_shape_and_class(call, shown, tmp_path):
+def test_octave_takes_vectors_of_every_shape_and_class(tmp_path):
     (tmp_path / "narx_model.m").write_text(export(model({"y(k-1)": 0.5, "u(k-2)": 0.25}), "matlab"))
-    script = f"r = {call}; if ischar(r), disp(r), else, disp(mat2str(r)), end"
-    assert octave(script, tmp_path).strip() == shown
+    show = "r = {}; if ischar(r), disp(r), else, disp(mat2str(r)), end"
+    shown = octave("\n".join(show.format(call) for call in CALLS), tmp_path).splitlines()
+    assert dict(zip(CALLS, shown, strict=True)) == CALLS
 
 
 @needs_octave

@@ -6,7 +6,7 @@ from math import exp
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
@@ -60,7 +60,6 @@ def test_an_input_at_rest_leaves_no_minus_zero():
     assert bits(free_run(exported, at_rest).y[1:]) == [0] * 8
 
 
-@settings(max_examples=60)
 @given(models(), st.integers(0, 2**32 - 1))
 def test_the_python_module_is_the_model_bit_for_bit(random_model, seed):
     data = record(2, seed)
