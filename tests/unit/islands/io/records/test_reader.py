@@ -9,7 +9,7 @@ import pytest
 from islands.errors import RecordError
 from islands.io.records import READERS, columns_of, fingerprint, read_record
 from islands.io.records.names import looks_like_time, time_column, unit_of
-from support.repository import measured_record
+from support.bad_records import lines, refusal
 
 SAMPLES = 50
 T = 0.01 * np.arange(SAMPLES)
@@ -342,79 +342,6 @@ def test_every_known_suffix_is_lower_case_with_its_dot():
     assert all(suffix == suffix.lower() and suffix.startswith(".") for suffix in READERS)
 
 
-# Measured records
-
-
-@pytest.mark.nightly
-def test_the_piezo_record_is_sampled_at_a_fifth_of_a_millisecond():
-    record = read_record(measured_record("piezo_micromanipulator_150V_1Hz.csv"), ["u_V"], "y_um")
-    assert record.dt == pytest.approx(2e-4, rel=1e-6)
-    assert (record.samples, record.start) == (50_001, 0.0)
-    assert (record.input_units, record.output_unit) == (("V",), "um")
-    assert (record.u[-1, 0], record.y[-1]) == (-118.05964, -13.938904)
-
-
-@pytest.mark.nightly
-def test_silverbox_is_read_with_the_sampling_frequency_that_it_states():
-    file = measured_record("silverbox.npz")
-    record = read_record(file, ["u"], "y", rows=slice(40650, 105712))
-    assert record.samples == 65_062
-    assert record.dt == pytest.approx(1 / 610.35, rel=1e-12)
-    assert record.start == pytest.approx(40650 / 610.35)
-    with np.load(file) as arrays:
-        assert record.y[0] == arrays["y"][40650]
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    ("name", "inputs", "output", "dt", "samples", "step"),
-    [
-        ("cascaded_tanks.csv", ["u_est_V"], "y_est_V", None, 1024, 4.0),
-        ("gas_furnace.csv", ["u_gasrate_ft3min"], "y_CO2_pct", None, 296, 9.0),
-        ("daisy_hairdryer.csv", ["u_V"], "y_temp", 0.08, 1000, 0.08),
-        ("wh2009.npz", ["u"], "y", None, 188_000, 1 / 51_200),
-        ("boucwen_benchmark.npz", ["u_train_N"], "y_train_m", None, 40_960, 1 / 750),
-    ],
-)
-def test_the_measured_records_are_read(name, inputs, output, dt, samples, step):
-    record = read_record(measured_record(name), inputs, output, dt=dt)
-    assert record.samples == samples
-    assert record.dt == pytest.approx(step, rel=1e-9)
-
-
-@pytest.mark.nightly
-def test_the_two_parts_of_the_buck_converter_follow_one_another_in_time():
-    file = measured_record("buck_converter.csv")
-    whole = read_record(file, ["u_V"], "y_V")
-    assert whole.samples == 2000
-    assert whole.dt == pytest.approx(1e-5, rel=1e-9)
-    validation = read_record(file, ["u_V"], "y_V", rows=slice(1001, None))
-    assert validation.start == pytest.approx(0.01001)
-    assert validation.y[0] == 15.6
-
-
-@pytest.mark.nightly
-def test_the_hair_dryer_needs_its_sampling_time():
-    with pytest.raises(
-        RecordError, match=r"daisy_hairdryer\.csv has no time column .* --dt \(library: dt=\)"
-    ):
-        read_record(measured_record("daisy_hairdryer.csv"), ["u_V"], "y_temp")
-
-
-@pytest.mark.nightly
-def test_the_tests_of_the_damper_are_told_apart_by_their_time():
-    file = measured_record("mrdamper_labcontrol.csv")
-    with pytest.raises(RecordError, match=r"line 3003, column t_s jumps back to 0 from 30: .*islands\.join"):
-        read_record(file, ["volt_V", "dist_mm"], "force_N")
-    assert read_record(file, ["dist_mm"], "force_N", rows=slice(0, 3001)).dt == pytest.approx(0.01)
-
-
-@pytest.mark.nightly
-def test_the_mirrors_arrays_of_many_realisations_are_refused_with_their_shape():
-    with pytest.raises(RecordError, match=r"u_100mV_train has the shape \(8192, 3, 6, 2\)"):
-        read_record(measured_record("fsm_piezo.npz"), ["u_100mV_train"], "y_um_100mV_train")
-
-
 def test_an_input_named_plus_one_is_read_one_sample_early(tmp_path):
     file = tmp_path / "record.csv"
     file.write_text("t_s,u_V,y_um\n" + "\n".join(f"{k / 10:g},{k * k},{k}" for k in range(40)))
@@ -429,3 +356,28 @@ def test_a_column_that_is_called_plus_one_is_itself(tmp_path):
     file = tmp_path / "record.csv"
     file.write_text("t_s,u,u+1,y\n" + "\n".join(f"{k / 10:g},{k},{-k},{k % 7}" for k in range(40)))
     assert read_record(file, ["u+1"], "y").u[3, 0] == -3.0
+
+
+# Files that are none
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(RecordError, match=r"there is no file .*none\.csv: check the path"):
+        read_record(tmp_path / "none.csv", ["u"], "y")
+
+
+def test_a_folder_is_refused(tmp_path):
+    with pytest.raises(RecordError, match="is a folder: give the path of the file in it"):
+        read_record(tmp_path, ["u"], "y")
+
+
+def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
+    (tmp_path / "file.csv").write_text("t,u,y")
+    with pytest.raises(RecordError, match=r"cannot be opened \(Not a directory\): check path"):
+        read_record(tmp_path / "file.csv" / "bad.csv", ["u"], "y")
+
+
+def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path):
+    message = refusal(tmp_path, lines(), name="bad.xlsx")
+    assert "bad.xlsx: files ending in '.xlsx' are not known" in message
+    assert all(suffix in message for suffix in READERS)

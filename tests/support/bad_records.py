@@ -1,0 +1,43 @@
+"""Files of records in which one thing is wrong, and the words in which they are refused."""
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.io.records import read_record
+
+HEADER = "t_s,u_V,y_um"
+
+
+def lines(samples=60):
+    """Lines of a sound record; line k + 1 of the file holds sample k - 1 (line 1 is the header)."""
+    return [HEADER, *(f"{k / 100:g},{k % 7 - 3},{k * k % 11}.5" for k in range(samples))]
+
+
+def refusal(tmp_path, content, inputs=("u_V",), output="y_um", name="bad.csv", **options):
+    """Read what is written from the lines (or the bytes) and return the message of the refusal."""
+    file = tmp_path / name
+    if isinstance(content, bytes):
+        file.write_bytes(content)
+    else:
+        file.write_text("\n".join(content) + "\n", encoding="utf-8")
+    with pytest.raises(RecordError) as caught:
+        read_record(file, inputs, output, **options)
+    return str(caught.value)
+
+
+def changed(line, column, cell, samples=60):
+    """Return the sound record with one cell exchanged; the line is counted as a person does."""
+    rows = lines(samples)
+    cells = rows[line - 1].split(",")
+    cells[column] = cell
+    rows[line - 1] = ",".join(cells)
+    return rows
+
+
+def archived(tmp_path, inputs=("u",), output="y", **arrays):
+    k = np.arange(60)
+    np.savez(tmp_path / "bad.npz", **({"u": k % 7 - 3.0, "y": k * k % 11 + 0.5, "dt": 0.01} | arrays))
+    with pytest.raises(RecordError) as caught:
+        read_record(tmp_path / "bad.npz", inputs, output)
+    return str(caught.value)

@@ -1,0 +1,61 @@
+"""Text tables that are no record are refused with a message that says what to do."""
+
+import pytest
+
+from support.bad_records import changed, lines, refusal
+
+
+def test_a_header_without_a_single_name_is_refused(tmp_path):
+    assert refusal(tmp_path, b",,\n,,\n").startswith("bad.csv has a header in line 1 and not a single sample")
+    rows = [",,", *lines()[1:]]
+    assert "bad.csv has no column u_V; it has (none with a name)" in refusal(tmp_path, rows)
+
+
+@pytest.mark.parametrize("header", [[], [""]])
+def test_a_file_without_a_header_is_refused(tmp_path, header):
+    message = refusal(tmp_path, [*header, *lines()[1:]])
+    assert f"bad.csv, line {len(header) + 1} holds the number 0 where names are expected" in message
+    assert "add a header line" in message
+
+
+def test_a_european_file_without_a_header_is_refused_for_that(tmp_path):
+    rows = [f"0,{k:03d};1,5;2,5" for k in range(60)]
+    assert "line 1 holds the number 0,000" in refusal(tmp_path, rows)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xef\xbb\xbf", b"\n \n\r\n"])
+def test_an_empty_file_is_refused(tmp_path, content):
+    message = refusal(tmp_path, content)
+    assert "bad.csv is empty" in message
+    assert "a header with names and a line per sample" in message
+
+
+@pytest.mark.parametrize("content", [b"t_s,u_V,y_um", b"t_s,u_V,y_um\r\n\r\n,,\r\n"])
+def test_a_file_with_a_header_only_is_refused(tmp_path, content):
+    message = refusal(tmp_path, content)
+    assert "bad.csv has a header in line 1 and not a single sample" in message
+
+
+def test_a_file_that_is_not_utf_8_is_refused_at_its_byte(tmp_path):
+    rows = changed(3, 1, "5µ")
+    message = refusal(tmp_path, "\n".join(rows).encode("latin-1"))
+    assert "bad.csv, line 3: byte 0xb5 at position" in message
+    assert "save the file as UTF-8" in message
+
+
+def test_decimal_commas_and_points_in_one_file_are_refused(tmp_path):
+    rows = ["t_s;u_V;y_um", *(f"{k / 100:.2f};{k % 7},5;{k % 11}" for k in range(60))]
+    message = refusal(tmp_path, rows)
+    assert "a decimal comma in bad.csv, line 2, column u_V (0,5)" in message
+    assert "a decimal point in bad.csv, line 2, column t_s (0.00)" in message
+    assert "the same mark" in message
+
+
+def test_marks_for_thousands_are_refused(tmp_path):
+    rows = ["t_s;u_V;y_um", *(f"{k};{k % 7};1.{k:03d},5" for k in range(60))]
+    assert "line 2, column y_um: '1.000,5' is not a number" in refusal(tmp_path, rows)
+
+
+def test_a_quote_that_is_never_closed_is_refused(tmp_path):
+    message = refusal(tmp_path, changed(40, 1, '"3'))
+    assert "is a quote never closed?" in message

@@ -1,0 +1,236 @@
+"""Equations of models, in plain text, in LaTeX and in MathML."""
+
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+
+from islands.model.equations import equation, latex_equation, mathml_equation
+from islands.model.expression import Apply, Lagged, Primitive
+from islands.model.model import model_of
+from islands.model.parsing import parse
+from islands.model.text import mathml
+from support.strategies import models, regressors
+
+U, Y = Lagged(1, 1), Lagged(0, 1)
+
+MODEL_12 = model_of(
+    [
+        (parse("y(k-1)"), 1.0),
+        (parse("phi1(u(k-1), u(k-2))"), 0.77),
+        (parse("u(k-2)*phi2(u(k-2), u(k-3))*phi1(u(k-2), u(k-3))"), 1.44e-2),
+        (parse("y(k-1)*phi2(u(k-2), u(k-3))*phi1(u(k-2), u(k-3))"), -9.6e-3),
+        (parse("u(k-2)^2*phi1(u(k-2), u(k-3))"), 3.15e-4),
+        (parse("u(k-2)*y(k-1)*phi1(u(k-2), u(k-3))"), -2.46e-4),
+    ]
+)
+
+
+def test_the_equation_of_the_papers_model_12():
+    assert equation(MODEL_12) == (
+        "y(k) = 1*y(k-1) - 0.000246*y(k-1)*u(k-2)*(u(k-2) - u(k-3))"
+        " - 0.0096*y(k-1)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3))"
+        " + 0.000315*u(k-2)^2*(u(k-2) - u(k-3))"
+        " + 0.0144*u(k-2)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3)) + 0.77*(u(k-1) - u(k-2))"
+    )
+
+
+def test_the_latex_of_the_papers_model_12_rounds_to_the_digits_asked_for():
+    assert latex_equation(MODEL_12, digits=1).startswith(
+        r"y_{k} = 1 \, y_{k-1} - 0.0002 \, y_{k-1} u_{k-2} \left(u_{k-2} - u_{k-3}\right)"
+        r" - 0.01 \, y_{k-1} \operatorname{sign}(u_{k-2} - u_{k-3}) \left(u_{k-2} - u_{k-3}\right)"
+    )
+
+
+def test_an_equation_without_parameters_numbers_them():
+    bare = model_of(
+        [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("u1", "u2")
+    )
+    bare = type(bare)(bare.regressors, input_names=bare.input_names)
+    assert equation(bare) == "y(k) = theta1*y(k-1) + theta2*(u1(k-1) + u2(k-1)) + theta3"
+    assert latex_equation(bare) == (
+        r"y_{k} = \theta_{1} \, y_{k-1} + \theta_{2} \, \left(u_{1,k-1} + u_{2,k-1}\right) + \theta_{3}"
+    )
+
+
+def test_an_equation_shows_very_small_and_negative_parameters():
+    model = model_of([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
+    assert equation(model) == "y(k) = -1.5e-07*y(k-1) - 2*u(k-1) - 0.25"
+    assert latex_equation(model) == r"y_{k} = -1.5 \times 10^{-7} \, y_{k-1} - 2 \, u_{k-1} - 0.25"
+
+
+def test_a_quotient_keeps_its_brackets_behind_its_parameter():
+    # 0.5*u/y would be read as (0.5*u)/y, another regressor: division is protected.
+    assert equation(model_of([(parse("u(k-1)/y(k-1)"), 0.5)])) == "y(k) = 0.5*(u(k-1)/y(k-1))"
+
+
+@given(models(inputs=2))
+def test_the_inputs_of_an_equation_are_numbered_where_there_are_several(model):
+    assert "u(" not in equation(model)
+    written = latex_equation(model)
+    assert written.count("{") == written.count("}")
+    assert written.count(r"\left") == written.count(r"\right")
+
+
+# MathML: a reader of the browser's page sees what stands in plain text.
+
+_SEEN = {
+    "\u2212": " - ",
+    "+": " + ",
+    "=": " = ",
+    "\u2062": "*",
+    "\u2061": "",
+    "\u00d7": "e",
+    "\u03b8": "theta",
+}
+
+
+def seen(element):
+    """Plain text of what is visible: an ``mrow`` keeps nothing together, brackets alone do."""
+    parts = [seen(child) for child in element]
+    match element.tag, parts:
+        case (("mi" | "mn" | "mo"), []):
+            return _SEEN.get(element.text, element.text)
+        case "msub", ["theta", index]:
+            return f"theta{index}"
+        case "msub", [name, index]:
+            channel, _, time = index.rpartition(",")
+            return f"{name}{channel}({time.replace(' ', '')})"
+        case "msup", ["10", exponent]:
+            # Of a number: a power of the constant 10 has brackets.
+            return exponent.replace(" ", "")
+        case "msup", ["q", exponent]:
+            return f"q{exponent.removeprefix(' - ')}"
+        case "msup", [base, exponent]:
+            return f"{base}^{exponent}"
+        case "mfrac", [first, second]:
+            return f"div({first}, {second})"
+        case "msqrt", [inside]:
+            return inside.replace("abs", "sqrt", 1)
+        case "mrow", ["|", inside, "|"]:
+            return f"abs({inside})"
+        case "mrow", ["ln", "", inside]:
+            return inside.replace("abs", "log", 1)
+        case (("math" | "mrow" | "mtable" | "mtr" | "mtd"), _):
+            return "".join(parts)
+    raise AssertionError(ElementTree.tostring(element))
+
+
+def seen_in(text):
+    return seen(ElementTree.fromstring(text))
+
+
+@pytest.mark.parametrize(
+    ("text", "what_is_seen"),
+    [
+        ("y(k-12)", "y(k-12)"),
+        ("u(k)", "u(k)"),
+        ("-2*u(k-1)", "( - 2)*u(k-1)"),
+        ("1e-5 + y(k-1)", "1e-5 + y(k-1)"),
+        ("1e-5*u(k-1)", "1e-5*u(k-1)"),
+        ("-1.5e200*u(k-1)", "( - 1.5e200)*u(k-1)"),
+        ("u(k-1)*2*3*(-4)", "u(k-1)*(2)*(3)*( - 4)"),
+        ("2^2*(1e-5)^2*(-3)^2", "(2)^2*(1e-5)^2*( - 3)^2"),
+        ("10^2*u(k-1)", "(10)^2*u(k-1)"),
+        ("u(k-1)^3*(y(k-1) - 1)^2", "u(k-1)^3*(y(k-1) - 1)^2"),
+        ("(u(k-1)*y(k-1) + 1)^2", "(u(k-1)*y(k-1) + 1)^2"),
+        ("sign(u(k-1))^2*abs(u(k-1))^2", "sign(u(k-1))^2*abs(u(k-1))^2"),
+        ("(u(k-1)/y(k-1))^2*(u(k-1)/y(k-2))", "(div(u(k-1), y(k-1)))^2*div(u(k-1), y(k-2))"),
+        ("sqrt(y(k-1) + 2*u(k-1))^2*sqrt(u(k-1))", "(sqrt(y(k-1) + 2*u(k-1)))^2*sqrt(u(k-1))"),
+        ("log(y(k-1))^2*log(u(k-1) - 1)", "(log(y(k-1)))^2*log(u(k-1) - 1)"),
+        ("max(u(k-1), exp(y(k-1)))", "max(u(k-1),exp(y(k-1)))"),
+        ("u(k-1) - (y(k-1) - 1)", "u(k-1) - (y(k-1) - 1)"),
+        ("u(k-1) + (-1)", "u(k-1) + ( - 1)"),
+        ("phi2(u(k-1), u(k-2))", "phi2(u(k-1),u(k-2))"),
+        ("q2(u(k-1)*y(k-1))", "q2*(u(k-1)*y(k-1))"),
+        ("u(k-1)*q1(y(k-1))", "u(k-1)*(q1*y(k-1))"),
+    ],
+)
+def test_what_is_seen_of_an_expression_in_mathml(text, what_is_seen):
+    assert seen_in(mathml(parse(text))) == what_is_seen
+
+
+def test_a_leaf_in_mathml():
+    assert mathml(Lagged(2, 3), 2) == (
+        "<msub><mi>u</mi><mrow><mn>2</mn><mo>,</mo><mi>k</mi><mo>&#x2212;</mo><mn>3</mn></mrow></msub>"
+    )
+
+
+def test_a_fraction_and_a_root_in_mathml():
+    past = "<mrow><mi>k</mi><mo>&#x2212;</mo><mn>1</mn></mrow>"
+    u, y = (f"<msub><mi>{name}</mi>{past}</msub>" for name in "uy")
+    assert mathml(parse("u(k-1)/y(k-1)")) == f"<mfrac>{u}{y}</mfrac>"
+    assert mathml(parse("sqrt(u(k-1))")) == f"<msqrt><mrow><mo>|</mo>{u}<mo>|</mo></mrow></msqrt>"
+
+
+def test_the_name_of_a_function_cannot_break_mathml():
+    for name, written in (("a<b&c>", "a&lt;b&amp;c&gt;"), ("\u03c3", "&#963;"), ("{0}", "{0}")):
+        text = mathml(Apply(Primitive(name, 1, abs, "{0}"), (U,)))
+        assert f"<mi>{written}</mi>" in text
+        assert seen_in(text) == f"{name}(u(k-1))"
+
+
+@given(models(inputs=2))
+def test_mathml_of_every_model_shows_its_plain_equation(model):
+    written = mathml_equation(model)
+    left, _, shown = seen_in(written).partition(" = ")
+    assert left == "y(k)"
+    # Text is parsed, because a number and a product are written in more than one way.
+    assert parse(shown) == parse(equation(model).removeprefix("y(k) = "))
+
+
+@given(models(inputs=1, most=12))
+def test_mathml_of_every_model_is_a_block_of_ascii_with_a_sign_between_two_terms(model):
+    written = mathml_equation(model)
+    assert written.isascii()
+    assert written.startswith('<math display="block">')
+    assert written.count('form="infix"') == model.size - 1
+    assert "u1" not in seen_in(written)
+
+
+@given(models(inputs=2, most=12))
+def test_a_row_of_mathml_is_short_or_a_single_term(model):
+    rows = ElementTree.fromstring(mathml_equation(model)).findall(".//mtr")
+    for row in rows:
+        text = "".join(row[1].itertext())
+        signs = [mark for mark in row[1].iter("mo") if mark.get("form") == "infix"]
+        assert len(text) <= 80 or len(signs) <= 1
+    # Another row begins only where the term did not fit.
+    for row, following in pairwise(rows):
+        assert "form" in following[1][0].attrib
+        assert len("".join((*row[1].itertext(), *following[1].itertext()))) > 80
+
+
+def test_a_short_equation_is_no_table():
+    written = mathml_equation(
+        model_of([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
+    )
+    assert "mtable" not in written
+    assert seen_in(written) == "y(k) =  - 1.5e-7*y(k-1) - 2*u(k-1) - 0.25"
+
+
+def test_the_mathml_of_the_papers_model_12_has_two_rows_and_the_digits_asked_for():
+    root = ElementTree.fromstring(mathml_equation(MODEL_12, digits=1))
+    first, second = (seen(row) for row in root.findall(".//mtr"))
+    assert first == (
+        "y(k) = 1*y(k-1) - 0.0002*y(k-1)*u(k-2)*(u(k-2) - u(k-3))"
+        " - 0.01*y(k-1)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3))"
+    )
+    assert second == (
+        " + 0.0003*u(k-2)^2*(u(k-2) - u(k-3))"
+        " + 0.01*u(k-2)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3)) + 0.8*(u(k-1) - u(k-2))"
+    )
+
+
+def test_mathml_without_parameters_numbers_them():
+    named = model_of(
+        [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("a", "b")
+    )
+    bare = type(named)(named.regressors, input_names=named.input_names)
+    assert seen_in(mathml_equation(bare)) == "y(k) = theta1*y(k-1) + theta2*(u1(k-1) + u2(k-1)) + theta3"
+
+
+@given(regressors(inputs=2))
+def test_mathml_of_every_regressor_is_one_element(item):
+    assert ElementTree.fromstring(mathml(item.expression, 2)).tag in {"mrow", "msub", "mn", "mfrac", "msqrt"}
