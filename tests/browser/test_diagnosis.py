@@ -8,9 +8,10 @@ import pytest
 
 from islands_service.blobs import Blobs
 from islands_service.jobs import EXTENDED, REPORT, JobState, Outcome, Report
-from support.played import claimed, stored
+from support.played import stored
 from support.screen import Screen
 from support.service_processes import Service
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -42,7 +43,7 @@ def test_a_diagnosis_is_followed_and_says_what_it_found(
     job = submitted(desk, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
     with stored(desk) as store:
-        lease = claimed(store, job)
+        lease = taken(store, job)
         store.leases.report(lease, Report({"phase": "looking for each of 32 effects"}))
         expect(page.locator(".stand .words")).to_have_text("looking for each of 32 effects")
         store.leases.finish(lease, diagnosed(desk))
@@ -72,7 +73,7 @@ def test_a_long_finding_does_not_leave_a_narrow_screen(
     job = submitted(desk)
     with stored(desk) as store:
         effects = ["thermal-drift", "rate-dependent-loop", "second-hysteresis"]
-        store.leases.finish(claimed(store, job), diagnosed(desk, effects=effects))
+        store.leases.finish(taken(store, job), diagnosed(desk, effects=effects))
     page = quiet(desk.url, width=380).go(f"#/jobs/{job}")
     for place in (f"#/jobs/{job}", "#/jobs"):
         page.goto(f"{desk.url}/{place}")
@@ -85,8 +86,8 @@ def test_the_list_says_what_was_found(quiet: Callable[..., Screen], desk: Servic
     jobs = [submitted(desk, name=name) for name in ("one", "two")]
     nothing = {"verdict": "nothing", "effects": [], "reduction_percent": None}
     with stored(desk) as store:
-        store.leases.finish(claimed(store, jobs[0]), diagnosed(desk))
-        store.leases.finish(claimed(store, jobs[1]), diagnosed(desk, **nothing))
+        store.leases.finish(taken(store, jobs[0]), diagnosed(desk))
+        store.leases.finish(taken(store, jobs[1]), diagnosed(desk, **nothing))
     page = quiet(desk.url).go()
     for job, words in zip(jobs, ("named: thermal-drift", "nothing"), strict=True):
         expect(page.locator(f"tr[data-job='{job}'] .words")).to_have_text(words)

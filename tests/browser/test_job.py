@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 
 from islands_service.jobs import JobState, Outcome
-from support.played import advance, claimed, squared_error, stored
+from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen
 from support.service_processes import Service
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -34,7 +35,7 @@ def test_the_course_grows_with_the_events_and_is_the_history(
     page = quiet(desk.url).go(f"#/jobs/{job}")
     expect(page.locator(".title .state")).to_have_text("queued")
     with stored(desk) as store:
-        lease = claimed(store, job)
+        lease = taken(store, job)
         expect(page.locator(".title .state")).to_have_text("running")
         for first, last in ((0, 40), (41, 90), (91, 200)):
             advance(store, lease, first, last)
@@ -55,7 +56,7 @@ def test_a_failure_is_told_in_the_services_words(
 ) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
-        store.leases.finish(claimed(store, job), Outcome(JobState.FAILED, problem=PROBLEM))
+        store.leases.finish(taken(store, job), Outcome(JobState.FAILED, problem=PROBLEM))
     page = quiet(desk.url).go(f"#/jobs/{job}")
     expect(page.locator(".failure")).to_have_text("The job failed" + PROBLEM["detail"])
     assert page.locator(".failure b").count() == 0
@@ -99,7 +100,7 @@ def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
     job = desk.submit(500)
     page = quiet(desk.url).go(f"#/jobs/{job}")
     with stored(desk) as store:
-        lease = claimed(store, job)
+        lease = taken(store, job)
         advance(store, lease, 0, 10)
         page.get_by_role("button", name="Cancel").click()
         expect(page.locator(".title .state")).to_have_text("cancelling")
@@ -117,7 +118,7 @@ def test_what_somebody_else_resumes_is_seen(quiet: Callable[..., Screen], desk: 
     desk.ask("POST", f"/v1/jobs/{job}/resume")
     expect(page.locator(".title .state")).to_have_text("queued")
     with stored(desk) as store:
-        advance(store, claimed(store, job), 0, 5)
+        advance(store, taken(store, job), 0, 5)
     expect(page.locator(".stand .words")).to_have_text("5 / 500")
 
 
@@ -142,7 +143,7 @@ def test_an_answer_that_comes_late_does_not_bring_back_what_was(
 def test_a_reload_keeps_the_place(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
-        advance(store, claimed(store, job), 0, 30)
+        advance(store, taken(store, job), 0, 30)
     page = quiet(desk.url, height=500).go(f"#/jobs/{job}")
     expect(page.locator("figure.chart").first).to_be_visible()
     page.locator("table code", has_text="y_um").wait_for()
@@ -159,7 +160,7 @@ def test_every_island_has_a_line_however_many_there_are(
 ) -> None:
     job = desk.submit(500, settings={"islands": 20})
     with stored(desk) as store:
-        advance(store, claimed(store, job), 0, 30, islands=20)
+        advance(store, taken(store, job), 0, 30, islands=20)
     page = quiet(desk.url).go(f"#/jobs/{job}")
     chart = page.locator("figure.chart").first
     expect(chart.locator("path.faint")).to_have_count(20)

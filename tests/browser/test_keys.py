@@ -6,10 +6,11 @@ from typing import Any
 import pytest
 
 from islands_service.store import Store
-from support.played import advance, claimed, stored
+from support.played import advance, stored
 from support.reading import unreadable
 from support.screen import Screen
 from support.service_processes import Service, serving
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -96,7 +97,7 @@ def test_the_events_of_a_job_come_with_the_key(
     page = screens(locked.url).go(f"#/jobs/{job}")
     enter(page, key)
     with stored(locked) as store:
-        lease = claimed(store, job)
+        lease = taken(store, job)
         for last in (5, 6, 7):
             advance(store, lease, last, last)
             expect(page.locator(".stand .words")).to_have_text(f"{last} / 500")

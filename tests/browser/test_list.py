@@ -6,9 +6,10 @@ from typing import Any
 import pytest
 
 from islands_service.jobs import JobState, Outcome
-from support.played import advance, claimed, stored
+from support.played import advance, stored
 from support.screen import Screen
 from support.service_processes import Service
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -28,7 +29,7 @@ def test_a_job_shows_up_and_passes_through_its_states(
     expect(state).to_have_text("queued")
     expect(row(page, job)).to_contain_text("waits for its turn")
     with stored(desk) as store:
-        lease = claimed(store, job)
+        lease = taken(store, job)
         advance(store, lease, 0, 125)
         expect(state).to_have_text("running")
         expect(row(page, job)).to_contain_text("125 / 500")

@@ -6,10 +6,11 @@ from typing import Any
 import pytest
 
 from islands_service.jobs import JobState, Outcome
-from support.played import advance, claimed, stored
+from support.played import advance, stored
 from support.reading import unreadable
 from support.screen import Screen
 from support.service_processes import Service
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -24,11 +25,11 @@ def places(desk: Service) -> dict[str, str]:
     cancelled = desk.submit(500, name="cancelled")
     running = desk.submit(500, name="running", settings={"islands": 8})
     with stored(desk) as store:
-        lease = claimed(store, failed)
+        lease = taken(store, failed)
         advance(store, lease, 0, 100)
         store.leases.finish(lease, Outcome(JobState.FAILED, problem=problem))
-        store.leases.finish(claimed(store, cancelled), Outcome(JobState.CANCELLED))
-        advance(store, claimed(store, running), 0, 212, islands=8)
+        store.leases.finish(taken(store, cancelled), Outcome(JobState.CANCELLED))
+        advance(store, taken(store, running), 0, 212, islands=8)
     desk.submit(500, name="queued")
     return {"list": "#/jobs", "nothing": "#/jobs?state=succeeded", "failed": failed, "running": running}
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from support.played import advance, claimed, squared_error, stored
+from support.played import advance, squared_error, stored
 from support.processes import eventually, kill
 from support.screen import Screen
 from support.service_processes import Service
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -56,7 +57,7 @@ def test_a_job_goes_on_where_its_stream_was_cut(
 ) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
-        lease = claimed(store, job)
+        lease = taken(store, job)
         advance(store, lease, 0, 50)
         screen = screens(desk.url)
         resumed: list[str] = []
@@ -96,7 +97,7 @@ def test_a_killed_service_is_back_before_anybody_does_anything(
     kill(desk.one("api"))
     desk.ready()
     with stored(desk) as store:
-        advance(store, claimed(store, job), 0, 7)
+        advance(store, taken(store, job), 0, 7)
     expect(page.locator(".stand .words")).to_have_text("7 / 500")
 
 

@@ -13,11 +13,12 @@ import pytest
 
 from islands_service.jobs import JobState, Outcome
 from support.command_line import ISLANDS, write_hysteresis
-from support.played import claimed, stored
+from support.played import stored
 from support.processes import eventually
 from support.reading import unreadable
 from support.screen import Screen
 from support.service_processes import Service
+from support.stores import taken
 
 pytestmark = pytest.mark.ci
 
@@ -73,7 +74,7 @@ def carried_out(desk: Service) -> Iterator[Any]:
             done = pool.submit(run, *command)
             new = eventually(lambda: set(jobs(desk)) - before or done.done())
             assert new is not True, done.result()
-            lease = claimed(store, new.pop())
+            lease = taken(store, new.pop())
             store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {}, summary={"equation": "y(k) = 42"}))
             return done.result()
 

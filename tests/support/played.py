@@ -9,9 +9,6 @@ from islands_service.jobs import Lease, Report
 from islands_service.store import Store
 from support.service_processes import Service
 
-#: Seconds of a lease: longer than any test.
-_LONG = 3600.0
-
 GENERATIONS = 500
 
 
@@ -20,14 +17,6 @@ def stored(service: Service) -> Iterator[Store]:
     """The service's own store."""
     with Store(f"sqlite:///{service.folder / 'islands.db'}") as store:
         yield store
-
-
-def claimed(store: Store, job: str) -> Lease:
-    """Take a job, and before it all that wait in front of it."""
-    while (lease := store.leases.claim("test", _LONG)) is not None:
-        if lease.job.id == job:
-            return lease
-    raise AssertionError(f"job {job} does not wait")
 
 
 def squared_error(generation: int, island: int) -> float:

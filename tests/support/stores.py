@@ -51,6 +51,14 @@ def claimed(store: Store, seconds: float = LONG, owner: str | None = None) -> Le
     return lease
 
 
+def taken(store: Store, job: str) -> Lease:
+    """Claim a job, and before it all that wait in front of it."""
+    while (lease := store.leases.claim(uuid4().hex, LONG)) is not None:
+        if lease.job.id == job:
+            return lease
+    raise AssertionError(f"job {job} does not wait")
+
+
 def point(generation: int) -> tuple[int, int, dict[int, float], tuple[float | None, ...]]:
     return generation, 10 * generation, {3: 1 / (1 + generation)}, (0.5, None)
 

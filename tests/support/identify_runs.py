@@ -1,0 +1,56 @@
+"""Small runs of ``islands identify``: their options, their record, what they leave and refuse."""
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.evolution.engine import SerialEngine
+from islands.evolution.presets import settings_of
+
+SMALL = (
+    "--population",
+    "10",
+    "--generations",
+    "3",
+    "--max-terms",
+    "3",
+    "--shooting",
+    "50",
+    "--max-height",
+    "3",
+)
+#: Every generation is an epoch.
+STEPWISE = (*SMALL, "--migrate-every", "1")
+TWO = (*STEPWISE, "--islands", "2", "--engine", "serial")
+COLUMNS = ("--input", "u_V", "--output", "y_um")
+DEEPEST = settings_of("hysteresis", {"max_height": 12}).maximum_lag
+
+
+def record(samples=700, seed=0, dt=0.01):
+    rng = np.random.default_rng(seed)
+    u, y = 0.1 * np.cumsum(rng.normal(size=samples)), np.zeros(samples)
+    for k in range(3, samples):
+        rise = u[k - 1] - u[k - 2]
+        y[k] = y[k - 1] + 0.8 * rise - 0.3 * y[k - 1] * abs(rise)
+    return Dataset(u, y + 0.001 * rng.normal(size=samples), dt, ("u_V",), "y_um")
+
+
+def refused(found):
+    code, out, error = found
+    assert code == 2, found
+    assert out == ""
+    assert error.startswith("error: ")
+    return error
+
+
+def models(folder):
+    return {path.name: path.read_bytes() for path in sorted((folder / "models").iterdir())}
+
+
+class Broken(SerialEngine):
+    """Fails behind the epoch that ends at generation 1."""
+
+    def run(self, problem, start, stop):
+        for epoch in super().run(problem, start, stop):
+            yield epoch
+            if epoch.archipelago.generation == 1:
+                raise OSError(28, "No space left on device")

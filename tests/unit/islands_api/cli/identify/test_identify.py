@@ -1,0 +1,261 @@
+"""``islands identify`` from inside: what it keeps, what it refuses, and what its options say."""
+
+import json
+import signal
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.io.checkpoints import read_checkpoint, write_hall
+from islands.io.records import write_record
+from islands.model.model import model_of
+from islands.model.parsing import parse
+from islands.simulation.predictors import free_run
+from islands_api.cli import run as command
+from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused
+
+# A run.
+
+
+def test_a_run_leaves_a_result_a_checkpoint_and_no_litter(run, with_figures, tmp_path):
+    code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4")
+    assert (code, error) == (0, "")
+    assert "out/: result.json, models/, figures/, summary.txt" in out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "checkpoint.json",
+        "figures",
+        "hall.json",
+        "models",
+        "result.json",
+        "summary.txt",
+    }
+    assert {"convergence.svg", "front.svg", "free-run.svg", "loop.svg", "hold.svg"} <= {
+        path.name for path in (tmp_path / "out/figures").iterdir()
+    }
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["generations"], search["evaluations"]) == (3, 40)
+    assert search["feasible_share"] == search["outcomes"]["ok"] / 40
+    assert search["wall_s"] > 0
+    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
+    assert archipelago.generation == 3
+    assert about["job"]["seed"] == archipelago.islands[0].seed == 4
+    assert [about["history"][at][0] for at in (0, -1)] == [0, 3]
+    assert search["ended_by"] == "generations"
+
+
+def test_signals_are_as_before_when_a_run_is_over(run):
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_what_an_earlier_run_left_in_the_folder_is_not_taken_for_this_one_s(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--test", "0.2")[0] == 0
+    assert (tmp_path / "out/test.json").exists()
+    assert (tmp_path / "out/hall.json").exists()
+    assert "--force" in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out"))
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--force")[0] == 0
+    assert not (tmp_path / "out/test.json").exists()
+    code, _, error = run(
+        "r.csv", *COLUMNS, *SMALL, "--out", "out", "--force", "--seed", "9", "--wall-time", "1e-9"
+    )
+    assert (code, error) == (
+        2,
+        "error: stopped before the first populations were evaluated: there is no model to keep",
+    )
+    assert not (tmp_path / "out/hall.json").exists()
+    assert not (tmp_path / "out/checkpoint.json").exists()
+
+
+def test_the_hall_of_fame_of_all_islands_stands_beside_the_checkpoint(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
+    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
+    assert len(archipelago.islands) == 2
+    write_hall(archipelago.hall, tmp_path / "expected.json")
+    assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "expected.json").read_bytes()
+    best = [min(entry.fitness for entry in island.hall.entries) for island in archipelago.islands]
+    assert about["history"][-1][3] == best
+
+
+# Test data: nothing touches it.
+
+
+def test_a_fraction_that_is_kept_for_the_test_changes_no_model(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "one", "--test", "0.2")[0] == 0
+    spoilt = record()
+    y = spoilt.y.copy()
+    y[560:] = 5.0 + 0.01 * y[560:]
+    write_record(Dataset(spoilt.u, y, spoilt.dt, ("u_V",), "y_um"), "r.csv")
+    code, out, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "other", "--test", "0.2")
+    assert code == 0
+    assert models(tmp_path / "one") == models(tmp_path / "other")
+    assert json.loads((tmp_path / "one/result.json").read_text())["record"]["samples"] == 560
+    good, bad = (json.loads((tmp_path / name / "test.json").read_text()) for name in ("one", "other"))
+    assert good["outcome"] == bad["outcome"] == "ok"
+    assert good["mape"] < 1.0 < bad["mape"]
+    assert f"touched by nothing before: free run ok, MAPE {bad['mape']:.4f} %" in out
+
+
+def test_the_test_may_be_a_file_or_rows_of_the_record(run, tmp_path):
+    write_record(record(seed=3), "t.csv")
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "file", "--test", "t.csv")[0] == 0
+    code, _, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "rows", "--rows", "0:500", "--test", "500:700")
+    assert code == 0
+    found = [json.loads((tmp_path / name / "test.json").read_text()) for name in ("file", "rows")]
+    assert all(set(each) == {"outcome", "mape", "r2", "rmse", "fit_percent"} for each in found)
+    assert found[0] != found[1]
+
+
+def test_a_diverging_test_is_said_and_stored_as_null_never_as_a_number(tmp_path, capsys):
+    class Diverging:
+        best = property(lambda self: self)
+
+        def simulate(self, tested):
+            return free_run(self.model, tested)
+
+    result = Diverging()
+    result.model = model_of([(parse("y(k-1)"), 2.0)])
+    command._test(result, record(), tmp_path)
+    document = json.loads((tmp_path / "test.json").read_text())
+    assert list(document) == ["outcome"]
+    assert document["outcome"].startswith("diverged: |y| left")
+    assert "MAPE" not in capsys.readouterr().out
+    result.model = model_of([(parse("y(k-1)"), 1.0)])
+    still = record()
+    command._test(result, Dataset(still.u, np.ones(700), 0.01), tmp_path)
+    document = json.loads((tmp_path / "test.json").read_text())
+    assert (document["mape"], document["rmse"]) == (None, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--test", "500:700"), "--test 500:700: say with --rows"),
+        (("--rows", "0:600", "--test", "500:700"), "--test 500:700: say with --rows"),
+        (
+            ("--rows", "0:400", "--validation", "400:600", "--test", "500:700"),
+            "samples that estimate or validate",
+        ),
+        (("--rows", "0:400", "--validation", "300:600"), "--validation 300:600: say with --rows"),
+        (("--test", "r.csv"), "samples that estimate or validate"),
+        (("--rows", "100:700", "--test", "r.csv"), "samples that estimate or validate"),
+        (("--test", "nowhere.csv"), "--test nowhere.csv: give a file that exists"),
+        (("--test", "1.5"), "lies between 0 and 1, got 1.5"),
+        (("--test", "slow.csv"), "sampled at 0.05 s, the record at 0.01 s: resample"),
+        (
+            ("--rows", "0:660", "--test", "660:700", "--max-height", "12"),
+            f"the test data has 40 samples and lags reach down to {DEEPEST}: give more",
+        ),
+    ],
+)
+def test_test_data_that_is_touched_or_unfit_is_refused_before_the_search(run, tmp_path, options, message):
+    write_record(record(dt=0.05), "slow.csv")
+    assert message in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out", *options))
+    assert not (tmp_path / "out").exists()
+
+
+# Budgets.
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--population", "0"), "population is at least 1, got 0"),
+        (("--generations", "-1"), "generations is at least 0, got -1"),
+        (("--max-terms", "0"), "max_terms is at least 1, got 0"),
+        (("--max-height", "-2"), "max_height is at least 0, got -2"),
+        (("--shooting", "0"), "shooting is at least 1, got 0"),
+        (("--preset", "quick"), "unknown preset 'quick': take one of paper-case1"),
+        (("--primitive", "mul", "--primitive", "gamma"), "unknown primitive 'gamma': take one of mul"),
+        (("--constraints", "physics"), "unknown constraints 'physics': take one of none, hysteresis"),
+        (("--validation", "nowhere.csv"), "--validation nowhere.csv: give a file that exists"),
+        (("--input", "u_mV"), "u_mV"),
+        (("--islands", "0"), "islands is at least 1, got 0"),
+        (("--topology", "mesh"), "unknown topology 'mesh': take one of isolated, ring"),
+        (("--topology", "ring:"), "topology 'ring:': a degree from 1 to 99 goes with random-regular alone"),
+        (("--islands", "2", "--topology", "1234567890>1"), "cannot read the edge '1234567890>1'"),
+        (("--migrate-every", "1234567890"), "cannot read migrate_every '1234567890'"),
+        (("--migrate-every", "5,"), "cannot read migrate_every '5,'"),
+        (("--migrants", "-1"), "cannot read migrants '-1'"),
+        (("--islands", "2", "--migrants", "301"), "301 individuals would arrive on an island of 300"),
+        (("--emigrants", "worst"), "unknown emigrants 'worst': take one of best"),
+        (("--replaced", "best"), "unknown replaced 'best': take one of worst"),
+        (("--character", "plain", "--character", "lazy"), "unknown character 'lazy': take one of plain"),
+        (("--max-evaluations", "-1"), "max_evaluations is at least 0, got -1"),
+        (("--target-error", "-0.1"), "target_error is a number and not negative, got -0.1"),
+        (("--target-error", "nan"), "target_error is a number and not negative, got nan"),
+    ],
+)
+def test_a_bad_budget_is_refused_by_name_and_leaves_no_folder(run, tmp_path, options, message):
+    assert message in refused(run("r.csv", *COLUMNS, "--out", "out", *options))
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_missing_is_asked_for(run):
+    assert "give RECORD, --input, --output and --out, or --resume DIR" in refused(
+        run("r.csv", "--out", "out")
+    )
+    assert "there is no file nothing.csv" in refused(run("nothing.csv", *COLUMNS, "--out", "out")).replace(
+        str(command.Path.cwd()) + "/", ""
+    )
+
+
+def test_options_reach_the_settings(run, tmp_path):
+    own = ("--primitive", "mul", "--primitive", "phi1", "--constraints", "none", "--preset", "hysteresis")
+    assert run("r.csv", *COLUMNS, *SMALL, *own, "--out", "out")[0] == 0
+    settings = json.loads((tmp_path / "out/result.json").read_text())["settings"]
+    assert settings["primitives"] == ["mul", "phi1"]
+    assert (settings["constraints"], settings["preset"]) == ("none", "hysteresis")
+    assert (settings["population"], settings["generations"], settings["shooting"]) == (10, 3, 50)
+    assert (settings["max_terms"], settings["max_height"]) == (3, 3)
+
+
+def test_options_of_islands_reach_the_settings(run, tmp_path):
+    own = (
+        *("--islands", "3", "--topology", "random-regular:2", "--migrate-every", "1,2:5"),
+        *("--migrants", "2", "--emigrants", "front", "--replaced", "random"),
+        *("--character", "explorer", "--character", "pruner"),
+        *("--max-evaluations", "1000", "--target-error", "1e-9"),
+    )
+    assert run("r.csv", *COLUMNS, *SMALL, *own, "--engine", "serial", "--out", "out")[0] == 0
+    document = json.loads((tmp_path / "out/result.json").read_text())
+    assert (
+        document["settings"].items()
+        >= {
+            "islands": 3,
+            "topology": "random-regular:2",
+            "migrate_every": "1,2:5",
+            "migrants": "2",
+            "emigrants": "front",
+            "replaced": "random",
+            "characters": ["explorer", "pruner"],
+            "max_evaluations": 1000,
+            "target_error": 1e-9,
+        }.items()
+    )
+    assert document["search"]["evaluations"] == 3 * 40
+    # Schedules and characters are read back from the checkpoint as they were given.
+    assert run("--resume", "out", "--engine", "serial")[0] == 0
+    assert json.loads((tmp_path / "out/result.json").read_text())["settings"] == document["settings"]
+
+
+@pytest.mark.parametrize(
+    ("options", "ended_by", "generations"),
+    [
+        (("--max-evaluations", "20"), "evaluations", 1),
+        (("--max-evaluations", "21"), "evaluations", 2),
+        (("--target-error", "1e3"), "target error", 0),
+    ],
+)
+def test_a_run_ends_by_its_budget_and_says_so(run, tmp_path, options, ended_by, generations):
+    code, _, error = run("r.csv", *COLUMNS, *STEPWISE, *options, "--out", "out")
+    assert (code, error) == (0, "")
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["ended_by"], search["generations"]) == (ended_by, generations)
+    # It has ended: resumed, nothing is left to be done.
+    before = models(tmp_path / "out")
+    assert run("--resume", "out")[0] == 0
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["ended_by"], search["generations"]) == (ended_by, generations)
+    assert models(tmp_path / "out") == before

@@ -1,0 +1,311 @@
+"""A run of ``islands identify``: how it stops and goes on, and by which engine."""
+
+import json
+import signal
+import sys
+from math import inf
+
+import pytest
+
+from islands.evolution.archipelago import founded
+from islands.evolution.engine import SerialEngine
+from islands.evolution.presets import settings_of
+from islands.evolution.search import State
+from islands.io.checkpoints import read_checkpoint, write_checkpoint
+from islands.io.records import write_record
+from islands.io.states import state_document
+from islands.validation.findings import Progress
+from islands_api.cli import run as command
+from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
+
+# Stopped and resumed.
+
+
+@pytest.mark.parametrize(
+    ("generation", "number", "budget"),
+    [(0, signal.SIGINT, STEPWISE), (2, signal.SIGTERM, STEPWISE), (2, signal.SIGINT, TWO)],
+)
+def test_stopped_it_keeps_the_best_so_far_and_resume_goes_on_as_if_never_stopped(
+    run, interrupted, tmp_path, generation, number, budget
+):
+    assert run("r.csv", *COLUMNS, *budget, "--out", "whole")[0] == 0
+    interrupted(generation, number)
+    code, out, error = run("r.csv", *COLUMNS, *budget, "--out", "out")
+    assert code == 0
+    assert error == "stopped: the result is the best so far; go on with --resume out"
+    assert "out/: result.json" in out
+    stopped = json.loads((tmp_path / "out/result.json").read_text())
+    assert stopped["search"]["generations"] == generation
+    assert stopped["search"]["ended_by"] == "stopped"
+    assert stopped["models"]
+    assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == generation
+
+    interrupted(None)
+    code, _, error = run("--resume", "out", "--engine", "serial")
+    assert (code, error) == (0, "")
+    assert models(tmp_path / "out") == models(tmp_path / "whole")
+    assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "whole/hall.json").read_bytes()
+    one, other = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("whole", "out"))
+    for document in (one, other):
+        # Seconds are the machine's; what a cache took is the process's.
+        for name in ("wall_s", "evaluations_per_second", "caches"):
+            del document["search"][name]
+    assert one == other
+
+
+def test_ctrl_c_in_the_last_generation_stops_nothing(run, interrupted):
+    interrupted(3)
+    code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out")
+    assert (code, error) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("signals", "code"),
+    [((signal.SIGINT, signal.SIGINT), 130), ((signal.SIGTERM, signal.SIGTERM), 0)],
+)
+def test_a_second_ctrl_c_interrupts_and_the_epochs_before_are_kept(run, interrupted, tmp_path, signals, code):
+    """Whoever ends processes may send SIGTERM twice: that asks for no more than once does."""
+    interrupted(1, *signals)
+    before = signal.getsignal(signal.SIGINT)
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == code
+    assert (tmp_path / "out/result.json").exists() == (code == 0)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
+
+
+def test_an_epoch_that_cannot_be_shown_is_kept(run, watched, tmp_path):
+    def broken(state):
+        if state.archipelago.generation == 2:
+            raise OSError(28, "No space left on device")
+
+    watched(broken)
+    assert "No space left" in run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[2]
+    archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
+    assert archipelago.generation == about["history"][-1][0] == 2
+
+
+def test_an_island_without_a_model_is_kept_as_none_and_comes_back(tmp_path):
+    """JSON knows no infinity."""
+    history = (
+        Progress(0, 20, {}, (inf, inf)),
+        Progress(1, 40, {2: 0.1 + 0.2}, (0.1 + 0.2, inf)),
+        Progress(2, 60, {1: 0.0, 2: 5e-324}, (0.0, 5e-324)),
+    )
+    state = State(founded(2, 5), 60, 7, {"ok": 31, "diverged": 29}, history)
+    about = {"job": {"seed": 5}, "wall_s": 12.5, **state_document(state)}
+    assert [least for *_, least in about["history"]] == [[None, None], [0.1 + 0.2, None], [0.0, 5e-324]]
+    path = tmp_path / command.CHECKPOINT
+    write_checkpoint(state.archipelago, path, about)
+    assert "Infinity" not in path.read_text()
+    assert command.stored(tmp_path) == ({"seed": 5}, state, 12.5)
+
+
+def test_an_engine_that_fails_loses_no_finished_epoch(run, engines, tmp_path):
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "whole")[0] == 0
+    engines(Broken())
+    assert "No space left" in run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[2]
+    assert not (tmp_path / "out/result.json").exists()
+    assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
+    engines(SerialEngine())
+    assert run("--resume", "out")[0] == 0
+    assert models(tmp_path / "out") == models(tmp_path / "whole")
+
+
+def test_checkpoints_are_written_while_a_search_goes_on(run, watched, monkeypatch, tmp_path):
+    """Every ten seconds: by a clock on which an epoch takes six."""
+    clock, found = [0.0], []
+    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
+
+    def watch(state):
+        clock[0] += 6.0
+        path = tmp_path / "out/checkpoint.json"
+        found.append(read_checkpoint(path)[0].generation if path.exists() else None)
+
+    watched(watch)
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--generations", "6", "--out", "out")[0] == 0
+    # The first populations are kept at once.
+    assert found == [None, 0, 0, 2, 2, 4, 4]
+    assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
+
+
+def test_checkpoints_that_take_long_are_written_less_often(run, watched, monkeypatch, tmp_path):
+    """One takes a second on this clock, and an epoch ten: a twentieth of the time is every other epoch."""
+    clock, written = [0.0], []
+    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
+
+    def slow(archipelago, path, about):
+        clock[0] += 1.0
+        written.append(archipelago.generation)
+        write_checkpoint(archipelago, path, about)
+
+    monkeypatch.setattr(command, "write_checkpoint", slow)
+
+    def watch(state):
+        clock[0] += 10.0
+
+    watched(watch)
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--generations", "6", "--out", "out")[0] == 0
+    assert written == [0, 3, 6, 6]
+
+
+def test_the_clock_may_end_a_run(run, watched, monkeypatch, tmp_path):
+    clock = [50.0]
+    monkeypatch.setattr(command, "monotonic", lambda: clock[0])
+
+    def watch(state):
+        clock[0] += 6.0
+
+    watched(watch)
+    code, _, error = run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--wall-time", "11")
+    assert code == 0
+    assert error.splitlines() == [
+        "stopped: the result is the best so far; go on with --resume out",
+        "an end by --wall-time is not reproducible: how far a search gets by then differs",
+    ]
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert (search["generations"], search["ended_by"]) == (1, "stopped")
+    # The seconds are counted anew: they are how long this process may take.
+    assert "stopped" in run("--resume", "out", "--wall-time", "5")[2]
+    assert json.loads((tmp_path / "out/result.json").read_text())["search"]["generations"] == 2
+    assert run("--resume", "out")[2] == ""
+
+
+def test_the_time_of_a_resumed_run_counts_that_before_it(run, interrupted, tmp_path):
+    interrupted(0)
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 0
+    path = tmp_path / "out/checkpoint.json"
+    document = json.loads(path.read_text())
+    document["about"]["wall_s"] += 1000.0
+    path.write_text(json.dumps(document))
+    assert run("--resume", "out")[0] == 0
+    search = json.loads((tmp_path / "out/result.json").read_text())["search"]
+    assert 1000 < search["wall_s"] < 1100
+    assert 1000 < json.loads(path.read_text())["about"]["wall_s"] < search["wall_s"]
+    assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
+
+
+def test_a_run_that_is_done_is_resumed_to_the_same_result(run, tmp_path):
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
+    before = models(tmp_path / "out")
+    assert run("--resume", "out")[0] == 0
+    assert models(tmp_path / "out") == before
+
+
+def test_it_is_resumed_from_another_folder_too(run, interrupted, tmp_path, monkeypatch):
+    write_record(record(seed=1), "v.csv")
+    interrupted(1)
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--validation", "v.csv")[0] == 0
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert run("--resume", "../out")[0] == 0
+
+
+@pytest.mark.parametrize("changed", ["r.csv", "v.csv", "t.csv"])
+def test_a_file_that_changed_is_refused(run, interrupted, tmp_path, changed):
+    for seed, name in enumerate(("v.csv", "t.csv"), start=1):
+        write_record(record(seed=seed), name)
+    interrupted(1)
+    files = "--validation", "v.csv", "--test", "t.csv"
+    assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", *files)[0] == 0
+    before = models(tmp_path / "out")
+    with (tmp_path / changed).open("a") as stream:
+        stream.write("\n")
+    assert f"{changed} has changed since the run began" in refused(run("--resume", "out"))
+    (tmp_path / changed).unlink()
+    assert "there is no file" in refused(run("--resume", "out"))
+    assert models(tmp_path / "out") == before
+
+
+def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
+    assert "cannot read the checkpoint nowhere/checkpoint.json" in refused(run("--resume", "nowhere"))
+    (tmp_path / "out").mkdir()
+    path = tmp_path / "out/checkpoint.json"
+    write_checkpoint(founded(1, 0), path, {})
+    assert "no checkpoint of islands identify: KeyError('job')" in refused(run("--resume", "out"))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ("r.csv",),
+        ("--out", "there"),
+        ("--seed", "0"),
+        ("--generations", "9"),
+        ("--preset", "narx"),
+        ("--force",),
+        ("--islands", "2"),
+        ("--topology", "ring"),
+        ("--migrate-every", "5"),
+        ("--migrants", "2"),
+        ("--emigrants", "front"),
+        ("--replaced", "random"),
+        ("--character", "plain"),
+        ("--max-evaluations", "100"),
+        ("--target-error", "0.5"),
+    ],
+)
+def test_resume_takes_no_setting_else(run, more):
+    assert "give nothing else" in refused(run("--resume", "out", *more))
+
+
+# Engines: how a run is carried out, never what it finds.
+
+
+@pytest.mark.parametrize(
+    ("number", "manner", "expected"),
+    [
+        (1, (), ("serial", None)),
+        (2, (), ("ray", None)),
+        (2, ("--engine", "serial"), ("serial", None)),
+        (1, ("--engine", "ray"), ("ray", None)),
+        (1, ("--ray-address", "there:6379"), ("ray", "there:6379")),
+    ],
+)
+def test_ray_carries_out_what_it_is_of_use_for_or_asked_for(run, engines, number, manner, expected):
+    asked = engines(SerialEngine())
+    code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--islands", number, *manner)
+    # What an engine has to say is said as it is.
+    assert (code, error) == (0, "[an engine] speaks")
+    # A run that goes on has as many islands as it began with.
+    assert run("--resume", "out", *manner)[0] == 0
+    assert asked == [expected] * 2
+
+
+def test_islands_that_a_preset_brings_count_as_well(run, engines, monkeypatch):
+    several = {"several": settings_of("hysteresis", {"islands": 2})}
+    monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
+    asked = engines(SerialEngine())
+    assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--out", "out")[0] == 0
+    assert run("--resume", "out")[0] == 0
+    assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--islands", "1", "--out", "one")[0] == 0
+    assert asked == [("ray", None), ("ray", None), ("serial", None)]
+
+
+@pytest.mark.parametrize("more", [(), ("--resume", "out")])
+def test_an_address_for_the_serial_engine_is_refused_before_anything_is_done(run, tmp_path, more):
+    new = () if more else ("r.csv", *COLUMNS, *SMALL, "--out", "out")
+    error = refused(run(*new, *more, "--engine", "serial", "--ray-address", "there:6379"))
+    assert "--ray-address goes with --engine ray: the serial engine runs in this process" in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("more", [(), ("--resume", "out")])
+def test_an_unknown_engine_is_refused_before_anything_is_done(run, tmp_path, more):
+    new = () if more else ("r.csv", *COLUMNS, *SMALL, "--out", "out")
+    message = "unknown engine 'dask': take one of serial, ray"
+    assert message in refused(run(*new, *more, "--engine", "dask"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_how_a_run_is_carried_out_may_change_when_it_goes_on(run, engines, interrupted, tmp_path):
+    asked = engines(SerialEngine())
+    assert run("r.csv", *COLUMNS, *TWO, "--out", "whole")[0] == 0
+    interrupted(1)
+    assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
+    interrupted(None)
+    manner = ("--engine", "ray", "--ray-address", "there:6379", "--wall-time", "1e9", "--verbose")
+    code, out, _ = run("--resume", "out", *manner)
+    assert code == 0
+    assert "cache of structures: " in out
+    assert asked == [("serial", None), ("serial", None), ("ray", "there:6379")]
+    assert models(tmp_path / "out") == models(tmp_path / "whole")
