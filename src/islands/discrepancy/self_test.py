@@ -11,7 +11,7 @@ from functools import partial
 from math import inf
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from islands.discrepancy.core import Core
 from islands.discrepancy.decision import Verdict
@@ -171,8 +171,8 @@ def self_test(
 
 def rate(count: int, of: int) -> Rate:
     """Return a rate with its bounds."""
-    low = float(beta.ppf(_OUTSIDE / 2, count, of - count + 1)) if count else 0.0
-    high = float(beta.ppf(1 - _OUTSIDE / 2, count + 1, of - count)) if count < of else 1.0
+    low = float(betaincinv(count, of - count + 1, _OUTSIDE / 2)) if count else 0.0
+    high = float(betaincinv(count + 1, of - count, 1 - _OUTSIDE / 2)) if count < of else 1.0
     return Rate(count / of if of else 0.0, (low, high), of)
 
 

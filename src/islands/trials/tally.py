@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from islands.trials.goals import EXACT, Goals
 from islands.trials.trial import Outcome
@@ -48,9 +48,11 @@ class Share:
     @property
     def bounds(self) -> tuple[float, float]:
         """Clopper and Pearson's 95 % interval, in percent."""
-        low = beta.ppf(_OUTSIDE / 2, self.count, self.of - self.count + 1) if self.count else 0.0
+        low = betaincinv(self.count, self.of - self.count + 1, _OUTSIDE / 2) if self.count else 0.0
         high = (
-            beta.ppf(1 - _OUTSIDE / 2, self.count + 1, self.of - self.count) if self.count < self.of else 1.0
+            betaincinv(self.count + 1, self.of - self.count, 1 - _OUTSIDE / 2)
+            if self.count < self.of
+            else 1.0
         )
         return 100 * float(low), 100 * float(high)
 
