@@ -11,6 +11,7 @@ setup: .venv/ready
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps -e .
+	$(BIN)/python -c 'from islands.warm_up import warm_up; warm_up()'
 	touch $@
 
 demo: setup
@@ -30,9 +31,14 @@ test: setup
 ci: setup
 	$(PYTEST) -n 2 -m ci
 
-# Everything else, and thorough examples for the properties.
+# Another order and other kills every day of the year.
+DAY := $(shell date +%j)
+
+# Everything else: the remaining slow tests, the properties with many examples, and 500 random kills of a service.
 nightly: setup
-	$(PYTEST) -n 2 --hypothesis-profile thorough -m "nightly or hypothesis"
+	$(PYTEST) -n 2 --timeout 1200 --random-order --random-order-seed $(DAY) \
+		--hypothesis-profile thorough -m "nightly or hypothesis"
+	$(BIN)/python benchmarks/service_soak.py --kills 500 --seed $(DAY)
 
 lint: setup
 	$(BIN)/ruff format --check .
