@@ -2,15 +2,18 @@
 
 from collections.abc import Mapping
 from io import BytesIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import FRAME, RESIDUAL, SIMULATED, save
 from islands.trials.hide.piezo import PIEZO
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 COUNTS: Mapping[tuple[str, str], int] = {
     ("delay", "delay"): 4,
@@ -24,25 +27,25 @@ COUNTS: Mapping[tuple[str, str], int] = {
 NAMES = ("offset", "delay", "jump")
 
 
-def rows(figure: Figure) -> list[str]:
+def rows(figure: "Figure") -> list[str]:
     return [text.get_text() for text in figure.axes[0].get_yticklabels()]
 
 
-def columns(figure: Figure) -> list[str]:
+def columns(figure: "Figure") -> list[str]:
     return [text.get_text() for text in figure.axes[0].get_xticklabels()]
 
 
 @pytest.fixture(scope="module")
-def figure() -> Figure:
+def figure() -> "Figure":
     return draw_confusion(COUNTS, NAMES, "a title")
 
 
-def test_names_stand_in_their_order_and_what_has_none_at_the_end(figure: Figure) -> None:
+def test_names_stand_in_their_order_and_what_has_none_at_the_end(figure: "Figure") -> None:
     assert rows(figure) == ["offset", "delay", "ripple", "nothing"]
     assert columns(figure) == ["offset", "delay", "unknown", "nothing"]
 
 
-def test_every_count_stands_in_its_cell(figure: Figure) -> None:
+def test_every_count_stands_in_its_cell(figure: "Figure") -> None:
     cells = {
         (
             rows(figure)[int(text.get_position()[1])],
@@ -67,8 +70,10 @@ def test_every_count_stands_in_its_cell(figure: Figure) -> None:
     ],
 )
 def test_colours_say_right_wrong_or_nothing(
-    figure: Figure, cell: tuple[str, str], colour: str, share: float
+    figure: "Figure", cell: tuple[str, str], colour: str, share: float
 ) -> None:
+    from matplotlib.colors import to_rgb
+
     patches = {
         (rows(figure)[int(each.get_y())], columns(figure)[int(each.get_x())]): each.get_facecolor()[:3]
         for each in figure.axes[0].patches
@@ -95,7 +100,7 @@ def test_a_catalogue_of_names_can_be_read() -> None:
     assert min(label.get_fontsize() for label in axes.get_yticklabels()) >= 6.0
 
 
-def test_the_title_does_not_touch_the_names(figure: Figure) -> None:
+def test_the_title_does_not_touch_the_names(figure: "Figure") -> None:
     figure.draw_without_rendering()
     title = figure._suptitle.get_window_extent()
     assert all(label.get_window_extent().y1 < title.y0 for label in figure.axes[0].get_xticklabels())

@@ -1,15 +1,19 @@
 """A free run's figure: measured and simulated with units, the residual below, nothing lost or invented."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.figures.free_run import draw_free_run
 from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 LONG = 100_000
 
@@ -29,19 +33,21 @@ def noise(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).standard_normal(LONG)
 
 
-def curve(axes: Axes, colour: str) -> tuple[np.ndarray, np.ndarray]:
+def curve(axes: "Axes", colour: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the one line of the axes that has a colour and more than two vertices."""
+    from matplotlib.colors import to_hex
+
     (line,) = (
         item for item in axes.lines if to_hex(item.get_color()) == colour and len(item.get_xdata()) > 2
     )
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
 
 
-def labels(figure: Figure) -> list[tuple[str, str]]:
+def labels(figure: "Figure") -> list[tuple[str, str]]:
     return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
 
 
-def words(axes: Axes) -> list[str]:
+def words(axes: "Axes") -> list[str]:
     return [text.get_text() for text in axes.texts]
 
 

@@ -1,10 +1,9 @@
 """The holds' figure: what stays is flat, what drifts is seen to drift, what diverges is said to."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from islands.data.dataset import Dataset
 from islands.figures.hold import draw_holds
@@ -12,6 +11,12 @@ from islands.figures.style import save
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
 from islands.validation.physics import LEVELS, physics
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
 
 PERIOD = 100
 ANGLE = 2 * np.pi * np.arange(5 * PERIOD) / PERIOD
@@ -35,17 +40,17 @@ BURSTING = model(y=1.01, du=0.15)
 
 
 @pytest.fixture(scope="module")
-def still(record: Dataset) -> Figure:
+def still(record: Dataset) -> "Figure":
     """The figure of a model that stays where it is; no test changes it."""
     return draw_holds(STILL, record, "still")
 
 
 @pytest.fixture(scope="module")
-def bursting(record: Dataset) -> Figure:
+def bursting(record: Dataset) -> "Figure":
     return draw_holds(BURSTING, record)
 
 
-def held(axes: Axes) -> list[Line2D]:
+def held(axes: "Axes") -> "list[Line2D]":
     """Return the lines of the output at rest, one for each level."""
     lines = [line for line in axes.lines if len(line.get_xdata()) > 2 and line.get_xdata()[0] >= 0]
     assert len(lines) == len(LEVELS)

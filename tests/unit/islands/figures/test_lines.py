@@ -1,12 +1,17 @@
 """What of a simulation is drawn, how far the axes follow it, and where it is said to have diverged."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.figures.lines import broken, divergence, drawable, limits, say_diverged, within_reach
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 NAN = np.nan
 
@@ -58,7 +63,9 @@ def test_a_divergence_is_a_simulation_that_ends_before_its_segment():
     assert found == [(slice(0, 4), 2)]
 
 
-def lost(*lines: tuple[list[float], list[float]]) -> Figure:
+def lost(*lines: tuple[list[float], list[float]]) -> "Figure":
+    from matplotlib.figure import Figure
+
     figure = Figure()
     axes = figure.subplots()
     axes.set(xlim=(0.0, 100.0), ylim=(0.0, 10.0))
@@ -66,11 +73,11 @@ def lost(*lines: tuple[list[float], list[float]]) -> Figure:
     return figure
 
 
-def marks(figure: Figure) -> list[tuple[float, float]]:
+def marks(figure: "Figure") -> list[tuple[float, float]]:
     return [(line.get_xdata()[0], line.get_ydata()[0]) for line in figure.axes[0].lines]
 
 
-def words(figure: Figure) -> list[str]:
+def words(figure: "Figure") -> list[str]:
     return [text.get_text() for text in figure.axes[0].texts]
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
@@ -19,6 +18,8 @@ def loops(periods: int, inputs: int = 1, length: int = 200, **changes: object) -
 
 @pytest.mark.parametrize("inputs", [1, 2, 3, 4])
 def test_every_input_has_a_panel_with_its_name_and_unit(inputs):
+    from matplotlib.colors import to_hex
+
     record = loops(3, inputs)
     figure = draw_loop(record, 0.9 * record.y, "title")
     assert [axes.get_xlabel() for axes in figure.axes] == [f"u{channel} (V)" for channel in range(inputs)]

@@ -1,15 +1,19 @@
 """The residual tests' figure: a panel for each test, its band and limit, and the verdict in words."""
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
 from islands.validation.residual_tests import ResidualTests, residual_tests
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 SAMPLES = 1000
 
@@ -23,11 +27,11 @@ def found(inputs: int = 1, coloured: bool = False) -> ResidualTests:
 
 
 @cache
-def drawn(inputs: int = 1, coloured: bool = False, title: str = "") -> Figure:
+def drawn(inputs: int = 1, coloured: bool = False, title: str = "") -> "Figure":
     return draw_residual_correlations(found(inputs, coloured), title)
 
 
-def stems(axes: Axes) -> np.ndarray:
+def stems(axes: "Axes") -> np.ndarray:
     """Return (lag, value) of every stem."""
     (collection,) = axes.collections
     return np.array([segment[1] for segment in collection.get_segments()])

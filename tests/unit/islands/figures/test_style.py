@@ -3,23 +3,32 @@
 import hashlib
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
 from islands.figures.free_run import draw_free_run
 from islands.figures.style import WIDTH, blank, house_style, label, save
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def example() -> Figure:
+
+def example() -> "Figure":
     u = np.sin(np.arange(300) / 10)
     return draw_free_run(
         Dataset(u, 2 * u, 0.1, ("u_V",), "y_um", ("V",), "um"), 1.9 * u, "the same $ content_"
     )
+
+
+@pytest.fixture
+def matplotlib() -> ModuleType:
+    return import_module("matplotlib")
 
 
 @pytest.mark.parametrize(
@@ -39,7 +48,7 @@ def test_a_label_is_the_name_with_its_unit_in_brackets(name, unit, expected):
     assert label(name, unit) == expected
 
 
-def test_settings_hold_again_after_drawing():
+def test_settings_hold_again_after_drawing(matplotlib):
     before = dict(matplotlib.rcParams.copy())
     example()
     with house_style():
@@ -47,7 +56,7 @@ def test_settings_hold_again_after_drawing():
     assert dict(matplotlib.rcParams.copy()) == before
 
 
-def test_settings_hold_again_after_a_failure():
+def test_settings_hold_again_after_a_failure(matplotlib):
     with pytest.raises(ZeroDivisionError), house_style():
         raise ZeroDivisionError
     assert matplotlib.rcParams["svg.hashsalt"] is None
@@ -80,14 +89,14 @@ def test_another_curve_gives_other_bytes(tmp_path):
     assert (tmp_path / "one.svg").read_bytes() != (tmp_path / "other.svg").read_bytes()
 
 
-def test_a_users_settings_do_not_show(tmp_path):
+def test_a_users_settings_do_not_show(tmp_path, matplotlib):
     save(example(), tmp_path / "plain.svg")
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "none"}):
         save(example(), tmp_path / "theirs.svg")
     assert (tmp_path / "theirs.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
 
 
-def test_a_file_holds_no_date_no_image_and_no_font_of_this_machine(tmp_path):
+def test_a_file_holds_no_date_no_image_and_no_font_of_this_machine(tmp_path, matplotlib):
     save(example(), str(tmp_path / "figure.svg"))
     text = (tmp_path / "figure.svg").read_text(encoding="utf-8")
     assert text.count("<svg ") == 1

@@ -4,12 +4,10 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 
 import islands
 from islands.data.dataset import Dataset
@@ -22,6 +20,12 @@ from islands.figures.style import save
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
 from islands.validation.residual_tests import residual_tests
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+    from matplotlib.transforms import Bbox
+
 
 LONG_TITLE = "What a report may want to say over a figure, with the name of a record and of a model, is long"
 
@@ -51,7 +55,7 @@ def diagnosis(samples: int, scale: float, dt: float):
 SHORT, LONG = record(200), record(20_000)
 TWO = record(600, inputs=2, segments=(350, 250))
 LARGE = record(5_000, scale=12_345.0, start=1e4)
-FIGURES: dict[str, Callable[[], Figure]] = {
+FIGURES: dict[str, "Callable[[], Figure]"] = {
     "a short run": lambda: draw_free_run(SHORT, 0.97 * SHORT.y),
     "a long run": lambda: draw_free_run(LONG, 0.97 * LONG.y, LONG_TITLE),
     "a run of two segments": lambda: draw_free_run(TWO, 0.97 * TWO.y, "two segments"),
@@ -93,12 +97,14 @@ every_figure = pytest.mark.parametrize("name", FIGURES)
 class Drawn:
     """A figure, and every text that is drawn with its box: no tick outside its axis is among them."""
 
-    figure: Figure
-    texts: list[tuple[Text, Bbox]]
+    figure: "Figure"
+    texts: "list[tuple[Text, Bbox]]"
 
 
 @cache
 def drawn(name: str) -> Drawn:
+    from matplotlib.text import Text
+
     texts: dict[int, Text] = {}
     figure, original = FIGURES[name](), Text.draw
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 
 from islands.kernels import lanes
 from islands.kernels.lanes import (
@@ -28,6 +27,23 @@ from islands.kernels.lanes import (
 )
 
 COUNTS = (1, 3, 4, 13)
+
+
+@cache
+def compiled(function):
+    from numba import njit
+
+    return njit(function)
+
+
+def njit(function):
+    """Compile a function when it is first called."""
+
+    def run(*arguments):
+        return compiled(function)(*arguments)
+
+    return run
+
 
 SPECIAL = [0.0, -0.0, 1.0, -1.0, np.nan, np.inf, -np.inf, 5e-324, -5e-324, 1e308, -1e308, 1 / 3]
 every_number = st.sampled_from(SPECIAL) | st.floats()
