@@ -9,11 +9,13 @@ import islands
 from islands.figures.discrepancy import DISCREPANCY_FIGURES, draw_ladder, draw_residual
 from islands.figures.style import save
 
+pytestmark = pytest.mark.usefixtures("without_layout")
+
 DT = 0.01
 
 
 @cache
-def diagnosis(friction: float = 0.3, levels: int = 0, samples: int = 1200):
+def diagnosis(friction: float = 0.3, levels: int = 0, samples: int = 900):
     """Return a diagnosis of a column that lacks dry friction; its input may be a staircase."""
     rng = np.random.default_rng(5)
     time = DT * np.arange(samples)
@@ -37,7 +39,7 @@ def of_the_residual():
 @cache
 def long():
     """Return the figures of a diagnosis of a long record, by name."""
-    found = diagnosis(samples=7000)
+    found = diagnosis(samples=6000)
     return {name: draw(found) for name, draw in DISCREPANCY_FIGURES.items()}
 
 

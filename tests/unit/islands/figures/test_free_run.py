@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+pytestmark = pytest.mark.usefixtures("without_layout")
 
-LONG = 100_000
+
+LONG = 40_000
 
 
 def sine(periods: int, samples: int = 400, **changes: object) -> Dataset:
@@ -125,7 +127,7 @@ def test_a_missing_output_stays_open_and_the_simulation_runs_through():
     assert np.isnan(curve(figure.axes[1], RESIDUAL)[1]).sum() == 20
 
 
-@pytest.mark.parametrize("spike", [0, 31_337, LONG - 1])
+@pytest.mark.parametrize("spike", [0, 21_337, LONG - 1])
 def test_a_spike_of_a_single_sample_is_drawn_in_a_long_record(spike):
     y = 0.1 * noise(0)
     y[spike] = 9.0

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
+pytestmark = pytest.mark.usefixtures("without_layout")
+
 
 PERIOD = 100
 ANGLE = 2 * np.pi * np.arange(5 * PERIOD) / PERIOD

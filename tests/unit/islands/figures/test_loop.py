@@ -8,6 +8,8 @@ from islands.errors import SettingsError
 from islands.figures.loop import draw_loop
 from islands.figures.style import MEASURED, SIMULATED, save
 
+pytestmark = pytest.mark.usefixtures("without_layout")
+
 
 def loops(periods: int, inputs: int = 1, length: int = 200, **changes: object) -> Dataset:
     angle = 2 * np.pi * np.arange(periods * length) / length - 0.5

@@ -1,7 +1,7 @@
 """What holds for every figure: no text is cut off or written over another, and saving is repeatable."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -81,16 +81,22 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
 }
 
 
-#: Figures that are saved twice at the fast level, one of each kind.
-SAVED = (
-    "a run of two segments",
-    "a loop of two inputs",
-    "a drifting hold",
-    "residuals",
-    *(f"{name} of a diagnosis, 400 samples of 0.001 s" for name in DISCREPANCY_FIGURES),
-)
+#: Figures of a diagnosis that are drawn at the fast level: of one record, each of its kind.
+DIAGNOSED = tuple(f"{name} of a diagnosis, 400 samples of 0.001 s" for name in DISCREPANCY_FIGURES)
 
-every_figure = pytest.mark.parametrize("name", FIGURES)
+#: Figures that are saved twice at the fast level, one of each kind.
+SAVED = ("a run of two segments", "a loop of two inputs", "a drifting hold", "residuals", *DIAGNOSED)
+
+
+def fast(names: Iterable[str]) -> pytest.MarkDecorator:
+    """Give the names of all figures to a test; all but some are for the night."""
+    kept = set(names)
+    return pytest.mark.parametrize(
+        "name", [name if name in kept else pytest.param(name, marks=pytest.mark.nightly) for name in FIGURES]
+    )
+
+
+every_figure = fast(name for name in FIGURES if name in DIAGNOSED or "diagnosis" not in name)
 
 
 @dataclass(frozen=True)
@@ -146,9 +152,7 @@ def test_no_text_is_smaller_than_a_journal_prints(name):
     assert min(text.get_fontsize() for text, _ in drawn(name).texts) >= 7.0
 
 
-@pytest.mark.parametrize(
-    "name", [name if name in SAVED else pytest.param(name, marks=pytest.mark.nightly) for name in FIGURES]
-)
+@fast(SAVED)
 def test_saving_twice_gives_the_same_bytes(name, tmp_path):
     for file in ("first", "second"):
         save(drawn(name).figure, tmp_path / f"{file}.svg")
