@@ -1,4 +1,4 @@
-"""Diagnosis: what it refuses, what it never sees, and that the same question has the same answer."""
+"""A diagnosis: what it names, what it refuses, what it does not see, and that it is the same each time."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from islands.trials.trial import TOLERANCE
 
 @pytest.fixture(scope="module")
 def record() -> Dataset:
-    return hide(["quadratic-drag"], np.random.default_rng(8), seconds=24.0, band=(1.0, 4.0)).record
+    return hide(["quadratic-drag"], np.random.default_rng(8), seconds=6.0, band=(1.0, 4.0)).record
 
 
 @pytest.fixture(scope="module")
@@ -73,18 +73,30 @@ def test_what_is_locked_away_is_seen_by_the_gain_alone(record: Dataset, found: D
     assert other.gain.after.rmse > 5 * found.gain.after.rmse
 
 
-def test_a_parameter_without_a_tolerance_is_calibrated_and_no_discrepancy(record: Dataset) -> None:
-    clean = hide([], np.random.default_rng(9), seconds=24.0).record
-    off = BoucWenPiezoCore(BoucWenPiezo(dp=1.3, A=0.7))
-    assert diagnose(clean, off).verdict == Verdict.NOTHING
-    trusted = diagnose(clean, off, TOLERANCE)
+@pytest.fixture(scope="module")
+def clean() -> Dataset:
+    return hide([], np.random.default_rng(9), seconds=6.0).record
+
+
+#: A simulation with two parameters that are far from those of the records.
+OFF = BoucWenPiezoCore(BoucWenPiezo(dp=1.3, A=0.7))
+
+
+def test_a_parameter_without_a_tolerance_is_calibrated_and_no_discrepancy(clean: Dataset) -> None:
+    assert diagnose(clean, OFF).verdict == Verdict.NOTHING
+
+
+def test_a_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> None:
+    trusted = diagnose(clean, OFF, TOLERANCE)
     assert {each.name for each in trusted.effects} <= {"wrong-parameter", "sensor-gain", "input-gain"}
     assert trusted.effects
 
 
 def test_a_column_is_a_simulation(record: Dataset) -> None:
     simulated = np.array(BoucWenPiezoCore().simulate(*_nominal(record)))
-    drifted = replace(record, y=simulated + 0.5 * record.time / 24.0 + 0.01 * np.sin(37.0 * record.time**2))
+    drifted = replace(
+        record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
+    )
     found = diagnose(drifted, ColumnCore("theirs", simulated))
     assert [each.name for each in found.effects if each.eta is not None] == ["linear-drift"]
     assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)

@@ -17,15 +17,21 @@ from support.simulated_records import recorded
 #: Level at which the upper tank overflows, and what the pump brings beside what it is told.
 RIM, BESIDE = 4.0, 0.8
 
-#: What is looked for beside the tanks' own effects.
-RIVALS = ("delay", "input-saturation", "exponential-creep", "output-saturation", "offset")
+#: What is looked for beside the tanks' own effects: at the fast level, and at the nightly level.
+RIVALS = (
+    ("offset",),
+    pytest.param(
+        ("delay", "input-saturation", "exponential-creep", "output-saturation", "offset"),
+        marks=pytest.mark.nightly,
+    ),
+)
 
 
 def silent(_line: str) -> None:
     pass
 
 
-def overflowing(rim: float, beside: float, samples: int = 600, dt: float = 4.0) -> Dataset:
+def overflowing(rim: float, beside: float, samples: int = 400, dt: float = 4.0) -> Dataset:
     """Integrate two tanks in small Euler steps; a part of what goes over the upper rim is caught below."""
     rng = np.random.default_rng(12)
     pump = np.repeat(rng.uniform(0.5, 5.5, samples // 30 + 1), 30)[:samples]
@@ -43,15 +49,15 @@ def overflowing(rim: float, beside: float, samples: int = 600, dt: float = 4.0) 
     return recorded(pump, np.array(y) + 0.01 * rng.standard_normal(samples), dt, ("V", "V"))
 
 
-@pytest.fixture(scope="module")
-def weighed():
+@pytest.fixture(scope="module", params=RIVALS, ids=len)
+def weighed(request):
     record = overflowing(RIM, BESIDE)
     core = simulation(PhysicalSpec(kind="cascaded-tanks"), record)
     fitted = fitted_samples(record)
     alone = Extended(core, (), scene_of(record, core, fitted))
     target = Target(record.y, np.arange(record.samples) < fitted, None, {})
     base = calibrate(alone, target, alone.nominal)
-    effects = [*core.effects, *(CATALOGUE[name] for name in RIVALS)]
+    effects = [*core.effects, *(CATALOGUE[name] for name in request.param)]
     evidence = by_misfit(base, target, effects, silent, map)
     return record, fitted, evidence, judged(evidence, fitted, np.random.default_rng(0))
 

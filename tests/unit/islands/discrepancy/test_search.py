@@ -14,6 +14,7 @@ from islands.discrepancy.core import Core
 from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
 from islands.discrepancy.cores.column import ColumnCore
 from islands.discrepancy.cores.program import ProgramCore
+from islands.discrepancy.effect import Effect
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.explanation import Explanation, without_effect
 from islands.discrepancy.extended import Extended
@@ -35,6 +36,22 @@ def backwards(function: Callable, arguments: Iterable) -> Iterator:
     return iter(reversed(found))
 
 
+#: Effects of several families, for searches whose law does not depend on how many there are.
+SOME = (
+    "delay",
+    "offset",
+    "jump",
+    "thermal-drift",
+    "exponential-creep",
+    "even-nonlinearity",
+    "cubic-stiffness",
+)
+
+
+def some(effects: Iterable[Effect]) -> list[Effect]:
+    return [effect for effect in effects if effect.name in SOME]
+
+
 def calibrated(record: Dataset, core: Core, effective: float | None = None) -> tuple[Calibrated, Target]:
     samples = fitted_samples(record)
     simulation = Extended(core, (), scene_of(record, core, samples))
@@ -43,12 +60,12 @@ def calibrated(record: Dataset, core: Core, effective: float | None = None) -> t
 
 
 def test_the_order_of_the_work_changes_no_bit_of_the_ladder() -> None:
-    u = wave()
+    u = wave(300)
     core = BoucWenPiezoCore()
     plain, _ = calibrated(recorded(u, u), core)
     y = plain.output + 1e-4 * u**2 + 0.05 * np.random.default_rng(2).standard_normal(u.size)
     base, target = calibrated(recorded(u, y), core)
-    effects = effects_for(core, base.simulation.scene, {})
+    effects = some(effects_for(core, base.simulation.scene, {}))
     forwards, back = (ladder(base, target, effects, spread) for spread in (map, backwards))
     assert [rung.effect.name for rung in forwards] == [rung.effect.name for rung in back]
     for one, other in zip(forwards, back, strict=True):
@@ -126,7 +143,7 @@ def test_what_a_second_cause_remembers_is_no_noise_once_it_is_found() -> None:
     noise = 0.05 * np.random.default_rng(3).standard_normal(u.size)
     core = ColumnCore("theirs", u)
     base, target = calibrated(recorded(u, u + 0.02 * u**2 + 0.3 * (time > 8.0) + noise), core)
-    effects = effects_for(core, base.simulation.scene, {})
+    effects = some(effects_for(core, base.simulation.scene, {}))
     rungs = ladder(base, target, effects)
     memory = rungs[0].fit.noise
     assert memory.order > 0
@@ -175,19 +192,19 @@ def test_what_explains_more_is_put_in_the_place_of_what_misled() -> None:
     assert [each.without.effects for each in found.rivals] == [(found.effects[1],), (found.effects[0],)]
 
 
-def test_of_effects_that_do_the_same_the_catalogue_s_first_goes_first() -> None:
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
+def test_of_effects_that_do_the_same_the_catalogue_s_first_goes_first(seed: int) -> None:
     """Rounding does not choose: a sensor's zero and a force that is always there cannot be told apart."""
     oscillator = made()["second-order"]
     record, core = oscillator.record, oscillator.core
-    for seed in range(4):
-        noise = 1e-3 * np.random.default_rng(seed).standard_normal(record.samples)
-        base, target = calibrated(replace(record, y=record.y + 0.01 + noise), core)
-        effects = effects_for(core, base.simulation.scene, {})
-        one, other = ladder(base, target, effects)[:2]
-        assert (one.effect.cause, other.effect.cause) == ("offset", "input-offset")
-        assert one.gained(base) == pytest.approx(other.gained(base), abs=EQUAL)
-        found, _ = explained(base, (one, other), target, effects, silent)
-        assert [each.name for each in found.effects] == ["offset"]
+    noise = 1e-3 * np.random.default_rng(seed).standard_normal(record.samples)
+    base, target = calibrated(replace(record, y=record.y + 0.01 + noise), core)
+    effects = effects_for(core, base.simulation.scene, {})
+    one, other = ladder(base, target, effects)[:2]
+    assert (one.effect.cause, other.effect.cause) == ("offset", "input-offset")
+    assert one.gained(base) == pytest.approx(other.gained(base), abs=EQUAL)
+    found, _ = explained(base, (one, other), target, effects, silent)
+    assert [each.name for each in found.effects] == ["offset"]
 
 
 def test_what_explodes_without_an_effect_begins_anew() -> None:

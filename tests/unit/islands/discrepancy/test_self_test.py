@@ -1,12 +1,13 @@
 """The self-test: surrogates are what they are said to be, and its answers hang on the seed alone."""
 
 import pickle
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from islands.discrepancy import reference
 from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
 from islands.discrepancy.cores.column import ColumnCore
 from islands.discrepancy.diagnosis import Candidate, Diagnosis, diagnose
@@ -18,11 +19,19 @@ from islands.trials.hide.records import hide
 from islands.trials.trial import TOLERANCE
 
 CORE = BoucWenPiezoCore()
-FEW = ("offset", "jump", "coulomb-friction")
+FEW = ("offset", "jump")
 
 
-def clean(pole: float = 0.0) -> Diagnosis:
-    return diagnose(hide([], np.random.default_rng(5), 6.0, pole).record, CORE, TOLERANCE)
+@pytest.fixture(scope="module", autouse=True)
+def _small_reference() -> Iterator[None]:
+    """Look with few random waves for what a residual still holds: that takes half of an analysis' time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference, "WAVES", 20)
+        yield
+
+
+def clean() -> Diagnosis:
+    return diagnose(hide([], np.random.default_rng(5), 6.0).record, CORE, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +60,7 @@ def column(source: Surrogates) -> tuple[Diagnosis, ColumnCore]:
 
 @pytest.fixture(scope="module")
 def tested(column: tuple[Diagnosis, ColumnCore]) -> SelfTest:
-    return self_test(*column, seed=3, effects=FEW, clean=6)
+    return self_test(*column, seed=3, effects=FEW, clean=1)
 
 
 def steps(source: Surrogates, effect: Effect, seed: int = 0) -> tuple[Injection, ...]:
@@ -59,8 +68,10 @@ def steps(source: Surrogates, effect: Effect, seed: int = 0) -> tuple[Injection,
 
 
 def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
-    found = clean(0.8)
-    source = surrogates_of(found, CORE, TOLERANCE)
+    hiding = hide([], np.random.default_rng(5), 6.0, 0.8, apart=False)
+    core = ColumnCore("theirs", hiding.nominal)
+    found = diagnose(hiding.record, core)
+    source = surrogates_of(found, core, {})
     drawn = [source.drawn(Probe(None, seed)) for seed in range(12)]
     assert all(np.array_equal(each.u, found.record.u) for each in drawn)
     noise = [each.y - source.simulated() for each in drawn]
@@ -124,6 +135,7 @@ def test_strengths_that_a_response_leaps_over_are_left_out(
     assert [each.misfit for each in found] == pytest.approx([0.15, 2.0])
 
 
+@pytest.mark.ci
 def test_a_limit_is_a_strength_that_is_named(diagnosis: Diagnosis) -> None:
     found = self_test(diagnosis, CORE, TOLERANCE, 3, effects=("coulomb-friction",), clean=0)
     friction = found.detection_limits["coulomb-friction"]
@@ -154,7 +166,7 @@ def test_the_same_seed_has_the_same_result_in_any_order(
     column: tuple[Diagnosis, ColumnCore], tested: SelfTest
 ) -> None:
     assert any(tested.detection_limits.values())
-    again = self_test(*column, seed=3, run=backwards, effects=FEW, clean=6)
+    again = self_test(*column, seed=3, run=backwards, effects=FEW, clean=1)
     assert again.detection_limits == tested.detection_limits
     assert again.false_alarm_rate == tested.false_alarm_rate
     assert again.p_value == tested.p_value
@@ -162,8 +174,8 @@ def test_the_same_seed_has_the_same_result_in_any_order(
 
 
 def test_another_seed_has_another_result(column: tuple[Diagnosis, ColumnCore], tested: SelfTest) -> None:
-    other = self_test(*column, seed=4, effects=FEW, clean=6)
-    assert other.detection_limits != tested.detection_limits
+    other = self_test(*column, seed=4, effects=FEW[-1:], clean=0)
+    assert other.detection_limits[FEW[-1]] != tested.detection_limits[FEW[-1]]
 
 
 def test_an_effects_result_does_not_hang_on_the_others(

@@ -41,7 +41,7 @@ def test_an_identified_model_follows_a_clean_record() -> None:
 
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
-    hiding = hide(["even-nonlinearity"], np.random.default_rng(4), 20.0, band=(2.0, 4.0), apart=False)
+    hiding = hide(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), apart=False)
     return diagnose(hiding.record, CORES["column"].made(hiding))
 
 
@@ -62,7 +62,7 @@ def test_an_oracle_without_a_name_or_without_a_gain_is_none(found: Diagnosis) ->
 
 def test_two_names_are_told_one_after_the_other() -> None:
     hiding = hide(
-        ["offset", "even-nonlinearity"], np.random.default_rng(6), 20.0, band=(1.0, 3.0), apart=False
+        ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), apart=False
     )
     found = diagnose(hiding.record, CORES["column"].made(hiding))
     share = share_of_gain(found, ["offset", "even-nonlinearity"], {})
