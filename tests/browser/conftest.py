@@ -4,16 +4,22 @@ Without playwright or Chromium these tests are skipped. Fixtures live as long as
 event loop running in this thread meanwhile, and other modules' tests may need one of their own.
 """
 
+import json
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from islands_service.store import Store
 from support.screen import Screen
 from support.service_processes import Service, serving
 
 CHROMIUM = Path("/usr/bin/chromium")
+
+#: Puts a key where the page keeps it.
+KEPT = "sessionStorage.setItem('islands.key', {})"
 
 _INSTALL = "install it with 'apt-get install --no-install-recommends chromium'"
 
@@ -69,6 +75,36 @@ def quiet(screens: Callable[..., Screen]) -> Iterator[Callable[..., Screen]]:
 
     yield make
     assert [screen.complaints for screen in made] == [[]] * len(made)
+
+
+@pytest.fixture(scope="module")
+def guarded(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """What runs a service that needs a key, which its client has."""
+
+    @contextmanager
+    def run(*options: object) -> Iterator[Service]:
+        folder = tmp_path_factory.mktemp("guarded") / "data"
+        folder.mkdir()
+        with Store(f"sqlite:///{folder / 'islands.db'}") as store:
+            _, secret = store.keys.create("test", frozenset({"read", "write"}))
+        with serving(folder, "--require-keys", *options) as service:
+            service.client.headers["Authorization"] = f"Bearer {secret}"
+            yield service
+
+    return run
+
+
+@pytest.fixture
+def opened(quiet: Callable[..., Screen], service: Service) -> Callable[..., Any]:
+    """Opens an address of the module's service, with the key at hand."""
+
+    def open_at(place: str, **options: Any) -> Any:
+        screen = quiet(service.url, **options)
+        secret = service.client.headers["Authorization"].removeprefix("Bearer ")
+        screen.page.add_init_script(KEPT.format(json.dumps(secret)))
+        return screen.go(place)
+
+    return open_at
 
 
 @pytest.fixture(scope="module")

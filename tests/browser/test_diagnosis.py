@@ -58,13 +58,13 @@ def test_a_diagnosis_is_followed_and_says_what_it_found(
     with page.context.expect_page() as opened:
         page.get_by_role("link", name="Read the report").click()
     expect(opened.value.get_by_role("heading", level=1)).to_have_text("piezo.csv against bouc-wen-piezo")
-    with page.expect_download() as taken:
+    with page.expect_download() as saved:
         page.get_by_role("button", name="Save the report").click()
-    taken.value.save_as(tmp_path / "report.html")
+    saved.value.save_as(tmp_path / "report.html")
     assert (tmp_path / "report.html").read_bytes() == PAGE
-    with page.expect_download() as taken:
+    with page.expect_download() as saved:
         page.get_by_role("button", name="Save the mended simulation").click()
-    assert taken.value.suggested_filename == f"extended-{job[:8]}.json"
+    assert saved.value.suggested_filename == f"extended-{job[:8]}.json"
 
 
 def test_a_long_finding_does_not_leave_a_narrow_screen(

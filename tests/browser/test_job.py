@@ -13,8 +13,6 @@ from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
 
-pytestmark = pytest.mark.ci
-
 PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7 <b>column y</b> is empty"}
 
 
@@ -28,6 +26,7 @@ def island_errors(generation: int, islands: int = 2) -> list[float]:
     return [sqrt(squared_error(generation, island)) for island in range(islands)]
 
 
+@pytest.mark.ci
 def test_the_course_grows_with_the_events_and_is_the_history(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -51,6 +50,7 @@ def test_the_course_grows_with_the_events_and_is_the_history(
     expect(sizes.locator(".place")).to_have_text("terms 5")
 
 
+@pytest.mark.ci
 def test_a_failure_is_told_in_the_services_words(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -64,6 +64,7 @@ def test_a_failure_is_told_in_the_services_words(
     assert names == ["Resume", "Delete"]
 
 
+@pytest.mark.ci
 def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -94,6 +95,7 @@ def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
     assert desk.ask("GET", f"/v1/jobs/{job}").status_code == 404
 
 
+@pytest.mark.ci
 def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -110,6 +112,7 @@ def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
     expect(page.locator(".stand .words")).to_have_text("10 / 500")
 
 
+@pytest.mark.nightly
 def test_what_somebody_else_resumes_is_seen(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
     job = desk.submit(500)
     desk.ask("POST", f"/v1/jobs/{job}/cancel")
@@ -122,6 +125,7 @@ def test_what_somebody_else_resumes_is_seen(quiet: Callable[..., Screen], desk: 
     expect(page.locator(".stand .words")).to_have_text("5 / 500")
 
 
+@pytest.mark.nightly
 def test_an_answer_that_comes_late_does_not_bring_back_what_was(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -140,6 +144,7 @@ def test_an_answer_that_comes_late_does_not_bring_back_what_was(
     assert page.locator(".title .state").text_content() == "queued"
 
 
+@pytest.mark.ci
 def test_a_reload_keeps_the_place(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
@@ -155,6 +160,7 @@ def test_a_reload_keeps_the_place(quiet: Callable[..., Screen], desk: Service, e
     assert page.url.endswith(f"#/jobs/{job}")
 
 
+@pytest.mark.ci
 def test_every_island_has_a_line_however_many_there_are(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -168,6 +174,7 @@ def test_every_island_has_a_line_however_many_there_are(
     assert legend(page) == pytest.approx([island_errors(30, 20)[0], island_errors(30, 20)[19]])
 
 
+@pytest.mark.ci
 def test_a_job_that_is_not_there_is_said_not_to_be(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -178,6 +185,7 @@ def test_a_job_that_is_not_there_is_said_not_to_be(
     expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
 
 
+@pytest.mark.ci
 def test_a_job_that_is_deleted_while_it_is_looked_at_is_gone(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -189,6 +197,7 @@ def test_a_job_that_is_deleted_while_it_is_looked_at_is_gone(
     expect(page.get_by_role("heading", name="There is no such job")).to_be_visible(timeout=10_000)
 
 
+@pytest.mark.ci
 def test_the_settings_and_the_data_are_those_of_the_job(quiet: Callable[..., Screen], desk: Service) -> None:
     page = quiet(desk.url).go(f"#/jobs/{desk.submit(321, rows='0:3500')}")
     page.locator("table code", has_text="y_um").wait_for()
@@ -224,6 +233,7 @@ EQUATIONS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("source", EQUATIONS)
 def test_nothing_but_mathematics_comes_in_with_an_equation(
     screens: Callable[..., Screen], desk: Service, source: str

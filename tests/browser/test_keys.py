@@ -5,23 +5,16 @@ from typing import Any
 
 import pytest
 
-from islands_service.store import Store
 from support.played import advance, stored
 from support.reading import unreadable
 from support.screen import Screen
-from support.service_processes import Service, serving
+from support.service_processes import Service
 from support.stores import taken
-
-pytestmark = pytest.mark.ci
 
 
 @pytest.fixture(scope="module")
-def locked(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    folder = tmp_path_factory.mktemp("locked") / "data"
-    folder.mkdir()
-    with Store(f"sqlite:///{folder / 'islands.db'}") as store:
-        store.keys.create("without one it would not start", frozenset({"read"}))
-    with serving(folder, "--coordinators", 0, "--require-keys") as service:
+def locked(guarded: Callable[..., Any]) -> Iterator[Service]:
+    with guarded("--coordinators", 0) as service:
         yield service
 
 
@@ -44,6 +37,7 @@ def enter(page: Any, secret: str) -> None:
     page.keyboard.press("Enter")
 
 
+@pytest.mark.ci
 def test_a_key_is_asked_for_refused_if_wrong_and_kept_if_right(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
@@ -69,6 +63,7 @@ def test_a_key_is_asked_for_refused_if_wrong_and_kept_if_right(
     assert page.evaluate("sessionStorage.getItem('islands.key')") is None
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 360])
 def test_the_question_can_be_read_by_everybody(
@@ -79,6 +74,7 @@ def test_the_question_can_be_read_by_everybody(
     assert unreadable(page) == []
 
 
+@pytest.mark.ci
 def test_the_key_stands_in_no_address(screens: Callable[..., Screen], locked: Service, key: str) -> None:
     screen = screens(locked.url)
     asked: list[str] = []
@@ -90,6 +86,7 @@ def test_the_key_stands_in_no_address(screens: Callable[..., Screen], locked: Se
     assert not [url for url in [*asked, page.url] if key in url]
 
 
+@pytest.mark.ci
 def test_the_events_of_a_job_come_with_the_key(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
@@ -103,6 +100,7 @@ def test_the_events_of_a_job_come_with_the_key(
             expect(page.locator(".stand .words")).to_have_text(f"{last} / 500")
 
 
+@pytest.mark.ci
 def test_another_ones_jobs_are_not_seen(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
@@ -114,6 +112,7 @@ def test_another_ones_jobs_are_not_seen(
     expect(page.get_by_role("heading", name="No jobs yet")).to_be_visible()
 
 
+@pytest.mark.nightly
 def test_a_revoked_key_is_asked_for_again_with_the_reason(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
@@ -126,6 +125,7 @@ def test_a_revoked_key_is_asked_for_again_with_the_reason(
     assert page.evaluate("sessionStorage.getItem('islands.key')") is None
 
 
+@pytest.mark.nightly
 def test_what_a_key_does_not_allow_is_said(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:

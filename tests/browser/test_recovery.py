@@ -14,8 +14,6 @@ from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
 
-pytestmark = pytest.mark.ci
-
 
 @contextmanager
 def away(service: Service) -> Iterator[None]:
@@ -31,6 +29,7 @@ def away(service: Service) -> Iterator[None]:
     service.ready()
 
 
+@pytest.mark.ci
 def test_the_list_says_that_the_service_is_away_and_recovers(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -52,6 +51,7 @@ def test_the_list_says_that_the_service_is_away_and_recovers(
     expect(page.get_by_role("status")).to_have_text("The service is back.")
 
 
+@pytest.mark.ci
 def test_a_job_goes_on_where_its_stream_was_cut(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -88,6 +88,7 @@ def test_a_job_goes_on_where_its_stream_was_cut(
     assert float(shown) == pytest.approx(squared_error(150, 0) ** 0.5)
 
 
+@pytest.mark.nightly
 def test_a_killed_service_is_back_before_anybody_does_anything(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
@@ -101,6 +102,7 @@ def test_a_killed_service_is_back_before_anybody_does_anything(
     expect(page.locator(".stand .words")).to_have_text("7 / 500")
 
 
+@pytest.mark.nightly
 def test_a_page_that_is_opened_while_the_service_fails_says_so(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:

@@ -20,8 +20,6 @@ from support.screen import Screen
 from support.service_processes import Service
 from support.stores import taken
 
-pytestmark = pytest.mark.ci
-
 
 @pytest.fixture(scope="module")
 def commands(chromium: Any, desk: Service) -> dict[str, str]:
@@ -81,6 +79,7 @@ def carried_out(desk: Service) -> Iterator[Any]:
         yield carry_out
 
 
+@pytest.mark.ci
 def test_the_command_line_submits_and_watches(
     commands: dict[str, str], folder: Path, carried_out: Any
 ) -> None:
@@ -89,12 +88,14 @@ def test_the_command_line_submits_and_watches(
     assert "rank" in done.stdout
 
 
+@pytest.mark.nightly
 def test_the_client_submits_and_waits(commands: dict[str, str], folder: Path, carried_out: Any) -> None:
     done = carried_out(folder, sys.executable, "-c", commands["Python"])
     assert done.returncode == 0, done.stderr
     assert done.stdout == "y(k) = 42\n"
 
 
+@pytest.mark.ci
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
 def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: Service) -> None:
     upload, submit = commands["curl"].split("\n", 1)
@@ -106,6 +107,7 @@ def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: 
     assert submitted.stdout.partition('"id":"')[2].partition('"')[0] in jobs(desk)
 
 
+@pytest.mark.ci
 def test_the_welcome_makes_room_for_the_first_job(
     chromium: Any, commands: dict[str, str], desk: Service, expect: Any
 ) -> None:
