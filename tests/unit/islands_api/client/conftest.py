@@ -13,13 +13,12 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from itertools import pairwise
 from typing import Any
 from uuid import uuid4
 
 import pytest
 
-from islands_api.client import AsyncClient, Client, transport
+from islands_api.client import AsyncClient, Client, asynchronous, synchronous, transport
 from islands_service.jobs import Lease
 from support.service import Service, kept
 from support.stores import LONG
@@ -103,6 +102,19 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have the client try again sooner than it does: for tests of what it does, not when."""
     monkeypatch.setattr(transport, "DELAYS", (0.03, 0.06))
     monkeypatch.setattr(transport, "LAST_DELAY", 0.1)
+
+
+@pytest.fixture
+def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The seconds for which the client waits before it asks again; it does not wait here."""
+    made: list[float] = []
+
+    async def pause(seconds: float) -> None:
+        made.append(seconds)
+
+    monkeypatch.setattr(synchronous, "sleep", made.append)
+    monkeypatch.setattr(asynchronous, "sleep", pause)
+    return made
 
 
 @pytest.fixture
@@ -269,16 +281,11 @@ class Script:
     answers: list[Answer]
     asked: list[tuple[float, str, dict[str, str]]] = field(default_factory=list)
 
-    @property
-    def pauses(self) -> list[float]:
-        """Seconds between the requests."""
-        times = [at for at, *_ in self.asked]
-        return [later - earlier for earlier, later in pairwise(times)]
-
 
 @pytest.fixture
 def scripted() -> Iterator[Callable[..., Script]]:
     """What makes a server that gives some answers in turn; the last one stays."""
+    over = threading.Event()
     with ExitStack() as stack:
 
         def make(*answers: Answer, delay: float = 0.0) -> Script:
@@ -295,7 +302,7 @@ def scripted() -> Iterator[Callable[..., Script]]:
                     status, headers, body = script.answers[0]
                     if len(script.answers) > 1:
                         script.answers.pop(0)
-                    time.sleep(delay)
+                    over.wait(delay)
                     self.send_response(status)
                     for name, value in {**headers, "Content-Length": str(len(body))}.items():
                         self.send_header(name, value)
@@ -315,6 +322,7 @@ def scripted() -> Iterator[Callable[..., Script]]:
             stack.callback(server.server_close)
             stack.callback(thread.join)
             stack.callback(server.shutdown)
+            stack.callback(over.set)
             return script
 
         yield make

@@ -72,7 +72,7 @@ def test_a_change_is_told_when_it_happens(
     began = time.monotonic()
     later(0.2, service.store.jobs.cancel, me.owner, job.id)
     assert [each.state for each in client.progress(job)] == ["queued", "cancelled"]
-    assert 0.2 <= time.monotonic() - began < 5.0
+    assert 0.2 <= time.monotonic() - began < 25.0
     asked = [entry for entry in service.logs if entry.get("path") == f"/v1/jobs/{job.id}"]
     assert len(asked) == 2  # as it is, and when it has changed: nobody asks again and again
 
@@ -102,7 +102,7 @@ def test_waiting_ends_in_time(client: Any, job: Any) -> None:
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=f"job {job.id} is still queued after 0.3 s"):
         client.wait(job, 0.3)
-    assert 0.3 <= time.monotonic() - began < 3.0
+    assert 0.3 <= time.monotonic() - began < 25.0
 
 
 def test_waiting_ends_in_time_though_the_job_goes_on(
@@ -114,7 +114,7 @@ def test_waiting_ends_in_time_though_the_job_goes_on(
     began = time.monotonic()
     with pytest.raises(TimeoutError, match="is still running after"):
         client.wait(job, 0.3)
-    assert 0.3 <= time.monotonic() - began < 3.0
+    assert 0.3 <= time.monotonic() - began < 25.0
 
 
 def test_waiting_ends_in_time_though_the_service_is_away(connect: Any, me: Any, wire: Any) -> None:
@@ -124,18 +124,18 @@ def test_waiting_ends_in_time_though_the_service_is_away(connect: Any, me: Any, 
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=r"is not known to have ended after 0.3 s: .* does not answer"):
         client.wait(job, 0.3)
-    assert time.monotonic() - began < 3.0
+    assert time.monotonic() - began < 25.0
 
 
 def test_waiting_ends_in_time_though_the_service_hangs(
     connect: Any, scripted: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transport, "GRACE", 0.1)
-    server = scripted((200, {}, b"{}"), delay=2.5)
+    server = scripted((200, {}, b"{}"), delay=60.0)
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=r"job 0 is not known to have ended after 0.2 s"):
         connect(server.url).wait("0", 0.2)
-    assert time.monotonic() - began < 2.4
+    assert time.monotonic() - began < 25.0
 
 
 def test_a_service_that_is_away_for_too_long_ends_the_waiting(connect: Any, me: Any, wire: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from islands_api.client import ServiceError, Unreachable, calls
+from islands_api.client import ServiceError, Unreachable, calls, transport
 from islands_service.jobs import JobState
 from islands_service.store.database import StoreInDoubt
 from support.service import Service, served
@@ -106,13 +106,13 @@ def test_what_never_left_may_be_sent_again(client: Any, connect: Any, me: Any, w
 def test_a_service_that_comes_back_in_time_is_waited_for(
     connect: Any, me: Any, wire: Any, later: Any
 ) -> None:
-    client = connect(wire.url, me.secret)
+    client = connect(wire.url, me.secret, retry=25.0)
     client.jobs()
     wire.tear()
     later(0.3, wire.mend)
     began = time.monotonic()
     assert client.submit(me.dataset, **SPEC).state == JobState.QUEUED
-    assert 0.2 < time.monotonic() - began < 5.0
+    assert time.monotonic() - began > 0.2
 
 
 def test_a_service_that_stays_away_is_told_of_in_time(connect: Any, me: Any, wire: Any) -> None:
@@ -122,27 +122,26 @@ def test_a_service_that_stays_away_is_told_of_in_time(connect: Any, me: Any, wir
     began = time.monotonic()
     with pytest.raises(Unreachable) as caught:
         client.jobs()
-    assert 0.2 <= time.monotonic() - began < 5.0
+    assert 0.2 <= time.monotonic() - began < 25.0
     assert str(caught.value) == (
         f"the service at {wire.url} does not answer (Connection refused): is it running, and is this its "
         "address?"
     )
 
 
-def test_nobody_waits_who_does_not_want_to(connect: Any, wire: Any) -> None:
+def test_nobody_waits_who_does_not_want_to(connect: Any, wire: Any, pauses: list[float]) -> None:
     wire.tear()
-    began = time.monotonic()
     with pytest.raises(Unreachable):
         connect(wire.url, retry=0.0).jobs()
-    assert time.monotonic() - began < 1.9  # the others try again for two seconds
+    assert pauses == []
 
 
 def test_a_service_that_hangs_is_told_of(connect: Any, scripted: Any) -> None:
-    server = scripted(EMPTY, delay=0.6)
+    server = scripted(EMPTY, delay=60.0)
     began = time.monotonic()
     with pytest.raises(Unreachable, match=r"does not answer \(timed out|ReadTimeout\)"):
         connect(server.url, timeout=0.2, retry=0.1).jobs()
-    assert time.monotonic() - began < 3.0
+    assert time.monotonic() - began < 25.0
 
 
 @pytest.mark.parametrize("url", ["127.0.0.1:8000", "localhost", "ftp://here", "http://", "http://[::1", ""])
@@ -155,12 +154,14 @@ def test_what_is_no_address_is_refused_at_once(connect: Any, url: str) -> None:
 # No time.
 
 
-def test_a_service_that_has_no_time_is_asked_again_when_it_says(connect: Any, scripted: Any) -> None:
+def test_a_service_that_has_no_time_is_asked_again_when_it_says(
+    connect: Any, scripted: Any, pauses: list[float]
+) -> None:
     server = scripted(refused(429, 1), refused(503), EMPTY)
     assert connect(server.url).jobs().items == ()
-    first, second = server.pauses
+    first, second = pauses
     assert first >= 1.0
-    assert second < 0.9
+    assert second <= max(transport.DELAYS)
 
 
 # Their moments stand in no test's name: every process that collects has its own.
@@ -169,10 +170,12 @@ def test_a_service_that_has_no_time_is_asked_again_when_it_says(connect: Any, sc
     ["soon", "-5", "", from_now(-3600.0), "1e9", "٣"],
     ids=["soon", "negative", "empty", "gone by", "no whole number", "foreign digit"],
 )
-def test_what_is_no_time_to_come_back_at_is_passed_over(connect: Any, scripted: Any, after: str) -> None:
+def test_what_is_no_time_to_come_back_at_is_passed_over(
+    connect: Any, scripted: Any, pauses: list[float], after: str
+) -> None:
     server = scripted(refused(503, after.encode().decode("latin-1")), EMPTY)
     assert connect(server.url).jobs().items == ()
-    assert server.pauses[0] < 0.9
+    assert [pause <= max(transport.DELAYS) for pause in pauses] == [True]
 
 
 @pytest.mark.parametrize("after", [3, from_now(3600.0)], ids=["seconds", "moment"])

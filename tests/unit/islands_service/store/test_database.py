@@ -152,7 +152,7 @@ def test_a_new_file_that_is_locked_is_waited_for_and_then_told(tmp_path, monkeyp
         began = time.monotonic()
         with pytest.raises(StoreUnavailable, match="locked"):
             database.write(executing("SELECT 1"))
-        assert 0.3 < time.monotonic() - began < 10
+        assert 0.3 < time.monotonic() - began < 25
         other.execute("COMMIT")
     database.write(executing("SELECT * FROM taken"))
     database.close()
@@ -210,7 +210,7 @@ def test_a_server_that_takes_connections_and_never_answers_is_given_up(monkeypat
         began = time.monotonic()
         with pytest.raises(StoreUnavailable, match="timeout"):
             database.write(executing("SELECT 1"))
-        assert time.monotonic() - began < 10
+        assert time.monotonic() - began < 25
         database.close()
 
 
