@@ -58,7 +58,7 @@ POOL = tuple(
     Individual(genes)
     for genes in (
         *(tuple(map(parse, texts)) for texts in AWKWARD),
-        *drawn(80),
+        *drawn(60),
     )
 )
 

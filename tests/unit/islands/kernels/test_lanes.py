@@ -26,7 +26,8 @@ from islands.kernels.lanes import (
     write,
 )
 
-COUNTS = (1, 3, 4, 13)
+#: How many vectors an operation takes at once; each is compiled for itself.
+COUNTS = (1, 13, *(pytest.param(count, marks=pytest.mark.nightly) for count in (3, 4)))
 
 
 @cache
