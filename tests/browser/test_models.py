@@ -182,12 +182,13 @@ def test_the_page_is_small_and_soon_there(
     finished: str,
     expect: Any,
 ) -> None:
-    started = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
-    plain = screens(service.url).go("healthz").evaluate(started)
+    painted = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
+    plain = screens(service.url).go("healthz").wait_for_function(painted).json_value()
     for place, ready in (("#/jobs", "tbody tr"), (f"#/jobs/{finished}", ".equation math")):
         page = opened(place)
         expect(page.locator(ready).first).to_be_visible()
         page.wait_for_load_state("networkidle")
-        files, data, painted = page.evaluate(MEASURED)
+        page.wait_for_function(painted)
+        files, data, first = page.evaluate(MEASURED)
         assert files + (data if place == "#/jobs" else 0) < MOST_BYTES
-        assert painted < max(MOST_MS, MOST_TIMES * plain)
+        assert first < max(MOST_MS, MOST_TIMES * plain)

@@ -163,6 +163,7 @@ def test_what_can_be_done_is_as_documented(service, document):
     assert conforms(document, ended).status_code == 204
 
 
+@pytest.mark.ci
 def test_a_diagnosis_is_as_documented(service, document, tmp_path):
     job = diagnosed(service, hidden(tmp_path))
     for of in ("", "/events", "/result", "/report", "/extended"):

@@ -282,23 +282,23 @@ def play(url, monkeypatch, examples, steps):
     )
 
 
-def test_on_sqlite_the_store_is_a_dictionary(prepared_sqlite, tmp_path, monkeypatch):
+@pytest.fixture
+def new_sqlite(prepared_sqlite, tmp_path):
+    """What makes a new SQLite file with our tables, and returns its URL."""
     numbers = count()
+    return lambda: f"sqlite:///{shutil.copyfile(prepared_sqlite, tmp_path / f'{next(numbers)}.db')}"
 
-    def new():
-        return f"sqlite:///{shutil.copyfile(prepared_sqlite, tmp_path / f'{next(numbers)}.db')}"
 
-    play(new, monkeypatch, examples=10, steps=40)
+# A step of the store takes milliseconds: fewer examples than the profile has, and more of them at night.
+
+
+def test_on_sqlite_the_store_is_a_dictionary(new_sqlite, monkeypatch):
+    play(new_sqlite, monkeypatch, examples=5, steps=30)
 
 
 @pytest.mark.nightly
-def test_on_sqlite_the_store_is_a_dictionary_for_long(prepared_sqlite, tmp_path, monkeypatch):
-    numbers = count()
-
-    def new():
-        return f"sqlite:///{shutil.copyfile(prepared_sqlite, tmp_path / f'{next(numbers)}.db')}"
-
-    play(new, monkeypatch, examples=40, steps=60)
+def test_on_sqlite_the_store_is_a_dictionary_for_long(new_sqlite, monkeypatch):
+    play(new_sqlite, monkeypatch, examples=40, steps=60)
 
 
 @pytest.mark.nightly

@@ -5,7 +5,7 @@ import math
 import time
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from islands_api.documents import Document, dataset_document, job_document, json_text
@@ -23,7 +23,6 @@ def no_constant(text):
     raise AssertionError(f"{text} is not JSON")
 
 
-@settings(max_examples=20)
 @given(FLOATS)
 def test_what_is_written_is_json(content):
     try:
