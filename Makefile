@@ -18,7 +18,7 @@ demo: setup
 	$(BIN)/islands demo --out demo-out
 
 # By file, since fixtures of modules are costly, and in the order of collection, which has the long files first.
-PYTEST := $(BIN)/pytest --dist loadfile --no-loadscope-reorder
+PYTEST := $(BIN)/pytest --costs --dist loadfile --no-loadscope-reorder
 
 # Bytecode of rewritten assertions is kept between runs, whatever the environment says: it halves the collection.
 unexport PYTHONDONTWRITEBYTECODE

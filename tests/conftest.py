@@ -10,7 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import HealthCheck, settings
 
-from islands.warm_up import warm_up
+pytest_plugins = ["support.cost_report"]
 
 # A kernel compiles in its first example, and the machine may be busy: neither is a failure of a property.
 _LENIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -22,6 +22,8 @@ settings.load_profile("fast")
 def pytest_configure(config):
     # Before the workers start: each of them would compile all kernels for itself.
     if not hasattr(config, "workerinput"):
+        from islands.warm_up import warm_up
+
         warm_up()
 
 

@@ -48,6 +48,7 @@ def test_a_result_says_how_its_islands_lived(folder: Path) -> None:
     assert (folder / "serial/figures/islands.svg").exists()
 
 
+@pytest.mark.ci
 def test_every_engine_finds_the_same_bytes(folder: Path, ray_address: str) -> None:
     assert set(ENGINES) == {"serial", "ray"}
     identify(folder, "ray", *ISLANDS, "--engine", "ray", "--ray-address", ray_address)

@@ -4,8 +4,6 @@ import os
 from dataclasses import replace
 
 import pytest
-import ray
-from ray.cluster_utils import Cluster
 
 from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
@@ -36,6 +34,8 @@ def undisturbed(posed):
 
 @pytest.fixture
 def head():
+    from ray.cluster_utils import Cluster
+
     # A process reads its token once, and another test of it may have set one.
     os.environ.setdefault("RAY_AUTH_TOKEN", "0123456789abcdef0123456789abcdef")
     started = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 10**8})
@@ -51,6 +51,8 @@ def add(head):
 
 @pytest.mark.parametrize("lost", [False, True])
 def test_two_nodes_find_what_one_process_finds_even_if_one_is_lost(head, posed, undisturbed, lost):
+    import ray
+
     nodes = [add(head), add(head)]
     told, seen = [], []
     with cluster(head.address):
