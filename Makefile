@@ -29,7 +29,7 @@ test: setup
 
 # What CI runs besides `make test`: browser, PostgreSQL, one kill of each kind, one trial of each family.
 ci: setup
-	$(PYTEST) -n 2 -m ci
+	$(PYTEST) -n 2 -m "ci and not nightly"
 
 # Another order and other kills every day of the year.
 DAY := $(shell date +%j)

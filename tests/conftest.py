@@ -19,6 +19,18 @@ settings.register_profile("thorough", _LENIENT, max_examples=400)
 settings.load_profile("fast")
 
 
+#: Every law of the store holds on both; a server of its own makes the second one a part of the level ci.
+DATABASES = ("sqlite", pytest.param("postgresql", marks=pytest.mark.ci))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark a test that starts a PostgreSQL as a part of the level ci."""
+    for item in items:
+        if "postgres" in item.fixturenames and not item.get_closest_marker("nightly"):
+            item.add_marker("ci")
+
+
 def pytest_configure(config):
     # Before the workers start: each of them would compile all kernels for itself.
     if not hasattr(config, "workerinput"):
@@ -118,16 +130,16 @@ def small_disk(tmp_path):
         yield lambda size, **options: stack.enter_context(mounted(tmp_path / "disk", size, **options))
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+@pytest.fixture(params=DATABASES)
 def database(request):
     """The URL of a database with our tables and nothing in them: every law holds on both kinds."""
     return {"sqlite": _prepared_sqlite, "postgresql": _prepared_postgresql}[request.param](request)
 
 
-@pytest.fixture(params=[_sqlite, _postgresql], ids=["sqlite", "postgresql"])
+@pytest.fixture(params=DATABASES)
 def empty_database(request):
     """The URL of a new database, without tables."""
-    return request.param(request)
+    return {"sqlite": _sqlite, "postgresql": _postgresql}[request.param](request)
 
 
 @pytest.fixture

@@ -59,6 +59,7 @@ def test_every_engine_finds_the_same_bytes(folder: Path, ray_address: str) -> No
         assert searches[0][name] == searches[1][name], name
 
 
+@pytest.mark.ci
 def test_isolated_islands_find_at_least_what_the_first_finds_alone(folder: Path) -> None:
     best = []
     for count in (1, 3):

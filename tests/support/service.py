@@ -82,7 +82,7 @@ def served(folder: Path, /, **changes: Any) -> Iterator[Service]:
     with (
         structlog.testing.capture_logs([structlog.contextvars.merge_contextvars]) as logs,
         listening(app) as url,
-        httpx.Client(base_url=url, timeout=PATIENCE) as client,
+        httpx.Client(base_url=url, timeout=PATIENCE, verify=False) as client,
     ):
         yield Service(url, client, app, store, settings, logs)
 

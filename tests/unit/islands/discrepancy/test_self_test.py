@@ -148,6 +148,7 @@ def test_a_limit_is_a_strength_that_is_named(diagnosis: Diagnosis) -> None:
     assert found.confusion["coulomb-friction", NOTHING] >= 1
 
 
+@pytest.mark.ci
 def test_what_is_within_a_tolerance_has_no_limit(diagnosis: Diagnosis) -> None:
     wide = dict.fromkeys(TOLERANCE, 0.5)
     found = self_test(diagnosis, CORE, wide, 3, effects=("wrong-parameter:beta",), clean=0)
@@ -162,6 +163,7 @@ def backwards(function: Callable[[Probe], Answer], probes: Sequence[Probe], /) -
     return reversed([function(probe) for probe in reversed(probes)])
 
 
+@pytest.mark.ci
 def test_the_same_seed_has_the_same_result_in_any_order(
     column: tuple[Diagnosis, ColumnCore], tested: SelfTest
 ) -> None:

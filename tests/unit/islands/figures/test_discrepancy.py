@@ -88,6 +88,7 @@ def test_an_input_of_few_levels_has_as_many_cells_and_no_empty_one() -> None:
     assert set(over_input.get_xdata()) <= set(np.unique(found.record.u))
 
 
+@pytest.mark.ci
 def test_a_long_record_is_shown_as_a_whole_and_in_part() -> None:
     shown = long()["over-time"].axes
     whole, part = (np.ptp(shown[place].get_xlim()) for place in (0, 2))

@@ -23,7 +23,9 @@ def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> Hiding:
     return hide(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("variant", [False, True], ids=["usual", "variant"])
+@pytest.mark.parametrize(
+    "variant", [False, pytest.param(True, marks=pytest.mark.ci)], ids=["usual", "variant"]
+)
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_every_effect_can_be_hidden_in_a_band(system: str, variant: bool) -> None:
     for name in SYSTEMS[system][0].known:
@@ -143,6 +145,7 @@ def test_a_misfit_that_no_strength_has_is_refused(monkeypatch: pytest.MonkeyPatc
         hide(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
 
 
+@pytest.mark.ci
 def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
 

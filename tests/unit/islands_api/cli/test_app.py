@@ -20,6 +20,7 @@ from islands_api.cli.app import main
 from islands_api.cli.fit import check_folder
 from islands_service.rows import rows_of
 from support.command_line import succeed
+from support.undrawn import undrawn_figures
 
 
 def record(samples=120, seed=0):
@@ -28,6 +29,13 @@ def record(samples=120, seed=0):
     for k in range(3, samples):
         y[k] = y[k - 1] + 0.8 * (u[k - 1] - u[k - 2]) - 0.3 * y[k - 1] * abs(u[k - 1] - u[k - 2])
     return Dataset(u, y + 0.001 * rng.normal(size=samples), 0.01, ("u_V",), "y_um")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def undrawn():
+    """Draw nothing: how a figure looks is no subject here."""
+    with undrawn_figures():
+        yield
 
 
 @pytest.fixture

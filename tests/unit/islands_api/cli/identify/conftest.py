@@ -10,6 +10,7 @@ from islands.io.records import write_record
 from islands_api.cli import run as command
 from islands_api.cli.app import main
 from support.identify_runs import record
+from support.undrawn import undrawn_figures
 
 
 @pytest.fixture
@@ -39,7 +40,9 @@ def run(request, monkeypatch, capsys, tmp_path):
 
 @pytest.fixture
 def with_figures():
-    """Ask for figures."""
+    """Ask for figures, whose files hold an empty picture."""
+    with undrawn_figures():
+        yield
 
 
 @pytest.fixture
