@@ -126,7 +126,7 @@ def test_a_secret_is_kept_nowhere(service):
     assert secret not in str(service.logs)
 
 
-@pytest.mark.parametrize("end", ["revoked", "expired"])
+@pytest.mark.parametrize("end", ["revoked", pytest.param("expired", marks=pytest.mark.ci)])
 def test_a_stream_ends_with_its_key(service, monkeypatch, end):
     monkeypatch.setattr(events, "_ALIVE", 0.05)
     path = f"/v1/jobs/{queued(service.store, 'me').id}/events"

@@ -7,7 +7,7 @@ and its explicit Runge-Kutta steps.
 
 import numpy as np
 import pytest
-from scipy import signal
+import scipy
 
 from islands.systems.bouc_wen import BoucWenPiezo, authors_estimation, authors_validation, simulate
 
@@ -36,8 +36,8 @@ def notebook():
     t = np.arange(0, 101, 0.001)
     x = np.random.RandomState(93862723).normal(0, 450, len(t))
     x[:1000] = x[-1000:] = 0
-    b, a = signal.butter(5, 0.002)
-    u = signal.filtfilt(b, a, x)
+    b, a = scipy.signal.butter(5, 0.002)
+    u = scipy.signal.filtfilt(b, a, x)
     late = (u[1:] - u[:-1]) / (t[1:] - t[:-1])
     train = displacement(u[1000:], late[999:])
     sine = 40 * np.sin(2 * np.pi * t[1000:])

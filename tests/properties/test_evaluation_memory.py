@@ -44,6 +44,7 @@ def test_every_cache_stays_within_its_limit_but_for_one_generation():
     assert repr(island) == repr(evolved(40))
 
 
+@pytest.mark.ci
 def test_with_its_own_limits_an_evaluator_takes_no_more_memory_however_long_it_is_at_work():
     """Measured, not said."""
     evaluator = Evaluator(record(), SMALL, LIMITS)
@@ -97,6 +98,7 @@ def test_genes_take_what_a_vocabulary_says(traced, setting):
     assert vocabulary.bytes / 2.5 < taken < vocabulary.bytes * 2.5
 
 
+@pytest.mark.ci
 def test_structures_take_what_an_evaluator_says(traced):
     setting = replace(SMALL, max_terms=6, constraints="none", structure="free")
     evaluator = Evaluator(record(), setting)

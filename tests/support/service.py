@@ -14,22 +14,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import httpx
 import numpy as np
-import scipy.io
 import structlog
 import uvicorn
 from fastapi import FastAPI
 from sqlalchemy import Connection
 
-from islands.evolution.engine import SerialEngine
 from islands.io.records import write_record
 from islands_api.app import create_app
 from islands_api.auth import LOCAL
 from islands_service.blobs import Blobs
-from islands_service.coordinator.discrepancy import discrepancy
-from islands_service.coordinator.identification import identification
 from islands_service.jobs import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -182,6 +177,8 @@ def npz(**arrays: Any) -> bytes:
 
 def matlab_5() -> bytes:
     """A record as MATLAB saves it by default."""
+    import scipy.io
+
     stream = io.BytesIO()
     scipy.io.savemat(stream, columns())
     return stream.getvalue()
@@ -189,6 +186,8 @@ def matlab_5() -> bytes:
 
 def matlab_73() -> bytes:
     """A record as MATLAB saves what is large: HDF5."""
+    import h5py
+
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, values in columns().items():
@@ -223,6 +222,9 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
 
 def diagnosed(service: Service, content: bytes, /, **changes: Any) -> str:
     """Upload a record and have a simulation held against it, here and now; return the job's id."""
+    from islands.evolution.engine import SerialEngine
+    from islands_service.coordinator.discrepancy import discrepancy
+
     dataset = service.upload(content).json()["id"]
     asked = held(dataset, channels=["T_K"], tolerance=KNOWN, **changes)
     job = service.client.post("/v1/discrepancies", json=asked).json()
@@ -241,6 +243,9 @@ QUICK = {"population": 20, "generations": 2, "max_terms": 3, "max_height": 2, "s
 
 def identified(service: Service, islands: int = 1) -> str:
     """Upload a record and have a job identify it, here and now; return the job's id."""
+    from islands.evolution.engine import SerialEngine
+    from islands_service.coordinator.identification import identification
+
     dataset = service.upload(csv(400)).json()["id"]
     settings = {**QUICK, "islands": islands}
     job = service.submit(**spec(dataset, preset="narx", settings=settings, seed=islands)).json()

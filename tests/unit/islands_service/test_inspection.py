@@ -166,6 +166,7 @@ def test_the_process_writes_no_files(tmp_path):
     assert new.stat().st_size == 0
 
 
+@pytest.mark.ci
 def test_the_service_answers_while_two_files_at_a_time_are_read(serve):
     stopped = set()
 

@@ -5,6 +5,8 @@ import sys
 import time
 from threading import Thread
 
+import pytest
+
 from islands_service.lifeline import Wish
 
 #: Waits a short time again and again while signals come at every moment of it.
@@ -23,6 +25,7 @@ print(made)
 """
 
 
+@pytest.mark.ci
 def test_a_signal_in_the_midst_of_a_look_is_not_waited_for_for_ever() -> None:
     command = [sys.executable, "-c", WAITING]
     said = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)

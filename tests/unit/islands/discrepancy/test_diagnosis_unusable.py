@@ -175,11 +175,15 @@ def test_an_axis_says_how_long_a_record_has_to_be(record: Dataset) -> None:
         islands.diagnose(record[:50], "rigid-axis")
 
 
-#: What is looked for at the fast level; at the nightly level it is the whole catalogue.
+#: What is looked for at the level ci; at the nightly level it is the whole catalogue.
 FEW = ("delay", "offset", "cubic-stiffness")
 
 
-@pytest.mark.parametrize("effects", [FEW, pytest.param(tuple(CATALOGUE), marks=pytest.mark.nightly)], ids=len)
+@pytest.mark.parametrize(
+    "effects",
+    [pytest.param(FEW, marks=pytest.mark.ci), pytest.param(tuple(CATALOGUE), marks=pytest.mark.nightly)],
+    ids=len,
+)
 def test_tanks_below_their_bottom_have_a_verdict(
     record: Dataset, effects: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:

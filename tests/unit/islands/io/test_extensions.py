@@ -24,6 +24,9 @@ from support.simulated_records import Made, made
 
 KINDS = list(made())
 
+#: Those whose effects are simulated one by one at the fast level.
+FAST = ("bouc-wen-piezo", "column", "extended")
+
 #: Samples after which a model does not know any more where it began.
 FORGOTTEN = 100
 
@@ -98,6 +101,11 @@ def test_what_is_written_simulates_the_same(asked: Made) -> None:
     simulates_the_same(asked, extended(asked, chosen(asked)))
 
 
+@pytest.mark.parametrize(
+    "asked",
+    [kind if kind in FAST else pytest.param(kind, marks=pytest.mark.ci) for kind in KINDS],
+    indirect=True,
+)
 def test_each_effect_by_itself_simulates_the_same(asked: Made) -> None:
     found = fixed(asked, known(asked))
     if begins(Extended(asked.core, (), extended(asked, []).simulation.scene)):
@@ -145,7 +153,7 @@ def test_with_other_effects_in_it_it_is_extended_once_more(asked: Made) -> None:
 @pytest.mark.parametrize(
     ("kind", "name", "point"),
     [
-        ("column", "jump", (1.0, 2.0)),
+        pytest.param("column", "jump", (1.0, 2.0), marks=pytest.mark.ci),
         pytest.param("bouc-wen-piezo", "even-nonlinearity", (1e-3,), marks=pytest.mark.nightly),
         pytest.param("linear", "delay", (0.02,), marks=pytest.mark.nightly),
     ],

@@ -156,6 +156,7 @@ def test_waiting_survives_a_service_that_is_started_again(
     assert client.wait(job).state == JobState.SUCCEEDED
 
 
+@pytest.mark.ci
 def test_an_impatient_client_can_wait_for_a_job_that_does_nothing(
     connect: Any, service: Service, me: Any
 ) -> None:

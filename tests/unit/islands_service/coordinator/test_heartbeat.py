@@ -217,7 +217,7 @@ with Store(sys.argv[1]) as store:
 """
 
 
-@pytest.mark.parametrize("lost", [False, True])
+@pytest.mark.parametrize("lost", [pytest.param(False, marks=pytest.mark.ci), True])
 def test_a_search_that_never_asks_again_ends_the_process_and_nothing_else_does(
     store: Store, lost: bool
 ) -> None:

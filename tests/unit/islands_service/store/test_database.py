@@ -202,6 +202,7 @@ def test_what_the_url_says_is_heeded(postgresql):
     patient.close()
 
 
+@pytest.mark.ci
 def test_a_server_that_takes_connections_and_never_answers_is_given_up(monkeypatch):
     """As one that was stopped, or is behind a wall."""
     monkeypatch.setitem(connections.CONNECTING, "connect_timeout", 2)

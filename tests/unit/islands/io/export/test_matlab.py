@@ -88,6 +88,7 @@ def test_octaves_primitives_are_the_kernels_at_every_jump_and_limit(tmp_path):
 
 @needs_octave
 # An example is a process of Octave: to shrink one would take minutes.
+@pytest.mark.ci
 @settings(max_examples=4, phases=[Phase.reuse, Phase.generate])
 @given(st.lists(models(), min_size=12, max_size=12), st.integers(0, 2**32 - 1))
 def test_octave_runs_whatever_stands_in_a_model(tmp_path_factory, random_models, seed):
