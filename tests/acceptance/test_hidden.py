@@ -10,7 +10,7 @@ import pytest
 from islands.trials.hide.piezo import PIEZO
 from islands.trials.trial import Outcome, Trial, carried_out
 
-#: Seconds of a record at the nightly level, and of one that is diagnosed in less than a second.
+#: Seconds of a record at the levels ci and nightly, and of one that is diagnosed in less than a second.
 SECONDS, SHORT = 30.0, 5.0
 
 #: Seeds that nothing was tuned on; of some effects another one, whose short record takes less work.
@@ -53,8 +53,13 @@ def test_a_hidden_effect_is_found_in_a_short_record(name: str) -> None:
     assert is_named(found), found
 
 
-@nightly
-@pytest.mark.parametrize("band", [(0.5, 1.5), (1.5, 5.0)], ids=["weak", "strong"])
+@pytest.mark.parametrize(
+    "band",
+    [
+        pytest.param((0.5, 1.5), id="weak", marks=pytest.mark.ci),
+        pytest.param((1.5, 5.0), id="strong", marks=nightly),
+    ],
+)
 @pytest.mark.parametrize("name", [name for name in PIEZO.known if name not in SCALE])
 def test_a_hidden_effect_is_found(name: str, band: tuple[float, float]) -> None:
     found = outcome(name, band=band)
@@ -108,7 +113,7 @@ def are_both_named(found: Outcome) -> bool:
     return len(seen) == 2 and all(any(name in each for each in seen) for name in found.trial.effects)
 
 
-@nightly
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "pair",
     [
