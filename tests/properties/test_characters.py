@@ -12,7 +12,7 @@ from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
-from support.migrating import (
+from support.migrations import (
     SETTINGS,
     advanced,
     evaluator,

@@ -19,7 +19,7 @@ from islands.evolution.problem import Problem
 from islands.evolution.rng import Purpose, Stream
 from islands.model.expression import Apply, Lagged, height, walk
 from islands.simulation.outcome import Verdict
-from support.migrating import SETTINGS, every_emigrants, folk, islands, keys, models, never, recorded
+from support.migrations import SETTINGS, every_emigrants, folk, islands, keys, models, never, recorded
 from support.searches import SMALL, islands_of
 
 

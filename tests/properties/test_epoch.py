@@ -9,7 +9,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island, first_generation, step
 from islands.evolution.problem import Problem, problem
-from support.migrating import SETTINGS, advanced, evaluator, every_replaced, keys, models, recorded
+from support.migrations import SETTINGS, advanced, evaluator, every_replaced, keys, models, recorded
 from support.searches import SMALL, exactly
 
 

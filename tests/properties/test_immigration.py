@@ -18,7 +18,7 @@ from islands.evolution.problem import Problem
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.topology import topology
 from islands.simulation.outcome import Verdict
-from support.migrating import (
+from support.migrations import (
     SETTINGS,
     arrivals,
     evaluator,

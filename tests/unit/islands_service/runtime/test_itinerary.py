@@ -16,7 +16,7 @@ from islands.evolution.archipelago import Archipelago, founded
 from islands_service.runtime.itinerary import Leg
 
 #: Where numbers stand for islands nobody looks at the record.
-from support.voyages import (
+from support.itineraries import (
     SEED,
     Voyage,
     epoch_of,

@@ -12,15 +12,15 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual
 from islands.evolution.problem import problem
 from islands_service.runtime.itinerary import Itinerary, Leg
-from support.searches import SMALL, exactly, record
 
 #: Where numbers stand for islands nobody looks at the record.
-from support.voyages import (
+from support.itineraries import (
     SEED,
     as_it_is,
     epoch_of,
     itinerary,
 )
+from support.searches import SMALL, exactly, record
 
 # What is lost.
 
