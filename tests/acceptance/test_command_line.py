@@ -98,6 +98,7 @@ def same_files(one: Path, other: Path) -> None:
         assert path.read_bytes() == (other / path.relative_to(one)).read_bytes(), path.name
 
 
+@pytest.mark.ci
 def test_the_same_fit_gives_the_same_models_bit_for_bit(folder: Path) -> None:
     with undrawn_figures():
         fit(folder, "again")

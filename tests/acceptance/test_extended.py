@@ -69,6 +69,7 @@ def test_it_is_shown_as_the_file_that_it_is(folder: Path) -> None:
     assert said == (folder / "extended.json").read_text()
 
 
+@pytest.mark.ci
 def test_it_is_shown_as_a_program_that_runs(folder: Path) -> None:
     program, out = folder / "program.py", folder / "by_program.csv"
     program.write_text(succeed("show", folder / "extended.json", "--format", "python"))

@@ -75,7 +75,7 @@ def test_a_parameter_beyond_its_tolerance_is_found(name: str, seconds: float) ->
 
 
 @pytest.mark.parametrize("seconds", [6.0, pytest.param(SECONDS, marks=nightly)])
-@pytest.mark.parametrize("name", [at_its_level("stiction"), "backlash"])
+@pytest.mark.parametrize("name", [at_its_level("stiction"), at_its_level("backlash")])
 def test_slips_are_told_from_play(name: str, seconds: float) -> None:
     found = outcome(name, band=(2.0, 4.0), seconds=seconds)
     assert found.named == (name,)
@@ -89,6 +89,7 @@ def test_nothing_is_said_of_a_clean_record(seed: int, seconds: float) -> None:
     assert (found.verdict, found.named, found.noise) == ("nothing", (), ())
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("seed", "seconds"),
     [(SEED + 2, 8.0), *(pytest.param(SEED + more, SECONDS, marks=nightly) for more in range(6))],
@@ -154,7 +155,7 @@ def test_three_at_once_are_all_found(seconds: float) -> None:
 @pytest.mark.parametrize(
     ("pole", "seconds"),
     [
-        (0.0, SHORT),
+        pytest.param(0.0, SHORT, marks=pytest.mark.ci),
         pytest.param(0.9, SHORT, marks=pytest.mark.ci),
         pytest.param(0.0, SECONDS, marks=nightly),
         pytest.param(0.9, SECONDS, marks=nightly),

@@ -24,6 +24,7 @@ def test_impossible_trials_are_refused() -> None:
     assert "2 effects at once" in fail("trials", "--effects", "offset", "--pairs", 1)
 
 
+@pytest.mark.ci
 def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In this process, one after the other."""
     monkeypatch.setattr("islands_api.cli.trials.pool", lambda _workers, _address: nullcontext(map))

@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,7 @@ def at_collection(nodes: list[ast.stmt]) -> Iterator[ast.stmt]:
             )
 
 
+@cache
 def imported(path: Path) -> set[str]:
     """Return the names of the packages that a module imports when it is loaded."""
     found = set()

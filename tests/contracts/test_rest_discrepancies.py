@@ -193,6 +193,7 @@ def test_a_model_of_towering_powers_is_not_read(service, order, power):
     assert "too long, or of too high a degree" in problem_of(answer, 422, "invalid-settings")
 
 
+@pytest.mark.ci
 def test_a_record_that_leaves_a_doubt_is_read_once_more(service, order):
     lines = b"u_V,y_um,s\n" + b"".join(b"%d,%d,%d\n" % (k % 7, k % 5, k % 3) for k in range(500))
     order["dataset"] = service.upload(lines).json()["id"]
@@ -296,6 +297,7 @@ print([name for name in sys.modules if name.startswith(("islands.kernels", "isla
 """
 
 
+@pytest.mark.ci
 def test_a_door_needs_no_kernels_to_know_a_model():
     order = {"dataset": "0-csv", "input": "u_V", "output": "y_um", **of_model()}
     command = [sys.executable, "-c", WEIGHT, json.dumps(order)]

@@ -178,8 +178,8 @@ def of_few_clusters(count):
     ("constraints", "fitness", "ends"),
     [
         ("none", "shooting", {"well", "ill", "pruned", "INFEASIBLE", "DIVERGED"}),
-        ("none", "one-step", {"well", "ill", "pruned", "INFEASIBLE"}),
-        ("hysteresis", "shooting", {"well", "ill", "pruned", "INFEASIBLE"}),
+        pytest.param("none", "one-step", {"well", "ill", "pruned", "INFEASIBLE"}, marks=pytest.mark.ci),
+        pytest.param("hysteresis", "shooting", {"well", "ill", "pruned", "INFEASIBLE"}, marks=pytest.mark.ci),
         ("hysteresis", "free-run", {"well", "ill", "pruned", "INFEASIBLE", "DIVERGED"}),
     ],
 )
@@ -196,7 +196,7 @@ def test_random_structures_get_what_the_oracle_says(constraints, fitness, ends):
 @pytest.mark.parametrize(
     ("rate", "constraints"),
     [
-        (600, "none"),
+        pytest.param(600, "none", marks=pytest.mark.ci),
         (100, "hysteresis"),
         pytest.param(100, "none", marks=pytest.mark.nightly),
         pytest.param(600, "hysteresis", marks=pytest.mark.nightly),

@@ -53,6 +53,7 @@ def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: 
     assert found.candidates[0].name == "quadratic-drag"
 
 
+@pytest.mark.ci
 def test_the_same_question_has_the_same_answer(record: Dataset, found: Diagnosis) -> None:
     again = diagnose(record, BoucWenPiezoCore(), TOLERANCE)
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))

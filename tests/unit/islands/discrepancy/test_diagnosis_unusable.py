@@ -205,6 +205,7 @@ def test_a_simulation_that_is_the_record_lacks_nothing(record: Dataset, name: st
     assert found.noise_floor == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.ci
 def test_without_noise_a_cause_is_named_all_the_same(record: Dataset) -> None:
     record = record[:300]
     found = islands.diagnose(record, "column:theirs", columns={"theirs": record.y - 1.0})

@@ -59,6 +59,7 @@ def calibrated(record: Dataset, core: Core, effective: float | None = None) -> t
     return calibrate(simulation, target, simulation.nominal), target
 
 
+@pytest.mark.ci
 def test_the_order_of_the_work_changes_no_bit_of_the_ladder() -> None:
     u = wave(300)
     core = BoucWenPiezoCore()

@@ -276,6 +276,7 @@ def test_what_cannot_be_laid_out_is_refused_with_a_reason(text, islands, message
     assert str(refused.value).startswith(message)
 
 
+@pytest.mark.ci
 def test_as_many_edges_as_may_be_drawn_and_a_degree_of_99_are_laid_out():
     assert topology.__wrapped__("random-regular:1", 50_000, 0).in_degree == 1
     assert topology.__wrapped__("random-regular:99", 100, 0).in_degree == 99

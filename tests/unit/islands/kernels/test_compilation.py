@@ -202,6 +202,7 @@ def test_without_a_choice_kernels_are_kept_in_the_users_cache_folder(start, tmp_
     assert expected.is_relative_to(tmp_path)
 
 
+@pytest.mark.ci
 def test_each_processor_has_a_folder_of_its_own_named_after_it(start, start_anew):
     here, haswell = said(start(READY)), said(start_anew(READY, NUMBA_CPU_NAME="haswell"))
     assert here["compiled"]

@@ -60,6 +60,7 @@ def test_an_oracle_without_a_name_or_without_a_gain_is_none(found: Diagnosis) ->
     assert share_of_gain(found, ["periodic-disturbance"], {}) is None
 
 
+@pytest.mark.ci
 def test_two_names_are_told_one_after_the_other() -> None:
     hiding = hide(
         ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), apart=False

@@ -131,6 +131,7 @@ def test_days_that_are_none_are_refused(run: Run, service: Service, days: object
     assert service.store.keys.all() == before
 
 
+@pytest.mark.ci
 def test_a_revoked_key_opens_nothing_after_a_second(run: Run, service: Service) -> None:
     secret = made(run, *ALL)
     key = key_of(service, secret).id

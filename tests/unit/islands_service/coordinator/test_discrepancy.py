@@ -93,6 +93,7 @@ class Interruption:
             raise JobCancelled("enough")
 
 
+@pytest.mark.ci
 def test_the_same_job_brings_the_same_bytes_however_often_it_is_interrupted(
     store: Store, blobs: Blobs, submit: Submit
 ) -> None:

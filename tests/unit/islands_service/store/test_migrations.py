@@ -176,6 +176,7 @@ def test_to_prepare_again_changes_nothing(database):
         assert contents(store) == before
 
 
+@pytest.mark.ci
 def test_processes_that_prepare_the_same_new_databases_at_once_all_succeed(empty_database, tmp_path):
     urls = [empty_database]
     if empty_database.startswith("sqlite"):

@@ -191,6 +191,7 @@ def test_a_unit_is_what_follows_the_last_underscore_or_stands_in_brackets(name, 
     assert unit_of(name) == unit
 
 
+@pytest.mark.ci
 def test_time_printed_with_five_digits_is_uniform(tmp_path):
     t = 2.13e-4 * np.arange(40_001)
     rows = (f"{value:.5g},{k % 7},{k % 11}" for k, value in enumerate(t))
