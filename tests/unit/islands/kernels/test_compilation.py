@@ -1,9 +1,8 @@
 """Compiled kernels are kept in one folder, found again, and compiled by one process at a time.
 
-What is tested happens between processes, so each test starts some, with a small module of kernels of its own.
-They import a copy of the one file under test: the whole package would take a second each time, and its
-folder's name would change whenever somebody edits a kernel while the tests run. Most are forks of one process
-that has loaded Numba; a process starts anew where the start itself or the processor's name counts.
+Each test starts processes with a small module of kernels of its own. They import a copy of the one file under
+test: the whole package takes a second, and its folder's name changes with every edit of a kernel. Most are forks
+of one process that has loaded Numba; a process starts alone where its start or the processor's name counts.
 """
 
 import json
