@@ -1,8 +1,8 @@
 """Compiled kernels are kept in one folder, found again, and compiled by one process at a time.
 
 Each test starts processes with a small module of kernels of its own. They import a copy of the one file under
-test: the whole package takes a second, and its folder's name changes with every edit of a kernel. Most are forks
-of one process that has loaded Numba; a process starts alone where its start or the processor's name counts.
+test: the whole package takes a second, and its folder's name changes with each edit of a kernel. Most are
+forks of one process that has loaded Numba; a few start alone, where the start itself counts.
 """
 
 import json
