@@ -1,4 +1,4 @@
-"""Option ``--costs``: report wall and CPU time by folder, and the tests over the limit."""
+"""Option ``--costs``: report wall and CPU time by folder, and the fast tests over the limit."""
 
 import resource
 from collections import defaultdict
@@ -46,7 +46,8 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     tests, folders = defaultdict(float), defaultdict(lambda: [set(), 0.0, 0.0])
     for report in phases:
         folder = "/".join(report.nodeid.split("::")[0].split("/")[1:-1][:3])
-        tests[report.nodeid] += report.cpu
+        if not {"ci", "nightly"} & report.keywords.keys():
+            tests[report.nodeid] += report.cpu
         folders[folder][0].add(report.nodeid)
         folders[folder][1] += report.duration
         folders[folder][2] += report.cpu
