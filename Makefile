@@ -32,7 +32,7 @@ ci: setup
 	$(PYTEST) -n 2 -m "ci and not nightly"
 
 # Another order and other kills every day of the year.
-DAY := $(shell date +%j)
+DAY = $(shell date +%j)
 
 # Everything else: the remaining slow tests, the properties with many examples, and 500 random kills of a service.
 nightly: setup

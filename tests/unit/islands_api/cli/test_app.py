@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import sys
 from contextlib import chdir
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from islands.io.models import write_model
 from islands.io.records import write_record
 from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
-from islands_api.cli.app import main
 from islands_api.cli.fit import check_folder
 from islands_service.rows import rows_of
 from support.command_line import succeed
@@ -39,21 +37,9 @@ def undrawn():
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run the command line in a folder of its own; return exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def command(*arguments):
-        monkeypatch.setattr(sys, "argv", ["islands", *map(str, arguments)])
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = stop.code
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return command
+def run(command_line):
+    """Run a command in a folder of its own; return exit code, standard output, standard error."""
+    return command_line
 
 
 FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")

@@ -1,15 +1,14 @@
 """``islands keys`` from inside, on the database of a service that runs: made, used, listed, revoked."""
 
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from islands_api.cli.app import main
 from islands_api.client import Client, ServiceError
 from islands_service.store.keys import SCOPES, Key
 from support.processes import eventually
@@ -28,24 +27,10 @@ def service(serve: Any) -> Iterator[Service]:
 
 
 @pytest.fixture
-def run(
-    service: Service, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Run:
+def run(service: Service, monkeypatch: pytest.MonkeyPatch, command_line: Run) -> Run:
     """Run ``islands keys`` on the service's data folder; return exit code, standard output and error."""
     monkeypatch.setenv("ISLANDS_DATA_DIR", str(service.settings.data_dir))
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["islands", "keys", *map(str, arguments)])
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+    return partial(command_line, "keys")
 
 
 def made(run: Run, *words: object) -> str:

@@ -1,39 +1,30 @@
 """A folder in which ``islands identify`` runs in this process, and what happens to it there."""
 
 import signal
-import sys
 from contextlib import contextmanager
 
 import pytest
 
 from islands.io.records import write_record
 from islands_api.cli import run as command
-from islands_api.cli.app import main
 from support.identify_runs import record
 from support.undrawn import undrawn_figures
 
 
 @pytest.fixture
-def run(request, monkeypatch, capsys, tmp_path):
+def run(request, monkeypatch, command_line):
     """Run the command in a folder that holds ``r.csv``; return exit code, standard output, standard error.
 
     Figures take most of a small run's time: only a test that asks for them has them.
     """
-    monkeypatch.chdir(tmp_path)
     write_record(record(), "r.csv")
     if "with_figures" not in request.fixturenames:
         monkeypatch.setattr("islands.figures.gallery.FIGURES", {})
         monkeypatch.setattr("islands.figures.gallery.search_figures", lambda _findings: ())
 
     def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["islands", "identify", *map(str, arguments)])
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = stop.code
-        said = capsys.readouterr()
-        return code, said.out, said.err.strip()
+        code, out, err = command_line("identify", *arguments)
+        return code, out, err.strip()
 
     return call
 

@@ -1,9 +1,9 @@
 """A service, and ``islands jobs`` in this process as its command line."""
 
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands_api.cli import jobs as command
-from islands_api.cli.app import main
 from islands_service.blobs import Blobs
 from islands_service.coordinator.identification import identification
 from islands_service.jobs import Outcome, Submission
@@ -40,25 +39,11 @@ def owner(service: Service, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 @pytest.fixture
-def run(
-    owner: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Run:
+def run(owner: str, monkeypatch: pytest.MonkeyPatch, command_line: Run, tmp_path: Path) -> Run:
     """Run ``islands jobs`` in a folder that holds ``r.csv``; return exit code, standard output and error."""
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(command, "PATIENCE", 0.2)
     (tmp_path / "r.csv").write_bytes(csv())
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["islands", "jobs", *map(str, arguments)])
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return call
+    return partial(command_line, "jobs")
 
 
 @pytest.fixture
