@@ -26,7 +26,7 @@ ALIKE = 5
 nightly = pytest.mark.nightly
 
 #: The effects, one of each family, that are hidden at the fast level.
-FAST = ("delay", "sensor-gain", "dead-zone", "loop-asymmetry", "gain-step", "offset", "cross-coupling")
+FAST = ("delay", "sensor-gain", "coulomb-friction", "loop-asymmetry", "gain-step", "cross-coupling")
 
 
 def at_its_level(value: object, fast: Container[object] = FAST) -> object:
@@ -139,6 +139,7 @@ def test_two_at_once_are_both_found_in_a_short_record() -> None:
     assert are_both_named(found), found
 
 
+@pytest.mark.ci
 def test_two_at_once_are_both_found_by_a_column() -> None:
     found = outcome("coulomb-friction", "periodic-disturbance", band=(1.0, 3.0), core="column", seconds=10.0)
     assert are_both_named(found), found
@@ -167,7 +168,7 @@ def test_a_cut_that_a_record_shows_once_is_found(pole: float, seconds: float) ->
     assert found.named == ("output-saturation",)
 
 
-@pytest.mark.parametrize("name", ["coulomb-friction", "periodic-disturbance"])
+@pytest.mark.parametrize("name", [at_its_level("coulomb-friction"), at_its_level("periodic-disturbance")])
 def test_a_column_is_enough_for_an_effect_behind_the_input(name: str) -> None:
     found = outcome(name, band=(0.5, 2.0), core="column", seconds=20.0)
     assert found.verdict in ("named", "named with remainder")

@@ -326,6 +326,7 @@ print(hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest(), ma
 """
 
 
+@pytest.mark.ci
 def test_long_sums_do_not_depend_on_the_number_of_threads(capsys):
     # This process computes with as many threads of its linear algebra as it was started with, mostly one.
     exec(DIGEST, {})

@@ -84,6 +84,7 @@ HIGH = replace(SMALL, max_height=5, initial_height=5)
 FREE = replace(HIGH, constraints="none", structure="free", primitives=("mul", "tanh", "exp", "add"))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "setting",
     [pytest.param(HIGH, id="paper", marks=pytest.mark.nightly), pytest.param(FREE, id="free")],

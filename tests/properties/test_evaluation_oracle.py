@@ -177,7 +177,9 @@ def of_few_clusters(count):
 @pytest.mark.parametrize(
     ("constraints", "fitness", "ends"),
     [
-        ("none", "shooting", {"well", "ill", "pruned", "INFEASIBLE", "DIVERGED"}),
+        pytest.param(
+            "none", "shooting", {"well", "ill", "pruned", "INFEASIBLE", "DIVERGED"}, marks=pytest.mark.ci
+        ),
         pytest.param("none", "one-step", {"well", "ill", "pruned", "INFEASIBLE"}, marks=pytest.mark.ci),
         pytest.param("hysteresis", "shooting", {"well", "ill", "pruned", "INFEASIBLE"}, marks=pytest.mark.ci),
         ("hysteresis", "free-run", {"well", "ill", "pruned", "INFEASIBLE", "DIVERGED"}),
@@ -197,7 +199,7 @@ def test_random_structures_get_what_the_oracle_says(constraints, fitness, ends):
     ("rate", "constraints"),
     [
         pytest.param(600, "none", marks=pytest.mark.ci),
-        (100, "hysteresis"),
+        pytest.param(100, "hysteresis", marks=pytest.mark.ci),
         pytest.param(100, "none", marks=pytest.mark.nightly),
         pytest.param(600, "hysteresis", marks=pytest.mark.nightly),
     ],

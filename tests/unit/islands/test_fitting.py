@@ -279,6 +279,7 @@ def test_an_output_that_never_moves_is_its_own_model(tmp_path, drawing):
     made.save(tmp_path)
 
 
+@pytest.mark.ci
 def test_a_model_that_diverges_even_one_step_ahead_spoils_no_fit(tmp_path, drawing):
     calm, u = tank(), tank().u.copy()
     u[200] = 1e5

@@ -81,6 +81,7 @@ def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
     )
 
 
+@pytest.mark.ci
 def test_what_was_named_is_taken_off(diagnosis: Diagnosis) -> None:
     assert [each.name for each in diagnosis.effects] == ["coulomb-friction"]
     source = surrogates_of(diagnosis, CORE, TOLERANCE)
@@ -175,6 +176,7 @@ def test_the_same_seed_has_the_same_result_in_any_order(
     assert again.confusion == tested.confusion
 
 
+@pytest.mark.ci
 def test_another_seed_has_another_result(column: tuple[Diagnosis, ColumnCore], tested: SelfTest) -> None:
     other = self_test(*column, seed=4, effects=FEW[-1:], clean=0)
     assert other.detection_limits[FEW[-1]] != tested.detection_limits[FEW[-1]]

@@ -114,6 +114,7 @@ def test_the_ladder_is_coloured_where_something_is_named() -> None:
     assert names[-1] == found.candidates[0].name
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", DISCREPANCY_FIGURES)
 def test_a_figure_is_small_enough_for_a_page(name: str, tmp_path) -> None:
     path = tmp_path / "figure.svg"

@@ -176,7 +176,10 @@ def test_a_search_has_the_figures_that_its_course_is_enough_for(history, names):
     assert search_figures(findings(history)) == names
 
 
-@pytest.mark.parametrize("draw", [draw_convergence, draw_front, draw_islands])
+@pytest.mark.parametrize(
+    "draw",
+    [draw_convergence, *(pytest.param(each, marks=pytest.mark.ci) for each in (draw_front, draw_islands))],
+)
 def test_saving_twice_gives_the_same_bytes(draw, tmp_path):
     for name in ("first", "second"):
         save(draw(findings(COURSE, MODELS)), tmp_path / f"{name}.svg")

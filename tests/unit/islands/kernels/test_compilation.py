@@ -1,8 +1,7 @@
 """Compiled kernels are kept in one folder, found again, and compiled by one process at a time.
 
-Each test starts processes with a small module of kernels of its own. They import a copy of the one file under
-test: the whole package takes a second, and its folder's name changes with each edit of a kernel. Most are
-forks of one process that has loaded Numba; a few start alone, where the start itself counts.
+Each test starts processes with a small module of kernels. They import a copy of the file under test, since the
+whole package takes a second to import. Most are forks of one process that has loaded Numba.
 """
 
 import json
@@ -374,6 +373,7 @@ def test_a_kernel_that_cannot_be_saved_is_used_all_the_same(start, tmp_path):
     assert said(start(code)) == 1.5
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("moment", ["before", "while", "after"])
 def test_the_folder_may_be_deleted_at_any_time(start, moment):
     code = """if True:

@@ -23,10 +23,9 @@ def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> Hiding:
     return hide(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    "variant", [False, pytest.param(True, marks=pytest.mark.ci)], ids=["usual", "variant"]
-)
-@pytest.mark.parametrize("system", ["piezo", "tanks", pytest.param("oscillator", marks=pytest.mark.ci)])
+@pytest.mark.ci
+@pytest.mark.parametrize("variant", [False, True], ids=["usual", "variant"])
+@pytest.mark.parametrize("system", ["piezo", "tanks", "oscillator"])
 def test_every_effect_can_be_hidden_in_a_band(system: str, variant: bool) -> None:
     for name in SYSTEMS[system][0].known:
         found = hidden(system, name, band=(0.3, 2.0), variant=variant)
@@ -75,7 +74,14 @@ def test_what_is_hidden_beside_a_gain_keeps_its_misfit() -> None:
     assert hidden("piezo", "sensor-gain", "periodic-disturbance", band=(2.0, 3.0)).misfit > 2.0
 
 
-@pytest.mark.parametrize("force", [forces.cube, forces.drag, forces.hysteresis, None])
+@pytest.mark.parametrize(
+    "force",
+    [
+        *(pytest.param(each, marks=pytest.mark.ci) for each in (forces.cube, forces.drag)),
+        forces.hysteresis,
+        None,
+    ],
+)
 def test_the_oscillator_is_solved(force: object) -> None:
     rng = np.random.default_rng(2)
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
