@@ -1,7 +1,7 @@
 """Compiled kernels are kept in one folder, found again, and compiled by one process at a time.
 
-Each test starts processes with a small module of kernels. They import a copy of the file under test, since the
-whole package takes a second to import. Most are forks of one process that has loaded Numba.
+Each test starts processes with a small module of kernels. They import a copy of the file under test, since
+the whole package takes a second to import. Most are forks of one process that has loaded Numba.
 """
 
 import json
