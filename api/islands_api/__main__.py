@@ -12,7 +12,7 @@ from time import monotonic, sleep
 import uvicorn
 
 from islands.errors import IslandsError, SettingsError
-from islands_api.app import create_app
+from islands_api.web.app import create_app
 from islands_service.logs import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.lib import format as npy
 
-from islands_api import auth
+from islands_api.web import auth
 from support.service import (
     columns,
     csv,

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from islands_api.middleware import SECURITY
-from islands_api.routes.page import FILES, FOLDER
+from islands_api.web.middleware import SECURITY
+from islands_api.web.routes.page import FILES, FOLDER
 
 TEXTS = {path.name: path.read_text(encoding="utf-8") for path in sorted(FOLDER.iterdir())}
 SCRIPTS = {name: text for name, text in TEXTS.items() if name.endswith(".js")}

@@ -285,7 +285,7 @@ def test_before_it_has_ended_it_says_so(service, order):
 
 WEIGHT = """
 import sys
-from islands_api.app import create_app
+from islands_api.web.app import create_app
 from islands_api.schemas import DiscrepancyRequest
 from islands_service.admission import _parts
 from islands_service.settings import ServiceSettings

@@ -6,9 +6,9 @@ import time
 import httpx
 import pytest
 
-from islands_api import hub
-from islands_api.auth import LOCAL
-from islands_api.routes import events as routes
+from islands_api.web import event_hub
+from islands_api.web.auth import LOCAL
+from islands_api.web.routes import events as routes
 from islands_service.store import leases
 from support.processes import eventually
 from support.service import PATIENCE, emptied, parsed, problem_of, queued
@@ -24,7 +24,7 @@ def shared(serve):
 
 @pytest.fixture
 def service(shared, monkeypatch):
-    monkeypatch.setattr(hub, "LOOK", 0.03)
+    monkeypatch.setattr(event_hub, "LOOK", 0.03)
     return emptied(shared)
 
 

@@ -12,7 +12,7 @@ import httpx
 import pytest
 from sqlalchemy import update
 
-from islands_api.routes import figures
+from islands_api.web.routes import figures
 from islands_service.store.tables import models, results
 from support.databases import server
 from support.disks import filled

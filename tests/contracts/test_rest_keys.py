@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from islands_api.routes import events
+from islands_api.web.routes import events
 from islands_service.store.keys import SCOPES
 from support.service import PATIENCE, csv, held, kept, problem_of, queued, spec
 

@@ -6,7 +6,7 @@ import httpx
 import pytest
 from fastapi.responses import StreamingResponse
 
-from islands_api.problems import PROBLEMS
+from islands_api.web.problems import PROBLEMS
 from islands_service.blobs import NoSuchBlob
 from islands_service.store.database import StoreInDoubt
 from support.repository import DOCS

@@ -9,8 +9,8 @@ from jsonschema import Draft202012Validator
 
 from islands.figures.gallery import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
-from islands_api.routes.figures import MODEL_FIGURES
-from islands_api.routes.figures import SEARCH_FIGURES as NAMED
+from islands_api.web.routes.figures import MODEL_FIGURES
+from islands_api.web.routes.figures import SEARCH_FIGURES as NAMED
 from support.service import (
     columns,
     csv,

@@ -22,8 +22,8 @@ from fastapi import FastAPI
 from sqlalchemy import Connection
 
 from islands.io.records import write_record
-from islands_api.app import create_app
-from islands_api.auth import LOCAL
+from islands_api.web.app import create_app
+from islands_api.web.auth import LOCAL
 from islands_service.blobs import Blobs
 from islands_service.jobs import Job, Submission
 from islands_service.settings import ServiceSettings

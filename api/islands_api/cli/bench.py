@@ -17,7 +17,7 @@ from islands.benchmark.report import Report, document, goals
 from islands.errors import IslandsError
 from islands_api.cli.app import THREADS
 from islands_api.cli.console import compile_kernels, output, progress
-from islands_api.cli.fit import check_folder
+from islands_api.cli.output_folder import check_folder
 
 
 def bench(

@@ -17,8 +17,8 @@ from islands.systems.catalogue import SYSTEMS, make_record
 from islands.systems.published_models import PUBLISHED
 from islands.validation.metrics import Metrics, metrics
 from islands_api.cli.console import compile_kernels, errors, output, progress
-from islands_api.cli.course import course
-from islands_api.cli.fit import check_folder, show_result
+from islands_api.cli.output_folder import check_folder, show_result
+from islands_api.cli.search_progress import course
 from islands_service.engines import ENGINES
 
 #: As many as the smallest machine has cores.

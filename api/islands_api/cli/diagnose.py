@@ -23,7 +23,7 @@ from islands.io.simulations import simulation
 from islands.proposing import proposed
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, output, progress
-from islands_api.cli.fit import check_folder
+from islands_api.cli.output_folder import check_folder
 from islands_service.diagnosis_report import in_words, report, self_test_in_words
 from islands_service.rows import rows_of
 

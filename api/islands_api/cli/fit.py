@@ -1,6 +1,5 @@
 """``islands fit``: forward selection over a library, and (constrained) least squares."""
 
-import os
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
@@ -8,13 +7,12 @@ from typing import Annotated
 import typer
 
 import islands
-from islands.errors import SettingsError
 from islands.estimation.constraints import CONSTRAINTS
 from islands.io.records import read_record
 from islands.model.library import LIBRARIES
-from islands.result import Result
 from islands_api.cli import options
-from islands_api.cli.console import compile_kernels, output, progress
+from islands_api.cli.console import compile_kernels, progress
+from islands_api.cli.output_folder import check_folder, show_result
 from islands_service.rows import rows_of
 
 
@@ -69,26 +67,3 @@ def fit(
         tell("figures", 1.0)
         result.save(out)
     show_result(result, out)
-
-
-def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
-    """Refuse to write over a result that somebody may still want; it is there where its last file is.
-
-    Raises
-    ------
-    SettingsError
-        There is one, the path or a part of it is a file, or nothing may be written there.
-    """
-    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not there.is_dir():
-        raise SettingsError(f"--out {folder}: {there} is a file, give a folder")
-    if not os.access(there, os.W_OK):
-        raise SettingsError(f"--out {folder}: nothing may be written in {there}, give another folder")
-    if (folder / result).exists() and not force:
-        raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
-
-
-def show_result(result: Result, folder: Path) -> None:
-    """Print the summary and where everything is."""
-    output.print(str(result), markup=False)
-    output.print(f"{folder}/: result.json, models/, figures/, summary.txt", markup=False)

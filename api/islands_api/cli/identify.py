@@ -9,8 +9,8 @@ from islands.errors import SettingsError, chosen
 from islands.io.records import fingerprint
 from islands_api.cli import options
 from islands_api.cli import search_options as search
-from islands_api.cli.fit import check_folder
-from islands_api.cli.run import Manner, run, stored
+from islands_api.cli.identify_run import Manner, run, stored
+from islands_api.cli.output_folder import check_folder
 from islands_service.engines import ENGINES
 
 #: Options that say how to run, not what: they may differ from one resumption to the next.

@@ -10,8 +10,9 @@ from islands_api.cli import job_views as views
 from islands_api.cli import options
 from islands_api.cli import search_options as search
 from islands_api.cli.console import errors, output
+from islands_api.cli.output_folder import check_folder
 from islands_api.client import Client, JobFailed
-from islands_api.client.discrepancies import simulation_of
+from islands_api.client.diagnosis_calls import simulation_of
 from islands_api.schemas import JobView
 from islands_service.jobs import DISCREPANCY, JobState
 
@@ -223,7 +224,6 @@ def result(
     """Show what a job that has succeeded found, and download it."""
     if out is not None:
         # It brings the kernels along: who only looks does not wait for them.
-        from islands_api.cli.fit import check_folder  # noqa: PLC0415
 
         for kept in views.RESULTS.values():
             check_folder(out, force, kept.file)

@@ -1,9 +1,9 @@
 """The Python client, for programs that wait and for those that do not. It speaks REST alone."""
 
-from islands_api.client.answers import Event
 from islands_api.client.asynchronous import AsyncClient
 from islands_api.client.calls import JobRef
 from islands_api.client.errors import JobFailed, ServiceError, Unreachable
+from islands_api.client.response_parsing import Event
 from islands_api.client.synchronous import Client
 
 __all__ = ["AsyncClient", "Client", "Event", "JobFailed", "JobRef", "ServiceError", "Unreachable"]

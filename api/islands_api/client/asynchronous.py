@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 import httpx
 
-from islands_api.client import calls, discrepancies
-from islands_api.client.answers import Event, EventLines, refuse_problem
+from islands_api.client import calls, diagnosis_calls
 from islands_api.client.calls import Call, JobRef
 from islands_api.client.errors import JobFailed, ServiceError
+from islands_api.client.response_parsing import Event, EventLines, refuse_problem
 from islands_api.client.transport import (
     PATIENCE,
     Tries,
@@ -123,8 +123,8 @@ class AsyncClient:
         return await self.call(calls.submit(*arguments, **named))
 
     async def diagnose(self, *arguments: Any, **named: Any) -> JobView:
-        """Submit a discrepancy job: see `islands_api.client.discrepancies.diagnose`."""
-        return await self.call(discrepancies.diagnose(*arguments, **named))
+        """Submit a discrepancy job: see `islands_api.client.diagnosis_calls.diagnose`."""
+        return await self.call(diagnosis_calls.diagnose(*arguments, **named))
 
     async def job(self, which: JobRef) -> JobView:
         """Look at a job."""

@@ -12,7 +12,7 @@ from uuid import uuid4
 import httpx
 
 from islands.errors import SettingsError
-from islands_api.client.answers import document_of, read_as
+from islands_api.client.response_parsing import document_of, read_as
 from islands_api.schemas import (
     DatasetPage,
     DatasetView,

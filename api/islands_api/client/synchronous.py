@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 
 import httpx
 
-from islands_api.client import calls, discrepancies
-from islands_api.client.answers import Event, EventLines, refuse_problem
+from islands_api.client import calls, diagnosis_calls
 from islands_api.client.calls import Call, JobRef
 from islands_api.client.errors import JobFailed, ServiceError
+from islands_api.client.response_parsing import Event, EventLines, refuse_problem
 from islands_api.client.transport import (
     PATIENCE,
     Tries,
@@ -139,8 +139,8 @@ class Client:
         return self.call(calls.submit(*arguments, **named))
 
     def diagnose(self, *arguments: Any, **named: Any) -> JobView:
-        """Submit a discrepancy job: see `islands_api.client.discrepancies.diagnose`."""
-        return self.call(discrepancies.diagnose(*arguments, **named))
+        """Submit a discrepancy job: see `islands_api.client.diagnosis_calls.diagnose`."""
+        return self.call(diagnosis_calls.diagnose(*arguments, **named))
 
     def job(self, which: JobRef) -> JobView:
         """Look at a job."""

@@ -15,7 +15,7 @@ from islands.io.models import write_model
 from islands.io.records import write_record
 from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
-from islands_api.cli.fit import check_folder
+from islands_api.cli.output_folder import check_folder
 from islands_service.rows import rows_of
 from support.command_line import succeed
 from support.undrawn import undrawn_figures

@@ -13,10 +13,10 @@ import pytest
 import islands_api
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.settings import Settings
-from islands_api.client import AsyncClient, Client, ServiceError, calls, discrepancies
+from islands_api.client import AsyncClient, Client, ServiceError, calls, diagnosis_calls
 from islands_api.client.calls import Call
-from islands_api.documents import job_document
 from islands_api.schemas import DatasetView, JobPage, JobRequest, JobView
+from islands_api.web.responses import job_document
 from islands_service.jobs import JobState
 from support.service import Service, csv, kept, queued
 from support.stores import FAILED, FOUND
@@ -236,13 +236,13 @@ def test_a_discrepancy_job_says_what_was_submitted(client: Any, me: Any) -> None
 )
 def test_a_simulation_that_cannot_be_sent_is_refused_before_it_is(text: str, why: str) -> None:
     with pytest.raises(IslandsError, match=why):
-        discrepancies.diagnose("0-csv", "u_V", "y_um", text)
+        diagnosis_calls.diagnose("0-csv", "u_V", "y_um", text)
 
 
 def test_a_model_file_goes_along(tmp_path: Path) -> None:
     path = tmp_path / "model.json"
     path.write_text('{"terms": []}')
-    body = discrepancies.diagnose("0-csv", "u_V", "y_um", f"model:{path}", channels="T_K").json
+    body = diagnosis_calls.diagnose("0-csv", "u_V", "y_um", f"model:{path}", channels="T_K").json
     assert body["channels"] == ["T_K"]
     assert body["simulation"] == {"kind": "model", "model": {"terms": []}, "name": "model model.json"}
 

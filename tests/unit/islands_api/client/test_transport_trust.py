@@ -12,8 +12,8 @@ import pytest
 import trustme
 
 from islands.errors import SettingsError
-from islands_api.app import create_app
 from islands_api.client import ServiceError, Unreachable
+from islands_api.web.app import create_app
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from support.service import Service, kept, listening

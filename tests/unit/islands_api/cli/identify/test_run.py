@@ -15,7 +15,7 @@ from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.io.records import write_record
 from islands.io.states import state_document
 from islands.validation.findings import Progress
-from islands_api.cli import run as command
+from islands_api.cli import identify_run as command
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
 
 # Stopped and resumed.

@@ -6,13 +6,13 @@ from fastapi import APIRouter, Path, Query, Response
 
 from islands.io.export import EXPORTS, export
 from islands.io.models import model_from_json
-from islands_api.auth import Caller, Reader
-from islands_api.documents import Document, Items
-from islands_api.doors import AtDoors, Doors
-from islands_api.kinds import finished, of_kind
-from islands_api.problems import RESPONSES, NoSuchThing
-from islands_api.routes.jobs import Id
 from islands_api.schemas import ModelPage, ModelView
+from islands_api.web.auth import Caller, Reader
+from islands_api.web.dependencies import AtDoors, Doors
+from islands_api.web.job_submission import finished, of_kind
+from islands_api.web.problems import RESPONSES, NoSuchThing
+from islands_api.web.responses import Document, Items
+from islands_api.web.routes.jobs import Id
 from islands_service.jobs import IDENTIFICATION
 from islands_service.store.results import StoredModel
 

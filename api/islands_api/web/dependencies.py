@@ -7,10 +7,10 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
 
-from islands_api.hub import Hub
-from islands_api.measures import Measures
-from islands_api.rate import Rate
-from islands_api.threads import Threads
+from islands_api.web.concurrency import Threads
+from islands_api.web.event_hub import Hub
+from islands_api.web.metrics import Measures
+from islands_api.web.rate_limit import Rate
 from islands_service.blobs import Blobs
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store

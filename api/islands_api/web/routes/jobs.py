@@ -4,15 +4,14 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Path, Query, Response
 
-from islands_api.auth import Reader, Writer
-from islands_api.bodies import JSONRoute
-from islands_api.cursors import Cursor, Limit, cursor_of, place_of
-from islands_api.documents import Document, Items, job_document
-from islands_api.doors import AtDoors, Doors
-from islands_api.kinds import of_kind
-from islands_api.problems import RESPONSES
 from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
-from islands_api.submissions import ACCEPTED, ETAG, IdempotencyKey, accept, etag
+from islands_api.web.auth import Reader, Writer
+from islands_api.web.dependencies import AtDoors, Doors
+from islands_api.web.job_submission import ACCEPTED, ETAG, IdempotencyKey, accept, etag, of_kind
+from islands_api.web.pagination import Cursor, Limit, cursor_of, place_of
+from islands_api.web.problems import RESPONSES
+from islands_api.web.requests import JSONRoute
+from islands_api.web.responses import Document, Items, job_document
 from islands_service.jobs import IDENTIFICATION, TERMINAL, Job, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)

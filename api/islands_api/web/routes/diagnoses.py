@@ -4,14 +4,13 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
-from islands_api.auth import Reader, Writer
-from islands_api.bodies import JSONRoute
-from islands_api.doors import AtDoors
-from islands_api.kinds import finished, of_kind
-from islands_api.problems import RESPONSES, NoSuchThing
-from islands_api.routes.jobs import Id
 from islands_api.schemas import DiscrepancyRequest, JobView
-from islands_api.submissions import ACCEPTED, JOBS, IdempotencyKey, accept
+from islands_api.web.auth import Reader, Writer
+from islands_api.web.dependencies import AtDoors
+from islands_api.web.job_submission import ACCEPTED, JOBS, IdempotencyKey, accept, finished, of_kind
+from islands_api.web.problems import RESPONSES, NoSuchThing
+from islands_api.web.requests import JSONRoute
+from islands_api.web.routes.jobs import Id
 from islands_service.jobs import DISCREPANCY, EXTENDED
 
 router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)

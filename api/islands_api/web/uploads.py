@@ -8,7 +8,7 @@ from typing import IO
 
 from islands.errors import RecordError
 from islands.io.records import READERS
-from islands_api.problems import TooLarge
+from islands_api.web.problems import TooLarge
 
 #: Bytes that are handled at once.
 CHUNK = 1 << 20

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands_api.documents import Document, dataset_document, job_document, json_text
 from islands_api.schemas import DatasetView, JobRequest, JobView
+from islands_api.web.responses import Document, dataset_document, job_document, json_text
 from islands_service.jobs import Report
 from support.service import kept, queued
 

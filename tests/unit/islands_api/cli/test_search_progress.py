@@ -12,8 +12,8 @@ from islands.evolution.search import State
 from islands.evolution.settings import Settings
 from islands.validation.findings import Progress
 from islands_api.cli import console
-from islands_api.cli import course as showing
-from islands_api.cli.course import SHOWN, course
+from islands_api.cli import search_progress as showing
+from islands_api.cli.search_progress import SHOWN, course
 
 
 @pytest.fixture

@@ -2,13 +2,13 @@
 
 from fastapi import APIRouter
 
-from islands_api.routes import datasets, discrepancies, events, figures, jobs, models, page, service
+from islands_api.web.routes import datasets, diagnoses, events, figures, jobs, models, page, service
 
 #: All of the interface.
 ROUTERS: tuple[APIRouter, ...] = (
     datasets.router,
     jobs.router,
-    discrepancies.router,
+    diagnoses.router,
     events.router,
     models.router,
     figures.router,

@@ -13,7 +13,7 @@ from starlette.responses import JSONResponse
 from starlette.routing import Match
 
 from islands.errors import IslandsError
-from islands_api.problems import (
+from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,
     NoKey,

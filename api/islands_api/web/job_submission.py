@@ -5,13 +5,14 @@ from typing import Annotated, Any
 from fastapi import Header
 
 from islands.errors import IslandsError
-from islands_api.auth import Caller
-from islands_api.documents import Document, job_document
-from islands_api.doors import Doors
 from islands_api.schemas import DiscrepancyRequest, JobRequest
+from islands_api.web.auth import Caller
+from islands_api.web.dependencies import Doors
+from islands_api.web.problems import NoSuchThing, NotFinished
+from islands_api.web.responses import Document, job_document
 from islands_service.admission import Doubt, admit
 from islands_service.inspection import inspected
-from islands_service.jobs import Job, Submission
+from islands_service.jobs import Job, JobState, Submission
 from islands_service.records import named
 
 #: Where jobs of every kind are.
@@ -91,3 +92,39 @@ def _admitted(doors: Doors, request: Request, submission: Submission) -> tuple[J
             return before, ()
         raise
     return doors.store.jobs.accepted(submission) if doubts else None, doubts
+
+
+async def of_kind(doors: Doors, caller: Caller, job: str, kind: str) -> Job:
+    """Return a job that is of a kind.
+
+    Raises
+    ------
+    NoSuchJob
+    NoSuchThing
+        It is of another kind, and has nothing of what is asked for.
+    """
+    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    if found.kind != kind:
+        raise NoSuchThing(
+            f"job {job} is of the kind {found.kind}, and only those of the kind {kind} have this: its "
+            "/result and /report say what it found"
+        )
+    return found
+
+
+async def finished(doors: Doors, job: Job) -> dict[str, Any]:
+    """Return a job's result without its models.
+
+    Raises
+    ------
+    NotFinished
+    """
+    document = await doors.do(doors.store.results.document, job.id)
+    if document is None:
+        hint = (
+            "wait until it has succeeded"
+            if job.state in (JobState.QUEUED, JobState.RUNNING)
+            else "resume it, or submit it again"
+        )
+        raise NotFinished(f"job {job.id} is {job.state} and has no result: {hint}")
+    return document

@@ -8,8 +8,8 @@ import tempfile
 import pytest
 
 from islands.errors import RecordError
-from islands_api.problems import TooLarge
-from islands_api.uploads import NAME, name_of, receive
+from islands_api.web.problems import TooLarge
+from islands_api.web.uploads import NAME, name_of, receive
 
 #: What strangers call a file, and what we do.
 NAMES = {

@@ -22,8 +22,8 @@ from islands.io.states import state_document, state_of
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, errors, output, progress
-from islands_api.cli.course import course
-from islands_api.cli.fit import show_result
+from islands_api.cli.output_folder import show_result
+from islands_api.cli.search_progress import course
 from islands_service.engines import ENGINES
 from islands_service.rows import rows_of
 

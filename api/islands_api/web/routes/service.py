@@ -5,10 +5,10 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from islands_api.auth import Operator
-from islands_api.doors import AtDoors
-from islands_api.problems import PROBLEMS, RESPONSES, NoSuchThing
 from islands_api.schemas import Health
+from islands_api.web.auth import Operator
+from islands_api.web.dependencies import AtDoors
+from islands_api.web.problems import PROBLEMS, RESPONSES, NoSuchThing
 
 router = APIRouter(tags=["service"], responses=RESPONSES)
 

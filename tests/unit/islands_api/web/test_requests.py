@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands_api.bodies import read_json
-from islands_api.problems import Unreadable
+from islands_api.web.problems import Unreadable
+from islands_api.web.requests import read_json
 from support.service import PROBLEM, csv, kept, problem_of, spec
 
 JSON_VALUES = st.recursive(

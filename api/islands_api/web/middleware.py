@@ -10,8 +10,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from islands_api.answers import METHODS, answer, defect
-from islands_api.problems import CrossOrigin, TooLarge, problem_of
+from islands_api.web.exception_handlers import METHODS, answer, defect
+from islands_api.web.problems import CrossOrigin, TooLarge, problem_of
 from islands_service.settings import LOOPBACK, ServiceSettings
 
 log = structlog.get_logger()

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
-from islands_api.doors import Doors
-from islands_api.problems import NoKey, ScopeMissing
+from islands_api.web.dependencies import Doors
+from islands_api.web.problems import NoKey, ScopeMissing
 from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.errors import SettingsError
-from islands_api.cursors import cursor_of, place_of
+from islands_api.web.pagination import cursor_of, place_of
 
 IDENTITIES = st.from_regex(r"\A[0-9A-Za-z_-]{1,64}\Z")
 

@@ -7,7 +7,7 @@ from contextvars import ContextVar
 
 import pytest
 
-from islands_api.threads import Threads
+from islands_api.web.concurrency import Threads
 
 who: ContextVar[str] = ContextVar("who", default="nobody")
 

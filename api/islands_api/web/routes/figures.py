@@ -11,13 +11,13 @@ import structlog
 from fastapi import APIRouter, Path, Response
 
 from islands.errors import IslandsError
-from islands_api.auth import Caller, Reader
-from islands_api.doors import AtDoors, Doors
-from islands_api.kinds import finished, of_kind
-from islands_api.problems import RESPONSES, NoSuchThing
-from islands_api.routes.jobs import Id
-from islands_api.routes.models import Rank, stored
 from islands_api.schemas import Names
+from islands_api.web.auth import Caller, Reader
+from islands_api.web.dependencies import AtDoors, Doors
+from islands_api.web.job_submission import finished, of_kind
+from islands_api.web.problems import RESPONSES, NoSuchThing
+from islands_api.web.routes.jobs import Id
+from islands_api.web.routes.models import Rank, stored
 from islands_service.blobs import NoSuchBlob
 from islands_service.jobs import IDENTIFICATION, REPORT
 from islands_service.specification import identification_of

@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from time import monotonic
 
-from islands_api.problems import TooManyRequests
+from islands_api.web.problems import TooManyRequests
 
 #: Buckets that are remembered: who has not asked for longest is forgotten, and is full by then.
 _REMEMBERED = 10_000

@@ -6,9 +6,9 @@ from contextlib import asynccontextmanager, suppress
 import pytest
 import structlog
 
-from islands_api import hub as hubs
-from islands_api.hub import Hub
-from islands_api.threads import Threads
+from islands_api.web import event_hub as hubs
+from islands_api.web.concurrency import Threads
+from islands_api.web.event_hub import Hub
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailable
 from support.stores import CANCELLED, FOUND, LONG, brought_on, claimed, submitted

@@ -9,16 +9,16 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from starlette.middleware.gzip import GZipMiddleware
 
-from islands_api import answers
-from islands_api.auth import KeyRing
-from islands_api.doors import DRAWINGS, INSPECTIONS, Doors
-from islands_api.hub import Hub
-from islands_api.measures import Measures
-from islands_api.middleware import Limited, SameOrigin, Watched
-from islands_api.problems import ProblemDocument
-from islands_api.rate import Rate
-from islands_api.routes import ROUTERS
-from islands_api.threads import Threads
+from islands_api.web import exception_handlers
+from islands_api.web.auth import KeyRing
+from islands_api.web.concurrency import Threads
+from islands_api.web.dependencies import DRAWINGS, INSPECTIONS, Doors
+from islands_api.web.event_hub import Hub
+from islands_api.web.metrics import Measures
+from islands_api.web.middleware import Limited, SameOrigin, Watched
+from islands_api.web.problems import ProblemDocument
+from islands_api.web.rate_limit import Rate
+from islands_api.web.routes import ROUTERS
 from islands_service.blobs import Blobs
 from islands_service.lifeline import EVERY, sign_of_life
 from islands_service.settings import ServiceSettings
@@ -88,7 +88,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     )
     for router in ROUTERS:
         app.include_router(router)
-    answers.install(app)
+    exception_handlers.install(app)
     # Figures and the page take a third; a job on its own is too small to gain, and events are not held back.
     app.add_middleware(GZipMiddleware, minimum_size=_PACKED, compresslevel=5)
     app.add_middleware(Limited, settings=settings)

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.responses import StreamingResponse
 
-from islands_api.auth import Caller, KeyRing, Reader
-from islands_api.documents import json_text
-from islands_api.doors import AtDoors, Doors
-from islands_api.problems import RESPONSES
-from islands_api.routes.jobs import Id
+from islands_api.web.auth import Caller, KeyRing, Reader
+from islands_api.web.dependencies import AtDoors, Doors
+from islands_api.web.problems import RESPONSES
+from islands_api.web.responses import json_text
+from islands_api.web.routes.jobs import Id
 from islands_service.jobs import TERMINAL, Event, Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)

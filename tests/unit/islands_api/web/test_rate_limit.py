@@ -2,9 +2,9 @@
 
 import pytest
 
-from islands_api import rate
-from islands_api.problems import TooManyRequests
-from islands_api.rate import Rate
+from islands_api.web import rate_limit
+from islands_api.web.problems import TooManyRequests
+from islands_api.web.rate_limit import Rate
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def clock(monkeypatch):
     class Clock:
         now = 100.0
 
-    monkeypatch.setattr(rate, "monotonic", lambda: Clock.now)
+    monkeypatch.setattr(rate_limit, "monotonic", lambda: Clock.now)
     return Clock
 
 
@@ -77,7 +77,7 @@ def test_without_a_rate_nobody_is_refused(clock):
 
 
 def test_strangers_take_up_no_memory_without_end(clock, monkeypatch):
-    monkeypatch.setattr(rate, "_REMEMBERED", 10)
+    monkeypatch.setattr(rate_limit, "_REMEMBERED", 10)
     bucket = Rate(rate=1.0, burst=2)
     bucket.take("first")
     for stranger in range(1000):

@@ -14,8 +14,8 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
-from islands_api.auth import caller_of
-from islands_api.problems import Unreadable, WrongMedia
+from islands_api.web.auth import caller_of
+from islands_api.web.problems import Unreadable, WrongMedia
 
 #: The most digits of a whole number: reading one takes the square of their count.
 _DIGITS = 400

@@ -7,14 +7,14 @@ import fastapi
 from fastapi import APIRouter, File, Form, UploadFile
 from pydantic import FiniteFloat
 
-from islands_api.auth import Reader, Writer
-from islands_api.bodies import FormRoute
-from islands_api.cursors import Cursor, Limit, cursor_of, place_of
-from islands_api.documents import Document, dataset_document
-from islands_api.doors import AtDoors, Doors
-from islands_api.problems import RESPONSES
 from islands_api.schemas import DatasetPage, DatasetView
-from islands_api.uploads import name_of, receive
+from islands_api.web.auth import Reader, Writer
+from islands_api.web.dependencies import AtDoors, Doors
+from islands_api.web.pagination import Cursor, Limit, cursor_of, place_of
+from islands_api.web.problems import RESPONSES
+from islands_api.web.requests import FormRoute
+from islands_api.web.responses import Document, dataset_document
+from islands_api.web.uploads import name_of, receive
 from islands_service.inspection import Asked, inspected
 from islands_service.records import named
 from islands_service.specification import Name

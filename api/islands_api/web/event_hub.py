@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import structlog
 
-from islands_api.threads import Threads
+from islands_api.web.concurrency import Threads
 from islands_service.jobs import TERMINAL, Event
 from islands_service.store import Store
 from islands_service.store.database import StoreError

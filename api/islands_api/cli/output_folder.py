@@ -1,0 +1,35 @@
+"""The folder that a command writes to: checked before the work, named after it."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from islands.errors import SettingsError
+from islands_api.cli.console import output
+
+if TYPE_CHECKING:
+    from islands.result import Result
+
+
+def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
+    """Check that a result can be written to a folder and overwrites no other one.
+
+    Raises
+    ------
+    SettingsError
+        The folder holds a result and ``force`` is false, the path or a part of it is a file, or the folder is
+        not writable.
+    """
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise SettingsError(f"--out {folder}: {there} is a file, give a folder")
+    if not os.access(there, os.W_OK):
+        raise SettingsError(f"--out {folder}: nothing may be written in {there}, give another folder")
+    if (folder / result).exists() and not force:
+        raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
+
+
+def show_result(result: "Result", folder: Path) -> None:
+    """Print the summary and the files of a result."""
+    output.print(str(result), markup=False)
+    output.print(f"{folder}/: result.json, models/, figures/, summary.txt", markup=False)

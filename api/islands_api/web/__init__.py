@@ -1,0 +1,1 @@
+"""The web service: a FastAPI application over the store. Read `app` first."""
