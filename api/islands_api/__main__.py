@@ -13,7 +13,7 @@ import uvicorn
 
 from islands.errors import IslandsError, SettingsError
 from islands_api.web.app import create_app
-from islands_service.logs import configure_logs
+from islands_service.logging_config import configure_logs
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.supervisor import MISCONFIGURED

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.lifeline import Wish, stop_on_signals
+from islands_service.liveness import Wish, stop_on_signals
 
 #: Seconds between two looks at the children.
 _LOOK = 0.05

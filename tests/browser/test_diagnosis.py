@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from islands_service.blobs import Blobs
-from islands_service.jobs import EXTENDED, REPORT, JobState, Outcome, Report
+from islands_service.domain.jobs import EXTENDED, REPORT, JobState, Outcome, Report
+from islands_service.store.blobs import Blobs
 from support.played import stored
 from support.screen import Screen
 from support.service_processes import Service

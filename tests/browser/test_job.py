@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobState, Outcome
 from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen

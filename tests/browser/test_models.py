@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from islands.evolution.engine import SerialEngine
-from islands_service.blobs import Blobs
-from islands_service.coordinator.identification import identification
+from islands_service.coordinator.identification_job import identification
 from islands_service.settings import ServiceSettings
+from islands_service.store.blobs import Blobs
 from support.played import stored
 from support.processes import eventually
 from support.reading import unreadable

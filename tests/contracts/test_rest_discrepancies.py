@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from islands_service.jobs import DISCREPANCY, JobState, Outcome, Report
+from islands_service.domain.jobs import DISCREPANCY, JobState, Outcome, Report
 from support.service import HIDDEN, diagnosed, held, hidden, identified, kept, parsed, problem_of, served
 from support.stores import LONG, claimed
 
@@ -287,7 +287,7 @@ WEIGHT = """
 import sys
 from islands_api.web.app import create_app
 from islands_api.schemas import DiscrepancyRequest
-from islands_service.admission import _parts
+from islands_service.intake.job_validation import _parts
 from islands_service.settings import ServiceSettings
 import json
 _parts(DiscrepancyRequest.model_validate(json.loads(sys.argv[1])), ServiceSettings())

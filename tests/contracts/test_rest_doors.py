@@ -5,7 +5,7 @@ import json
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from islands_service.jobs import JobState, Report
+from islands_service.domain.jobs import JobState, Report
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, claimed
 

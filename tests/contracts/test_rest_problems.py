@@ -7,7 +7,7 @@ import pytest
 from fastapi.responses import StreamingResponse
 
 from islands_api.web.problems import PROBLEMS
-from islands_service.blobs import NoSuchBlob
+from islands_service.store.blobs import NoSuchBlob
 from islands_service.store.database import StoreInDoubt
 from support.repository import DOCS
 from support.service import PROBLEM, problem_of, queued

@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import update
 
 from islands.errors import SettingsError
-from islands_service.jobs import TERMINAL, JobState, QuotaExceeded
+from islands_service.domain.jobs import TERMINAL, JobState, QuotaExceeded
 from islands_service.store.datasets import DatasetInUse, NoSuchDataset, dataset_id
 from islands_service.store.keys import PREFIX, SCOPES, NoSuchKey
 from islands_service.store.tables import datasets, jobs

@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from islands_service.jobs import JobState, LeaseLost, Report
+from islands_service.domain.jobs import JobState, LeaseLost, Report
 from support.stores import (
     ALICE,
     CANCELLED,

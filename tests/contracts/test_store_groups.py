@@ -6,11 +6,11 @@ from contextlib import suppress
 import pytest
 from sqlalchemy import insert, select, text
 
-from islands_service.jobs import NoSuchJob
+from islands_service.domain.jobs import NoSuchJob
 from islands_service.store import Store
 from islands_service.store import database as database_module
-from islands_service.store.changes import change, record
 from islands_service.store.database import GROUP, StoreError
+from islands_service.store.job_events import change, record
 from islands_service.store.tables import keys
 from support.stores import (
     ALICE,

@@ -5,7 +5,7 @@ import time
 import pytest
 from sqlalchemy import update
 
-from islands_service.jobs import JobState, NoSuchJob, WrongState
+from islands_service.domain.jobs import JobState, NoSuchJob, WrongState
 from islands_service.store.datasets import NoSuchDataset
 from islands_service.store.jobs import PAGE
 from islands_service.store.tables import jobs as jobs_table

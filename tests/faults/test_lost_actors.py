@@ -11,7 +11,7 @@ from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
-from islands_service.runtime import crew
+from islands_service.runtime import actor_pool
 from islands_service.runtime.cluster import LOST, ClusterError
 from support.processes import actors, alive, eventually, kill
 from support.searches import SMALL, exactly, record
@@ -81,15 +81,15 @@ def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_repla
 ):
     import ray
 
-    monkeypatch.setattr(crew, "STAND_IN_AFTER", 0.0)
-    found = crew.Crew(posed, 3, told.append)
+    monkeypatch.setattr(actor_pool, "STAND_IN_AFTER", 0.0)
+    found = actor_pool.Crew(posed, 3, told.append)
     try:
         everybody = min(3, len(os.sched_getaffinity(0))) + 1
         eventually(lambda: found.tend(at_once=True) and len(found.places) == everybody)
         regular = [found.home(island) for island in range(3)]
         kill(min(actors()))
         eventually(lambda: found.tend(at_once=True) and told)
-        assert found.places[0] == crew.STAND_IN
+        assert found.places[0] == actor_pool.STAND_IN
         assert len(found.places) == everybody - 1
         replaced = [
             now for now, before in zip(map(found.home, range(3)), regular, strict=True) if now != before

@@ -10,10 +10,10 @@ import time
 
 import pytest
 
-from islands_service.jobs import JobState, LeaseLost
+from islands_service.domain.jobs import JobState, LeaseLost
 from islands_service.store import Store
-from islands_service.store.changes import change, record
 from islands_service.store.database import StoreUnavailable
+from islands_service.store.job_events import change, record
 from support.databases import answers, emptied, server
 from support.processes import eventually
 from support.repository import ROOT

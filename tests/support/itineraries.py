@@ -11,7 +11,7 @@ from islands.evolution.individual import Individual
 from islands.evolution.problem import Problem
 from islands.evolution.schedule import Schedule
 from islands.evolution.topology import topology
-from islands_service.runtime.itinerary import AHEAD, Itinerary, Leg
+from islands_service.runtime.epoch_scheduler import AHEAD, Itinerary, Leg
 from support.searches import SMALL, record
 from support.strategies import layouts, schedule_text, schedules
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from math import sqrt
 from typing import Any
 
-from islands_service.jobs import Lease, Report
+from islands_service.domain.jobs import Lease, Report
 from islands_service.store import Store
 from support.service_processes import Service
 

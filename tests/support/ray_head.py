@@ -20,7 +20,7 @@ def ray_head(folder: Path) -> Iterator[str]:
     environment = {**os.environ, "ISLANDS_DATA_DIR": str(folder), "RAY_AUTH_TOKEN": token}
     # The head ends with this process, also when this process is killed.
     mortal = [setpriv, "--pdeathsig", "TERM"] if (setpriv := shutil.which("setpriv")) else []
-    command = [*mortal, sys.executable, "-m", "islands_service.runtime.head"]
+    command = [*mortal, sys.executable, "-m", "islands_service.runtime.ray_head"]
     address = folder / "ray-address"
     with (folder / "head.log").open("w") as log:
         head = subprocess.Popen(command, env=environment, stdout=log, stderr=log)

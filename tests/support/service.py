@@ -24,10 +24,10 @@ from sqlalchemy import Connection
 from islands.io.records import write_record
 from islands_api.web.app import create_app
 from islands_api.web.auth import LOCAL
-from islands_service.blobs import Blobs
-from islands_service.jobs import Job, Submission
+from islands_service.domain.jobs import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.blobs import Blobs
 from islands_service.store.tables import metadata
 
 #: Seconds after which a test's request has failed.
@@ -223,7 +223,7 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
 def diagnosed(service: Service, content: bytes, /, **changes: Any) -> str:
     """Upload a record and have a simulation held against it, here and now; return the job's id."""
     from islands.evolution.engine import SerialEngine
-    from islands_service.coordinator.discrepancy import discrepancy
+    from islands_service.coordinator.diagnosis_job import discrepancy
 
     dataset = service.upload(content).json()["id"]
     asked = held(dataset, channels=["T_K"], tolerance=KNOWN, **changes)
@@ -244,7 +244,7 @@ QUICK = {"population": 20, "generations": 2, "max_terms": 3, "max_height": 2, "s
 def identified(service: Service, islands: int = 1) -> str:
     """Upload a record and have a job identify it, here and now; return the job's id."""
     from islands.evolution.engine import SerialEngine
-    from islands_service.coordinator.identification import identification
+    from islands_service.coordinator.identification_job import identification
 
     dataset = service.upload(csv(400)).json()["id"]
     settings = {**QUICK, "islands": islands}

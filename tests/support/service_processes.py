@@ -20,7 +20,7 @@ from support.processes import alive, descendants, eventually
 ROLES = {
     "api": "-m islands_api",
     "coordinator": "-m islands_service.coordinator",
-    "head": "-m islands_service.runtime.head",
+    "head": "-m islands_service.runtime.ray_head",
     "raylet": "raylet/raylet ",
     "gcs": "gcs/gcs_server ",
     "island": "ray::IslandActor",

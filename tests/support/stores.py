@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from sqlalchemy import event, select
 
-from islands_service.jobs import Job, JobState, Lease, Outcome, Report, Submission
+from islands_service.domain.jobs import Job, JobState, Lease, Outcome, Report, Submission
 from islands_service.store import Store
 from islands_service.store.tables import metadata
 from support.processes import eventually
@@ -129,7 +129,7 @@ def at_once(actions: list[Callable[[], Any]]) -> list[Any]:
 _STANDING = """
 import signal, sys, threading
 from islands_service.store import Store, connections
-from islands_service.store.changes import change
+from islands_service.store.job_events import change
 connections.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", -1.0)

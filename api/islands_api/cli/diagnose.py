@@ -24,7 +24,7 @@ from islands.proposing import proposed
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
-from islands_service.diagnosis_report import in_words, report, self_test_in_words
+from islands_service.reports.diagnosis_report import in_words, report, self_test_in_words
 from islands_service.rows import rows_of
 
 #: Files of a result.
@@ -122,7 +122,7 @@ def _cores(workers: int | None, tested: bool) -> AbstractContextManager[Spread]:
     if workers == 1 or (workers is None and not tested):
         return nullcontext(map)
     # An analysis of some seconds need not wait for Ray.
-    from islands_service.runtime.pool import pool  # noqa: PLC0415
+    from islands_service.runtime.parallel_map import pool  # noqa: PLC0415
 
     return pool(workers)
 

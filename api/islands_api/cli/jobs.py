@@ -14,7 +14,7 @@ from islands_api.cli.output_folder import check_folder
 from islands_api.client import Client, JobFailed
 from islands_api.client.diagnosis_calls import simulation_of
 from islands_api.schemas import JobView
-from islands_service.jobs import DISCREPANCY, JobState
+from islands_service.domain.jobs import DISCREPANCY, JobState
 
 jobs = typer.Typer(
     help="Jobs of a service: submit, diagnose, list, show, watch, cancel, resume, result.",

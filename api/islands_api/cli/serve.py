@@ -73,7 +73,7 @@ def roles(settings: ServiceSettings) -> list[Role]:
         for index in range(settings.coordinators)
     ]
     if not settings.ray_address and settings.coordinators:
-        head = (*python, "islands_service.runtime.head")
+        head = (*python, "islands_service.runtime.ray_head")
         ours.append(Role("ray", head, _RAY_PATIENCE, address=settings.ray_address_file))
     return ours
 

@@ -18,7 +18,7 @@ from islands.trials.cores import CORES, Simulated
 from islands.trials.tally import Bin, Measure, Share, confusion, reliability, tally
 from islands.trials.trial import Outcome, Trial, carried_out
 from islands_api.cli.console import compile_kernels, output, progress
-from islands_service.runtime.pool import pool
+from islands_service.runtime.parallel_map import pool
 
 #: Bands of the misfit of each effect in standard deviations of the noise: they are taken in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))

@@ -19,11 +19,11 @@ from islands_api.web.middleware import Limited, SameOrigin, Watched
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.rate_limit import Rate
 from islands_api.web.routes import ROUTERS
-from islands_service.blobs import Blobs
-from islands_service.lifeline import EVERY, sign_of_life
+from islands_service.liveness import EVERY, sign_of_life
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.telemetry import Traces
+from islands_service.store.blobs import Blobs
+from islands_service.tracing import Traces
 
 #: Bytes from which on an answer is packed.
 _PACKED = 4000

@@ -11,9 +11,9 @@ from islands_api.web.concurrency import Threads
 from islands_api.web.event_hub import Hub
 from islands_api.web.metrics import Measures
 from islands_api.web.rate_limit import Rate
-from islands_service.blobs import Blobs
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.blobs import Blobs
 
 P = ParamSpec("P")
 T = TypeVar("T")

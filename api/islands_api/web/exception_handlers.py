@@ -26,8 +26,8 @@ from islands_api.web.problems import (
     WrongMethod,
     problem_of,
 )
-from islands_service.blobs import NoSuchBlob
-from islands_service.jobs import QuotaExceeded
+from islands_service.domain.jobs import QuotaExceeded
+from islands_service.store.blobs import NoSuchBlob
 from islands_service.store.database import StoreError, StoreFull, StoreInDoubt
 
 log = structlog.get_logger()

@@ -10,10 +10,10 @@ from islands_api.web.auth import Caller
 from islands_api.web.dependencies import Doors
 from islands_api.web.problems import NoSuchThing, NotFinished
 from islands_api.web.responses import Document, job_document
-from islands_service.admission import Doubt, admit
-from islands_service.inspection import inspected
-from islands_service.jobs import Job, JobState, Submission
-from islands_service.records import named
+from islands_service.domain.jobs import Job, JobState, Submission
+from islands_service.intake.file_inspection import inspected
+from islands_service.intake.job_inputs import named
+from islands_service.intake.job_validation import Doubt, admit
 
 #: Where jobs of every kind are.
 JOBS = "/v1/jobs"

@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-from islands_service.blobs import NoSuchBlob
-from islands_service.jobs import IdempotencyConflict, NoSuchJob, QuotaExceeded, WrongState
+from islands_service.domain.jobs import IdempotencyConflict, NoSuchJob, QuotaExceeded, WrongState
+from islands_service.store.blobs import NoSuchBlob
 from islands_service.store.database import StoreFull, StoreInDoubt, StoreUnavailable
 from islands_service.store.datasets import DatasetInUse, NoSuchDataset
 

@@ -7,9 +7,9 @@ import socket
 import sys
 
 from islands.errors import IslandsError
-from islands_service.coordinator.loop import Coordinator
-from islands_service.lifeline import Wish, lifeline, stop_on_signals
-from islands_service.logs import configure_logs
+from islands_service.coordinator.coordinator import Coordinator
+from islands_service.liveness import Wish, lifeline, stop_on_signals
+from islands_service.logging_config import configure_logs
 from islands_service.settings import service_settings
 
 

@@ -10,8 +10,8 @@ from types import TracebackType
 import structlog
 
 from islands.errors import IslandsError
-from islands_service.jobs import JobState, Lease, LeaseLost, Outcome
-from islands_service.lifeline import Wish
+from islands_service.domain.jobs import JobState, Lease, LeaseLost, Outcome
+from islands_service.liveness import Wish
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 

@@ -14,7 +14,7 @@ from islands.evolution.individual import Population
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.warm_up import warm_up
-from islands_service.runtime.report import Report, report_of, unpacked
+from islands_service.runtime.packed_epoch import Report, report_of, unpacked
 
 
 class IslandActor:

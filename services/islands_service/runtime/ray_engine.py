@@ -9,11 +9,11 @@ from ray.exceptions import RayError, RayTaskError
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import Caches, Epoch, Stop, Tell
 from islands.evolution.problem import Problem
+from islands_service.runtime.actor_pool import Crew
 from islands_service.runtime.cluster import LOST
-from islands_service.runtime.crew import Crew
+from islands_service.runtime.epoch_scheduler import Itinerary, Leg
 from islands_service.runtime.errors import ClusterError
-from islands_service.runtime.itinerary import Itinerary, Leg
-from islands_service.runtime.report import PackedIslands, Report, report_of
+from islands_service.runtime.packed_epoch import PackedIslands, Report, report_of
 
 #: Seconds between two looks at whether the search is to stop.
 _LOOK = 0.1

@@ -8,10 +8,10 @@ from typing import Any
 from sqlalchemy import Connection, Row, delete, func, insert, select, tuple_
 
 from islands.errors import IslandsError
-from islands_service.jobs import ACTIVE, QuotaExceeded
-from islands_service.store import locks
-from islands_service.store.clock import now
+from islands_service.domain.jobs import ACTIVE, QuotaExceeded
+from islands_service.store import dialect
 from islands_service.store.database import Database
+from islands_service.store.dialect import now
 from islands_service.store.tables import datasets, jobs
 
 
@@ -80,7 +80,7 @@ class Datasets:
         identity = dataset_id(blob, suffix)
 
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
-            locks.counting(connection, owner)
+            dialect.counting(connection, owner)
             before = connection.execute(_one(owner, identity)).one_or_none()
             if before is not None:
                 return _dataset_of(before), False

@@ -9,8 +9,8 @@ from typing import Any
 from sqlalchemy import Column, Connection, Row, func, insert, or_, select, update
 
 from islands.errors import IslandsError, SettingsError
-from islands_service.store.clock import now
 from islands_service.store.database import Database
+from islands_service.store.dialect import now
 from islands_service.store.tables import keys
 
 #: What a key may allow.

@@ -10,10 +10,10 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, and_, case, delete, func, insert, or_, select, update
 
-from islands_service.jobs import Job, JobState, Lease, LeaseLost, Outcome, Report
-from islands_service.store.changes import change, job_of, record
-from islands_service.store.clock import now
+from islands_service.domain.jobs import Job, JobState, Lease, LeaseLost, Outcome, Report
 from islands_service.store.database import Database
+from islands_service.store.dialect import now
+from islands_service.store.job_events import change, job_of, record
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
 #: Attempts that may fail to bring a job on, one after the other, before it is given up.

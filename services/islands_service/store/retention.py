@@ -2,9 +2,9 @@
 
 from sqlalchemy import Connection, delete, select, union
 
-from islands_service.jobs import TERMINAL
-from islands_service.store.clock import now
+from islands_service.domain.jobs import TERMINAL
 from islands_service.store.database import Database
+from islands_service.store.dialect import now
 from islands_service.store.tables import artefacts, datasets, jobs
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, inspect, text
 
-from islands_service.store import locks
+from islands_service.store import dialect
 from islands_service.store.database import Database, StoreError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def prepare(database: Database) -> None:
         if revision(connection) == HEAD:
             return
     with database.alone() as connection:
-        locks.migrating(connection)
+        dialect.migrating(connection)
         upgrade(connection)
 
 

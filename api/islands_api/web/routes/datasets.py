@@ -15,9 +15,9 @@ from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import FormRoute
 from islands_api.web.responses import Document, dataset_document
 from islands_api.web.uploads import name_of, receive
-from islands_service.inspection import Asked, inspected
-from islands_service.records import named
-from islands_service.specification import Name
+from islands_service.domain.job_spec import Name
+from islands_service.intake.file_inspection import Asked, inspected
+from islands_service.intake.job_inputs import named
 from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)

@@ -18,9 +18,9 @@ from islands_api.web.job_submission import finished, of_kind
 from islands_api.web.problems import RESPONSES, NoSuchThing
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, stored
-from islands_service.blobs import NoSuchBlob
-from islands_service.jobs import IDENTIFICATION, REPORT
-from islands_service.specification import identification_of
+from islands_service.domain.job_spec import identification_of
+from islands_service.domain.jobs import IDENTIFICATION, REPORT
+from islands_service.store.blobs import NoSuchBlob
 from islands_service.store.database import StoreFull, StoreUnavailable
 
 log = structlog.get_logger()
@@ -191,7 +191,7 @@ async def _draw(doors: Doors, caller: Caller, job: str, rank: int | None) -> Non
 async def _drawn(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
     of = () if rank is None else ("--rank", str(rank))
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "islands_service.drawing", job, f"--owner={caller.owner}", *of),
+        *(sys.executable, "-m", "islands_service.reports.figure_worker", job, f"--owner={caller.owner}", *of),
         stdout=PIPE,
         stderr=PIPE,
         env=doors.settings.environment(),

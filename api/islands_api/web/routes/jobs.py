@@ -12,7 +12,7 @@ from islands_api.web.pagination import Cursor, Limit, cursor_of, place_of
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
 from islands_api.web.responses import Document, Items, job_document
-from islands_service.jobs import IDENTIFICATION, TERMINAL, Job, JobState
+from islands_service.domain.jobs import IDENTIFICATION, TERMINAL, Job, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 

@@ -13,7 +13,7 @@ from islands_api.web.job_submission import finished, of_kind
 from islands_api.web.problems import RESPONSES, NoSuchThing
 from islands_api.web.responses import Document, Items
 from islands_api.web.routes.jobs import Id
-from islands_service.jobs import IDENTIFICATION
+from islands_service.domain.jobs import IDENTIFICATION
 from islands_service.store.results import StoredModel
 
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)

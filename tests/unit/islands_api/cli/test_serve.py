@@ -9,7 +9,7 @@ import pytest
 from islands.errors import SettingsError
 from islands_api import __main__ as doors
 from islands_api.cli.serve import roles
-from islands_service.lifeline import EVERY
+from islands_service.liveness import EVERY
 from islands_service.settings import ServiceSettings, service_settings
 
 

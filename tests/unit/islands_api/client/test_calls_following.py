@@ -9,7 +9,7 @@ import pytest
 
 from islands_api.client import AsyncClient, Event, JobFailed, ServiceError, Unreachable, transport
 from islands_api.client.response_parsing import EventLines
-from islands_service.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobState, Outcome
 from support.service import Service
 from support.stores import CANCELLED, FAILED, FOUND, brought_on
 

@@ -15,8 +15,8 @@ from islands.io.export import EXPORTS
 from islands.io.models import model_from_json
 from islands_api.client import ServiceError
 from islands_api.schemas import HistoryPage, ModelView
-from islands_service.blobs import Blobs
-from islands_service.coordinator.identification import identification
+from islands_service.coordinator.identification_job import identification
+from islands_service.store.blobs import Blobs
 from support.service import Service, csv
 
 #: A search of a blink, by two islands.

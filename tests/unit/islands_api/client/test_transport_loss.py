@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from islands_api.client import ServiceError, Unreachable, calls, transport
-from islands_service.jobs import JobState
+from islands_service.domain.jobs import JobState
 from islands_service.store.database import StoreInDoubt
 from support.service import Service, served
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from islands_api.schemas import DatasetView, JobRequest, JobView
 from islands_api.web.responses import Document, dataset_document, job_document, json_text
-from islands_service.jobs import Report
+from islands_service.domain.jobs import Report
 from support.service import kept, queued
 
 FLOATS = st.recursive(

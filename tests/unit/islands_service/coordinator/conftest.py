@@ -14,10 +14,10 @@ from islands.io.records import read_record
 from islands.io.records.preview import preview
 from islands.io.results import result_document
 from islands.io.states import history_document
-from islands_service.blobs import Blobs
-from islands_service.jobs import Job, Submission
+from islands_service.domain.jobs import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
+from islands_service.store.blobs import Blobs
 from support.command_line import write_hysteresis
 from support.stores import ALICE
 

@@ -7,8 +7,8 @@ import pytest
 
 from islands_service.coordinator import heartbeat as heartbeats
 from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
-from islands_service.jobs import JobState, Lease, LeaseLost, Outcome
-from islands_service.lifeline import Wish
+from islands_service.domain.jobs import JobState, Lease, LeaseLost, Outcome
+from islands_service.liveness import Wish
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailable
 from support.processes import eventually
@@ -193,7 +193,7 @@ def test_a_finished_job_has_no_heartbeat(store: Store) -> None:
 
 HANGING = """
 import sys, time
-from islands_service.lifeline import Wish
+from islands_service.liveness import Wish
 from islands_service.coordinator import heartbeat
 from islands_service.store import Store
 heartbeat.HANGS = 0.3

@@ -10,7 +10,7 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import MetaData, create_engine, inspect, select, text
 
-from islands_service.jobs import JobState
+from islands_service.domain.jobs import JobState
 from islands_service.store import Store
 from islands_service.store.database import Database, StoreError
 from islands_service.store.schema import HEAD, configuration, prepare, revision, upgrade

@@ -11,9 +11,9 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands_api.cli import jobs as command
-from islands_service.blobs import Blobs
-from islands_service.coordinator.identification import identification
-from islands_service.jobs import Outcome, Submission
+from islands_service.coordinator.identification_job import identification
+from islands_service.domain.jobs import Outcome, Submission
+from islands_service.store.blobs import Blobs
 from support.service import FIGURES, Service, ahead, csv
 from support.stores import LONG, taken
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from islands_api.cli import jobs as command
-from islands_service.jobs import Outcome
+from islands_service.domain.jobs import Outcome
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
 from support.service import FIGURES, Service, ahead, kept, queued

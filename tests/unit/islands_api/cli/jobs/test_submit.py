@@ -11,9 +11,9 @@ import typer
 from islands_api.cli import jobs as command
 from islands_api.cli.identify import identify
 from islands_api.cli.search_options import SETTINGS
-from islands_service.blobs import Blobs
-from islands_service.jobs import DISCREPANCY, EXTENDED, REPORT, JobState, Outcome, Submission
-from islands_service.specification import Identification
+from islands_service.domain.job_spec import Identification
+from islands_service.domain.jobs import DISCREPANCY, EXTENDED, REPORT, JobState, Outcome, Submission
+from islands_service.store.blobs import Blobs
 from support.command_line import COLUMNS
 from support.service import Service, csv, held
 from support.stores import taken

@@ -1,0 +1,91 @@
+"""A discrepancy job: what a simulation gets wrong about a record, its report, and the simulation mended."""
+
+from collections.abc import Callable
+from time import monotonic
+
+import structlog
+
+from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.discrepancy.proposal import Proposal
+from islands.discrepancy.spread import Spread
+from islands.evolution.engine import Engine
+from islands.io.diagnoses import diagnosis_document
+from islands.io.extensions import extended_json
+from islands.io.simulations import simulation
+from islands.proposing import proposed
+from islands_service.domain.job_spec import discrepancy_of
+from islands_service.domain.jobs import EXTENDED, REPORT, JobState, Lease, Outcome, Report
+from islands_service.intake.job_inputs import record_and_columns
+from islands_service.reports.diagnosis_report import in_words, report
+from islands_service.runtime.parallel_map import on_ray
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+
+def discrepancy(
+    lease: Lease,
+    store: Store,
+    blobs: Blobs,
+    _engine: Engine,
+    check: Callable[[], None],
+    _every: float,
+    spread: Spread | None = None,
+) -> Outcome:
+    """Carry out a discrepancy job. It takes seconds to minutes: interrupted, it begins anew.
+
+    Parameters
+    ----------
+    check : callable
+        Raises what ends the job before its time.
+    spread : Spread, optional
+        Fits the effects; by default on the Ray that this process is connected to.
+
+    Raises
+    ------
+    IslandsError
+        The record or the simulation cannot be used, or what ``check`` raises.
+    """
+    began = monotonic()
+
+    def tell(line: str) -> None:
+        check()
+        try:
+            store.leases.report(lease, Report({"phase": line}))
+        except StoreError as error:
+            # The analysis goes on: the next line tells where it is.
+            log.warning("report failed", job=lease.job.id, reason=str(error))
+
+    spec = discrepancy_of(lease.job.spec)
+    stored = store.datasets.get(lease.job.owner, spec.dataset)
+    tell("reading the record")
+    record, columns = record_and_columns(spec, stored, blobs)
+    core = simulation(spec.simulation, record, columns)
+    found = diagnose(record, core, spec.tolerance, spec.seed, tell, spread or on_ray())
+    tell("a formula for what has no name")
+    proposal = proposed(found, spec.seed)
+    wall_s = monotonic() - began
+    tell("writing the report")
+    artefacts = {REPORT: blobs.write(report(stored.name, found, proposal=proposal))}
+    if found.gain is not None:
+        artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())
+    document = diagnosis_document(found, wall_s, proposal=proposal)
+    return Outcome(
+        JobState.SUCCEEDED,
+        document,
+        summary=_summary(found, proposal, core.name, wall_s),
+        artefacts=artefacts,
+    )
+
+
+def _summary(found: Diagnosis, proposal: Proposal | None, simulated: str, wall_s: float) -> dict[str, object]:
+    return {
+        "simulation": simulated,
+        "verdict": str(found.verdict),
+        "effects": [finding.name for finding in found.effects],
+        "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
+        "words": in_words(found, proposal),
+        "wall_s": wall_s,
+    }

@@ -1,0 +1,197 @@
+"""An identification as a job: the search on Ray, its checkpoints, and what it brought."""
+
+import gzip
+from collections.abc import Callable
+from dataclasses import replace
+from math import isfinite
+from time import monotonic, sleep
+from typing import Any
+
+import structlog
+
+from islands.evolution.engine import Engine
+from islands.evolution.search import State
+from islands.evolution.settings import Settings
+from islands.identification import identify
+from islands.io.checkpoints import archipelago_of, checkpoint_text
+from islands.io.models import model_json
+from islands.io.results import result_document
+from islands.io.states import history_document, state_document, state_of
+from islands.model.equations import equation
+from islands.validation.findings import Findings
+from islands_service.domain.job_spec import identification_of
+from islands_service.domain.jobs import Job, JobState, Lease, Outcome, Report
+from islands_service.intake.job_inputs import record_and_validation
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreError
+
+log = structlog.get_logger()
+
+#: Seconds between two reports of progress.
+REPORT_EVERY = 0.5
+
+#: Part of a run that may go into checkpoints: of a thousand islands one takes half a minute.
+CHECKPOINT_SHARE = 0.05
+
+
+def identification(
+    lease: Lease, store: Store, blobs: Blobs, engine: Engine, check: Callable[[], None], every: float
+) -> Outcome:
+    """Carry out an identification, from its last checkpoint on.
+
+    Parameters
+    ----------
+    check : callable
+        Raises what ends the job before its time.
+    every : float
+        Seconds between two checkpoints, at least.
+
+    Raises
+    ------
+    IslandsError
+        The record or the settings cannot be used, the cluster failed, or what ``check`` raises.
+    """
+    job = lease.job
+    spec = identification_of(job.spec)
+    datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
+    record, validation = record_and_validation(spec, datasets, blobs)
+    start, spent = _stored(job, blobs)
+    watch = _Watch(lease, store, blobs, check, every, start, spent)
+
+    def stop() -> bool:
+        check()
+        return False
+
+    result = identify(
+        record,
+        validation,
+        preset=spec.preset,
+        seed=spec.seed,
+        progress=watch,
+        stop=stop,
+        start=start,
+        engine=engine,
+        **spec.changes,
+    )
+    watch.flush()
+    return outcome_of(result.with_wall_time(watch.spent).findings)
+
+
+def outcome_of(findings: Findings) -> Outcome:
+    """Return what is stored of findings."""
+    document = result_document(findings)
+    models = document.pop("models")
+    best = models[0]
+    summary = {
+        "models": len(models),
+        "equation": equation(findings.models[0].model),
+        "size": best["size"],
+        "metrics": best["metrics"]["validation"]["free_run"],
+        "property_1": best["physics"]["property_1"],
+        "evaluations": document["search"]["evaluations"],
+        "wall_s": document["search"]["wall_s"],
+        "ended_by": document["search"]["ended_by"],
+    }
+    files = [model_json(entry.model) for entry in findings.models]
+    return Outcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
+
+
+def _stored(job: Job, blobs: Blobs) -> tuple[State | None, float]:
+    """Return where a job stood at its last checkpoint, and the seconds that it had taken."""
+    if job.checkpoint is None:
+        return None, 0.0
+    text = gzip.decompress(blobs.read(job.checkpoint)).decode()
+    archipelago, about = archipelago_of(text, f"the checkpoint of job {job.id}")
+    return state_of(archipelago, about), float(about["wall_s"])
+
+
+class _Watch:
+    """Tells the store how far a search is, and keeps checkpoints."""
+
+    def __init__(
+        self,
+        lease: Lease,
+        store: Store,
+        blobs: Blobs,
+        check: Callable[[], None],
+        every: float,
+        start: State | None,
+        spent: float,
+    ) -> None:
+        self._lease, self._store, self._blobs = lease, store, blobs
+        self._check, self._every = check, every
+        self._began = monotonic() - spent
+        self._first = (monotonic(), 0 if start is None else start.evaluations)
+        # Points that are told for good: the last one of a history is replaced while nothing gets better.
+        self._told = 0 if start is None else len(start.history) - 1
+        self._report_at = self._checkpoint_at = monotonic()  # the first populations are kept at once
+        self._last: tuple[State, Settings] | None = None
+
+    @property
+    def spent(self) -> float:
+        """Seconds that the job has taken, in all attempts."""
+        return monotonic() - self._began
+
+    def __call__(self, state: State, settings: Settings) -> None:
+        self._check()
+        self._last = state, settings
+        if monotonic() >= min(self._report_at, self._checkpoint_at):
+            self._tell(state, settings)
+
+    def flush(self) -> None:
+        """Tell what has not been told yet; a store that is away is waited for."""
+        while self._last is not None and not self._tell(*self._last):
+            self._check()
+            sleep(REPORT_EVERY)
+
+    def _tell(self, state: State, settings: Settings) -> bool:
+        """Tell how far the search is; return whether that could be told."""
+        began = monotonic()
+        points, after = self._points(state)
+        report = Report(self._progress(state, settings), points, after=after)
+        try:
+            if began >= self._checkpoint_at:
+                report = replace(report, checkpoint=self._blobs.write(self._checkpoint(state)))
+            self._store.leases.report(self._lease, report)
+        except StoreError as error:
+            # The search goes on: what could not be told now is told with the next report.
+            log.warning("report failed", job=self._lease.job.id, reason=str(error))
+            self._report_at = monotonic() + REPORT_EVERY
+            if report.checkpoint is not None:
+                # One that nobody could be told of stays on the disk until a sweep.
+                self._checkpoint_at = monotonic() + self._every
+            return False
+        self._told = len(state.history) - 1
+        now = monotonic()
+        self._report_at = now + REPORT_EVERY
+        if report.checkpoint is not None:
+            self._checkpoint_at = now + max(self._every, (now - began) / CHECKPOINT_SHARE)
+        return True
+
+    def _progress(self, state: State, settings: Settings) -> dict[str, Any]:
+        last = state.history[-1]
+        since, before = self._first
+        rate = (state.evaluations - before) / max(monotonic() - since, 1e-9)
+        left = (settings.generations - last.generation) * settings.population * settings.islands
+        best = {size: error**0.5 for size, error in last.best.items()}
+        return {
+            "phase": "search",
+            "generation": last.generation,
+            "generations": settings.generations,
+            "evaluations": state.evaluations,
+            "evaluations_per_second": rate,
+            "seconds_left": left / rate if rate > 0.0 else None,
+            "best_error": min((error for error in best.values() if isfinite(error)), default=None),
+            "best_by_size": best,
+            "islands": [least**0.5 if isfinite(least) else None for least in last.islands],
+        }
+
+    def _points(self, state: State) -> tuple[tuple[Any, ...], int]:
+        new = history_document(state.history[self._told :])
+        after = state.history[self._told - 1].generation if self._told else -1
+        return tuple((*point[:3], tuple(point[3])) for point in new), after
+
+    def _checkpoint(self, state: State) -> bytes:
+        about = {"job": self._lease.job.id, "wall_s": self.spent, **state_document(state)}
+        return gzip.compress(checkpoint_text(state.archipelago, about).encode(), compresslevel=1, mtime=0)

@@ -1,0 +1,1 @@
+"""Jobs and their specifications as values, without a database. Read `jobs` first."""

@@ -1,0 +1,72 @@
+"""Records of jobs: from uploaded data sets to what the core identifies."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.io.records import read_record
+from islands_service.domain.job_spec import Discrepancy, Identification, Part
+from islands_service.rows import rows_of
+from islands_service.store.blobs import Blobs, full_disk_told
+from islands_service.store.datasets import StoredDataset
+
+
+@contextmanager
+def named(blob: Path, name: str) -> Iterator[Path]:
+    """Give a blob its owner's name for it: messages speak of that, and its suffix chooses the reader.
+
+    Raises
+    ------
+    StoreFull
+    """
+    with full_disk_told(), tempfile.TemporaryDirectory(prefix="islands-record-") as folder:
+        link = Path(folder) / name
+        link.symlink_to(blob.absolute())
+        yield link
+
+
+def record_and_validation(
+    spec: Identification, datasets: dict[str, StoredDataset], blobs: Blobs
+) -> tuple[Dataset, Dataset | float]:
+    """Read what a job estimates from, and what it validates with.
+
+    Raises
+    ------
+    RecordError
+        A record cannot be used as the job says.
+    NoSuchBlob
+        The data folder has lost a file.
+    """
+
+    def read(dataset: str, rows: str | None) -> Dataset:
+        stored = datasets[dataset]
+        with named(blobs.path(stored.blob), stored.name) as path:
+            return read_record(path, spec.inputs, spec.output, spec.dt, rows_of(rows))
+
+    record = read(spec.dataset, spec.rows)
+    if isinstance(spec.validation, Part):
+        return record, read(spec.validation.dataset, spec.validation.rows)
+    return record, spec.validation
+
+
+def record_and_columns(
+    spec: Discrepancy, stored: StoredDataset, blobs: Blobs
+) -> tuple[Dataset, dict[str, NDArray[np.float64]]]:
+    """Read what a simulation is held against, and beside it the column that is the simulation, if one is.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used as the job says.
+    NoSuchBlob
+        The data folder has lost a file.
+    """
+    with named(blobs.path(stored.blob), stored.name) as path:
+        whole = read_record(path, spec.inputs, spec.output, spec.dt, rows_of(spec.rows))
+    kept = 1 + len(spec.channels)
+    return whole.first_inputs(kept), dict(zip(spec.beside, whole.u[:, kept:].T, strict=True))

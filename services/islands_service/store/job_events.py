@@ -1,0 +1,55 @@
+"""Changes of a job: each raises its version, and is an event of that number. And a job as its row has it."""
+
+import json
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, update
+
+from islands_service.domain.jobs import Job, JobState
+from islands_service.store.dialect import now
+from islands_service.store.tables import events, jobs
+
+
+def change(connection: Connection, job: str, **values: Any) -> Row[Any]:
+    """Change a job in a way that watchers see, and return it as it is then."""
+    return connection.execute(
+        update(jobs)
+        .where(jobs.c.id == job)
+        .values(version=jobs.c.version + 1, updated=now(), **values)
+        .returning(jobs)
+    ).one()
+
+
+def record(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
+    """Write down what happened to a job as its version's event."""
+    values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}
+    connection.execute(insert(events), values)
+
+
+def job_of(row: Row[Any]) -> Job:
+    """Make a job of its row."""
+    return Job(
+        row.id,
+        row.owner,
+        row.kind,
+        row.name,
+        json.loads(row.spec),
+        row.priority,
+        JobState(row.state),
+        row.version,
+        row.attempt,
+        bool(row.cancel_requested),
+        read_document(row.progress),
+        row.checkpoint,
+        read_document(row.summary),
+        read_document(row.problem),
+        row.created,
+        row.updated,
+        row.started,
+        row.finished,
+    )
+
+
+def read_document(text: str | None) -> dict[str, Any] | None:
+    """Read what stands in a column as JSON."""
+    return None if text is None else dict(json.loads(text))

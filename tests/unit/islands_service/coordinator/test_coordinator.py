@@ -1,0 +1,393 @@
+"""The coordinator's loop: every job ends, or is given back, whatever happens to it."""
+
+import errno
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from threading import Thread
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+
+from islands.errors import IslandsError, RecordError
+from islands.evolution.engine import SerialEngine
+from islands_service.coordinator import coordinator as coordinator_module
+from islands_service.coordinator.coordinator import Coordinator
+from islands_service.domain.jobs import (
+    DISCREPANCY,
+    IDENTIFICATION,
+    Job,
+    JobState,
+    Lease,
+    Outcome,
+    Report,
+    Submission,
+)
+from islands_service.liveness import Wish
+from islands_service.runtime.errors import ClusterError
+from islands_service.settings import ServiceSettings
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs, NoSuchBlob
+from islands_service.store.database import StoreFull, StoreUnavailable
+from support.processes import eventually
+from support.service import held
+from support.stores import ALICE, child
+
+Found = tuple[list[Any], list[Any]]
+
+
+class Alone(Coordinator):
+    """A coordinator that needs no Ray: its engine is this process."""
+
+    def _wait_for_ray(self, *_: object) -> None:
+        pass
+
+    def _engine(self, _: Lease) -> SerialEngine:  # type: ignore[override]
+        return SerialEngine()
+
+
+@pytest.fixture
+def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
+    """Run a coordinator in a thread; it is told to stop at the end."""
+    stopping = Wish()
+    threads = []
+
+    def run(kind: type[Coordinator] = Alone, name: str = "me") -> Thread:
+        thread = Thread(target=kind(settings, name, stopping).run)
+        thread.stop = stopping.make  # type: ignore[attr-defined]
+        thread.start()
+        threads.append(thread)
+        return thread
+
+    yield run
+    stopping.make()
+    for thread in threads:
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+def ends(store: Store, job: Job) -> Job:
+    eventually(lambda: store.jobs.get(ALICE, job.id).finished is not None, seconds=30.0)
+    return store.jobs.get(ALICE, job.id)
+
+
+def working(monkeypatch: pytest.MonkeyPatch, how: Callable[..., Outcome]) -> None:
+    """Let jobs be carried out in another way: an entry of the table, as any kind of job is."""
+    monkeypatch.setattr(coordinator_module, "WORK", MappingProxyType({"identification": how}))
+    monkeypatch.setattr(coordinator_module, "RETRY", 0.02)
+
+
+DONE = Outcome(JobState.SUCCEEDED, {}, (), {"done": True})
+
+
+def test_a_coordinator_carries_out_one_job_after_the_other(
+    store: Store, job: Job, coordinator: Callable[..., Thread], undisturbed: Found
+) -> None:
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    coordinator()
+    for each in (job, second):
+        assert ends(store, each).state == JobState.SUCCEEDED
+        assert [model.document for model in store.results.models(each.id)] == undisturbed[0]
+
+
+def test_a_coordinator_carries_out_jobs_of_every_kind(
+    store: Store, job: Job, coordinator: Callable[..., Thread]
+) -> None:
+    assert set(coordinator_module.WORK) == {IDENTIFICATION, DISCREPANCY}
+    short = store.jobs.submit(Submission(ALICE, held(job.spec["dataset"], rows="0:99"), DISCREPANCY))[0]
+    coordinator()
+    assert ends(store, job).state == JobState.SUCCEEDED
+    failed = ends(store, short)
+    assert failed.state == JobState.FAILED
+    assert failed.problem is not None
+    assert failed.problem["type"] == "invalid-record"
+    assert "99 samples, and a diagnosis takes " in failed.problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "detail"),
+    [
+        (RecordError("line 7 is wrong"), "invalid-record", "line 7 is wrong"),
+        (NoSuchBlob("the blob is gone"), "no-such-blob", "the blob is gone"),
+        (IslandsError("something else"), "job-failed", "something else"),
+        (ZeroDivisionError("by zero"), "defect", "ZeroDivisionError: by zero. Please report it"),
+    ],
+)
+def test_what_goes_wrong_in_a_job_is_told_with_a_type_and_holds_up_nobody(
+    store: Store,
+    job: Job,
+    coordinator: Callable[..., Thread],
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+    kind: str,
+    detail: str,
+) -> None:
+    def fail_first(lease: Lease, *_: object) -> Outcome:
+        if lease.job.id == job.id:
+            raise error
+        return DONE
+
+    working(monkeypatch, fail_first)
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    coordinator()
+    failed = ends(store, job)
+    assert failed.state == JobState.FAILED
+    assert failed.problem is not None
+    assert failed.problem["type"] == kind
+    assert failed.problem["detail"].startswith(detail)
+    assert "Traceback" not in json.dumps(failed.problem)
+    assert ends(store, second).state == JobState.SUCCEEDED
+
+
+def wait_for_end(
+    _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, _s: float
+) -> Outcome:
+    while True:
+        check()
+        time.sleep(0.01)
+
+
+def test_told_to_stop_it_gives_its_job_back_and_that_was_no_attempt(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    working(monkeypatch, wait_for_end)
+    thread = coordinator()
+    eventually(lambda: store.jobs.get(ALICE, job.id).state == JobState.RUNNING)
+    thread.stop()  # type: ignore[attr-defined]
+    thread.join(5.0)
+    back = store.jobs.get(ALICE, job.id)
+    assert (back.state, back.attempt) == (JobState.QUEUED, 0)
+
+
+def test_a_cancelled_job_is_let_go(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    working(monkeypatch, wait_for_end)
+    coordinator()
+    eventually(lambda: store.jobs.get(ALICE, job.id).state == JobState.RUNNING)
+    store.jobs.cancel(ALICE, job.id)
+    assert ends(store, job).state == JobState.CANCELLED
+
+
+def test_a_job_that_is_taken_away_is_left_to_who_has_it(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = []
+
+    def lose(lease: Lease, *arguments: Any) -> Outcome:
+        if not gone:
+            gone.append(store.leases.claim("me", 60.0))  # who has the name may take it
+            wait_for_end(lease, *arguments)
+        return DONE
+
+    working(monkeypatch, lose)
+    coordinator()
+    second = store.jobs.submit(Submission(ALICE, job.spec))[0]
+    eventually(lambda: store.jobs.get(ALICE, second.id).state == JobState.SUCCEEDED)
+    assert store.jobs.get(ALICE, job.id).state in (JobState.RUNNING, JobState.SUCCEEDED)
+    assert gone[0].epoch == 2
+
+
+class Full(Alone):
+    """A coordinator whose store is full when a job's end is to be written down, for some tries."""
+
+    def run(self) -> None:
+        finish = self._store.leases.finish
+        self.tries = 0
+
+        def full(lease: Lease, outcome: Outcome) -> None:
+            self.tries += 1
+            if self.tries == 2:
+                self._store.jobs.cancel(ALICE, lease.job.id)
+            if self.tries < 8:
+                raise StoreFull("the disk is full")
+            finish(lease, outcome)
+
+        self._store.leases.finish = full  # type: ignore[method-assign]
+        super().run()
+
+
+def test_the_end_of_a_job_is_written_down_as_soon_as_there_is_room(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is done again: it is one attempt, and whoever cancels it now is too late."""
+    working(monkeypatch, lambda *_: DONE)
+    monkeypatch.setattr(coordinator_module, "RETRY", 0.1)
+    coordinator(Full)
+    ended = ends(store, job)
+    assert (ended.state, ended.attempt, ended.summary) == (JobState.SUCCEEDED, 1, {"done": True})
+
+
+def test_a_store_that_is_away_in_the_middle_of_a_job_costs_no_attempt(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    away = [7]  # more often than a job may be tried in vain
+
+    def work(*_: object) -> Outcome:
+        if away[0]:
+            away[0] -= 1
+            raise StoreUnavailable("the database does not answer")
+        return DONE
+
+    monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY", 0.01)
+    working(monkeypatch, work)
+    coordinator()
+    ended = ends(store, job)
+    assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, 1)
+
+
+def test_a_lost_cluster_ends_the_coordinator_and_gives_the_job_back_as_an_attempt(
+    store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lost(*_: object) -> Outcome:
+        raise ClusterError("no more")
+
+    working(monkeypatch, lost)
+    doomed = Alone(settings, "me", Wish())
+    doomed._connected = True
+    with pytest.raises(ClusterError, match="no more"):
+        doomed.run()
+    back = store.jobs.get(ALICE, job.id)
+    assert (back.state, back.attempt) == (JobState.QUEUED, 1)
+
+
+def test_who_has_the_name_of_one_that_died_takes_its_job_over_at_once(
+    store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    died = store.leases.claim("me", 3600.0)
+    assert died is not None
+    working(monkeypatch, lambda *_: DONE)
+    coordinator(name="me")
+    assert ends(store, job).attempt == 2  # long before the lease of an hour has run out
+
+
+def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
+    store: Store, blobs: Blobs, job: Job, coordinator: Callable[..., Thread]
+) -> None:
+    young, old = blobs.write(b"young"), blobs.write(b"old")
+    named = store.datasets.get(ALICE, str(job.spec["dataset"])).blob
+    for blob in (old, named):
+        os.utime(blobs.path(blob), (1e9, 1e9))
+    coordinator()
+    ends(store, job)
+
+    def swept() -> bool:
+        return old not in {blob for blob, _ in blobs.all()}
+
+    eventually(swept, seconds=30.0)
+    assert {young, named} <= {blob for blob, _ in blobs.all()}
+
+
+def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
+    store: Store,
+    blobs: Blobs,
+    job: Job,
+    coordinator: Callable[..., Thread],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    left: list[str] = []
+
+    def old(data: bytes) -> str:
+        blob = blobs.write(data)
+        os.utime(blobs.path(blob), (1e9, 1e9))
+        return blob
+
+    def keeps_checkpoints(lease: Lease, *arguments: Any) -> Outcome:
+        for data in (b"replaced", b"named"):
+            left.append(old(data))
+            store.leases.report(lease, Report({}, checkpoint=left[-1]))
+        left.append(blobs.write(b"about to be named"))
+        return wait_for_end(lease, *arguments)
+
+    working(monkeypatch, keeps_checkpoints)
+    monkeypatch.setattr(coordinator_module, "SWEEP_EVERY", 0.05)
+    coordinator()
+    eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=30.0)
+    now = store.jobs.get(ALICE, job.id)
+    assert (now.state, now.checkpoint) == (JobState.RUNNING, left[1])
+    assert set(left[1:]) <= set(dict(blobs.all()))
+
+
+@pytest.mark.parametrize(
+    "error", [StoreUnavailable("the database does not answer"), OSError(errno.ESTALE, "Stale file handle")]
+)
+def test_a_sweep_that_fails_costs_a_job_nothing(
+    store: Store,
+    job: Job,
+    coordinator: Callable[..., Thread],
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+) -> None:
+    tries = []
+
+    class Unswept(Alone):
+        def _sweep(self) -> None:
+            if self._store.jobs.standing().leases:
+                tries.append(1)
+                raise error
+
+    def works(*arguments: Any) -> Outcome:
+        while len(tries) < 3:
+            arguments[4]()
+        return DONE
+
+    working(monkeypatch, works)
+    monkeypatch.setattr(coordinator_module, "SWEEP_EVERY", 0.0)
+    coordinator(Unswept)
+    assert ends(store, job).state == JobState.SUCCEEDED
+    assert [event.kind for event in store.jobs.events(job.id)] == ["queued", "running", "succeeded"]
+
+
+def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
+    store: Store, blobs: Blobs, settings: ServiceSettings, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A coordinator may stand still between two steps of a sweep, for longer than a blob may be unnamed."""
+    monkeypatch.setattr(coordinator_module, "ORPHAN", 0.1)
+    sweeping = Alone(settings, "me", Wish())
+    named_blobs = sweeping._store.retention.named_blobs
+    written: list[str] = []
+
+    def standing_still() -> frozenset[str]:
+        named = named_blobs()
+        written.append(blobs.write(b"named meanwhile"))
+        time.sleep(0.3)
+        return named
+
+    sweeping._store.retention.named_blobs = standing_still  # type: ignore[method-assign]
+    with sweeping._store:
+        sweeping._sweep()
+    assert blobs.read(written[0]) == b"named meanwhile"
+
+
+HANGING = """
+import sys, time
+from pathlib import Path
+from islands_service.liveness import Wish
+from islands_service.coordinator import heartbeat
+from islands_service.coordinator.coordinator import Coordinator
+from islands_service.settings import ServiceSettings
+heartbeat.HANGS = 0.3
+class Engine:
+    def run(self, problem, start, stop):
+        stop()
+        time.sleep(60)
+        yield
+class Alone(Coordinator):
+    def _wait_for_ray(self, *_): pass
+    def _engine(self, _): return Engine()
+Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", Wish()).run()
+"""
+
+
+@pytest.mark.ci
+def test_a_coordinator_whose_search_hangs_ends_and_its_job_goes_on(
+    store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
+) -> None:
+    with child(HANGING, str(settings.data_dir)) as hanging:
+        said, _ = hanging.communicate(timeout=60)
+    assert ("search hangs" in said, hanging.returncode) == (True, 1)
+    coordinator(name="hanging")
+    ended = ends(store, job)
+    assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, 2)

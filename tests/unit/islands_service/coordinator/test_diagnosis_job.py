@@ -1,0 +1,170 @@
+"""A discrepancy job: what it tells, what it brings, and that it brings the same however often it begins."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from islands.discrepancy import reference
+from islands.errors import RecordError, SettingsError
+from islands.evolution.engine import SerialEngine
+from islands.io.records.preview import preview
+from islands_service.coordinator.coordinator import problem_of
+from islands_service.coordinator.diagnosis_job import discrepancy
+from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.domain.jobs import (
+    DISCREPANCY,
+    EXTENDED,
+    REPORT,
+    Job,
+    JobState,
+    Lease,
+    Outcome,
+    Submission,
+)
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreUnavailable
+from support.command_line import write_offset
+from support.service import held
+from support.stores import ALICE
+from support.undrawn import undrawn_figures
+
+Submit = Callable[..., Job]
+
+COLUMN, PIEZO = {"kind": "column", "column": "theirs_um"}, {"kind": "bouc-wen-piezo"}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record with a temperature, and a simulation in a column that lacks an offset."""
+    path = write_offset(tmp_path_factory.mktemp("offset") / "record.csv")
+    header, *lines = path.read_text().splitlines()
+    warmth = np.cumsum(np.random.default_rng(1).standard_normal(len(lines)))
+    rows = [f"{line},{kelvin:.6f}" for line, kelvin in zip(lines, warmth, strict=True)]
+    path.write_text("\n".join([f"{header},T_K", *rows]) + "\n")
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No figure is drawn, and few random waves look for what a residual still holds."""
+    monkeypatch.setattr(reference, "WAVES", 20)
+    with undrawn_figures():
+        yield
+
+
+@pytest.fixture
+def submit(store: Store, blobs: Blobs, measured: Path) -> Submit:
+    """What submits a job on the record that differs from its simulation by an offset."""
+    data, described = measured.read_bytes(), asdict(preview(measured))
+    dataset, _ = store.datasets.add(ALICE, "record.csv", ".csv", blobs.write(data), len(data), described)
+
+    def submitted(**changes: Any) -> Job:
+        spec = held(dataset.id, **{"channels": ["T_K"], "simulation": COLUMN, **changes})
+        return store.jobs.submit(Submission(ALICE, spec, DISCREPANCY))[0]
+
+    return submitted
+
+
+def claim(store: Store) -> Lease:
+    lease = store.leases.claim("me", 60.0)
+    assert lease is not None
+    return lease
+
+
+def carried_out(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> Outcome:
+    return discrepancy(lease, store, blobs, SerialEngine(), check, 1.0, map)
+
+
+def phases(store: Store, job: Job) -> list[str]:
+    return [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
+
+
+def without_time(outcome: Outcome) -> Outcome:
+    document, summary = dict(outcome.document or {}), dict(outcome.summary or {})
+    assert document.pop("wall_s") == summary.pop("wall_s") > 0.0
+    return replace(outcome, document=document, summary=summary)
+
+
+class Interruption:
+    """A check that raises at its n-th call."""
+
+    def __init__(self, at: int) -> None:
+        self.left = at
+
+    def __call__(self) -> None:
+        self.left -= 1
+        if self.left == 0:
+            raise JobCancelled("enough")
+
+
+@pytest.mark.ci
+def test_the_same_job_brings_the_same_bytes_however_often_it_is_interrupted(
+    store: Store, blobs: Blobs, submit: Submit
+) -> None:
+    job = submit()
+    first = without_time(carried_out(claim(store), store, blobs))
+    told = phases(store, job)
+    assert (first.document or {})["effects"][0]["name"] == "offset"
+    assert set(first.artefacts) == {REPORT, EXTENDED}
+    for at in (1, len(told)):
+        with pytest.raises(JobCancelled):
+            carried_out(claim(store), store, blobs, Interruption(at))
+    # Blobs are named by what is in them: the report and the extended simulation are the same, too.
+    assert without_time(carried_out(claim(store), store, blobs)) == first
+    assert phases(store, job)[-len(told) :] == told
+
+
+def test_a_column_is_a_simulation_too(store: Store, blobs: Blobs, submit: Submit) -> None:
+    job = submit()
+    document = carried_out(claim(store), store, blobs).document or {}
+    assert document["simulation"] == "column theirs_um"
+    assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
+    assert document["verdict"] == "named"
+    assert phases(store, job)[-1] == "writing the report"
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind", "words"),
+    [
+        ({"rows": "0:99"}, RecordError, "99 samples, and a diagnosis takes "),
+        ({"simulation": PIEZO, "tolerance": {"mass": 0.1}}, SettingsError, "has no parameter 'mass'"),
+        (
+            {"simulation": {**PIEZO, "parameters": {"mass": 1.0}}},
+            SettingsError,
+            "there is no parameter mass",
+        ),
+    ],
+)
+def test_what_the_record_or_the_simulation_does_not_allow_is_the_jobs_problem(
+    store: Store, blobs: Blobs, submit: Submit, changes: dict[str, Any], kind: type, words: str
+) -> None:
+    submit(**changes)
+    with pytest.raises(kind, match=words) as caught:
+        carried_out(claim(store), store, blobs)
+    expected = {RecordError: "invalid-record", SettingsError: "invalid-settings"}[kind]
+    assert problem_of(caught.value)["type"] == expected
+
+
+class Away:
+    """Leases of a store that cannot be reached when something is to be told."""
+
+    def __init__(self, store: Store) -> None:
+        self._store, self.leases = store, self
+
+    def report(self, *_: object) -> None:
+        raise StoreUnavailable("the database does not answer")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._store, name)
+
+
+def test_reports_that_fail_cost_nothing(store: Store, blobs: Blobs, submit: Submit) -> None:
+    job = submit()
+    outcome = carried_out(claim(store), Away(store), blobs)
+    assert outcome.state == JobState.SUCCEEDED
+    assert phases(store, job) == []

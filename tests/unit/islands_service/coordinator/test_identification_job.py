@@ -1,0 +1,179 @@
+"""An identification as a job: what it tells, what it keeps, and how it goes on where it was interrupted."""
+
+import gzip
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from islands.evolution.engine import SerialEngine
+from islands_service.coordinator import identification_job as work
+from islands_service.coordinator.heartbeat import JobCancelled
+from islands_service.coordinator.identification_job import identification
+from islands_service.domain.jobs import Job, JobState, Lease, LeaseLost, Outcome
+from islands_service.store import Store
+from islands_service.store.blobs import Blobs
+from islands_service.store.database import StoreUnavailable
+from support.stores import ALICE
+
+Found = tuple[list[Any], list[Any]]
+
+
+def claim(store: Store, name: str = "me") -> Lease:
+    lease = store.leases.claim(name, 60.0)
+    assert lease is not None
+    return lease
+
+
+def carried_out(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> Outcome:
+    return identification(lease, store, blobs, SerialEngine(), check, 1e-9)
+
+
+def models_of(outcome: Outcome) -> list[Any]:
+    return [json.loads(json.dumps(document)) for document, _ in outcome.models]
+
+
+class Interruption:
+    """A check that raises as soon as a job's progress has reached a generation."""
+
+    def __init__(self, store: Store, job: Job, at: int) -> None:
+        self._store, self._job, self._at = store, job.id, at
+
+    def __call__(self) -> None:
+        progress = self._store.jobs.get(ALICE, self._job).progress
+        if progress is not None and progress["generation"] >= self._at:
+            raise JobCancelled("enough")
+
+
+def test_a_job_brings_what_one_process_finds_by_itself(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found
+) -> None:
+    lease = claim(store)
+    outcome = carried_out(lease, store, blobs)
+    assert outcome.state == JobState.SUCCEEDED
+    assert models_of(outcome) == undisturbed[0]
+    store.leases.finish(lease, outcome)
+    assert [model.document for model in store.results.models(job.id)] == undisturbed[0]
+    ended = store.jobs.get(ALICE, job.id)
+    assert ended.summary is not None
+    assert ended.summary["models"] == len(undisturbed[0])
+    assert ended.progress is not None
+    assert ended.progress["generation"] == ended.progress["generations"]
+
+
+def test_however_often_it_is_interrupted_it_ends_with_the_same_models_and_history(
+    store: Store,
+    blobs: Blobs,
+    job: Job,
+    undisturbed: Found,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    for at in (0, 1, 2, 9, 25):
+        lease = claim(store)
+        with pytest.raises(JobCancelled):
+            carried_out(lease, store, blobs, Interruption(store, job, at))
+        store.leases.release(lease)
+    lease = claim(store)
+    assert lease.job.progress is not None
+    assert lease.job.progress["generation"] >= 25
+    outcome = carried_out(lease, store, blobs)
+    assert models_of(outcome) == undisturbed[0]
+    assert store.results.history(job.id) == undisturbed[1]
+
+
+def test_rare_reports_tell_the_same_history_as_frequent_ones(
+    store: Store, blobs: Blobs, job: Job, undisturbed: Found
+) -> None:
+    carried_out(claim(store), store, blobs)
+    assert store.results.history(job.id) == undisturbed[1]
+
+
+def test_the_time_of_all_attempts_counts(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    interruption = Interruption(store, job, 25)
+
+    def slowly() -> None:
+        time.sleep(0.005)
+        interruption()
+
+    with pytest.raises(JobCancelled):
+        carried_out(lease := claim(store), store, blobs, slowly)
+    store.leases.release(lease)
+    kept = store.jobs.get(ALICE, job.id).checkpoint
+    assert kept is not None
+    before = json.loads(gzip.decompress(blobs.read(kept)))["about"]["wall_s"]
+    time.sleep(0.5)  # nobody works on it
+    checks: list[float] = []
+    began = time.monotonic()
+    outcome = carried_out(claim(store), store, blobs, lambda: checks.append(time.monotonic()))
+    last = time.monotonic() - began
+    assert outcome.document is not None
+    assert before > 0.2
+    spent = outcome.document["search"]["wall_s"]
+    assert before + checks[-1] - checks[0] <= spent <= before + last + 0.01
+
+
+def test_the_first_populations_are_kept_at_once(store: Store, blobs: Blobs, job: Job) -> None:
+    """A job that ends its coordinator soon after would otherwise never come on."""
+    with pytest.raises(JobCancelled):
+        identification(claim(store), store, blobs, SerialEngine(), Interruption(store, job, 0), 3600.0)
+    assert store.jobs.get(ALICE, job.id).checkpoint is not None
+
+
+class Flaky:
+    """Leases of a store that cannot be reached at some of the reports."""
+
+    def __init__(self, store: Store, fails: Callable[[int], bool]) -> None:
+        self._store, self._fails, self.reports = store, fails, 0
+        self.leases = self
+
+    def report(self, *arguments: Any) -> Job:
+        self.reports += 1
+        if self._fails(self.reports):
+            raise StoreUnavailable("the database does not answer")
+        return self._store.leases.report(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._store, name)
+
+
+def test_reports_that_fail_cost_nothing(
+    store: Store,
+    blobs: Blobs,
+    job: Job,
+    undisturbed: Found,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    # The last ones are among those that fail.
+    flaky = Flaky(store, lambda number: number % 3 != 0 or 30 < number < 36)
+    outcome = carried_out(claim(store), flaky, blobs)
+    assert flaky.reports > 9
+    assert models_of(outcome) == undisturbed[0]
+    assert store.results.history(job.id) == undisturbed[1]
+
+
+def test_who_has_lost_the_lease_stops_at_its_next_report(store: Store, blobs: Blobs, job: Job) -> None:
+    old = store.leases.claim("me", 60.0)
+    assert old is not None
+    new = claim(store)  # the same name: the one before must be gone
+    with pytest.raises(LeaseLost):
+        carried_out(old, store, blobs)
+    assert store.jobs.get(ALICE, job.id).version == new.job.version
+    assert store.jobs.get(ALICE, job.id).checkpoint is None
+
+
+def test_a_store_that_is_away_is_not_offered_a_new_checkpoint_every_time(
+    store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
+    before = set(dict(blobs.all()))
+    flaky = Flaky(store, lambda number: number < 20)
+    identification(claim(store), flaky, blobs, SerialEngine(), lambda: None, 3600.0)  # type: ignore[arg-type]
+    assert flaky.reports >= 20
+    assert len(set(dict(blobs.all())) - before) == 1

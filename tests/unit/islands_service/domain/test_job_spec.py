@@ -1,0 +1,183 @@
+"""What a job may say: what no service could carry out is refused before anything is made of it."""
+
+import time
+from dataclasses import asdict, fields
+
+import pytest
+from pydantic import ValidationError
+
+from islands.errors import SettingsError
+from islands.evolution.presets import PRESETS
+from islands.evolution.settings import Settings
+from islands_api.schemas import JobRequest
+from islands_service.domain.job_spec import LIMITS, Identification, SettingsChanges, checked
+from support.service import spec
+
+DATASET = "0" * 32 + "-csv"
+
+
+def order(**changes):
+    return Identification.model_validate(spec(DATASET, **changes))
+
+
+def refused(settings, **changes):
+    """What is said of settings that can be read and not be carried out, and the seconds that it takes."""
+    began = time.perf_counter()
+    with pytest.raises(SettingsError) as error:
+        checked(order(settings=settings, **changes), 256, 10**10)
+    assert time.perf_counter() - began < 20.0
+    return str(error.value)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_is_accepted_as_it_is(preset):
+    assert checked(order(preset=preset), 256, 10**10) == PRESETS[preset]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_setting_of_a_preset_can_be_said(preset):
+    said = asdict(PRESETS[preset])
+    assert checked(order(preset=preset, settings=said), 256, 10**10) == PRESETS[preset]
+
+
+def test_every_setting_says_what_it_means():
+    described = SettingsChanges.model_json_schema()["properties"]
+    assert list(described) == [each.name for each in fields(Settings)]
+    assert all(entry["description"] for entry in described.values())
+
+
+def test_every_limit_is_of_a_setting():
+    assert LIMITS.keys() <= {each.name for each in fields(Settings)}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_one_more_than_a_limit_is_refused(name):
+    most = LIMITS[name]
+    assert refused({name: most + 1}) == f"{name} is at most {most} on this service, got {most + 1}"
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"islands": 10**6}, "islands is at most 256 on this service"),
+        ({"islands": 257}, "islands is at most 256 on this service"),
+        ({"islands": -1}, "islands is at least 1, got -1"),
+        ({"topology": "0>1," * 250_000}, "topology has 1000000 characters, and 20000 is the most"),
+        (
+            {"islands": 2, "topology": ",".join(["0>1"] * 4000) + ",0>9"},
+            "0>9 does not join two of the islands",
+        ),
+        ({"topology": "random-regular:99", "islands": 50}, "takes more than 99 islands"),
+        ({"migrate_every": "5," * 9_999 + "1"}, "cannot read migrate_every"),
+        ({"migrate_every": "5," * 10_001}, "migrate_every has 20002 characters"),
+        ({"migrants": 10**30}, "cannot read migrants"),
+        ({"shifts": [10**9]}, "back-shifts are at most 1000 on this service"),
+        ({"shifts": [0]}, "back-shifts are at least 1"),
+        ({"shifts": list(range(1, 66))}, "shifts has 65 entries, and 64 is the most"),
+        ({"primitives": ["mul"] * 10_000}, "primitives has 10000 entries"),
+        ({"characters": ["explorer"] * 65}, "characters has 65 entries"),
+        ({"library_degree": 50}, "library_degree is at most 8"),
+        (
+            {"library": "polynomial", "library_degree": 8, "library_lags": 30, "max_height": 12},
+            "candidates are more than a library may have (4000)",
+        ),
+        ({"library": "phi-polynomial", "library_lags": 1}, "lags of at least 2"),
+        ({"library": "polynomial", "library_degree": 0}, "degree and lags are at least 1"),
+        ({"library": "no such"}, "no such"),
+        ({"elite": 1.5}, "elite lies between 0 and 1, got 1.5"),
+        ({"tolerance": -1e-3}, "the tolerance of pruning is not negative"),
+        ({"target_error": -1.0}, "target_error is a number and not negative"),
+        ({"initial_terms": [3, 2]}, "initial_terms (3, 2) lie between 1 and max_terms"),
+        ({"shifts": [], "primitives": []}, "give at least one of them"),
+        (
+            {"population": 100_000, "generations": 10**6},
+            "1e+11 individuals, and this service evaluates at most",
+        ),
+    ],
+)
+def test_what_would_take_all_memory_or_time_is_refused_at_once(settings, words):
+    assert words in refused(settings)
+
+
+def test_many_inputs_make_a_library_too_large():
+    assert "candidates are more" in refused({"library_degree": 5}, inputs=[f"u{i}" for i in range(16)])
+
+
+def test_the_budget_counts_the_first_population_too():
+    settings = {"population": 10, "generations": 9, "islands": 1, "max_terms": 3}
+    assert checked(order(settings=settings), 256, 100).population == 10
+    with pytest.raises(SettingsError, match="100 individuals, and this service evaluates at most 99"):
+        checked(order(settings=settings), 256, 99)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"dt": 0}, "greater than 0"),
+        ({"dt": -0.1}, "greater than 0"),
+        ({"dt": float("inf")}, "finite number"),
+        ({"dt": float("nan")}, "finite number"),
+        ({"validation": 1.5}, "less than 1"),
+        ({"validation": 1}, "less than 1"),
+        ({"validation": float("nan")}, "finite number"),
+        ({"validation": {"dataset": DATASET, "rows": "x"}}, "cannot read the rows 'x'"),
+        ({"validation": {"dataset": "../../etc"}}, "should match pattern"),
+        ({"validation": {}}, "Field required"),
+        ({"rows": "a:b"}, "cannot read the rows 'a:b': write START:STOP, for example 0:5000"),
+        ({"rows": "5"}, "cannot read the rows"),
+        ({"rows": "1:2:3"}, "cannot read the rows"),
+        ({"rows": ""}, "cannot read the rows"),
+        ({"rows": "0:5\n"}, "cannot read the rows"),
+        ({"rows": "٣:"}, "cannot read the rows"),
+        ({"rows": ":٩"}, "cannot read the rows"),
+        ({"rows": "0:" + "9" * 13}, "cannot read the rows"),
+        ({"inputs": []}, "at least 1 item"),
+        ({"inputs": ["u"] * 17}, "at most 16 items"),
+        ({"inputs": "u_V"}, "valid tuple"),
+        ({"inputs": [""]}, "at least 1 character"),
+        ({"inputs": ["u" * 201]}, "at most 200 characters"),
+        ({"inputs": [7]}, "valid string"),
+        ({"output": None}, "valid string"),
+        ({"dataset": "a\0b"}, "should match pattern"),
+        ({"dataset": ""}, "should match pattern"),
+        ({"dataset": "a" * 49}, "should match pattern"),
+        ({"seed": -1}, "greater than or equal to 0"),
+        ({"seed": 2**63}, "less than 9223372036854775808"),
+        ({"seed": 0.5}, "fractional part"),
+        ({"settings": {"tolerance": float("inf")}}, "finite number"),
+        ({"settings": {"target_error": float("nan")}}, "finite number"),
+        ({"settings": {"generations": 0.5}}, "fractional part"),
+        ({"settings": {"generations": "many"}}, "valid integer"),
+        ({"settings": {"__class__": 1}}, "not permitted"),
+        ({"settings": []}, "valid dictionary"),
+    ],
+)
+def test_what_has_no_meaning_is_refused(changes, words):
+    with pytest.raises(ValidationError, match=words.replace("(", r"\(").replace("?", r"\?")):
+        order(**changes)
+
+
+@pytest.mark.parametrize("rows", [":", "0:", ":-1", "-100:", "10:20", "999999999999:"])
+def test_rows_are_read(rows):
+    assert order(rows=rows).rows == rows
+
+
+@pytest.mark.parametrize("seed", [0, 2**63 - 1])
+def test_every_seed_of_63_bits_is_kept_exactly(seed):
+    assert order(seed=seed).seed == seed
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\nb", "a\x1b[31mb", "x" * 201, "\x7f"])
+def test_a_job_has_a_name_of_one_line(name):
+    with pytest.raises(ValidationError, match="name"):
+        JobRequest.model_validate(spec(DATASET, name=name))
+
+
+@pytest.mark.parametrize("name", ["", "Größe 😀 <b>'\"&", "x" * 200])
+def test_a_job_may_be_called_as_people_do(name):
+    assert JobRequest.model_validate(spec(DATASET, name=name)).name == name
+
+
+def test_what_determines_the_result_is_what_was_said_and_no_more():
+    request = JobRequest.model_validate(spec(DATASET, name="n", priority=3, settings={"islands": 2}))
+    assert request.spec == spec(DATASET, settings={"islands": 2})

@@ -1,0 +1,203 @@
+"""Inspection: whatever a file does to the process that reads it, that process alone has the harm."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from islands.errors import RecordError
+from islands_service.intake.file_inspection import Asked, inspected
+from support.processes import alive, descendants, eventually
+from support.service import csv
+
+MEMORY, SECONDS = 6_000_000_000, 30.0
+
+#: What the process writes after it has limited itself.
+WRITES = """
+import sys
+from islands_service.intake.file_inspection import _limit
+_limit(6_000_000_000, 30.0)
+for path in sys.argv[1:]:
+    try:
+        with open(path, "w") as stream:
+            stream.write("harm")
+    except OSError as error:
+        print(error.errno)
+"""
+
+
+def looked_into(path, asked=None, memory=MEMORY, seconds=SECONDS):
+    return asyncio.run(inspected(path, asked or Asked(), memory, seconds))
+
+
+def inspections():
+    """The processes that read files for this one."""
+    return [
+        pid
+        for pid, line in descendants(os.getpid()).items()
+        if "islands_service.intake.file_inspection" in line
+    ]
+
+
+@pytest.fixture
+def record(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(csv())
+    return path
+
+
+@pytest.fixture
+def endless(tmp_path):
+    """A file that is never read to its end."""
+    path = tmp_path / "a.csv"
+    os.mkfifo(path)
+    return path
+
+
+def test_a_record_is_described(record):
+    found = looked_into(record, Asked(("u_V",), "y_um", 0.01, "0:100"))
+    assert [column["name"] for column in found["columns"]] == ["t_s", "u_V", "y_um"]
+    assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (Asked(("u_V",), "y_um", dt=0.02), "the sampling time is 0.01 s by column t_s and 0.02 s"),
+        (Asked(("u_V",), "y_um", rows="150:250"), "has samples 0 to 199: rows 150:250 are not a part of it"),
+        (Asked(("u_V",), "y_um", rows="5:1"), "rows 5:1 are not a part of it"),
+        (Asked(("u_V",), "y_um", rows="0:20"), "20 samples, from line 2 to line 21, are too few"),
+        (Asked(("force",), "y_um"), "a.csv has no column force"),
+        (Asked(("force",)), "no column force; it has t_s, u_V, y_um"),
+        (Asked(("u_V+1",), "y_um", rows="-20:"), "are too few"),
+    ],
+)
+def test_what_is_asked_of_a_record_is_checked(record, asked, words):
+    with pytest.raises(RecordError) as refused:
+        looked_into(record, asked)
+    assert words in str(refused.value)
+
+
+def test_a_file_that_takes_too_much_memory_ends_the_process(record):
+    with pytest.raises(RecordError, match=r"a\.csv cannot be read within 0\.1 GB of memory and 30 s \(.+\)"):
+        looked_into(record, memory=100_000_000)
+
+
+def test_a_file_that_takes_too_long_ends_the_process(endless):
+    began = time.monotonic()
+    with pytest.raises(RecordError, match=r"a\.csv takes longer than 1 s to read: give a shorter record"):
+        looked_into(endless, seconds=1.0)
+    assert time.monotonic() - began < 20.0
+    assert not alive(inspections())
+
+
+@pytest.mark.ci
+def test_a_process_that_turns_in_circles_has_so_much_time_of_the_processor():
+    imports = "from islands_service.intake.file_inspection import _limit"
+    script = f"{imports}\n_limit(6_000_000_000, 0.0)\nwhile True: pass"
+    done = subprocess.run([sys.executable, "-c", script], check=False, timeout=60)
+    assert done.returncode < 0
+
+
+def test_who_gives_up_takes_the_process_along(endless):
+    async def scene():
+        task = asyncio.create_task(inspected(endless, Asked(), MEMORY, SECONDS))
+        while not inspections():
+            await asyncio.sleep(0.01)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        return alive(inspections())
+
+    assert asyncio.run(scene()) == []
+
+
+def test_the_process_knows_no_secret_and_holds_no_file_of_ours(endless, tmp_path, monkeypatch):
+    monkeypatch.setenv("ISLANDS_DATABASE", "postgresql+psycopg://me:secret@host/islands")
+    (tmp_path / "islands.db").touch()
+
+    async def scene():
+        task = asyncio.create_task(inspected(endless, Asked(), MEMORY, SECONDS))
+        while not (found := inspections()) or _limits(found[0])["Max file size"] != ["0", "0"]:
+            await asyncio.sleep(0.01)
+        (pid,) = found
+        process = Path(f"/proc/{pid}")
+        entries = (process / "environ").read_bytes().split(b"\0")
+        environment = dict(entry.split(b"=", 1) for entry in entries if entry)
+        opened = _opened(pid)
+        limits = _limits(pid)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        return environment, opened, limits
+
+    with (tmp_path / "islands.db").open("rb"):
+        environment, opened, limits = asyncio.run(scene())
+    assert environment.keys() <= {b"PATH", b"OPENBLAS_NUM_THREADS", b"PYTHONDONTWRITEBYTECODE"}
+    assert not [path for path in opened if path.endswith(".db") or path.startswith("socket")]
+    assert limits["Max address space"] == [str(MEMORY)] * 2
+    assert limits["Max cpu time"] == ["31", "31"]
+    assert limits["Max open files"] == ["64", "64"]
+    assert limits["Max core file size"] == ["0", "0"]
+
+
+def _opened(pid):
+    """What a process has open: it goes on opening and closing while it is looked at."""
+    opened = []
+    for path in Path(f"/proc/{pid}/fd").iterdir():
+        with suppress(OSError):
+            opened.append(str(path.readlink()))
+    return opened
+
+
+def _limits(pid):
+    lines = Path(f"/proc/{pid}/limits").read_text().splitlines()[1:]
+    return {line[:26].strip(): line[26:].split()[:2] for line in lines}
+
+
+def test_the_process_writes_no_files(tmp_path):
+    new = tmp_path / "new"
+    done = subprocess.run(
+        [sys.executable, "-c", WRITES, new], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.stdout == "27\n"  # EFBIG
+    assert new.stat().st_size == 0
+
+
+@pytest.mark.ci
+def test_the_service_answers_while_two_files_at_a_time_are_read(serve):
+    stopped = set()
+
+    def stop_readers():
+        """Have those who read wait in the middle of it."""
+        for pid in inspections():
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGSTOP)
+                stopped.add(pid)
+        return len(alive(stopped)) == 2
+
+    with serve() as service:
+        content = csv(2000)
+        uploads = [
+            threading.Thread(target=service.upload, args=(content + b"\n" * n, f"{n}.csv")) for n in range(4)
+        ]
+        for upload in uploads:
+            upload.start()
+        eventually(stop_readers)
+        for _ in range(20):
+            assert service.client.get("/v1/jobs").status_code == 200
+        assert set(inspections()) == set(alive(stopped))
+        while any(upload.is_alive() for upload in uploads):
+            for pid in alive(stopped):
+                os.kill(pid, signal.SIGCONT)
+            assert len(inspections()) <= 2
+        for upload in uploads:
+            upload.join()
+        assert len(service.client.get("/v1/datasets").json()["items"]) == 4

@@ -1,0 +1,77 @@
+"""Islands on their way: packed, and unpacked where somebody looks at them."""
+
+import pickle
+from dataclasses import replace
+
+import pytest
+
+from islands.evolution.archipelago import Archipelago
+from islands.evolution.epoch import IslandEpoch
+from islands.evolution.evaluation import Evaluator
+from islands_service.runtime import packed_epoch as reports
+from islands_service.runtime.packed_epoch import PackedIslands, report_of, unpacked
+from support.searches import SMALL, exactly, islands_of, record
+
+
+@pytest.fixture(scope="module")
+def islands():
+    return islands_of(Evaluator(record(), SMALL), 3)
+
+
+@pytest.fixture
+def packed(islands):
+    return PackedIslands([report_of(IslandEpoch(island, (), ())) for island in islands])
+
+
+def test_an_island_comes_out_as_it_went_in(islands):
+    for island in islands:
+        back = unpacked(report_of(IslandEpoch(island, island.elite[:2], ())))
+        assert exactly(back) == exactly(island)
+        # And goes on to breed the same: hashes are of one process, and made anew.
+        assert {gene: 0 for each in back.population for gene in each.genes} == {
+            gene: 0 for each in island.population for gene in each.genes
+        }
+
+
+def test_a_report_says_what_the_epoch_brought(islands):
+    epoch = IslandEpoch(islands[-1], islands[-1].elite[:2], ())
+    found = report_of(epoch, "me", {"pairs": (1, 2)})
+    assert (found.emigrants, found.steps) == (epoch.emigrants, epoch.steps)
+    assert (found.actor, found.caches) == ("me", {"pairs": (1, 2)})
+    assert pickle.loads(pickle.dumps(found)) == found
+
+
+def test_packed_islands_are_those_islands(islands, packed):
+    assert len(packed) == len(islands)
+    assert [*packed] == islands
+    assert packed[-1] == islands[-1]
+    assert packed[1:3] == tuple(islands[1:3])
+    assert islands[2] in packed
+    assert exactly(Archipelago(packed)) == exactly(Archipelago(tuple(islands)))
+
+
+def test_packed_islands_equal_whatever_has_the_same_islands(islands, packed):
+    assert packed == tuple(islands)
+    assert tuple(islands) == packed
+    assert Archipelago(packed) == Archipelago(tuple(islands))
+    assert hash(packed) == hash(tuple(islands))
+    other = (*islands[:-1], replace(islands[-1], seed=99))
+    assert packed != other
+    assert packed != tuple(islands[:-1])
+    assert packed != 3
+
+
+def test_places_that_are_not_there_are_refused(islands, packed):
+    for place in (len(islands), -len(islands) - 1):
+        with pytest.raises(IndexError):
+            packed[place]
+
+
+def test_an_island_is_unpacked_once_and_not_before_somebody_looks(monkeypatch, islands):
+    opened = []
+    monkeypatch.setattr(reports, "unpacked", lambda report: opened.append(report) or unpacked(report))
+    found = PackedIslands([report_of(IslandEpoch(island, (), ())) for island in islands])
+    assert len(found) == len(islands)
+    assert not opened
+    assert found[2] is found[2]
+    assert len(opened) == 1

@@ -1,0 +1,170 @@
+"""Blobs: named by what is in them, whole or not there, swept away when nobody names them."""
+
+import errno
+import os
+import time
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from islands_service.store.blobs import Blobs, NoSuchBlob, full_disk_told
+from islands_service.store.database import StoreFull
+from support.stores import MANY, at_once
+
+LONG_AGO = 1_000_000.0
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "data" / "blobs"
+
+
+@pytest.fixture
+def blobs(folder):
+    return Blobs(folder)
+
+
+def files(folder):
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+def aged(path):
+    os.utime(path, (LONG_AGO, LONG_AGO))
+
+
+@pytest.mark.parametrize("data", [b"", b"a", bytes(range(256)) * 5000])
+def test_a_blob_is_what_was_written_and_its_name_says_what_that_was(blobs, data):
+    blob = blobs.write(data)
+    assert blob == sha256(data).hexdigest()
+    assert blobs.read(blob) == data
+    assert blobs.path(blob).read_bytes() == data
+
+
+def test_a_blob_is_there_for_whoever_opens_the_folder(blobs, folder):
+    assert Blobs(folder).read(blobs.write(b"a")) == b"a"
+
+
+def test_the_same_bytes_are_one_file(blobs, folder):
+    assert blobs.write(b"a") == blobs.write(b"a")
+    assert len(files(folder)) == 1
+
+
+def test_many_who_write_the_same_bytes_at_once_write_one_blob(blobs, folder):
+    data = b"x" * 100_000
+    assert set(at_once([partial(blobs.write, data)] * MANY)) == {sha256(data).hexdigest()}
+    assert [path.read_bytes() for path in files(folder)] == [data]
+
+
+def test_a_blob_that_is_not_there_says_what_to_do(blobs, folder):
+    with pytest.raises(NoSuchBlob, match=f"{'0' * 64} is not in .*blobs: restore .* from a backup"):
+        blobs.read("0" * 64)
+
+
+def test_nobody_else_may_look_into_the_folder(blobs, folder):
+    blobs.write(b"a")
+    assert {path.stat().st_mode & 0o077 for path in (folder, *folder.rglob("*"))} == {0}
+
+
+def test_what_is_received_in_pieces_is_one_blob(blobs):
+    with blobs.receiving() as stream:
+        for _ in range(100):
+            stream.write(b"abc")
+        blob = blobs.keep(stream)
+    assert blobs.read(blob) == b"abc" * 100
+
+
+def test_what_is_not_kept_leaves_nothing(blobs, folder):
+    with blobs.receiving() as stream:
+        stream.write(b"a")
+        assert len(files(folder)) == 1
+    assert files(folder) == []
+
+
+def test_what_fails_while_it_is_received_leaves_nothing(blobs, folder):
+    def fails():
+        with blobs.receiving() as stream:
+            stream.write(b"a" * 100_000)
+            raise ConnectionError
+
+    with pytest.raises(ConnectionError):
+        fails()
+    assert files(folder) == []
+
+
+def test_what_was_kept_is_kept_whatever_fails_after_it(blobs, folder):
+    def fails():
+        with blobs.receiving() as stream:
+            stream.write(b"a")
+            blobs.keep(stream)
+            raise ConnectionError
+
+    with pytest.raises(ConnectionError):
+        fails()
+    assert blobs.read(sha256(b"a").hexdigest()) == b"a"
+    assert len(files(folder)) == 1
+
+
+def test_a_blob_and_its_folders_are_on_the_disk_before_its_name_is_told(blobs, folder, monkeypatch):
+    synced = []
+
+    def fsync(descriptor):
+        path = Path(f"/proc/self/fd/{descriptor}").readlink()
+        synced.append((path, path.stat().st_size))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    blob = blobs.write(b"abc" * 10_000)
+    (part, size), *folders = synced
+    assert (part.parent, size) == (folder, 30_000)
+    assert [path for path, _ in folders] == [folder / blob[:2], folder]
+
+
+def test_all_that_is_there_is_told_and_what_has_no_name_yet(blobs, folder):
+    assert list(blobs.all()) == []
+    made = {blobs.write(bytes([each])) for each in range(20)}
+    with blobs.receiving() as stream:
+        found = list(blobs.all())
+        assert {blob for blob, _ in found} == {*made, ""}
+        assert dict(found)[""] == Path(stream.name)
+        assert all(blobs.path(blob) == path for blob, path in found if blob)
+
+
+def test_what_nobody_names_is_swept_away_once_it_is_old(blobs):
+    named, unnamed, young = (blobs.write(each) for each in (b"a", b"b", b"c"))
+    for blob in (named, unnamed):
+        aged(blobs.path(blob))
+    assert blobs.sweep({named}, LONG_AGO) == 0
+    assert blobs.sweep({named}, LONG_AGO + 1) == 1
+    assert {blob for blob, _ in blobs.all()} == {named, young}
+    assert blobs.sweep((), time.time() + 60) == 2
+
+
+def test_what_was_left_half_written_is_swept_away_once_it_is_old(blobs, folder):
+    left = folder / "left.part"
+    left.write_bytes(b"half")
+    assert blobs.sweep((), LONG_AGO) == 0
+    aged(left)
+    assert blobs.sweep((), LONG_AGO + 1) == 1
+    assert files(folder) == []
+
+
+def test_a_blob_that_is_written_again_is_young_again(blobs):
+    """Whoever has written it is about to name it."""
+    blob = blobs.write(b"a")
+    aged(blobs.path(blob))
+    blobs.write(b"a")
+    assert blobs.sweep((), LONG_AGO + 1) == 0
+    assert blobs.read(blob) == b"a"
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_is_told(number):
+    with pytest.raises(StoreFull, match="make room"), full_disk_told():
+        raise OSError(number, os.strerror(number))
+
+
+def test_another_fault_of_the_disk_is_not_called_a_full_one():
+    with pytest.raises(OSError, match="Input/output error") as raised, full_disk_told():
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+    assert not isinstance(raised.value, StoreFull)

@@ -1,0 +1,48 @@
+"""The wish to stop: a signal may come at any moment, also in the midst of looking for it."""
+
+import subprocess
+import sys
+import time
+from threading import Thread
+
+import pytest
+
+from islands_service.liveness import Wish
+
+#: Waits a short time again and again while signals come at every moment of it.
+WAITING = """
+import signal
+from islands_service.liveness import Wish, stop_on_signals
+made = 0
+signal.setitimer(signal.ITIMER_REAL, 0.5, 2e-4)
+for _ in range(20_000):
+    stopping = Wish()
+    stop_on_signals(stopping)
+    signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGTERM))
+    made += stopping.wait(1e-5)
+signal.setitimer(signal.ITIMER_REAL, 0.0)
+print(made)
+"""
+
+
+@pytest.mark.ci
+def test_a_signal_in_the_midst_of_a_look_is_not_waited_for_for_ever() -> None:
+    command = [sys.executable, "-c", WAITING]
+    said = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    assert said.stderr == ""
+    assert int(said.stdout) > 1000
+
+
+def test_a_wish_ends_the_wait_at_once_and_stays() -> None:
+    stopping = Wish()
+    assert not stopping.wait(0.0)
+    assert not stopping.made
+    thread = Thread(target=lambda: (time.sleep(0.1), stopping.make()))
+    began = time.monotonic()
+    thread.start()
+    assert stopping.wait(20.0)
+    assert time.monotonic() - began < 19.0
+    thread.join()
+    assert stopping.made
+    assert stopping.wait(20.0)
+    assert time.monotonic() - began < 19.0

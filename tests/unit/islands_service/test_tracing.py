@@ -1,0 +1,69 @@
+"""Traces arrive at a collector: a span a request, with the service's name, and none where none are wanted."""
+
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from threading import Thread
+
+import pytest
+from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
+
+from islands_service.tracing import Traces
+from support.service import served
+
+
+@pytest.fixture
+def collector():
+    """A collector of OTLP over HTTP: its address, and what it was sent."""
+    received = []
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self):
+            received.append(self.rfile.read(int(self.headers["Content-Length"])))
+            self.send_response(200)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/v1/traces", received
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def spans(received):
+    """Yield the sender and the name of every span."""
+    for body in received:
+        for resource in ExportTraceServiceRequest.FromString(body).resource_spans:
+            sender = {each.key: each.value.string_value for each in resource.resource.attributes}
+            for scope in resource.scope_spans:
+                for span in scope.spans:
+                    yield sender["service.name"], span.name
+
+
+def test_a_request_is_a_span_and_a_look_at_our_health_is_none(collector, tmp_path):
+    address, received = collector
+    with served(tmp_path / "data", telemetry=address) as service:
+        assert service.client.get("/v1/jobs").status_code == 200
+        assert service.client.get("/readyz").status_code == 200
+    sent = list(spans(received))
+    assert ("islands-api", "GET /v1/jobs") in sent
+    assert not any("readyz" in name for _, name in sent)
+
+
+def test_an_attempt_at_a_job_is_a_span_of_the_coordinator(collector):
+    address, received = collector
+    traces = Traces(address, "coordinator")
+    with traces.span("identification", job="1f", attempt=2):
+        pass
+    traces.close()
+    assert list(spans(received)) == [("islands-coordinator", "identification")]
+
+
+def test_without_an_endpoint_nothing_of_opentelemetry_is_made():
+    traces = Traces("", "coordinator")
+    with traces.span("identification"):
+        traces.close()
+    assert traces.provider is None
