@@ -24,10 +24,10 @@ for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np  # noqa: E402 - after what it reads
 
 import islands  # noqa: E402
-from islands.discrepancy.self_test import probed  # noqa: E402
+from islands.discrepancy.detectability import probed  # noqa: E402
 from islands.discrepancy.surrogates import Probe, injections, surrogates_of  # noqa: E402
-from islands.io.extensions import extended_document  # noqa: E402
-from islands.io.simulations import simulation  # noqa: E402
+from islands.io.simulator_spec.document import extended_document  # noqa: E402
+from islands.io.simulator_spec.factory import simulation  # noqa: E402
 
 NAIVE = Path(__file__).parents[1] / "tests" / "support" / "naive_damper.py"
 DATA = Path(os.environ.get("ISLANDS_DATA_DIR", Path(__file__).parents[2] / "shared/data"))

@@ -10,20 +10,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from islands._diagnose import diagnose
+    from islands._fit import fit
+    from islands._identify import identify
+    from islands._result import FittedModel, Result, simulate
     from islands.data.dataset import Dataset, join
     from islands.data.split import Split, split
-    from islands.diagnosing import diagnose
     from islands.discrepancy.diagnosis import Diagnosis
     from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-    from islands.fitting import fit
-    from islands.identification import identify
     from islands.io.models import read_model, write_model
     from islands.io.records import read_record, write_record
-    from islands.io.simulations import simulated
+    from islands.io.simulator_spec.factory import simulated
     from islands.model.model import Model, model_of
     from islands.model.parsing import parse
     from islands.model.primitives import PRIMITIVES, primitive
-    from islands.result import FittedModel, Result, simulate
 
 __all__ = [
     "PRIMITIVES",
@@ -58,18 +58,18 @@ __all__ = [
 _HOMES = {
     "data.dataset": ("Dataset", "join"),
     "data.split": ("Split", "split"),
-    "diagnosing": ("diagnose",),
+    "_diagnose": ("diagnose",),
     "discrepancy.diagnosis": ("Diagnosis",),
     "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
-    "fitting": ("fit",),
-    "identification": ("identify",),
+    "_fit": ("fit",),
+    "_identify": ("identify",),
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
-    "io.simulations": ("simulated",),
+    "io.simulator_spec.factory": ("simulated",),
     "model.model": ("Model", "model_of"),
     "model.parsing": ("parse",),
     "model.primitives": ("PRIMITIVES", "primitive"),
-    "result": ("FittedModel", "Result", "simulate"),
+    "_result": ("FittedModel", "Result", "simulate"),
 }
 
 

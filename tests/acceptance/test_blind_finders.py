@@ -12,9 +12,9 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from acceptance import test_hidden as checks
-from islands.discrepancy import preparation
+from islands.discrepancy.calibration.levenberg_marquardt import preparation
 from islands.discrepancy.effects import CATALOGUE
-from islands.trials.hide.piezo import PIEZO
+from islands.trials.injection.piezo import PIEZO
 from islands.trials.trial import Outcome, Trial
 
 Finder = Callable[[Trial], Outcome]

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.discrepancy.core import Core
+from islands.discrepancy.detectability import NOTHING, Answer, SelfTest, self_test
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.self_test import NOTHING, Answer, SelfTest, self_test
-from islands.discrepancy.spread import Spread
+from islands.discrepancy.interfaces.simulator import Core
 from islands.discrepancy.surrogates import Probe
 from islands.io.records import write_record
-from islands.trials.hide.records import hide
+from islands.parallel import Spread
+from islands.trials.injection.measurement import hide
 from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration import Target, held_against
+from islands.discrepancy.calibration.levenberg_marquardt import Target, held_against
+from islands.discrepancy.calibration.preparation import fitted_samples, scene_of
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.extended import Extended
-from islands.discrepancy.preparation import fitted_samples, scene_of
-from islands.io.extensions import extended_json
+from islands.discrepancy.simulators.extended import Extended
 from islands.io.records import write_record
+from islands.io.simulator_spec.document import extended_json
 from support.command_line import fail, succeed
 from support.simulated_records import made
 

@@ -7,7 +7,7 @@ from collections.abc import Container
 
 import pytest
 
-from islands.trials.hide.piezo import PIEZO
+from islands.trials.injection.piezo import PIEZO
 from islands.trials.trial import Outcome, Trial, carried_out
 
 #: Seconds of a record at the levels ci and nightly, and of one that is diagnosed in less than a second.

@@ -6,11 +6,11 @@ from inspect import getmodule
 import numpy as np
 import pytest
 
-from islands.discrepancy.decision import Verdict
 from islands.discrepancy.detectors import DETECTORS
-from islands.discrepancy.effect import Scene
 from islands.discrepancy.effects import CATALOGUE, OF_EACH, sentence
-from islands.io.simulation_spec import KINDS
+from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.effect import Scene
+from islands.io.simulator_spec.schema import KINDS
 from support.repository import DOCS
 
 GUIDE = (DOCS / "discrepancy.md").read_text()

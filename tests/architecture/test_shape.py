@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from islands.estimation.constraints import CONSTRAINTS
-from islands.evolution.characters import CHARACTERS
-from islands.evolution.constraints import STRUCTURES
+from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
+from islands.evolution.gene_structure import STRUCTURES
+from islands.evolution.island_profiles import CHARACTERS
 from islands.evolution.migration import EMIGRANTS, REPLACED
 from islands.evolution.presets import PRESETS
 from islands.evolution.topology import TOPOLOGIES
-from islands.figures.gallery import FIGURES, SEARCH_FIGURES
+from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS
-from islands.model.library import LIBRARIES
+from islands.model.candidate_library import LIBRARIES
 from islands.model.primitives import PRIMITIVES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from islands._identify import identify
 from islands.evolution.engine import SerialEngine
-from islands.identification import identify
 from islands.io.records import read_record
-from islands.io.results import result_document
+from islands.io.result_folder import result_document
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
 

@@ -7,7 +7,7 @@ Its parameters are rounded to three digits; with those the record gives 0.3310 /
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.estimation.estimation import Estimated, estimate
+from islands.estimation.estimate import Estimated, estimate
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED, published

@@ -5,16 +5,16 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.estimation.constrained import constrained_least_squares
-from islands.estimation.constraints import CONSTRAINTS, Constraint, constraint, every_regressor
+from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.least_squares import least_squares
+from islands.estimation.parameter_constraints import CONSTRAINTS, Constraint, constraint, every_regressor
 from islands.model.clusters import OUTPUT_AT_REST, steady_state
 from islands.model.expression import Lagged
 from islands.model.model import model_of
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import plain
-from islands.program.columns import regressor_matrix
+from islands.model.rendering import plain
+from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import Outcome, Verdict
 from islands.simulation.predictors import free_run
 

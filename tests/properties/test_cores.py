@@ -5,23 +5,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.core import Core
-from islands.discrepancy.cores import (
-    between,
+from islands.discrepancy.calibration.preparation import effects_for, fitted_samples, scene_of
+from islands.discrepancy.interfaces.context import Scene
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.simulators import (
     bouc_wen_piezo,
     cascaded_tanks,
-    column,
-    extension,
+    intersample,
     linear,
     narx,
-    program,
+    python_function,
+    recorded_output,
     rigid_axis,
+    saved_extension,
     second_order,
 )
-from islands.discrepancy.effect import Effect, Site
-from islands.discrepancy.extended import Extended
-from islands.discrepancy.preparation import effects_for, fitted_samples, scene_of
-from islands.discrepancy.scene import Scene
+from islands.discrepancy.simulators.extended import Extended
 from support.simulated_records import made
 
 #: By name, what each has to be; the held one is within the extension.
@@ -32,10 +32,10 @@ KINDS = {
     "cascaded-tanks": cascaded_tanks.CascadedTanksCore,
     "linear": linear.LinearCore,
     "model": narx.NarxCore,
-    "column": column.ColumnCore,
-    "python": program.ProgramCore,
-    "held": between.Between,
-    "extended": extension.ExtensionCore,
+    "column": recorded_output.ColumnCore,
+    "python": python_function.ProgramCore,
+    "held": intersample.Between,
+    "extended": saved_extension.ExtensionCore,
 }
 
 
@@ -69,9 +69,9 @@ def effects(core: Core, scene: Scene) -> list[Effect]:
 
 
 def test_every_core_is_here() -> None:
-    modules = {path.stem for path in Path(between.__file__).parent.glob("*.py")}
+    modules = {path.stem for path in Path(intersample.__file__).parent.glob("*.py")}
     here = {kind.__module__.rpartition(".")[2] for kind in KINDS.values()}
-    assert modules - {"__init__", "coordinates", "around"} == here
+    assert modules - {"__init__", "coordinates", "around", "extended"} == here
 
 
 def test_it_is_what_it_says(name: str, core: Core) -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.effect import Scene, Site
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.extended import Extended
+from islands.discrepancy.interfaces.effect import Scene, Site
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.simulators.extended import Extended
 
 
 @pytest.fixture(scope="module")

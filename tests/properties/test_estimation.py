@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.estimation.constrained import constrained_least_squares
+from islands.estimation.constrained_least_squares import constrained_least_squares
 from islands.estimation.least_squares import least_squares
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.columns import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import OK, Outcome, Verdict
 from support.regressions import problem, seeds, squares
 
@@ -313,7 +313,7 @@ from islands.estimation.least_squares import factor
 from islands.model.expression import Lagged
 from islands.model.regressor import regressor
 from islands.model.parsing import parse
-from islands.program.columns import gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 
 texts = ["y(k-1)", "y(k-2)", "u(k-1)", "u(k-1)*y(k-1)", "u(k-2)^3", "sign(u(k-1) - u(k-2))"]
 terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]

@@ -8,13 +8,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from islands.estimation.constraints import CONSTRAINTS
+from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.gene_index import Vocabulary
 from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation, step
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.variation import random_gene
-from islands.evolution.vocabulary import Vocabulary
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from support.searches import SMALL, evolved, islands_of, record

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.estimation.constrained import constrained_least_squares, null_space
-from islands.estimation.constraints import CONSTRAINTS
+from islands.estimation.constrained_least_squares import constrained_least_squares, null_space
+from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.individual import Individual
@@ -18,7 +18,7 @@ from islands.evolution.variation import random_genes
 from islands.model.expression import Lagged
 from islands.model.model import Model, canonical_order
 from islands.model.parsing import parse
-from islands.program.columns import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import Outcome, Verdict
 from islands.simulation.predictors import multiple_shooting
 from support.searches import distinct_genes, record

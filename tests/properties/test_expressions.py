@@ -18,7 +18,7 @@ from islands.model.expression import Apply, Constant, Lagged, Shift, content, la
 from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.model.regressor import canonical, regressor
-from islands.model.text import latex, plain
+from islands.model.rendering import latex, plain
 from support.strategies import (
     any_number,
     expressions,
@@ -248,7 +248,7 @@ from islands.model.expression import Lagged, content, lags
 from islands.model.model import model_of
 from islands.model.equations import equation, latex_equation
 from islands.model.parsing import parse
-from islands.model.text import at_rest
+from islands.model.rendering import at_rest
 terms = ["max(y(k-3), u2(k-1))*tanh(u1(k-2))", "u1(k-1)*sign(u1(k-1) - u1(k-4))^3", "y(k-1)", "3", "u2(k-7)",
          "exp(phi1(u1(k-1), u1(k-2)))*y(k-2)", "sin(y(k-1) + 2*u2(k-3) - u1(k-1)*u2(k-1))", "2*y(k-9)"]
 model = model_of([(parse(text), 0.5) for text in terms], ("u1", "u2"))

@@ -11,11 +11,11 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset, join
-from islands.estimation.constraints import CONSTRAINTS
-from islands.estimation.estimation import Estimated, estimate
+from islands.estimation.estimate import Estimated, estimate
 from islands.estimation.forward_selection import forward_selection
-from islands.model.library import candidates
-from islands.model.text import plain
+from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.model.candidate_library import candidates
+from islands.model.rendering import plain
 from islands.simulation.outcome import Outcome, Verdict
 from islands.validation.physics import cluster_sums
 

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from islands.data.dataset import Dataset
 from islands.estimation.froe import froe
 from islands.estimation.least_squares import least_squares
-from islands.kernels import selection
+from islands.kernels import err_selection
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.columns import gram_matrix
+from islands.program.regressor_matrix import gram_matrix
 from support.regressions import problem, seeds, squares
 
 
@@ -31,7 +31,7 @@ def prune(gram, tolerance):
     """Return the positions that pruning leaves."""
     terms = len(gram) - 1
     kept = np.full(terms, -1)
-    return tuple(kept[: selection.prune(gram, terms, tolerance, kept)].tolist())
+    return tuple(kept[: err_selection.prune(gram, terms, tolerance, kept)].tolist())
 
 
 def textbook(psi, y):

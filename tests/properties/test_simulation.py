@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
-from islands.kernels.sums import total
+from islands.kernels.summation import total
 from islands.model.expression import value
 from islands.model.model import model_of
 from islands.model.parsing import parse

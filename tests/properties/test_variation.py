@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.constraints import phi
 from islands.evolution.evaluation import Evaluator
+from islands.evolution.gene_structure import phi
 from islands.evolution.individual import Individual, regressor_of
 from islands.evolution.island import first_generation, step
 from islands.evolution.problem import problem
@@ -26,7 +26,7 @@ from islands.evolution.variation import (
 from islands.model.expression import Apply, Lagged, Shift, children, walk
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
-from islands.model.text import plain
+from islands.model.rendering import plain
 from support.searches import SMALL, record
 
 # What is legal, said a second time and in other words than the source's.

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from islands.benchmark.comparison import Comparison
+from islands.benchmark.full_runs import Run
 from islands.benchmark.machine import Machine
 from islands.benchmark.report import Report
 from islands.benchmark.scaling import Scaling, against_islands
-from islands.benchmark.search import Run
 
 KINDS = ("poly", "general", "gp")
 POINTS = ((1.0, 2.0), (2.0, 3.0), (4.0, 5.0))

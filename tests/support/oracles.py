@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from islands.kernels.machine import ADD, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SIGN_OF_PRODUCT, SUBTRACT
+from islands.kernels.interpreter import ADD, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SIGN_OF_PRODUCT, SUBTRACT
 
 
 def sign(a):

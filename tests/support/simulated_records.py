@@ -10,8 +10,9 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.core import Core
-from islands.io.simulation_spec import (
+from islands.discrepancy.interfaces.simulator import Core
+from islands.io.simulator_spec.factory import simulation
+from islands.io.simulator_spec.schema import (
     ColumnSpec,
     LinearSpec,
     LocalExtendedSpec,
@@ -20,7 +21,6 @@ from islands.io.simulation_spec import (
     PhysicalSpec,
     ProgramSpec,
 )
-from islands.io.simulations import simulation
 
 #: A function of the user's own, in a file.
 PROGRAM = Path(__file__).with_name("naive_damper.py")

@@ -11,9 +11,9 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from islands.benchmark.figures import save_scalings
-from islands.benchmark.measurement import measure
 from islands.benchmark.report import Report, document, goals
+from islands.benchmark.run import measure
+from islands.benchmark.scaling import save_scalings
 from islands.errors import IslandsError
 from islands_api.cli.app import THREADS
 from islands_api.cli.console import compile_kernels, output, progress

@@ -8,24 +8,23 @@ from typing import Annotated, Any
 
 import typer
 
+from islands._explain_residual import proposed
 from islands.data.dataset import Dataset
-from islands.discrepancy.core import Core
-from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.detectability import SelfTest, self_test
+from islands.discrepancy.diagnosis import Diagnosis, Proposal
 from islands.discrepancy.diagnosis import diagnose as diagnosed
-from islands.discrepancy.proposal import Proposal
-from islands.discrepancy.self_test import SelfTest, self_test
-from islands.discrepancy.spread import Spread
-from islands.io.diagnoses import as_json, diagnosis_document
-from islands.io.extensions import extended_json
+from islands.discrepancy.interfaces.simulator import Core
+from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records import read_record
-from islands.io.simulation_spec import ColumnSpec, innermost, spec_of
-from islands.io.simulations import simulation
-from islands.proposing import proposed
+from islands.io.records.row_range import rows_of
+from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.factory import simulation
+from islands.io.simulator_spec.schema import ColumnSpec, innermost, spec_of
+from islands.parallel import Spread
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_service.reports.diagnosis_report import in_words, report, self_test_in_words
-from islands_service.rows import rows_of
 
 #: Files of a result.
 RESULT, EXTENDED, REPORT = "discrepancy.json", "extended.json", "report.html"

@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 import islands
-from islands.estimation.constraints import CONSTRAINTS
+from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.io.records import read_record
-from islands.model.library import LIBRARIES
+from islands.io.records.row_range import rows_of
+from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
 from islands_api.cli.output_folder import check_folder, show_result
-from islands_service.rows import rows_of
 
 
 def fit(

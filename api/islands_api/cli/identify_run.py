@@ -14,18 +14,17 @@ import islands
 from islands.data.dataset import SAME_DT
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import settings_of
-from islands.evolution.search import State
+from islands.evolution.search_state import State
 from islands.evolution.settings import Settings
-from islands.io.checkpoints import read_checkpoint, write_checkpoint, write_hall
+from islands.io.checkpoints import read_checkpoint, state_document, state_of, write_checkpoint, write_hall
 from islands.io.records import fingerprint, read_record
-from islands.io.states import state_document, state_of
+from islands.io.records.row_range import rows_of
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, errors, output, progress
 from islands_api.cli.output_folder import show_result
 from islands_api.cli.search_progress import course
 from islands_service.engines import ENGINES
-from islands_service.rows import rows_of
 
 CHECKPOINT = "checkpoint.json"
 HALL = "hall.json"

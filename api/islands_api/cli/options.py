@@ -9,10 +9,10 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.records import read_record
-from islands.io.simulation_spec import KINDS, LocalExtendedSpec, is_extended, spec_of
+from islands.io.records.row_range import overlap, rows_of
+from islands.io.simulator_spec.schema import KINDS, LocalExtendedSpec, is_extended, spec_of
 from islands.model.model import Model
 from islands.systems.published_models import published
-from islands_service.rows import overlap, rows_of
 
 Record = Annotated[
     Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point), NPZ, MAT or Parquet.")

@@ -4,8 +4,8 @@ from typing import Annotated
 
 import typer
 
-from islands.estimation.constraints import CONSTRAINTS
-from islands.evolution.characters import CHARACTERS
+from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.evolution.island_profiles import CHARACTERS
 from islands.evolution.migration import EMIGRANTS, REPLACED
 from islands.evolution.presets import PRESETS
 from islands.evolution.topology import TOPOLOGIES

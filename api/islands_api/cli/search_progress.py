@@ -5,9 +5,9 @@ from itertools import takewhile
 from math import inf
 from time import monotonic
 
-from islands.evolution.search import State
+from islands.evolution.history import Progress
+from islands.evolution.search_state import State
 from islands.evolution.settings import Settings
-from islands.validation.findings import Progress
 from islands_api.cli.console import Tell
 
 #: Islands that are shown one by one.

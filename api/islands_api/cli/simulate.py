@@ -7,17 +7,17 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from islands._fit import SHOOTING
+from islands._result import simulate as run
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, SettingsError
-from islands.fitting import SHOOTING
 from islands.io.records import read_record, write_simulation
-from islands.io.simulation_spec import ColumnSpec, LocalExtendedSpec, innermost
-from islands.io.simulations import simulated
-from islands.result import simulate as run
+from islands.io.records.row_range import rows_of
+from islands.io.simulator_spec.factory import simulated
+from islands.io.simulator_spec.schema import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
-from islands_service.rows import rows_of
 
 
 def simulate(

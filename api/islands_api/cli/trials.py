@@ -14,8 +14,8 @@ from rich.table import Table
 from islands.errors import SettingsError, chosen
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
-from islands.trials.cores import CORES, Simulated
-from islands.trials.tally import Bin, Measure, Share, confusion, reliability, tally
+from islands.trials.cases import CORES, Simulated
+from islands.trials.scoring import Bin, Measure, Share, confusion, reliability, tally
 from islands.trials.trial import Outcome, Trial, carried_out
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_service.runtime.parallel_map import pool

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
-from islands.io.simulation_spec import spec_of
+from islands.io.simulator_spec.schema import spec_of
 from islands_api.client.calls import Call, DatasetRef, id_of, names_of, submission
 from islands_api.schemas import JobView
 

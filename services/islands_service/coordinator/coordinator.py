@@ -239,7 +239,7 @@ class Coordinator:
             return None
 
     def _connect(self) -> None:
-        from islands.warm_up import warm_up  # noqa: PLC0415
+        from islands._warm_up import warm_up  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
         self._ray.enter_context(cluster(self._address()))
@@ -266,8 +266,7 @@ class Coordinator:
             self._store.retention.forget(self._settings.retention)
         # The time first, then the names, then the files: what is named after this is younger than an hour.
         before = time() - ORPHAN
-        named = self._store.retention.named_blobs()
-        removed = self._blobs.sweep(named, before)
+        removed = self._blobs.sweep(self._store.retention.named_blobs(), before)
         log.info("swept", blobs=removed)
 
 
@@ -284,12 +283,9 @@ class _Watched:
 
 
 def problem_of(error: IslandsError) -> dict[str, str]:
-    """Describe why a job failed, as whoever submitted it is told."""
-    return {
-        "type": PROBLEMS.get(type(error).__name__, "job-failed"),
-        "title": "The job failed",
-        "detail": str(error),
-    }
+    """Describe why a job failed, for its owner."""
+    kind = PROBLEMS.get(type(error).__name__, "job-failed")
+    return {"type": kind, "title": "The job failed", "detail": str(error)}
 
 
 #: The types of problems that a job's own input can cause.

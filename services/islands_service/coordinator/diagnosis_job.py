@@ -5,14 +5,13 @@ from time import monotonic
 
 import structlog
 
-from islands.discrepancy.diagnosis import Diagnosis, diagnose
-from islands.discrepancy.proposal import Proposal
-from islands.discrepancy.spread import Spread
+from islands._explain_residual import proposed
+from islands.discrepancy.diagnosis import Diagnosis, Proposal, diagnose
 from islands.evolution.engine import Engine
-from islands.io.diagnoses import diagnosis_document
-from islands.io.extensions import extended_json
-from islands.io.simulations import simulation
-from islands.proposing import proposed
+from islands.io.diagnosis_json import diagnosis_document
+from islands.io.simulator_spec.document import extended_json
+from islands.io.simulator_spec.factory import simulation
+from islands.parallel import Spread
 from islands_service.domain.job_spec import discrepancy_of
 from islands_service.domain.jobs import EXTENDED, REPORT, JobState, Lease, Outcome, Report
 from islands_service.intake.job_inputs import record_and_columns

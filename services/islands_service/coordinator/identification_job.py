@@ -9,16 +9,15 @@ from typing import Any
 
 import structlog
 
+from islands._identify import identify
 from islands.evolution.engine import Engine
-from islands.evolution.search import State
+from islands.evolution.search_state import State
 from islands.evolution.settings import Settings
-from islands.identification import identify
-from islands.io.checkpoints import archipelago_of, checkpoint_text
+from islands.io.checkpoints import archipelago_of, checkpoint_text, history_document, state_document, state_of
 from islands.io.models import model_json
-from islands.io.results import result_document
-from islands.io.states import history_document, state_document, state_of
+from islands.io.result_folder import result_document
 from islands.model.equations import equation
-from islands.validation.findings import Findings
+from islands.search_result import Findings
 from islands_service.domain.job_spec import identification_of
 from islands_service.domain.jobs import Job, JobState, Lease, Outcome, Report
 from islands_service.intake.job_inputs import record_and_validation

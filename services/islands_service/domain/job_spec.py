@@ -21,8 +21,8 @@ from pydantic import (
 from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS, settings_of
 from islands.evolution.settings import Settings
-from islands.io.simulation_spec import ColumnSpec, SimulationSpec, innermost
-from islands.model.library import candidates
+from islands.io.simulator_spec.schema import ColumnSpec, SimulationSpec, innermost
+from islands.model.candidate_library import candidates
 
 S = TypeVar("S", bound=BaseModel)
 

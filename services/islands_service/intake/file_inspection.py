@@ -113,7 +113,7 @@ def main() -> None:
     # After the limits: whatever these do, they do it within them.
     from islands.io.records import read_record  # noqa: PLC0415
     from islands.io.records.preview import preview  # noqa: PLC0415
-    from islands_service.rows import rows_of  # noqa: PLC0415
+    from islands.io.records.row_range import rows_of  # noqa: PLC0415
 
     asked = Asked(**request["asked"])
     try:
@@ -150,7 +150,7 @@ def _refuse_unreadable(found: "Preview", path: str) -> None:
 
 def _refuse_unusable(problems: Mapping[str, str], asked: Asked) -> None:
     """Refuse columns by what a preview says of each: a job that would read them is not known yet."""
-    from islands.io.records.names import column_of  # noqa: PLC0415
+    from islands.io.records.column_names import column_of  # noqa: PLC0415
 
     for name in (*asked.inputs, *([] if asked.output is None else [asked.output])):
         source = column_of(name, problems)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.io.records import read_record
+from islands.io.records.row_range import rows_of
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
-from islands_service.rows import rows_of
 from islands_service.store.blobs import Blobs, full_disk_told
 from islands_service.store.datasets import StoredDataset
 

@@ -9,12 +9,12 @@ from typing import Any
 
 from islands.errors import RecordError, SettingsError
 from islands.io.models import model_from_json
-from islands.io.records.checks import check_choice
-from islands.io.records.names import column_of
-from islands.io.simulation_spec import PARAMETERS, ModelSpec, PhysicalSpec, innermost
+from islands.io.records.column_names import column_of
+from islands.io.records.row_range import overlap, rows_of
+from islands.io.records.validation import check_choice
+from islands.io.simulator_spec.schema import PARAMETERS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_spec import LIMITS, SHIFT, Discrepancy, Identification, Part, checked
 from islands_service.intake.file_inspection import Asked
-from islands_service.rows import overlap, rows_of
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.datasets import StoredDataset

@@ -4,10 +4,9 @@ import base64
 import io
 from typing import Any
 
-from islands.discrepancy.decision import Finding, Verdict
-from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.proposal import Proposal
-from islands.discrepancy.self_test import NOTHING, SelfTest
+from islands.discrepancy.detectability import NOTHING, SelfTest
+from islands.discrepancy.diagnosis import Diagnosis, Proposal
+from islands.discrepancy.inference.verdict import Finding, Verdict
 from islands.discrepancy.surrogates import STRENGTHS
 from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.style import save

@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
+from islands.data.split import split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import settings_of
-from islands.figures.gallery import FIGURES, SEARCH_FIGURES, search_figures
+from islands.figures.registry import FIGURES, SEARCH_FIGURES, search_figures
 from islands.figures.style import save
-from islands.fitting import parts_of
+from islands.io.checkpoints import history_of
 from islands.io.models import model_from_json
-from islands.io.states import history_of
+from islands.search_result import Assessed, Findings, Search
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
-from islands.validation.findings import Assessed, Findings, Search
 from islands_service.domain.job_spec import identification_of
 from islands_service.domain.jobs import REPORT, Job
 from islands_service.intake.job_inputs import record_and_validation
@@ -97,7 +97,7 @@ def findings_of(job: Job, store: Store, blobs: Blobs, rank: int | None) -> Findi
     spec = identification_of(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = record_and_validation(spec, datasets, blobs)
-    split = parts_of(record, validation)
+    split = split_data(record, validation)
     settings = settings_of(spec.preset, spec.changes)
     document = store.results.document(job.id)
     stored = store.results.models(job.id, rank)

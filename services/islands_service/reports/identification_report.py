@@ -7,9 +7,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup
 
-from islands.io.results import COLUMNS, row
+from islands.io.result_folder import COLUMNS, row
 from islands.model.equations import mathml_equation
-from islands.validation.findings import Findings
+from islands.search_result import Findings
 
 #: Pages that are files of their own.
 TEMPLATES = Environment(

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import ray
 from ray.exceptions import RayError, RayTaskError
 
-from islands.discrepancy.spread import Spread
+from islands.parallel import Spread
 from islands_service.runtime.cluster import cluster
 from islands_service.runtime.errors import ClusterError
 

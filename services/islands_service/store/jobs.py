@@ -1,6 +1,5 @@
 """What owners do with jobs: submit, look, list, cancel, resume, delete. Each owner sees its own alone."""
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,15 +9,12 @@ from uuid import uuid4
 from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_
 
 from islands_service.domain.jobs import (
-    ACTIVE,
     RESUMABLE,
     TERMINAL,
     Event,
-    IdempotencyConflict,
     Job,
     JobState,
     NoSuchJob,
-    QuotaExceeded,
     Submission,
     WrongState,
 )
@@ -26,52 +22,8 @@ from islands_service.store import dialect
 from islands_service.store.database import Database
 from islands_service.store.dialect import now
 from islands_service.store.job_events import change, job_of, read_document, record
+from islands_service.store.submission_checks import accepted, digest, refuse_above
 from islands_service.store.tables import events, jobs
-
-
-def digest(submission: Submission) -> str:
-    """Return what tells one request from another."""
-    return hashlib.sha256(submission.request.encode()).hexdigest()
-
-
-def accepted(connection: Connection, submission: Submission) -> Job | None:
-    """Return the job that a submission's idempotency key names already, None where it names none.
-
-    Raises
-    ------
-    IdempotencyConflict
-        The key was used with another request.
-    """
-    key = submission.idempotency_key
-    if key is None:
-        return None
-    query = select(jobs).where(jobs.c.owner == submission.owner, jobs.c.idempotency_key == key)
-    before = connection.execute(query).one_or_none()
-    if before is None:
-        return None
-    if before.request_sha256 != digest(submission):
-        raise IdempotencyConflict(
-            f"the idempotency key {key!r} belongs to job {before.id}, which was asked for with another "
-            "request: take a new key"
-        )
-    return job_of(before)
-
-
-def refuse_above(connection: Connection, owner: str, most: int) -> None:
-    """Refuse one more job of an owner who has so many.
-
-    Raises
-    ------
-    QuotaExceeded
-    """
-    active = connection.execute(
-        select(func.count()).select_from(jobs).where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE))
-    ).scalar_one()
-    if active >= most:
-        raise QuotaExceeded(
-            f"{active} jobs are waiting or running, and {most} is the most: wait for some, or cancel some"
-        )
-
 
 #: The most jobs of a page.
 PAGE = 200

@@ -6,9 +6,9 @@ from math import isclose
 from pathlib import Path
 from statistics import median
 
-from islands.benchmark import compiled_c, ours, plain_numpy
+from islands.benchmark import compiled_c, kernel_evaluator, plain_numpy
 from islands.benchmark.clock import milliseconds
-from islands.benchmark.compiler import compiler
+from islands.benchmark.compiled_c import compiler
 from islands.benchmark.workload import CASE1, INTERVAL, WARM_UP, Candidate
 from islands.errors import ModelError
 
@@ -53,7 +53,7 @@ class Comparison:
 
 def compare(
     candidates: Sequence[Candidate],
-    state: ours.Prepared,
+    state: kernel_evaluator.Prepared,
     rounds: int,
     folder: Path,
     tell: Callable[[float], None],
@@ -101,21 +101,23 @@ def compare(
     )
 
 
-def _times(candidate: Candidate, state: ours.Prepared, compiled: Sequence[Callable[[], float]]) -> _Times:
+def _times(
+    candidate: Candidate, state: kernel_evaluator.Prepared, compiled: Sequence[Callable[[], float]]
+) -> _Times:
     regressors, theta, record = candidate.regressors, candidate.theta, state.record
     times = {
-        "uncached_ms": _evaluation(lambda pruned: ours.uncached_ms(state, candidate, pruned)),
+        "uncached_ms": _evaluation(lambda pruned: kernel_evaluator.uncached_ms(state, candidate, pruned)),
         "numpy_ms": _evaluation(
             lambda pruned: milliseconds(
                 lambda: plain_numpy.evaluate(regressors, theta, record, WARM_UP, INTERVAL, pruned)
             )
         ),
-        "cached_ms": _evaluation(lambda pruned: ours.cached_ms(state, candidate, pruned)),
-        "gram_ms": ours.gram_ms(state, candidate),
+        "cached_ms": _evaluation(lambda pruned: kernel_evaluator.cached_ms(state, candidate, pruned)),
+        "gram_ms": kernel_evaluator.gram_ms(state, candidate),
         "numpy_simulation_ms": milliseconds(
             lambda: plain_numpy.simulate(regressors, theta, record, WARM_UP, INTERVAL)
         ),
-        "simulation_ms": ours.simulation_ms(state, candidate),
+        "simulation_ms": kernel_evaluator.simulation_ms(state, candidate),
     }
     if compiled:
         times["c_simulation_ms"] = min(milliseconds(simulate) for simulate in compiled)
@@ -134,8 +136,10 @@ def _compiled(candidate: Candidate, rows: compiled_c.Rows, folder: Path) -> list
     ]
 
 
-def _check(candidate: Candidate, state: ours.Prepared, compiled: Sequence[Callable[[], float]]) -> None:
-    own = ours.squared_error(state, candidate)
+def _check(
+    candidate: Candidate, state: kernel_evaluator.Prepared, compiled: Sequence[Callable[[], float]]
+) -> None:
+    own = kernel_evaluator.squared_error(state, candidate)
     plain = plain_numpy.simulate(candidate.regressors, candidate.theta, state.record, WARM_UP, INTERVAL)
     for side, error in (("plain numpy", plain), *(("compiled C", simulate()) for simulate in compiled)):
         if not isclose(own, error, rel_tol=_SAME):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.benchmark.infix import infix
+from islands.benchmark.expression_source import infix
 from islands.data.dataset import Dataset
 from islands.model.regressor import Regressor
 

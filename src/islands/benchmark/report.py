@@ -5,9 +5,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from islands.benchmark.comparison import Comparison
+from islands.benchmark.full_runs import Run
 from islands.benchmark.machine import Machine
 from islands.benchmark.scaling import Scaling, line_through
-from islands.benchmark.search import Run
 
 #: Individuals per second and core of the authors' toolbox, mean over an evolved run on the same record: 19 to
 #: 32 were measured beside the first design of these kernels. It is not measured here.

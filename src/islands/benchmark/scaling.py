@@ -1,16 +1,21 @@
 """How the cost grows: with samples, terms, the size of trees, and islands."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import cycle
+from pathlib import Path
 from statistics import fmean, median
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from islands.benchmark import ours
-from islands.benchmark.search import Run
+from islands.benchmark import kernel_evaluator
+from islands.benchmark.full_runs import Run
 from islands.benchmark.workload import Candidate, drawn, full_tree, monomial
 from islands.data.dataset import Dataset
+from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, house_style, save, settled
 from islands.model.expression import walk
 
 #: Where the cost is measured.
@@ -71,12 +76,14 @@ def against_samples(record: Dataset, individuals: int, tell: Callable[[float], N
     sizes = [size for size in SAMPLES if size <= record.samples]
     costs = []
     for place, size in enumerate(sizes):
-        costs.append((float(size), _cost(ours.prepared(record[:size]), candidates)))
+        costs.append((float(size), _cost(kernel_evaluator.prepared(record[:size]), candidates)))
         tell((place + 1) / len(sizes))
     return _evaluation("samples", "samples of the record", costs)
 
 
-def against_terms(state: ours.Prepared, individuals: int, tell: Callable[[float], None]) -> Scaling:
+def against_terms(
+    state: kernel_evaluator.Prepared, individuals: int, tell: Callable[[float], None]
+) -> Scaling:
     """Measure individuals of more and more products of lagged signals."""
     costs = []
     for place, terms in enumerate(TERMS):
@@ -85,7 +92,9 @@ def against_terms(state: ours.Prepared, individuals: int, tell: Callable[[float]
     return _evaluation("terms", "terms of an individual", costs)
 
 
-def against_tree_size(state: ours.Prepared, individuals: int, tell: Callable[[float], None]) -> Scaling:
+def against_tree_size(
+    state: kernel_evaluator.Prepared, individuals: int, tell: Callable[[float], None]
+) -> Scaling:
     """Measure individuals of ten full trees, higher and higher; their size is counted in nodes."""
     costs = []
     for place, height in enumerate(HEIGHTS):
@@ -105,11 +114,15 @@ def against_islands(runs: Mapping[int, Sequence[Run]]) -> Scaling:
     )
 
 
-def _cost(state: ours.Prepared, candidates: Sequence[Candidate]) -> dict[str, float]:
+def _cost(state: kernel_evaluator.Prepared, candidates: Sequence[Candidate]) -> dict[str, float]:
     """Return the median milliseconds of evaluations with pruning, by what is known."""
     return {
-        "nothing cached": median(ours.uncached_ms(state, each, pruned=True) for each in candidates),
-        "inner products cached": median(ours.cached_ms(state, each, pruned=True) for each in candidates),
+        "nothing cached": median(
+            kernel_evaluator.uncached_ms(state, each, pruned=True) for each in candidates
+        ),
+        "inner products cached": median(
+            kernel_evaluator.cached_ms(state, each, pruned=True) for each in candidates
+        ),
     }
 
 
@@ -120,3 +133,39 @@ def _evaluation(name: str, x_label: str, costs: Sequence[tuple[float, Mapping[st
 
 def _nodes(candidates: Sequence[Candidate]) -> float:
     return fmean(sum(1 for item in each.regressors for _ in walk(item.expression)) for each in candidates)
+
+
+_LOOKS = ((SIMULATED, "o"), (RESIDUAL, "s"), (MEASURED, "^"))
+
+
+@house_style()
+def draw_scaling(scaling: Scaling) -> Figure:
+    """Draw a cost against what it grows with; the legend tells how well a line explains each curve."""
+    figure = blank(3.2)
+    axes = figure.subplots()
+    for (name, points), (colour, marker) in zip(scaling.curves.items(), cycle(_LOOKS), strict=False):
+        x, y = np.array(points).T
+        line = line_through(points)
+        # Two points are always on a line.
+        told = f"{name}, line with R² = {line.r2:.4f}" if len(points) > 2 else name
+        axes.plot(x, y, marker, color=colour, markersize=4, label=told)
+        ends = np.array([x[0], x[-1]])
+        axes.plot(ends, line.intercept + line.slope * ends, color=colour, lw=0.8)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(scaling.x_label)
+    axes.set_ylabel(scaling.y_label)
+    axes.legend()
+    return settled(figure)
+
+
+def save_scalings(scalings: Iterable[Scaling], folder: Path) -> tuple[Path, ...]:
+    """Write a figure of every scaling as SVG; return the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for scaling in scalings:
+        path = folder / f"{scaling.name}.svg"
+        save(draw_scaling(scaling), path)
+        written.append(path)
+    return tuple(written)

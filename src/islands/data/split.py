@@ -56,3 +56,16 @@ def split(record: Dataset, fraction: float = 0.25) -> Split:
     if boundary in (0, record.samples):
         raise SettingsError(f"a fraction of {fraction} of {record.samples} samples leaves a part empty")
     return Split(record[:boundary], record[boundary:])
+
+
+def split_data(record: Dataset, validation: Dataset | float) -> Split:
+    """Return estimation and validation data: two records, or two parts of one record.
+
+    Raises
+    ------
+    RecordError
+        The validation data has another number of inputs or sampling time.
+    SettingsError
+        The fraction leaves a part empty.
+    """
+    return Split(record, validation) if isinstance(validation, Dataset) else split(record, validation)

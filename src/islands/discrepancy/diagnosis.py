@@ -6,9 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration import Calibrated, Target, calibrate
-from islands.discrepancy.core import Core
-from islands.discrepancy.decision import (
+from islands.discrepancy.calibration.intersample_selection import settled, solved_alike
+from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
+from islands.discrepancy.calibration.preparation import checked, effects_for, fitted_samples, scene_of
+from islands.discrepancy.detectors import DETECTORS
+from islands.discrepancy.inference.experiment_design import decisive
+from islands.discrepancy.inference.holdout import Gain, gain_of
+from islands.discrepancy.inference.screening import Rung, ladder
+from islands.discrepancy.inference.stepwise_search import LEAST, Tell, silent
+from islands.discrepancy.inference.strategies import Evidence, by_misfit, by_noise, first_of, judged
+from islands.discrepancy.inference.verdict import (
     TEMPER,
     Finding,
     Value,
@@ -16,17 +23,10 @@ from islands.discrepancy.decision import (
     findings,
     share,
 )
-from islands.discrepancy.detectors import DETECTORS
-from islands.discrepancy.effect import Effect, Scene, Signal
-from islands.discrepancy.evidence import Evidence, by_misfit, by_noise, first_of, judged
-from islands.discrepancy.experiment import decisive
-from islands.discrepancy.extended import Extended
-from islands.discrepancy.gain import Gain, gain_of
-from islands.discrepancy.ladder import Rung, ladder
-from islands.discrepancy.preparation import checked, effects_for, fitted_samples, scene_of
-from islands.discrepancy.search import LEAST, Tell, silent
-from islands.discrepancy.solver import settled, solved_alike
-from islands.discrepancy.spread import Spread
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal
+from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.simulators.extended import Extended
+from islands.parallel import Spread
 
 #: Times that causes are looked for anew because with them the record asks for another hold or step.
 ROUNDS = 3
@@ -219,3 +219,20 @@ def _noise(y: Signal, residual: Signal, scene: Scene) -> tuple[Finding, ...]:
             sure = 1.0 / (1.0 + float(np.exp(-detection.gained / (2 * TEMPER))))
             found.append(Finding(detector.name, detector.family, sure, (), values, detection.gained, None))
     return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A formula for what the best simulation leaves over.
+
+    Attributes
+    ----------
+    formula : str
+        Of the residual, measured minus simulated, in free run: it reads its own past, the input and the
+        simulated output.
+    explains : float
+        Share of the remainder's mean square that it foretells over the locked samples.
+    """
+
+    formula: str
+    explains: float

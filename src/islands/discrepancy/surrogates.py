@@ -8,13 +8,13 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.core import Core
+from islands.discrepancy.calibration.noise_model import Noise, noise_of
+from islands.discrepancy.calibration.preparation import effects_for
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.effect import Effect, Signal
-from islands.discrepancy.extended import Extended
-from islands.discrepancy.ladder import carried
-from islands.discrepancy.noise import Noise, noise_of
-from islands.discrepancy.preparation import effects_for
+from islands.discrepancy.inference.screening import carried
+from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.simulators.extended import Extended
 
 #: Misfits of what is injected, in standard deviations of the residual.
 STRENGTHS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)

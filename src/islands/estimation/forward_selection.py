@@ -9,11 +9,11 @@ then forbids.
 from collections.abc import Sequence
 
 from islands.data.dataset import Dataset
-from islands.estimation.constraints import constraint
 from islands.estimation.froe import froe
+from islands.estimation.parameter_constraints import constraint
 from islands.model.model import canonical_order
 from islands.model.regressor import Regressor
-from islands.program.columns import gram_matrix
+from islands.program.regressor_matrix import gram_matrix
 from islands.simulation.outcome import Outcome
 
 Structure = tuple[Regressor, ...]

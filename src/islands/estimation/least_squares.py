@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
 from islands.errors import RecordError
-from islands.kernels.orthogonal import orthogonalise
-from islands.kernels.sums import total
+from islands.kernels.qr import orthogonalise
+from islands.kernels.summation import total
 from islands.simulation.outcome import OK, Outcome, Verdict
 
 #: A regressor that keeps less than this share of its norm depends on those before it.

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.estimation.constrained import null_space
-from islands.estimation.constraints import constraint
+from islands.estimation.constrained_least_squares import null_space
+from islands.estimation.parameter_constraints import constraint
 from islands.kernels.simulate import DIVERGED, Layout, simulate
-from islands.kernels.sums import dot
+from islands.kernels.summation import dot
 from islands.model.model import Model
-from islands.program.linker import link
+from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.outcome import Outcome, Verdict
 from islands.simulation.predictors import bound_of, multiple_shooting

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.estimation.constraints import CONSTRAINTS
+from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
+from islands.evolution.gene_index import ZERO, Vocabulary
 from islands.evolution.individual import Individual
 from islands.evolution.settings import Settings
-from islands.evolution.vocabulary import ZERO, Vocabulary
-from islands.kernels import evaluate as kernel
+from islands.kernels import population as kernel
+from islands.kernels.pair_table import PLACE_BYTES, clear, pair_table
 from islands.model.expression import Expression, Lagged
 from islands.model.regressor import Regressor
-from islands.program.columns import rows_of
-from islands.program.pairs import PLACE_BYTES, clear, pair_table
+from islands.program.regressor_matrix import rows_of
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Outcome, Verdict
 from islands.simulation.predictors import bound_of

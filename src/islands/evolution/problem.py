@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
-from islands.evolution.characters import CHARACTERS
-from islands.evolution.constraints import with_phi
+from islands.evolution.gene_structure import with_phi
+from islands.evolution.island_profiles import CHARACTERS
 from islands.evolution.settings import Settings
 from islands.evolution.variation import Genes
+from islands.model.candidate_library import candidates
 from islands.model.expression import Expression, height
-from islands.model.library import candidates
 from islands.simulation.outcome import Outcome
 
 

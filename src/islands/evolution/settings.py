@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from math import inf
 
 from islands.errors import SettingsError, chosen
-from islands.estimation.constraints import CONSTRAINTS
-from islands.evolution.characters import CHARACTERS
-from islands.evolution.constraints import STRUCTURES
+from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
+from islands.evolution.gene_structure import STRUCTURES
+from islands.evolution.island_profiles import CHARACTERS
 from islands.evolution.migration import EMIGRANTS, REPLACED
 from islands.evolution.schedule import Schedule, schedule
 from islands.evolution.topology import topology
-from islands.model.library import library_named
+from islands.model.candidate_library import library_named
 from islands.model.primitives import PRIMITIVES
 
 #: More islands than this would not fit into any coordinator.

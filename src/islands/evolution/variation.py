@@ -7,7 +7,7 @@ of a new gene are mended, and where the parameters are constrained every individ
 
 from collections.abc import Sequence
 
-from islands.evolution.constraints import LINEAR_OUTPUT, PHI, STRUCTURES, is_linear_output
+from islands.evolution.gene_structure import LINEAR_OUTPUT, PHI, STRUCTURES, is_linear_output
 from islands.evolution.rng import Stream
 from islands.evolution.settings import Settings
 from islands.model.expression import Apply, Expression, Lagged, Shift, children, height

@@ -11,8 +11,8 @@ from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.scene import Signal
-from islands.figures.stretch import last_loops, representative
+from islands.discrepancy.interfaces.context import Signal
+from islands.figures.downsampling import VERTICES, thin
 from islands.figures.style import (
     FRAME,
     MEASURED,
@@ -27,7 +27,7 @@ from islands.figures.style import (
     label,
     settled,
 )
-from islands.figures.thinning import VERTICES, thin
+from islands.figures.windows import last_loops, representative
 
 #: Colour of the simulation as it was, where both are drawn.
 BEFORE = "#e69f00"

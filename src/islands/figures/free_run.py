@@ -7,8 +7,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.figures.lines import broken, divergence, drawable, limits, say_diverged, within_reach
-from islands.figures.stretch import representative
+from islands.figures.diverging_lines import broken, divergence, drawable, limits, say_diverged, within_reach
+from islands.figures.downsampling import thin
 from islands.figures.style import (
     FRAME,
     MEASURED,
@@ -23,7 +23,7 @@ from islands.figures.style import (
     label,
     settled,
 )
-from islands.figures.thinning import thin
+from islands.figures.windows import representative
 from islands.validation.metrics import metrics
 
 _TYPICAL = ", whose mean absolute residual is the median of all such stretches"

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.figures.lines import limits, say_diverged, within_reach
+from islands.figures.diverging_lines import limits, say_diverged, within_reach
+from islands.figures.downsampling import thin
 from islands.figures.style import FRAME, blank, house_style, label, settled
-from islands.figures.thinning import thin
 from islands.model.model import Model
 from islands.validation.physics import LEVELS, hold_response, percent_of_range
 

@@ -3,9 +3,9 @@
 from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
-from islands.figures.lines import broken
+from islands.figures.diverging_lines import broken
+from islands.figures.downsampling import thin
 from islands.figures.style import FRAME, MEASURED, RESIDUAL, blank, house_style, label, settled
-from islands.figures.thinning import thin
 
 
 @house_style()

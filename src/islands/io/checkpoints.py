@@ -5,7 +5,7 @@ Expressions are text that is read back as written; floats are exact.
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,15 @@ from typing import Any
 from islands.errors import ModelError
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.history import Progress
 from islands.evolution.individual import Individual
 from islands.evolution.island import Island
+from islands.evolution.search_state import State
 from islands.model.expression import Primitive
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor
-from islands.model.text import plain
+from islands.model.rendering import plain
 from islands.simulation.outcome import Outcome, Verdict
 
 SCHEMA = "islands.checkpoint/3"
@@ -140,4 +142,57 @@ def _read_individual(document: Mapping[str, Any], primitives: Mapping[str, Primi
         tuple(map(float, document["theta"])),
         inf if document["fitness"] is None else float(document["fitness"]),
         Outcome(Verdict[verdict], str(reason)),
+    )
+
+
+def state_document(state: State) -> dict[str, Any]:
+    """Describe what was counted, and the history; numbers that JSON does not know become null."""
+    return {
+        "evaluations": state.evaluations,
+        "duplicates": state.duplicates,
+        "outcomes": dict(state.outcomes),
+        "history": history_document(state.history),
+    }
+
+
+def history_document(history: Sequence[Progress]) -> list[list[Any]]:
+    """Describe a history: generation, evaluations, best fitness by size, best fitness by island."""
+    return [
+        [
+            point.generation,
+            point.evaluations,
+            dict(point.best),
+            [least if least < inf else None for least in point.islands],
+        ]
+        for point in history
+    ]
+
+
+def history_of(document: Sequence[Sequence[Any]]) -> tuple[Progress, ...]:
+    """Make a history of its document."""
+    return tuple(
+        Progress(
+            generation,
+            evaluations,
+            {int(size): error for size, error in best.items()},
+            tuple(inf if error is None else error for error in least),
+        )
+        for generation, evaluations, best, least in document
+    )
+
+
+def state_of(archipelago: Archipelago, document: Mapping[str, Any]) -> State:
+    """Make a state of its document.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError
+        It is none.
+    """
+    return State(
+        archipelago,
+        document["evaluations"],
+        document["duplicates"],
+        document["outcomes"],
+        history_of(document["history"]),
     )

@@ -14,7 +14,7 @@ from islands.model.model import Model, canonical_order
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor, regressor
-from islands.model.text import plain
+from islands.model.rendering import plain
 
 SCHEMA: Literal["islands.model/1"] = "islands.model/1"
 

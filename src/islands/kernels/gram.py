@@ -7,9 +7,9 @@ All sums have the written order of `sums` over the chunks of `Rows`. A number do
 are computed with it, nor on whether all pairs were asked for or a few.
 """
 
-from islands.kernels.columns import arena_for, evaluate
-from islands.kernels.compilation import kernel
-from islands.kernels.lanes import (
+from islands.kernels.jit_cache import kernel
+from islands.kernels.regressor_columns import arena_for, evaluate
+from islands.kernels.simd import (
     VECTOR,
     add,
     fold,
@@ -23,7 +23,7 @@ from islands.kernels.lanes import (
     splat,
     store,
 )
-from islands.kernels.sums import CHUNK
+from islands.kernels.summation import CHUNK
 
 #: Bytes of running sums that are held at a time; more take another pass over the record.
 _ROOM = 1 << 26

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.kernels.compilation import kernel
-from islands.kernels.lanes import (
+from islands.kernels.interpreter import TEMPORARY, execute, multiply_factors
+from islands.kernels.jit_cache import kernel
+from islands.kernels.simd import (
     VECTOR,
     add,
     address,
@@ -28,7 +29,6 @@ from islands.kernels.lanes import (
     subtract,
     write,
 )
-from islands.kernels.machine import TEMPORARY, execute, multiply_factors
 
 #: Steps that are simulated before the history is moved and the bound is checked.
 CHUNK = 64

@@ -6,7 +6,7 @@ from html import unescape
 
 from islands.model.expression import Constant, Lagged
 from islands.model.model import Model
-from islands.model.text import (
+from islands.model.rendering import (
     MINUS,
     TIMES,
     latex_factor,

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
 from islands.model.primitives import ADD, MUL, PRIMITIVES
-from islands.model.text import LARGEST_POWER
+from islands.model.rendering import LARGEST_POWER
 
 _SIGNAL = re.compile(r"y|u([1-9][0-9]*)?")
 _BACK_SHIFT = re.compile(r"q([0-9]+)")

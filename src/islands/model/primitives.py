@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Expression, Primitive
-from islands.model.protection import check
+from islands.model.primitive_checks import check
 
 #: Names that stand for signals, time and back-shifts in text.
 SIGNALS = re.compile(r"y|u\d*|k|q\d+")

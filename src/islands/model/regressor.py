@@ -21,7 +21,7 @@ from islands.model.expression import (
     unshifted,
 )
 from islands.model.primitives import ADD, MUL, SIGN, SUB
-from islands.model.text import plain
+from islands.model.rendering import plain
 
 _ONE = Constant(1.0)
 

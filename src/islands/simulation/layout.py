@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.kernels.lanes import room
+from islands.kernels.simd import room
 from islands.kernels.simulate import WIDTHS, Layout
 
 #: What an instruction costs besides the work on its row, in lanes.

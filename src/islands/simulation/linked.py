@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.kernels.machine import Program
+from islands.kernels.interpreter import Program
 from islands.kernels.simulate import WIDTHS, Layout, simulate
 from islands.model.regressor import Regressor
-from islands.program.linker import link
+from islands.program.term_pool import link
 from islands.simulation.predictors import bound_from
 
 #: A single run stands in the first lane of the narrowest row.

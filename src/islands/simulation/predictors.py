@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.kernels.simulate import simulate
-from islands.kernels.sums import total
+from islands.kernels.summation import total
 from islands.model.model import Model
-from islands.program.linker import link
+from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Outcome, Verdict
 

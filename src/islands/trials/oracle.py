@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from islands.discrepancy.calibration import Calibrated, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
+from islands.discrepancy.calibration.preparation import effects_for
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.effect import Effect
-from islands.discrepancy.effects import core_shape, in_order
-from islands.discrepancy.preparation import effects_for
+from islands.discrepancy.effects import in_order, model_form
+from islands.discrepancy.interfaces.effect import Effect
 
 #: Starts of each effect that are fitted, of those that promise most.
 _STARTS = 3
@@ -38,7 +38,7 @@ def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str
     effects = effects_for(simulation.core, simulation.scene, tolerance)
     told = found.base
     # That its own form is wrong is no gain of a cause: both are held against the model with that mended.
-    for form in (effect for effect in effects if effect.name == core_shape.NAME):
+    for form in (effect for effect in effects if effect.name == model_form.NAME):
         told = _fitted(told, form, target)
     before = _error(found, told)
     for name in names:

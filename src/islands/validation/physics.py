@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset, join
-from islands.estimation.constraints import PROPERTY_1
-from islands.model import text
+from islands.estimation.parameter_constraints import PROPERTY_1
+from islands.model import rendering
 from islands.model.clusters import OUTPUT_AT_REST, clusters
 from islands.model.model import Model
 from islands.simulation.predictors import bound_of, free_run
@@ -164,7 +164,7 @@ def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
     """
     sums = {group.steady_state: group.total(model.parameters) for group in clusters(model.regressors)}
     return tuple(
-        ClusterSum(text.at_rest(state, model.inputs), total, PROPERTY_1.get(state, 0.0))
+        ClusterSum(rendering.at_rest(state, model.inputs), total, PROPERTY_1.get(state, 0.0))
         for state, total in ({OUTPUT_AT_REST: 0.0} | sums).items()
     )
 

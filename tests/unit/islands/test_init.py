@@ -1,8 +1,8 @@
 """The public names of the package, and what its docstring says."""
 
 import islands
-from islands.fitting import fit
-from islands.identification import identify
+from islands._fit import fit
+from islands._identify import identify
 from support.repository import ROOT
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-from islands.discrepancy.detector import Detector
 from islands.discrepancy.detectors import (
     coloured_noise,
     held_samples,
@@ -10,6 +9,7 @@ from islands.discrepancy.detectors import (
     outliers,
     quantisation,
 )
+from islands.discrepancy.inference.noise_detectors import Detector
 
 DETECTORS: Mapping[str, Detector] = {
     module.DETECTOR.name: module.DETECTOR

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from islands.discrepancy.detector import Detection, Detector
-from islands.discrepancy.effect import Scene, Signal
-from islands.discrepancy.noise import noise_of
+from islands.discrepancy.calibration.noise_model import noise_of
+from islands.discrepancy.inference.noise_detectors import Detection, Detector
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 
 def _detect(_y: Signal, residual: Signal, _scene: Scene) -> Detection | None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from islands.discrepancy.detector import Detection, Detector
-from islands.discrepancy.effect import Scene, Signal
+from islands.discrepancy.inference.noise_detectors import Detection, Detector
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 #: Equal neighbours that make a burst, and bursts that are no chance.
 _RUN, _BURSTS = 3, 2

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from islands.discrepancy.detector import Detection, Detector
-from islands.discrepancy.effect import Scene, Signal
-from islands.discrepancy.noise import noise_of
+from islands.discrepancy.calibration.noise_model import noise_of
+from islands.discrepancy.inference.noise_detectors import Detection, Detector
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 #: Strengths that are tried, relative to the largest output.
 _STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])

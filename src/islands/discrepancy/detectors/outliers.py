@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from islands.discrepancy.detector import Detection, Detector
-from islands.discrepancy.effect import Scene, Signal
-from islands.discrepancy.noise import noise_of
+from islands.discrepancy.calibration.noise_model import noise_of
+from islands.discrepancy.inference.noise_detectors import Detection, Detector
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 #: Scaled median deviations beyond which a sample is none of the others, and the least number of them.
 _FAR, _LEAST = 5.5, 3

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from islands.discrepancy.detector import Detection, Detector
-from islands.discrepancy.effect import Scene, Signal
+from islands.discrepancy.inference.noise_detectors import Detection, Detector
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 #: A lattice is coarse enough to matter where its step is this part of what is left, and known as one where
 #: there are this many samples for each of its levels.

@@ -1,7 +1,7 @@
 """The gain drifts: gain (1 + k t / T) over the record's duration T."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _parameters(_scene: Scene) -> tuple[Parameter, ...]:

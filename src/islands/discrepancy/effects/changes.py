@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import scipy
 
-from islands.discrepancy.effect import Scene, Signal
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 #: Instants that a search begins from, and parts of the fitted record that are left free at its ends: what
 #: changes there can be told from nothing by a few samples alone.

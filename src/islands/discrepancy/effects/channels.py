@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from islands.discrepancy.effect import Scene, Signal
+from islands.discrepancy.interfaces.effect import Scene, Signal
 
 #: Units of temperatures.
 TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")

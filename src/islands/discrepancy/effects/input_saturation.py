@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _form(u: Signal, values: Signal, scene: Scene) -> Signal:

@@ -1,8 +1,8 @@
 """The output's zero jumps: y + c behind an instant."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
 from islands.discrepancy.effects.changes import after, bounds, instants
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _form(y: Signal, values: Signal, scene: Scene) -> Signal:

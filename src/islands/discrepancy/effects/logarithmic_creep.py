@@ -1,8 +1,8 @@
 """The output creeps with the logarithm of time: y + kappa times a sum of low-passes, two to a decade."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects.lags import low_pass
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.effects.filters import low_pass
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 #: Time constants in seconds.
 TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)

@@ -1,7 +1,7 @@
 """The outflow has a linear part beside that of Bernoulli's law: + l x in the flow out of one state."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 #: What the names of these effects begin with; the state's own stands behind it.
 NAME = "outflow-law"

@@ -1,7 +1,7 @@
 """The loop's shape changes with the rate: beta, gamma (1 + k |u'|)."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _parameters(scene: Scene) -> tuple[Parameter, ...]:

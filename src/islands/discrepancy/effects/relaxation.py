@@ -1,7 +1,7 @@
 """The hysteretic state decays: - h / tau in h'."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _parameters(_scene: Scene) -> tuple[Parameter, ...]:

@@ -3,8 +3,8 @@
 import numpy as np
 import scipy
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 #: Radians of a sample: a faster mode is not there for this record.
 FASTEST = 2.6

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from islands.discrepancy.effect import Effect, Element, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
 
 #: Starting points: how quickly it turns, in one over the coordinate's peak, and g in parts of chi.
 _QUICK, _BENT = (0.3, 1.0, 2.5, 8.0, 25.0), (0.0, 0.8, -1.2)

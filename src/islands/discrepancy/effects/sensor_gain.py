@@ -1,7 +1,7 @@
 """The sensor's gain is off: (1 + k) y."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _form(y: Signal, values: Signal, _scene: Scene) -> Signal:

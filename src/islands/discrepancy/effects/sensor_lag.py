@@ -1,8 +1,8 @@
 """The sensor follows with a time constant: tau y' + y = v."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.effects.lags import low_pass
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.effects.filters import low_pass
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _form(y: Signal, values: Signal, scene: Scene) -> Signal:

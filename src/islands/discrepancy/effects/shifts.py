@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from islands.discrepancy.effect import Signal
+from islands.discrepancy.interfaces.effect import Signal
 
 #: Neighbours that an interpolation goes through: with four, a signal of ten samples a period is out by as
 #: much as a delay of a hundredth of a sample.

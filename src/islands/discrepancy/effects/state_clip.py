@@ -1,7 +1,7 @@
 """A state stops at a level, as a tank's at its rim: what is above it is lost, or spills on in part."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 #: What the names of these effects begin with; the state's own stands behind it.
 NAME = "state-clip"

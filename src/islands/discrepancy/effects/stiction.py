@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
-from islands.kernels.hysteresis import slider
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.systems.hysteresis_operators import slider
 
 
 def _form(u: Signal, values: Signal, _scene: Scene) -> Signal:

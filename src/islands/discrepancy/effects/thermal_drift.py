@@ -1,8 +1,8 @@
 """The output follows a temperature: y + k (T - T(0)), T a given channel."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
 from islands.discrepancy.effects.channels import channel, channel_unit, spread, there
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
 def _form(y: Signal, values: Signal, scene: Scene) -> Signal:

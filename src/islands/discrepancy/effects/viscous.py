@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from islands.discrepancy.effect import Effect, Element, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
 
 
 def _force(_x: float, rate: float, _z: float, c: Any) -> float:

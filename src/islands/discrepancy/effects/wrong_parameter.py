@@ -1,7 +1,7 @@
 """A parameter of the simulation is off: it is another one than its tolerance allows."""
 
-from islands.discrepancy.effect import Effect, Scene, Signal, Site
-from islands.discrepancy.parameter import Parameter
+from islands.discrepancy.interfaces.context import Parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 #: What the names of these effects begin with; the parameter's own stands behind it.
 NAME = "wrong-parameter"

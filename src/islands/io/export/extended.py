@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from islands.discrepancy.effects import sentence
 from islands.errors import chosen
-from islands.io.simulation_spec import LocalExtendedSpec
+from islands.io.simulator_spec.schema import LocalExtendedSpec
 
 
 def in_words(asked: LocalExtendedSpec) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.channels import Channels
-from islands.io.records.claims import check_samples
-from islands.io.records.names import seconds_per_unit
+from islands.io.records.column_names import seconds_per_unit
+from islands.io.records.columnar import Channels
+from islands.io.records.size_limits import check_samples
 
 #: Rows that are decoded at a time. Memory then follows what the pages hold, never what the file claims.
 _BATCH = 2**16

@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 
 from islands.errors import RecordError
-from islands.io.records.checks import (
+from islands.io.records.column_names import structures_of, time_column, unit_of
+from islands.io.records.reader import opened
+from islands.io.records.sampling import sampling_of
+from islands.io.records.table import Columns, Rows, Table
+from islands.io.records.validation import (
     MIN_SAMPLES,
     check_equal_length,
     check_length,
@@ -16,10 +20,6 @@ from islands.io.records.checks import (
     check_values,
     check_varies,
 )
-from islands.io.records.names import structures_of, time_column, unit_of
-from islands.io.records.reader import opened
-from islands.io.records.sampling import sampling_of
-from islands.io.records.table import Columns, Rows, Table
 
 
 @dataclass(frozen=True, slots=True)

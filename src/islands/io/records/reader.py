@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.io.records.archive import read_archive
-from islands.io.records.checks import check_choice, check_length, check_values, check_varies
-from islands.io.records.delimited import read_delimited
-from islands.io.records.matlab import read_matlab
-from islands.io.records.names import column_of, structures_of, time_column, unit_of
+from islands.io.records.column_names import column_of, structures_of, time_column, unit_of
+from islands.io.records.mat.reader import read_matlab
+from islands.io.records.npz import read_archive
 from islands.io.records.parquet import read_parquet
 from islands.io.records.sampling import sampling_of
 from islands.io.records.table import Table
+from islands.io.records.text_table import read_delimited
+from islands.io.records.validation import check_choice, check_length, check_values, check_varies
 
 #: How a file is read, by its suffix. A new format is a reader and an entry here.
 READERS: dict[str, Callable[[Path], Table]] = {

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.names import TIME_UNITS, looks_like_time, seconds_per_unit, unit_of
+from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit, unit_of
 from islands.io.records.table import Columns, Rows, Table
 
 #: Part of a step by which time stamps may leave the grid, and by which two sampling times may differ.

@@ -70,8 +70,8 @@ class Table(Protocol):
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times in seconds that the file states besides a time column, by their arrays.
 
-        Those among the fields of the structure (`islands.io.records.names.structures_of`) go before those at
-        the top, and those of other structures do not count.
+        Those among the fields of the structure (`islands.io.records.column_names.structures_of`) go before
+        those at the top, and those of other structures do not count.
 
         Raises
         ------

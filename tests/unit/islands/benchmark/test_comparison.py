@@ -4,8 +4,8 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from islands.benchmark import comparison, ours
-from islands.benchmark.compiler import compiler
+from islands.benchmark import comparison, kernel_evaluator
+from islands.benchmark.compiled_c import compiler
 from islands.benchmark.workload import CASE1, INTERVAL, WARM_UP, benchmark_record, drawn, monomial
 from islands.errors import ModelError
 from islands.model.model import Model
@@ -14,7 +14,7 @@ from islands.simulation.predictors import multiple_shooting
 
 @pytest.fixture(scope="module")
 def state():
-    return ours.prepared(benchmark_record(3_000))
+    return kernel_evaluator.prepared(benchmark_record(3_000))
 
 
 def test_our_error_counts_whole_intervals_alone(state):
@@ -22,7 +22,7 @@ def test_our_error_counts_whole_intervals_alone(state):
     whole = state.record[: WARM_UP + 5 * INTERVAL]
     simulated = multiple_shooting(Model(one.regressors, one.theta), whole, INTERVAL, WARM_UP)
     assert state.record.samples > whole.samples
-    assert ours.squared_error(state, one) == pytest.approx(
+    assert kernel_evaluator.squared_error(state, one) == pytest.approx(
         simulated.mean_squared_error * 5 * INTERVAL, rel=1e-12
     )
 
@@ -32,10 +32,10 @@ def test_our_error_counts_whole_intervals_alone(state):
 def test_our_evaluation_simulates_the_parameters_given(state, pruned, cached):
     """Those of least squares may diverge, and a simulation that ends early would flatter us."""
     (one,) = drawn(monomial, 1)
-    ours._evaluation(state, one, pruned, cached)()
+    kernel_evaluator._evaluation(state, one, pruned, cached)()
     growing = replace(one, theta=(1.5, *one.theta[1:]))
     with pytest.raises(ModelError, match="ends early"):
-        ours._evaluation(state, growing, pruned, cached)
+        kernel_evaluator._evaluation(state, growing, pruned, cached)
 
 
 def test_every_time_of_every_side_is_measured(state, tmp_path):

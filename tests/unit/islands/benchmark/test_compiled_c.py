@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from islands.benchmark import compiled_c, plain_numpy
-from islands.benchmark.compiler import compiled, compiler
-from islands.benchmark.peak import peak
+from islands.benchmark.compiled_c import compiled, compiler
+from islands.benchmark.machine import peak
 from islands.errors import ModelError
 
 WARM_UP, INTERVAL = 26, 20
@@ -75,7 +75,7 @@ def test_more_chains_than_one_add_up_to_the_operations_counted(tmp_path):
     """The C of the peak returns 2 operations for every element of every chain and round."""
     import ctypes
 
-    from islands.benchmark import peak as module
+    from islands.benchmark import machine as module
 
     library = compiled(module._SOURCE, module._FLAGS, tmp_path)
     library.multiply_add.restype = ctypes.c_double

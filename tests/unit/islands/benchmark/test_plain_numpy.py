@@ -8,7 +8,7 @@ from islands.benchmark import plain_numpy
 from islands.estimation.froe import froe
 from islands.model.expression import Lagged
 from islands.model.model import Model
-from islands.program.columns import gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix
 from islands.simulation.predictors import multiple_shooting
 
 WARM_UP, INTERVAL = 26, 20

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from islands.benchmark.full_runs import Run
 from islands.benchmark.machine import this_machine
 from islands.benchmark.report import document, goals
 from islands.benchmark.scaling import Scaling
-from islands.benchmark.search import Run
 from support.made_reports import KINDS, POINTS, comparison, report
 
 

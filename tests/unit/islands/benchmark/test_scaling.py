@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.benchmark import ours, scaling
-from islands.benchmark.figures import draw_scaling, save_scalings
-from islands.benchmark.scaling import Scaling, against_islands, line_through
-from islands.benchmark.search import Run
+from islands.benchmark import kernel_evaluator, scaling
+from islands.benchmark.full_runs import Run
+from islands.benchmark.scaling import Scaling, against_islands, draw_scaling, line_through, save_scalings
 from islands.benchmark.workload import benchmark_record
 
 numbers = st.floats(-100.0, 100.0)
@@ -44,7 +43,7 @@ def piezo():
 def test_every_cost_is_measured_at_every_point(piezo, monkeypatch):
     monkeypatch.setattr(scaling, "TERMS", (2, 4))
     monkeypatch.setattr(scaling, "HEIGHTS", (1, 2))
-    state, told = ours.prepared(piezo), []
+    state, told = kernel_evaluator.prepared(piezo), []
     found = [
         scaling.against_samples(piezo, 1, told.append),
         scaling.against_terms(state, 1, told.append),

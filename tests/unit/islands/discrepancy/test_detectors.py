@@ -5,8 +5,8 @@ import pytest
 import scipy
 
 from islands.discrepancy.detectors import DETECTORS
-from islands.discrepancy.effect import Scene
-from islands.discrepancy.search import LEAST
+from islands.discrepancy.inference.stepwise_search import LEAST
+from islands.discrepancy.interfaces.effect import Scene
 
 SAMPLES, SIGMA = 4000, 0.14
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset, join
-from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.cores.column import ColumnCore
-from islands.discrepancy.decision import Verdict
+from islands.discrepancy.calibration.preparation import FEWEST, LOCKED
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
-from islands.discrepancy.preparation import FEWEST, LOCKED
+from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.simulators.recorded_output import ColumnCore
 from islands.errors import RecordError, SettingsError
-from islands.io.diagnoses import as_json, diagnosis_document
+from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.systems.bouc_wen import BoucWenPiezo
-from islands.trials.hide.records import hide
+from islands.trials.injection.measurement import hide
 from islands.trials.trial import TOLERANCE
 
 
@@ -104,7 +104,7 @@ def test_a_column_is_a_simulation(record: Dataset) -> None:
 
 
 def _nominal(record: Dataset) -> tuple:
-    from islands.discrepancy.preparation import fitted_samples, scene_of
+    from islands.discrepancy.calibration.preparation import fitted_samples, scene_of
 
     core = BoucWenPiezoCore()
     scene = scene_of(record, core, fitted_samples(record))

@@ -9,11 +9,11 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.discrepancy import preparation
-from islands.discrepancy.decision import Verdict
+from islands.discrepancy.calibration.levenberg_marquardt import preparation
 from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.inference.verdict import Verdict
 from islands.errors import IslandsError, RecordError, SettingsError
-from islands.io.simulation_spec import LocalSpec, PhysicalSpec
+from islands.io.simulator_spec.schema import LocalSpec, PhysicalSpec
 from support.simulated_records import made, recorded, wave
 
 #: Simulations that take what is not given from the record, and those that are what they are.

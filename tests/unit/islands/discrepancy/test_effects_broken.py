@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy import preparation
-from islands.discrepancy.cores.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.calibration.levenberg_marquardt import preparation
 from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.effect import Effect
 from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
 from islands.errors import SettingsError
 from support.simulated_records import recorded, wave
 

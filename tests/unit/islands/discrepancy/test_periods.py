@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.discrepancy.periods import SHORTEST, period_of, repeated_noise
+from islands.discrepancy.inference.noise_floor import SHORTEST, period_of, repeated_noise
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 
 from islands.data.dataset import Dataset, join
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.estimation.estimation import estimate
+from islands.estimation.estimate import estimate
 from islands.estimation.refinement import Refined, _Residual, refine
 from islands.model.model import model_of
 from islands.model.parsing import parse

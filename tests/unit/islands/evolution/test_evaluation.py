@@ -7,14 +7,14 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.estimation.estimation import estimate
+from islands.estimation.estimate import estimate
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual, regressor_of
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.model.expression import height
 from islands.model.parsing import parse
-from islands.program.columns import regressor_matrix
+from islands.program.regressor_matrix import regressor_matrix
 from islands.simulation.outcome import Verdict
 from islands.simulation.predictors import multiple_shooting
 from islands.systems.catalogue import make_record

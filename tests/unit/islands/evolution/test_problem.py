@@ -8,16 +8,16 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
-from islands.evolution.characters import CHARACTERS
-from islands.evolution.constraints import with_phi
+from islands.evolution.gene_structure import with_phi
 from islands.evolution.individual import regressor_of
+from islands.evolution.island_profiles import CHARACTERS
 from islands.evolution.problem import Problem, problem
 from islands.evolution.settings import Settings
+from islands.model.candidate_library import candidates
 from islands.model.expression import Apply, height, walk
-from islands.model.library import candidates
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
-from islands.model.text import plain
+from islands.model.rendering import plain
 from support.searches import distinct_genes
 
 SETTINGS = Settings(library="phi-polynomial", library_degree=3, library_lags=3)

@@ -18,7 +18,7 @@ from islands.evolution.variation import (
 )
 from islands.model.expression import Lagged, height, walk
 from islands.model.parsing import parse
-from islands.model.text import plain
+from islands.model.rendering import plain
 
 SETTINGS = Settings(constraints="none", structure="free", max_terms=6, initial_terms=(1, 6))
 SEEDS = range(300)

@@ -14,7 +14,7 @@ from islands.data.dataset import Dataset
 from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
-from islands.figures.loop import draw_loop
+from islands.figures.hysteresis_loop import draw_loop
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
 from islands.model.model import Model, model_of

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.kernels.columns import columns
 from islands.kernels.gram import gram, inner_products
-from islands.kernels.sums import CHUNK, dot
+from islands.kernels.regressor_columns import columns
+from islands.kernels.summation import CHUNK, dot
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.columns import arranged
-from islands.program.linker import link
+from islands.program.regressor_matrix import arranged
+from islands.program.term_pool import link
 from support.oracles import side_by_side
 
 #: The constant is one on rows behind a segment's end, too: they must not count.

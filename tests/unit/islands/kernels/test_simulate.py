@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.kernels.simulate import BEYOND, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
-from islands.kernels.sums import total
+from islands.kernels.summation import total
 from islands.model.expression import value
 from islands.model.model import model_of
 from islands.model.parsing import parse
-from islands.program.linker import link
+from islands.program.term_pool import link
 from islands.simulation.layout import layout
 
 SAMPLES = 3 * CHUNK + 12

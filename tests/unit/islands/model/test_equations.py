@@ -10,7 +10,7 @@ from islands.model.equations import equation, latex_equation, mathml_equation
 from islands.model.expression import Apply, Lagged, Primitive
 from islands.model.model import model_of
 from islands.model.parsing import parse
-from islands.model.text import mathml
+from islands.model.rendering import mathml
 from support.strategies import models, regressors
 
 U, Y = Lagged(1, 1), Lagged(0, 1)

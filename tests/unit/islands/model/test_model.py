@@ -8,7 +8,7 @@ from islands.model.expression import Constant
 from islands.model.model import Model, canonical_order, model_of
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.model.text import plain
+from islands.model.rendering import plain
 from support.strategies import models
 
 

@@ -11,7 +11,7 @@ from islands.model.expression import Lagged, Primitive
 from islands.model.parsing import parse
 from islands.model.primitives import LARGEST_EXPONENT, PRIMITIVES, TINY, check, primitive
 from islands.model.regressor import canonical
-from islands.model.text import latex, plain
+from islands.model.rendering import latex, plain
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))

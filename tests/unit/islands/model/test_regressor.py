@@ -8,7 +8,7 @@ from islands.model.expression import Apply, Constant, Lagged
 from islands.model.parsing import parse
 from islands.model.primitives import MUL, PRIMITIVES, primitive
 from islands.model.regressor import canonical, regressor
-from islands.model.text import plain
+from islands.model.rendering import plain
 
 
 def written(text):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from islands.kernels.machine import (
+from islands.kernels.interpreter import (
     ADD,
     CALL,
     MAX_FACTORS,
@@ -22,8 +22,8 @@ from islands.model.expression import Lagged, value
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.program.linker import link
-from islands.program.row_functions import row_address
+from islands.program.primitive_functions import row_address
+from islands.program.term_pool import link
 from support.oracles import NUMBERS
 from support.strategies import regressors, signals
 

@@ -6,7 +6,7 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.estimation.estimation import estimate
+from islands.estimation.estimate import estimate
 from islands.validation.physics import LEVELS, ClusterSum, cluster_sums, hold_response, physics
 
 PERIOD = 200

@@ -13,10 +13,10 @@ from islands.data.dataset import Dataset
 from islands.errors import IslandsError, RecordError, SettingsError
 from islands.io.models import write_model
 from islands.io.records import write_record
+from islands.io.records.row_range import rows_of
 from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
-from islands_service.rows import rows_of
 from support.command_line import succeed
 from support.undrawn import undrawn_figures
 

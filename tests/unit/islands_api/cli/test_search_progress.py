@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console
 
 from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.search import State
+from islands.evolution.history import Progress
+from islands.evolution.search_state import State
 from islands.evolution.settings import Settings
-from islands.validation.findings import Progress
 from islands_api.cli import console
 from islands_api.cli import search_progress as showing
 from islands_api.cli.search_progress import SHOWN, course

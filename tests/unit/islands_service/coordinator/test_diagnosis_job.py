@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.discrepancy import reference
+from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
@@ -52,7 +52,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No figure is drawn, and few random waves look for what a residual still holds."""
-    monkeypatch.setattr(reference, "WAVES", 20)
+    monkeypatch.setattr(noise_floor, "WAVES", 20)
     with undrawn_figures():
         yield
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from islands.discrepancy.self_test import SelfTest, rate
+from islands.discrepancy.detectability import SelfTest, rate
 from islands_service.reports.diagnosis_report import self_test_in_words
 
 

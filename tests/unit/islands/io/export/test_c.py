@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
-from islands.benchmark.compiler import compiled, compiler
+from islands.benchmark.compiled_c import compiled, compiler
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.io.export import export

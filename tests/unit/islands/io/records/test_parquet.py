@@ -12,8 +12,8 @@ from pyarrow import parquet
 
 from islands.errors import RecordError
 from islands.io.records import columns_of, read_record
-from islands.io.records.claims import MOST_SAMPLES
 from islands.io.records.parquet import read_parquet
+from islands.io.records.size_limits import MOST_SAMPLES
 
 SAMPLES = 60
 K = np.arange(SAMPLES)

@@ -8,7 +8,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands.io.records import READERS, columns_of, fingerprint, read_record
-from islands.io.records.names import looks_like_time, time_column, unit_of
+from islands.io.records.column_names import looks_like_time, time_column, unit_of
 from support.bad_records import lines, refusal
 
 SAMPLES = 50

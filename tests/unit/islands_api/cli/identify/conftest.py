@@ -19,8 +19,8 @@ def run(request, monkeypatch, command_line):
     """
     write_record(record(), "r.csv")
     if "with_figures" not in request.fixturenames:
-        monkeypatch.setattr("islands.figures.gallery.FIGURES", {})
-        monkeypatch.setattr("islands.figures.gallery.search_figures", lambda _findings: ())
+        monkeypatch.setattr("islands.figures.registry.FIGURES", {})
+        monkeypatch.setattr("islands.figures.registry.search_figures", lambda _findings: ())
 
     def call(*arguments):
         code, out, err = command_line("identify", *arguments)

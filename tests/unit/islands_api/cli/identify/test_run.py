@@ -9,12 +9,11 @@ import pytest
 
 from islands.evolution.archipelago import founded
 from islands.evolution.engine import SerialEngine
+from islands.evolution.history import Progress
 from islands.evolution.presets import settings_of
-from islands.evolution.search import State
-from islands.io.checkpoints import read_checkpoint, write_checkpoint
+from islands.evolution.search_state import State
+from islands.io.checkpoints import read_checkpoint, state_document, write_checkpoint
 from islands.io.records import write_record
-from islands.io.states import state_document
-from islands.validation.findings import Progress
 from islands_api.cli import identify_run as command
 from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models, record, refused
 

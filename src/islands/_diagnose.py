@@ -1,0 +1,56 @@
+"""Diagnose: hold a simulation against a record, by its name or by what a file says of it."""
+
+from collections.abc import Mapping
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.diagnosis import diagnose as diagnosed
+from islands.discrepancy.inference.stepwise_search import Tell, silent
+from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.simulator import Core
+from islands.io.simulator_spec.factory import simulation as made
+from islands.io.simulator_spec.schema import LocalSpec, SimulationSpec
+from islands.parallel import Spread
+
+
+def diagnose(
+    record: Dataset,
+    simulation: str | SimulationSpec | LocalSpec | Core,
+    *,
+    tolerance: Mapping[str, float] | None = None,
+    columns: Mapping[str, Signal] | None = None,
+    seed: int = 0,
+    progress: Tell = silent,
+    spread: Spread = map,
+) -> Diagnosis:
+    """Find out what a simulation gets wrong about a record, why, and what mending it is worth.
+
+    Parameters
+    ----------
+    record : Dataset
+        Its first input drives the simulation; further ones are channels that may couple in.
+    simulation : str, spec or Core
+        As on the command line: ``second-order``, ``linear:2``, ``model:FILE.json``,
+        ``python:FILE.py:FUNCTION``, ... Or one that is made already.
+    tolerance : mapping, optional
+        Relative standard deviations of its parameters about their nominal values; who is not named is free.
+    columns : mapping, optional
+        Outputs of simulations elsewhere, ``(samples,)`` each: ``column:NAME`` takes one.
+    seed : int
+        The same record, simulation and seed give the same diagnosis, bit for bit.
+    progress : callable
+        Told what is being done.
+    spread : Spread
+        Fits the effects, side by side perhaps; the result is the same.
+
+    Raises
+    ------
+    RecordError
+        The record cannot be used, or the simulation diverges on it.
+    SettingsError, ModelError
+        There is no such simulation, or a tolerance is of none of its parameters.
+    """
+    # What is asked for has a kind; what is made has sites for effects.
+    asked_for = isinstance(simulation, str) or hasattr(simulation, "kind")
+    core = made(simulation, record, columns) if asked_for else simulation  # type: ignore[arg-type]
+    return diagnosed(record, core, tolerance, seed, progress, spread)  # type: ignore[arg-type]

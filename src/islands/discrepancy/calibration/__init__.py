@@ -1,0 +1,1 @@
+"""Estimation of a simulator's parameters from data. Read `levenberg_marquardt` first."""

@@ -1,0 +1,63 @@
+"""How a core is solved: what its input does between samples, and in how fine steps; before anything else.
+
+Both imitate physics where they are wrong: a hold that is not the record's looks like a delay, too coarse a
+step like damping.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
+from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.simulators.intersample import Between, Hold
+
+#: Steps a sample at the most, and the change that finer ones may make, in what is left over.
+FINEST, NOTICED = 32, 0.05
+
+#: By how much another hold has to fit better, in minus twice the log-likelihood.
+BETTER = 10.0
+
+
+def settled(fit: Calibrated, target: Target) -> Core:
+    """Return the core of a fit, solved as the record asks for it."""
+    core = fit.simulation.core
+    if not core.integrates:
+        return core
+    inner, now = (core.core, core.hold) if isinstance(core, Between) else (core, Hold.FIRST)
+    held = {}
+    for hold in (now, *(each for each in Hold if each != now)):
+        fine = _fine_enough(inner, hold, fit)
+        again = calibrate(_solved(fit.simulation, fine), target, fit.values)
+        held[hold] = (again.score, fine)
+    best = min(held, key=lambda hold: held[hold][0])
+    return held[best if held[best][0] < held[now][0] - BETTER else now][1]
+
+
+def solved_alike(one: Core, other: Core) -> bool:
+    """Tell whether two cores are solved in the same way."""
+    return _way(one) == _way(other)
+
+
+def _way(core: Core) -> tuple[Hold, int]:
+    return (core.hold, core.times) if isinstance(core, Between) else (Hold.FIRST, 1)
+
+
+def _solved(simulation: Extended, core: Core) -> Extended:
+    return replace(simulation, core=core)
+
+
+def _fine_enough(inner: Core, hold: Hold, fit: Calibrated) -> Core:
+    """Halve the step until that changes nothing beside what is left over."""
+    seen = NOTICED * float(np.sqrt(fit.mean_square))
+    times = 1
+    coarse = _solved(fit.simulation, Between(inner, hold, times)).simulate(fit.values)
+    while times < FINEST:
+        finer = _solved(fit.simulation, Between(inner, hold, 2 * times)).simulate(fit.values)
+        with np.errstate(over="ignore", invalid="ignore"):
+            change = float(np.sqrt(np.mean((finer - coarse) ** 2)))
+        if change < seen:
+            break
+        times, coarse = 2 * times, finer
+    return inner if times == 1 and hold == Hold.FIRST else Between(inner, hold, times)

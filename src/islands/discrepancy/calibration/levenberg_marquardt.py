@@ -1,0 +1,175 @@
+"""Calibration: the values with which a simulation comes closest to a record, by Levenberg and Marquardt."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.discrepancy.calibration.noise_model import Noise, noise_of, white
+from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.simulators.extended import Extended
+
+#: Steps at the most, tries of each, and what one has to gain in minus twice the log-likelihood.
+STEPS, TRIES, WORTH = 25, 6, 0.02
+
+#: Part of a parameter's scale that a derivative steps.
+STEP = 1e-2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """What a simulation is held against.
+
+    Attributes
+    ----------
+    y : ndarray, shape (samples,)
+        The measured output.
+    seen : ndarray of bool, shape (samples,)
+        What estimation may see.
+    noise : Noise or None
+        What residuals are whitened by; None takes them as they are.
+    tolerance : mapping
+        Relative standard deviations of the core's parameters about their nominal values; who is not named is
+        free.
+    effective : float or None
+        How many samples that know nothing of each other the ones seen are worth, where what is left is the
+        simulation's misfit and no noise; None takes it as noise that may remember.
+    """
+
+    y: Signal
+    seen: NDArray[np.bool_]
+    noise: Noise | None
+    tolerance: Mapping[str, float]
+    effective: float | None = None
+
+    def observed(self, signal: Signal) -> Signal:
+        """Return the samples of a signal that are seen, whitened."""
+        return (signal if self.noise is None else self.noise.whiten(signal))[self.seen]
+
+    def residual(self, simulated: Signal) -> Signal:
+        """Return what is left of the samples that are seen, whitened."""
+        return self.observed(self.y - simulated)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibrated:
+    """A simulation with values, held against a record.
+
+    Attributes
+    ----------
+    simulation : Extended
+    values : ndarray, shape (parameters,)
+    output : ndarray, shape (samples,)
+        Of the whole record.
+    mean_square : float
+        Of the residual over the samples that estimation saw.
+    noise : Noise
+        Of that residual.
+    penalty : float
+        Squares of the deviations from tolerances.
+    """
+
+    simulation: Extended
+    values: Signal
+    output: Signal
+    mean_square: float
+    noise: Noise
+    penalty: float
+
+    @property
+    def score(self) -> float:
+        """Minus twice the log-likelihood, the noise's memory counted, effects' values not yet paid for."""
+        return self.noise.minus_twice_log_likelihood + self.penalty
+
+
+def calibrate(simulation: Extended, target: Target, start: Signal, steps: int = STEPS) -> Calibrated:
+    """Fit a simulation's values from a start."""
+    lower, upper = simulation.bounds
+    pull, nominal = pull_of(simulation, target.tolerance)
+    scales = simulation.scales
+    values = np.clip(start, lower, upper)
+    output = simulation.simulate(values)
+    residual = target.residual(output)
+    cost = _cost(residual, pull * (values - nominal))
+    damping = 1e-3
+    # What is rounding alone cannot be fitted: a record may be what the simulation has made.
+    exact = residual.size * (np.finfo(float).eps * float(np.max(np.abs(target.y)))) ** 2
+    for _ in range(steps if values.size and np.isfinite(cost) else 0):
+        if float(residual @ residual) <= exact:
+            break
+        jacobian = _jacobian(simulation, target, values, output)
+        weight = residual.size / max(float(residual @ residual), np.finfo(float).tiny)
+        hessian = weight * (jacobian.T @ jacobian) + np.diag((pull * scales) ** 2)
+        slope = weight * (jacobian.T @ residual) - scales * pull**2 * (values - nominal)
+        for _ in range(TRIES):
+            curved = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
+            moved = np.clip(values + np.linalg.lstsq(curved, slope, rcond=None)[0] * scales, lower, upper)
+            output_there = simulation.simulate(moved)
+            residual_there = target.residual(output_there)
+            cost_there = _cost(residual_there, pull * (moved - nominal))
+            if cost_there < cost:
+                break
+            damping = max(8 * damping, 1e-6)
+        else:
+            break
+        gained = cost - cost_there
+        values, output, residual, cost = moved, output_there, residual_there, cost_there
+        damping /= 5
+        if gained < WORTH:
+            break
+    return held_against(simulation, target, values)
+
+
+def held_against(simulation: Extended, target: Target, values: Signal) -> Calibrated:
+    """Hold a simulation against a record with values as they are."""
+    output = simulation.simulate(values)
+    residual = (target.y - output)[target.seen]
+    pull, nominal = pull_of(simulation, target.tolerance)
+    penalty = float(np.sum((pull * (values - nominal)) ** 2))
+    mean_square = float(np.mean(residual**2))
+    noise = noise_of(residual) if target.effective is None else white(mean_square, target.effective)
+    return Calibrated(simulation, values, output, mean_square, noise, penalty)
+
+
+def covariance(fit: Calibrated, target: Target) -> NDArray[np.float64]:
+    """Return the covariance of a fit's values, shape (parameters, parameters): the noise's memory counts."""
+    simulation = fit.simulation
+    whitened = Target(target.y, target.seen, fit.noise, target.tolerance)
+    scales = simulation.scales
+    jacobian = _jacobian(simulation, whitened, fit.values, fit.output)
+    pull, _ = pull_of(simulation, target.tolerance)
+    worth = fit.noise.samples / np.count_nonzero(target.seen)
+    information = worth * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((pull * scales) ** 2)
+    inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
+    return inverse
+
+
+def pull_of(simulation: Extended, tolerance: Mapping[str, float]) -> tuple[Signal, Signal]:
+    """Return one over each value's standard deviation, 0 where it is free; and where it is pulled to."""
+    nominal = simulation.nominal
+    pull = np.zeros(nominal.size)
+    for place, parameter in enumerate(simulation.core.parameters):
+        if parameter.name in tolerance:
+            pull[place] = 1.0 / (tolerance[parameter.name] * abs(parameter.nominal))
+    return pull, nominal
+
+
+def _jacobian(simulation: Extended, target: Target, values: Signal, output: Signal) -> NDArray[np.float64]:
+    """Return how the samples seen change with each scaled value, whitened, shape (seen, parameters)."""
+    _, upper = simulation.bounds
+    columns = np.empty((int(np.count_nonzero(target.seen)), values.size))
+    for place, scale in enumerate(simulation.scales):
+        step = STEP if values[place] + STEP * scale <= upper[place] else -STEP
+        moved = values.copy()
+        moved[place] += step * scale
+        columns[:, place] = target.observed((simulation.simulate(moved) - output) / step)
+    # Where a step explodes nothing is known of that direction.
+    return np.nan_to_num(columns, nan=0.0)
+
+
+def _cost(residual: Signal, pulled: Signal) -> float:
+    squares = max(float(residual @ residual), np.finfo(float).tiny)
+    if np.isnan(squares):
+        return float("inf")
+    return residual.size * float(np.log(squares)) + float(pulled @ pulled)

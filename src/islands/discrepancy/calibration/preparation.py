@@ -1,0 +1,101 @@
+"""Preparation: whether a record can be analysed, which part of it, at which scales, and for which effects."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.effects.wrong_parameter import wrong_parameter
+from islands.discrepancy.interfaces.effect import Effect, Scene, Site
+from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.simulators.coordinates import peak
+from islands.discrepancy.simulators.extended import Extended
+from islands.errors import RecordError, SettingsError
+
+#: Part of the record that nothing but the gain ever sees: its end.
+LOCKED = 0.25
+
+#: The fewest samples that are worth an analysis.
+FEWEST = 200
+
+
+def effects_for(core: Core, scene: Scene, tolerance: Mapping[str, float]) -> list[Effect]:
+    """Return the effects that can enter a simulation and that a record could show."""
+    trusted = {each.name for each in core.parameters if not each.initial} <= tolerance.keys()
+    effects = [
+        effect
+        for effect in CATALOGUE.values()
+        if effect.site in core.sites
+        and (effect.site != Site.CORE or effect.name in core.understood)
+        and effect.name not in core.has
+        and (trusted or not effect.gain)
+        and effect.applies(scene)
+    ]
+    effects += core.effects
+    return effects + [wrong_parameter(each) for each in core.parameters if each.name in tolerance]
+
+
+def checked(tolerance: Mapping[str, float], core: Core) -> Mapping[str, float]:
+    """Return tolerances, once it is known that the simulation has such parameters."""
+    names = [parameter.name for parameter in core.parameters]
+    for name, value in tolerance.items():
+        if name not in names:
+            raise SettingsError(f"{core.name} has no parameter {name!r}: it has {', '.join(names) or 'none'}")
+        if not 0.0 < value < 1.0:
+            raise SettingsError(f"the tolerance of {name} is a part of its value, like 0.02; got {value:g}")
+    return dict(tolerance)
+
+
+def seen(record: Dataset) -> Dataset:
+    """Return the part of a record that estimation may see: its end is locked away."""
+    return record[: int((1.0 - LOCKED) * record.samples)]
+
+
+def fitted_samples(record: Dataset) -> int:
+    """Return how many samples estimation sees, once it is known that the record can be used."""
+    if record.samples < FEWEST:
+        raise RecordError(
+            f"the record has {record.samples} samples, and a diagnosis takes {FEWEST} at least: give a "
+            "longer one"
+        )
+    if len(record.segments) > 1:
+        raise RecordError("the record is several recordings: diagnose one after the other")
+    if np.isnan(record.y).any():
+        raise RecordError("the measured output has gaps: repair them, or select rows without any")
+    fitted = seen(record).samples
+    for name, signal in zip((*record.input_names, record.output_name), (*record.u.T, record.y), strict=True):
+        if np.ptp(signal[:fitted]) == 0.0:
+            raise RecordError(f"column {name} is constant: a diagnosis needs signals that move")
+    for name, signal in zip(record.input_names[1:], record.u.T[1:], strict=True):
+        if np.array_equal(signal, record.u[:, 0]):
+            raise RecordError(f"channel {name} is the input itself: leave it out")
+    return fitted
+
+
+def scene_of(record: Dataset, core: Core, fitted: int) -> Scene:
+    """Return what drives a simulation, and the scales of a record."""
+    names, units = record.input_names, record.input_units
+    scene = Scene(
+        u=np.ascontiguousarray(record.u[:, 0]),
+        dt=record.dt,
+        channels={
+            name: np.ascontiguousarray(record.u[:, place]) for place, name in enumerate(names) if place
+        },
+        units=dict(zip(names[1:], units[1:], strict=True)),
+        input_peak=float(np.max(np.abs(record.u[:, 0]))),
+        output_peak=1.0,
+        input_unit=units[0] or "1",
+        output_unit=record.output_unit or "1",
+        fitted=fitted * record.dt,
+    )
+    simulation = Extended(core, (), scene)
+    nominal = simulation.simulate(simulation.nominal)
+    if not np.isfinite(nominal).all():
+        raise RecordError(
+            f"the simulation {core.name} diverges on this input: check its parameters, its units and the "
+            "sampling time"
+        )
+    scaled = replace(scene, output_peak=peak(nominal))
+    return replace(scaled, frame=core.frame(scaled, nominal))

@@ -1,0 +1,1 @@
+"""Which effects explain a residual: screening, stepwise search, verdict. Read `strategies` first."""

@@ -1,0 +1,211 @@
+"""The ladder: a simulation extended by each effect in turn, each as good as it can be, best first."""
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    STEP,
+    Calibrated,
+    Target,
+    calibrate,
+    held_against,
+    pull_of,
+)
+from islands.discrepancy.effects import in_order
+from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.simulators.extended import Extended, broken
+from islands.parallel import Spread
+
+#: Points of a grid that a fit begins from, the steps that each may take before one is chosen, and how far a
+#: strength is carried from its grid's value.
+STARTS, FIRST_STEPS, FARTHEST = 3, 6, 5.0
+
+#: Scores that are less apart are equal: of effects that do the same the one that the catalogue has first goes
+#: first, and those of one simulation alone last.
+EQUAL = 0.5
+
+#: Effects that are fitted beside others, though by their responses alone none would pay.
+PROMISING = 5
+
+#: A simulation to be fitted, and where that begins.
+Fit = tuple[Extended, Sequence[Signal]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rung:
+    """A simulation with one more effect.
+
+    Attributes
+    ----------
+    effect : Effect
+    fit : Calibrated
+    """
+
+    effect: Effect
+    fit: Calibrated
+
+    def gained(self, base: Calibrated) -> float:
+        """Return by how much it is better than without the effect, its values paid for."""
+        return base.score - self.fit.score - price(self.effect, base)
+
+
+def price(effect: Effect, base: Calibrated) -> float:
+    """Return what an effect's values have to gain, as BIC has it: log n for each."""
+    values = len(effect.parameters(base.simulation.scene)) + effect.searched
+    return values * float(np.log(base.noise.samples))
+
+
+def ladder(base: Calibrated, target: Target, effects: Iterable[Effect], spread: Spread = map) -> list[Rung]:
+    """Extend a simulation by each effect in turn; return the rungs, the best first.
+
+    Parameters
+    ----------
+    spread : Spread
+        Fits the effects, side by side perhaps.
+    """
+    space = _Projection(base, target)
+    screened = []
+    for effect in effects:
+        simulation = base.simulation.with_effects(in_order((*base.simulation.effects, effect)))
+        starts = _starts(base, simulation, effect, target, space)
+        if starts:
+            screened.append((starts[0][0], effect, simulation, [values for _, values in starts]))
+    if base.simulation.effects and target.effective is None:
+        # Beside what is there already, the most promising ones alone are worth a fit.
+        screened.sort(key=lambda each: each[0])
+        screened = [
+            each
+            for place, each in enumerate(screened)
+            if place < PROMISING or space.gained(each[0]) > price(each[1], base)
+        ]
+    found = spread(partial(_fitted, target), [(simulation, starts) for _, _, simulation, starts in screened])
+    rungs = [
+        Rung(effect, min((held_against(simulation, target, values) for values in ends), key=_score))
+        for (_, effect, simulation, _), ends in zip(screened, found, strict=True)
+    ]
+    return sorted(rungs, key=lambda rung: -round(rung.gained(base) / EQUAL))
+
+
+def _fitted(target: Target, asked: Fit) -> list[Signal]:
+    """Fit from every start a few steps far, and from the best one to the end; return the values."""
+    simulation, starts = asked
+    if target.effective is not None:
+        # Where the form is wrong there are many minima, and the first steps do not tell which is the best.
+        return [calibrate(simulation, target, start).values for start in starts]
+    fits = [calibrate(simulation, target, start, steps=FIRST_STEPS) for start in starts]
+    return [calibrate(simulation, target, min(fits, key=_score).values).values]
+
+
+def same_fit(asked: Fit) -> Hashable:
+    """Return what two fits of a simulation to a target have in common if they are the same."""
+    simulation, starts = asked
+    return tuple(effect.name for effect in simulation.effects), *(start.tobytes() for start in starts)
+
+
+def _score(fit: Calibrated) -> float:
+    return fit.score
+
+
+def carried(values: Signal, old: Extended, new: Extended) -> Signal:
+    """Return the values of a simulation for one with other effects; what is new does nothing yet."""
+    moved = new.nominal
+    own = len(old.core.parameters)
+    moved[:own] = values[:own]
+    for effect in new.effects:
+        if effect in old.effects:
+            moved[new.part(effect)] = values[old.part(effect)]
+    return moved
+
+
+class _Projection:
+    """What is left of a response when the base's own values have explained what they can."""
+
+    def __init__(self, base: Calibrated, target: Target) -> None:
+        simulation, values = base.simulation, base.values
+        self._target, self._values = target, values.size
+        self._sigma = float(np.std(target.residual(base.output))) or 1.0
+        pull, nominal = pull_of(simulation, target.tolerance)
+        columns = []
+        for place, scale in enumerate(simulation.scales):
+            moved = values.copy()
+            moved[place] += STEP * scale
+            # A tolerance is one more observation of its value.
+            held = np.zeros(values.size)
+            held[place] = pull[place] * scale
+            columns.append(self._observed((simulation.simulate(moved) - base.output) / STEP, held))
+        self._basis = np.linalg.qr(np.column_stack(columns))[0] if columns else None
+        # Of a value that a fit has moved from where its tolerance wants it, that is left to be explained.
+        self.residual = self._left(self._observed(target.y - base.output, pull * (nominal - values)))
+        self._samples = base.noise.samples
+
+    def gained(self, remains: float) -> float:
+        """Return by how much minus twice the log-likelihood falls where so many squares remain."""
+        return self._samples * float(np.log(float(self.residual @ self.residual) / max(remains, 1e-300)))
+
+    def __call__(self, response: Signal) -> Signal:
+        return self._left(self._observed(response, np.zeros(self._values)))
+
+    def _left(self, seen: Signal) -> Signal:
+        return seen if self._basis is None else seen - self._basis @ (self._basis.T @ seen)
+
+    def _observed(self, response: Signal, held: Signal) -> Signal:
+        return np.concatenate([self._target.observed(response) / self._sigma, held])
+
+
+def _points(effect: Effect, simulation: Extended, residual: Signal) -> Sequence[tuple[float, ...]]:
+    """Return where a search for an effect begins."""
+    part = simulation.part(effect)
+    try:
+        points = effect.grid(simulation.scene, residual)
+    except Exception as error:
+        raise broken(effect, f"its grid fails: {type(error).__name__}: {error}") from error
+    if any(len(point) != part.stop - part.start for point in points):
+        raise broken(effect, f"its grid has to give {part.stop - part.start} values at each point")
+    return points
+
+
+def _starts(
+    base: Calibrated, simulation: Extended, effect: Effect, target: Target, space: _Projection
+) -> list[tuple[float, Signal]]:
+    """Return the points of an effect's grid that explain most, its strength fitted to what is left.
+
+    Each stands behind the squares that remain with it.
+    """
+    part = simulation.part(effect)
+    lower, upper = simulation.bounds
+    at_rest = carried(base.values, base.simulation, simulation)
+    tried = []
+    for point in _points(effect, simulation, target.y - base.output):
+        values = at_rest.copy()
+        values[part] = point
+        response = space(simulation.simulate(values) - base.output)
+        with np.errstate(over="ignore", invalid="ignore"):  # what explodes is no start
+            size = float(response @ response)
+        if not np.isfinite(size) or size == 0.0:
+            continue
+        points = [(_squares(space.residual - response), values)]
+        if effect.linear:
+            along = np.clip(float(response @ space.residual) / size, -FARTHEST, FARTHEST)
+            values = values.copy()
+            values[part.start : part.start + effect.linear] *= along
+            values = np.clip(values, lower, upper)
+            response = space(simulation.simulate(values) - base.output)
+            points.append((_squares(space.residual - response), values))
+        remains, values = min(points, key=_first)
+        if np.isfinite(remains):
+            tried.append((remains, values))
+    tried.sort(key=_first)
+    return tried[:STARTS]
+
+
+def _squares(left: Signal) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):
+        remains = float(left @ left)
+    return remains if np.isfinite(remains) else float("inf")
+
+
+def _first(point: tuple[float, Signal]) -> float:
+    return point[0]

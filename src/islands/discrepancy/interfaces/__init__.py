@@ -1,0 +1,1 @@
+"""Types that simulators and effects implement. Read `effect` and `simulator` first."""

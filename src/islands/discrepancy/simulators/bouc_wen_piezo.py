@@ -1,0 +1,76 @@
+"""The Bouc-Wen piezoelectric actuator of the paper's equation (11), with places for effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from islands.discrepancy.effects.changes import gain_over_time
+from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.simulator import Forces
+from islands.discrepancy.simulators.coordinates import of_input
+from islands.systems.bouc_wen import BoucWenPiezo
+from islands.systems.hysteresis_operators import bouc_wen
+
+
+@dataclass(frozen=True, slots=True)
+class BoucWenPiezoCore:
+    """``y = dp x - h + forces``, ``h' = A x' - beta |x'| h - gamma x' |h|``; the coordinate is the voltage.
+
+    Attributes
+    ----------
+    piezo : BoucWenPiezo
+        Nominal parameters; by default the paper's.
+    """
+
+    piezo: BoucWenPiezo = field(default_factory=BoucWenPiezo)
+    name: str = "bouc-wen-piezo"
+    sites: frozenset[Site] = frozenset(Site)
+    understood: frozenset[str] = frozenset(
+        ("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing")
+    )
+    has: frozenset[str] = frozenset()
+    effects: tuple[Effect, ...] = ()
+    integrates: bool = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """A, beta, gamma, dp: a fifth to five times what they are nominally."""
+        return tuple(
+            Parameter(name, unit, nominal, part * abs(nominal), *_about(nominal))
+            for name, unit, nominal, part in (
+                ("A", "um/V", self.piezo.A, 0.01),
+                ("beta", "1/V", self.piezo.beta, 0.03),
+                ("gamma", "1/V", self.piezo.gamma, 0.03),
+                ("dp", "um/V", self.piezo.dp, 0.005),
+            )
+        )
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return of_input(scene, output)
+
+    def simulate(
+        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        A, beta, gamma, dp = values
+        h = np.empty_like(x)
+        bouc_wen(
+            np.ascontiguousarray(x),
+            *(scene.dt, A, beta, gamma),
+            *(
+                own.get("relaxation", 0.0),
+                own.get("rate-dependent-loop", 0.0),
+                own.get("loop-asymmetry", 0.0),
+            ),
+            *(0.0, h),
+        )
+        return dp * gain_over_time(own, scene) * x - h + beside(x, scene, forces)
+
+
+def _about(nominal: float) -> tuple[float, float]:
+    ends = (0.2 * nominal, 5.0 * nominal)
+    return min(ends), max(ends)

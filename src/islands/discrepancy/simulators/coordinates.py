@@ -1,0 +1,30 @@
+"""The coordinates of simulations without inertia, and of those that move."""
+
+import numpy as np
+
+from islands.discrepancy.interfaces.context import Frame, Scene, Signal
+
+
+def of_input(scene: Scene, output: Signal) -> Frame:
+    """Return the input as the coordinate: forces add to the output at once."""
+    rate = float(np.std(np.diff(scene.u))) / scene.dt or 1.0
+    return Frame(scene.input_unit, scene.input_peak, rate, scene.output_unit, peak(output))
+
+
+def of_output(scene: Scene, output: Signal) -> Frame:
+    """Return the output as the coordinate: forces act beside the input, and move it."""
+    rate = float(np.std(np.diff(output))) / scene.dt or 1.0
+    return Frame(
+        scene.output_unit,
+        peak(output),
+        rate,
+        scene.input_unit,
+        scene.input_peak,
+        dissipates=True,
+        sharp=0.02,
+    )
+
+
+def peak(signal: Signal) -> float:
+    """Return the largest absolute value."""
+    return float(np.max(np.abs(signal))) or 1.0

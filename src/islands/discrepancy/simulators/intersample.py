@@ -1,0 +1,130 @@
+"""A core in finer steps than the record's: what its input does between samples, and how well it is solved."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+import scipy
+
+from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.simulator import Core, Forces
+
+
+class Around:
+    """A core around another one; what it does not say itself, that one says."""
+
+    __slots__ = ()
+
+    core: Core
+
+    @property
+    def name(self) -> str:
+        """As the core's."""
+        return self.core.name
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """As the core's."""
+        return self.core.parameters
+
+    @property
+    def sites(self) -> frozenset[Site]:
+        """As the core's."""
+        return self.core.sites
+
+    @property
+    def understood(self) -> frozenset[str]:
+        """As the core's."""
+        return self.core.understood
+
+    @property
+    def has(self) -> frozenset[str]:
+        """As the core's."""
+        return self.core.has
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """As the core's."""
+        return self.core.effects
+
+    @property
+    def integrates(self) -> bool:
+        """As the core's."""
+        return self.core.integrates
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return self.core.frame(scene, output)
+
+
+#: Inputs that are remembered between their samples.
+_REMEMBERED = 2
+
+
+class Hold(StrEnum):
+    """What an input does between two samples."""
+
+    FIRST = "first-order"
+    ZERO = "zero-order"
+    BAND = "band-limited"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Between(Around):
+    """A core that is simulated ``times`` as often as it is recorded.
+
+    Attributes
+    ----------
+    core : Core
+    hold : Hold
+        It runs straight from sample to sample, stays, or is the smoothest that passes through all samples.
+    times : int
+    """
+
+    core: Core
+    hold: Hold = Hold.FIRST
+    times: int = 1
+    _known: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
+
+    def simulate(
+        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        u, midway = self._finer(x)
+        finer = replace(scene, u=u, dt=scene.dt / self.times, midway=midway)
+        return self.core.simulate(values, u, finer, own, forces)[:: self.times]
+
+    def _finer(self, x: Signal) -> tuple[Signal, Signal]:
+        key = x.tobytes()
+        if key not in self._known:
+            while len(self._known) >= _REMEMBERED:
+                del self._known[next(iter(self._known))]
+            self._known[key] = finer(x, self.hold, self.times)
+        return self._known[key]
+
+
+def finer(x: Signal, hold: Hold, times: int) -> tuple[Signal, Signal]:
+    """Return a signal ``times`` as often, and midway and at the end of each of its steps.
+
+    Returns
+    -------
+    ndarray, shape (times * samples,)
+        Every ``times``-th one is a sample.
+    ndarray, shape (2, times * samples)
+    """
+    match hold:
+        case Hold.ZERO:
+            stays = np.repeat(x, times)
+            return stays, np.stack([stays, stays])
+        case Hold.FIRST:
+            at = np.arange(2 * times * x.size + 1) / (2 * times)
+            straight = np.interp(at, np.arange(x.size), x)
+        case Hold.BAND:
+            # Its ends are led on by reflection: a filter that meets zeros rings.
+            spare = min(64, x.size - 1)
+            longer = np.concatenate([2 * x[0] - x[spare:0:-1], x, 2 * x[-1] - x[-2 : -spare - 2 : -1]])
+            smooth = scipy.signal.resample_poly(longer, 2 * times, 1, window=("kaiser", 8.0))
+            straight = smooth[2 * times * spare : 2 * times * (spare + x.size) + 1]
+    return straight[:-1:2].copy(), np.stack([straight[1::2], straight[2::2]])

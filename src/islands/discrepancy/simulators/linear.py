@@ -1,0 +1,123 @@
+"""A linear model of some order, estimated here, with places for effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.simulator import Forces
+from islands.discrepancy.simulators.coordinates import of_input
+from islands.errors import RecordError
+
+#: Rounds of Steiglitz and McBride.
+_ROUNDS = 12
+
+#: A change of a coefficient that matters, relative to the largest of its kind.
+_SCALE = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearCore:
+    """``A(q) (y - level) = B(q) u``, from a state of its own on: as many poles as zeros, delayed or not.
+
+    Attributes
+    ----------
+    numerator, denominator : ndarray, shapes (order + 1,) and (order,)
+        Of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ..., both on the side of u.
+    level : float
+        Output at rest.
+    delay : int
+        Samples.
+    """
+
+    numerator: Signal
+    denominator: Signal
+    level: float
+    delay: int
+    unit: str
+    name: str = "linear"
+    sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
+    understood: frozenset[str] = frozenset()
+    has: frozenset[str] = frozenset(("offset",))
+    effects: tuple[Effect, ...] = ()
+    integrates: bool = False
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients, level, and the filter's state at the first sample."""
+        order = self.denominator.size
+        gain = _SCALE * float(np.max(np.abs(self.numerator))) or _SCALE
+        return (
+            *(Parameter(f"b{lag}", "", float(b), gain) for lag, b in enumerate(self.numerator)),
+            *(Parameter(f"a{lag + 1}", "", float(a), _SCALE) for lag, a in enumerate(self.denominator)),
+            Parameter("level", self.unit, self.level, _SCALE * abs(self.level) + gain),
+            *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
+        )
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return of_input(scene, output)
+
+    def simulate(
+        self, values: Signal, x: Signal, scene: Scene, _own: Mapping[str, float], forces: Forces
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        order = self.denominator.size
+        numerator, denominator = values[: order + 1], values[order + 1 : 2 * order + 1]
+        late = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
+        level, state = values[2 * order + 1], values[2 * order + 2 :]
+        # As if the first input had been there for ever, but for the state.
+        filtered, _ = scipy.signal.lfilter(
+            numerator, np.concatenate([[1.0], -denominator]), late - x[0], zi=state
+        )
+        return level + filtered + beside(x, scene, forces)
+
+
+def linear(order: int, delay: int, record: Dataset) -> LinearCore:
+    """Estimate a linear model by the method of Steiglitz and McBride (1965): least squares of its simulation.
+
+    Raises
+    ------
+    RecordError
+        The record is shorter than ten times what is estimated.
+    """
+    u, y = record.u[:, 0], record.y
+    if record.samples < 10 * (2 * order + 2) + delay:
+        raise RecordError(
+            f"{record.samples} samples are too few to estimate a linear model of order {order}: take a lower "
+            "order or a longer record"
+        )
+    late = np.concatenate([np.full(delay, u[0]), u[: u.size - delay]]) - u[0]
+    found, least = None, np.inf
+    denominator = np.zeros(order)
+    for _ in range(_ROUNDS):
+        prefilter = np.concatenate([[1.0], -denominator])
+        numerator, denominator, level = _least_squares(late, y, order, prefilter)
+        if order and np.max(np.abs(np.roots(np.concatenate([[1.0], -denominator])))) >= 1.0:
+            break
+        simulated = level + scipy.signal.lfilter(numerator, np.concatenate([[1.0], -denominator]), late)
+        missed = float(np.mean((y - simulated)[order + delay :] ** 2))
+        if missed < least:
+            found, least = (numerator, denominator, level), missed
+    if found is None:  # not stable: what does not move at all is
+        found = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
+    return LinearCore(*found, delay, record.output_unit or "1")
+
+
+def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:
+    past = scipy.signal.lfilter([1.0], prefilter, u)
+    seen = scipy.signal.lfilter([1.0], prefilter, y - y[0])
+    constant = scipy.signal.lfilter([1.0], prefilter, np.ones(y.size))
+    rows = y.size - order
+    columns = [past[order - lag : order - lag + rows] for lag in range(order + 1)]
+    columns += [seen[order - lag : order - lag + rows] for lag in range(1, order + 1)]
+    columns.append(constant[order:])
+    weights = np.linalg.lstsq(np.column_stack(columns), seen[order:], rcond=None)[0]
+    numerator, denominator = weights[: order + 1], weights[order + 1 : 2 * order + 1]
+    at_rest = float(weights[-1]) / (1.0 - float(denominator.sum()) or 1.0)
+    return numerator, denominator, float(y[0]) + at_rest

@@ -1,0 +1,55 @@
+"""A column of the record: somebody else's simulation, of which only the output is known."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.simulator import Forces
+from islands.discrepancy.simulators.coordinates import of_input
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColumnCore:
+    """An output as it was simulated elsewhere.
+
+    What acts on its input or in its equation cannot be simulated anew: effects on the output, and forces of
+    the input as it was recorded, are all that can be looked for.
+
+    Attributes
+    ----------
+    column : str
+    simulated : ndarray, shape (samples,)
+    """
+
+    column: str
+    simulated: Signal
+    parameters: tuple[Parameter, ...] = ()
+    sites: frozenset[Site] = frozenset((Site.FORCE, Site.OUTPUT))
+    understood: frozenset[str] = frozenset()
+    has: frozenset[str] = frozenset()
+    effects: tuple[Effect, ...] = ()
+    integrates: bool = False
+
+    @property
+    def name(self) -> str:
+        """How it is asked for."""
+        return f"column {self.column}"
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return of_input(scene, output)
+
+    def simulate(
+        self,
+        _values: Signal,
+        x: Signal,
+        scene: Scene,
+        _own: Mapping[str, float],
+        forces: Forces,
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return np.asarray(self.simulated) + beside(x, scene, forces)

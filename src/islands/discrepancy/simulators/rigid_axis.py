@@ -1,0 +1,182 @@
+"""A rigid axis with friction: its force is given, its position is measured; with places for effects."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.effects import friction
+from islands.discrepancy.effects.changes import gain_over_time
+from islands.discrepancy.effects.input_offset import input_offset
+from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Element, Site
+from islands.discrepancy.interfaces.force import elements_of
+from islands.discrepancy.interfaces.simulator import Forces
+from islands.discrepancy.simulators.coordinates import of_output
+from islands.errors import RecordError
+from islands.systems.mechanics import balance
+
+#: What its state is called.
+FORCE = "force"
+
+#: Seconds of a shot, samples of one at least, and samples over which the measured position is smoothed.
+SHOT, LEAST, SMOOTHED = 0.5, 20, 9
+
+#: Part of the usual rate within which dry friction turns, nominally.
+_SHARP = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidAxisCore:
+    """``m x'' + c x' + F tanh(x' / vs) = u + forces``, by multiple shooting; the coordinate is the output.
+
+    Nothing pulls an axis back, so that a free run drifts away: it starts anew every half second, from a
+    position and a rate that are fitted to what is measured (Bock's multiple shooting, its states eliminated).
+
+    Attributes
+    ----------
+    mass, damping, dry, turns : float
+        Nominal parameters.
+    measured, rate : ndarray, shape (samples,)
+        The output, and its smoothed rate.
+    shot : int
+        Samples between two starts.
+    units : tuple of str
+        Of input and output.
+    """
+
+    mass: float
+    damping: float
+    dry: float
+    turns: float
+    measured: Signal
+    rate: Signal
+    shot: int
+    units: tuple[str, str]
+    name: str = "rigid-axis"
+    sites: frozenset[Site] = frozenset(Site)
+    understood: frozenset[str] = frozenset(("gain-step", "ageing"))
+    has: frozenset[str] = frozenset(("viscous", "coulomb-friction", "offset", "linear-drift"))
+    effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
+    integrates: bool = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Mass, damping, dry friction, and the rate at which that turns."""
+        force, length = self.units
+        usual = float(np.std(self.rate)) or 1.0
+        moved = abs(self.dry) + abs(self.damping) * usual + abs(self.mass) * usual / (SHOT / 5)
+        return (
+            Parameter(
+                "m", f"{force} s^2/{length}", self.mass, 0.01 * self.mass, 0.05 * self.mass, 20 * self.mass
+            ),
+            Parameter(
+                "c", f"{force} s/{length}", self.damping, 0.01 * moved / usual, 0.0, 20 * moved / usual
+            ),
+            Parameter("F", force, self.dry, 0.01 * moved, 0.0, 20 * moved),
+            # How sharply friction turns is its own business: a wrong width looks like play.
+            Parameter("vs", f"{length}/s", self.turns, 0.3 * self.turns, 0.01 * self.turns, 20 * self.turns),
+        )
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return replace(of_output(scene, output), sharp=_SHARP)
+
+    def simulate(
+        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        mass, damping, dry, turns = map(float, values)
+        gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
+        dry_friction = friction.EFFECT.form
+        assert isinstance(dry_friction, Element)
+        elements = elements_of([*forces, (dry_friction, np.array([dry, turns]))], scene, balance=True)
+        times = x.size // self.measured.size
+        starts = np.zeros(x.size, dtype=bool)
+        starts[:: self.shot * times] = True
+
+        def shots(position: Signal, rate: Signal) -> Signal:
+            y = np.empty(x.size)
+            balance(
+                *(x * gain + offset, scene.midway_of(x) * gain + offset),
+                *(scene.dt, mass, damping, 0.0, elements),
+                *(starts, np.repeat(position, times), np.repeat(rate, times), y),
+            )
+            return y[::times]
+
+        return np.repeat(self._freed(shots, scene.frame), times)
+
+    def _freed(self, shots: Callable[[Signal, Signal], Signal], frame: Frame) -> Signal:
+        """Return the shots with their states as free as can be: by Newton and Gauss, from what is measured.
+
+        All shots are fitted side by side: a state moves its own alone.
+        """
+        position, rate = self.measured, self.rate
+        y = shots(position, rate)
+        moved = (1e-4 * frame.peak, 1e-4 * frame.rate)
+        responses = (
+            (shots(position + moved[0], rate) - y) / moved[0],
+            (shots(position, rate + moved[1]) - y) / moved[1],
+        )
+        which = np.arange(y.size) // self.shot
+        for _ in range(2):
+            steps = self._steps(self.measured - y, responses, which)
+            there = shots(position + steps[0], rate + steps[1])
+            squares = [np.bincount(which, weights=(self.measured - each) ** 2) for each in (y, there)]
+            # A shot that sticks may leap over its best state.
+            closer = (squares[1] < squares[0])[which]
+            position = np.where(closer, position + steps[0], position)
+            rate = np.where(closer, rate + steps[1], rate)
+            y = np.where(closer, there, y)
+        return y
+
+    @staticmethod
+    def _steps(
+        missed: Signal, responses: tuple[Signal, Signal], which: NDArray[np.int64]
+    ) -> tuple[Signal, Signal]:
+        """Solve every shot's two equations; return the steps of its state at each of its samples."""
+
+        def inner(one: Signal, other: Signal) -> Signal:
+            return np.asarray(np.bincount(which, weights=one * other), dtype=np.float64)
+
+        first, second = responses
+        a, b, d = inner(first, first), inner(first, second), inner(second, second)
+        p, q = inner(first, missed), inner(second, missed)
+        determinant = a * d - b * b
+        # A shot of one sample tells its position alone.
+        sure = determinant > 1e-12 * a * d
+        determinant = np.where(sure, determinant, 1.0)
+        position = np.where(sure, (d * p - b * q) / determinant, p / np.maximum(a, 1e-300))
+        rate = np.where(sure, (a * q - b * p) / determinant, 0.0)
+        return position[which], rate[which]
+
+
+def rigid_axis(given: Mapping[str, float], record: Dataset, seen: int) -> RigidAxisCore:
+    """Return the core of parameters that are given; what is missing is estimated from what may be seen.
+
+    The estimate is that of the inverse dynamics: least squares of the force on smoothed acceleration, rate
+    and direction (Olsen and Petersen 2001).
+    """
+    if record.samples < 4 * LEAST:
+        raise RecordError(f"an axis needs {4 * LEAST} samples, the record has {record.samples}")
+    y, dt = record.y, record.dt
+    rate, acceleration = (
+        scipy.signal.savgol_filter(y, SMOOTHED, 3, deriv=order, delta=dt) for order in (1, 2)
+    )
+    usual = float(np.std(rate)) or 1.0
+    columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * usual))])[:seen]
+    names = ("m", "c", "F")
+    free = [place for place, name in enumerate(names) if name not in given]
+    known = np.array([given.get(name, 0.0) for name in names])
+    force = scipy.signal.savgol_filter(record.u[:, 0], SMOOTHED, 3)[:seen]
+    known[free] = scipy.optimize.lsq_linear(
+        columns[:, free], force - columns @ known, bounds=(1e-12, np.inf)
+    ).x
+    mass, damping, dry = map(float, known)
+    turns = given.get("vs", _SHARP * usual)
+    shot = max(LEAST, round(SHOT / dt))
+    units = (record.input_units[0] or "1", record.output_unit or "1")
+    return RigidAxisCore(mass, damping, dry, turns, np.asarray(y), rate, shot, units)

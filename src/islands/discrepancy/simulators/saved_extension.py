@@ -1,0 +1,75 @@
+"""A simulation with effects in it as a simulation of its own: it is simulated, and can be diagnosed again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.interfaces.simulator import Core, Forces
+from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.simulators.intersample import Around
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExtensionCore(Around):
+    """A core and effects in it, with the values that were found.
+
+    Attributes
+    ----------
+    core : Core
+        Solved as the record asked for.
+    added : tuple of Effect
+    values : ndarray, shape (parameters,)
+        Of the effects, one after the other: their nominal values from now on.
+    scales : Scene
+        Of the record that they were found in: some strengths are parts of its peaks, or of its duration.
+    """
+
+    core: Core
+    added: tuple[Effect, ...]
+    values: Signal
+    scales: Scene
+
+    @property
+    def name(self) -> str:
+        """The core's, and those of the effects."""
+        return " + ".join([self.core.name, *(effect.name for effect in self.added)])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The core's, and those of each effect with the effect's name before them."""
+        found, at = list(self.core.parameters), 0
+        for effect in self.added:
+            for parameter in effect.parameters(self.scales):
+                name = f"{effect.name} {parameter.name}"
+                found.append(replace(parameter, name=name, nominal=float(self.values[at])))
+                at += 1
+        return tuple(found)
+
+    @property
+    def integrates(self) -> bool:
+        """It is solved already as its record asked for."""
+        return False
+
+    @property
+    def has(self) -> frozenset[str]:
+        """What the core has, and what was added."""
+        return self.core.has | {effect.name for effect in self.added}
+
+    def simulate(
+        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        scales = self.scales
+        inner = replace(
+            scene,
+            u=np.ascontiguousarray(x),
+            input_peak=scales.input_peak,
+            output_peak=scales.output_peak,
+            fitted=scales.fitted,
+            lasts=scales.duration,
+            frame=scales.frame,
+        )
+        return Extended(self.core, self.added, inner).simulate(values, own, forces)

@@ -1,0 +1,100 @@
+"""A mass on a spring and a damper, with places for effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.effects.changes import gain_over_time
+from islands.discrepancy.effects.input_offset import input_offset
+from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.force import elements_of
+from islands.discrepancy.interfaces.simulator import Forces
+from islands.discrepancy.simulators.coordinates import of_output
+from islands.systems.mechanics import balance
+from islands.systems.second_order import SecondOrder, second_order_of
+
+#: What its state is called.
+FORCE = "force"
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrderCore:
+    """``m x'' + c x' + k x = u + forces``; the coordinate is the output.
+
+    Attributes
+    ----------
+    system : SecondOrder
+        Nominal parameters.
+    units : tuple of str
+        Of input and output.
+    size : float
+        Of the output.
+    """
+
+    system: SecondOrder
+    units: tuple[str, str]
+    size: float
+    name: str = "second-order"
+    sites: frozenset[Site] = frozenset(Site)
+    understood: frozenset[str] = frozenset(("gain-step", "ageing"))
+    has: frozenset[str] = frozenset(("viscous",))
+    effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
+    integrates: bool = True
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Mass, damping, stiffness, and the state at the first sample."""
+        system, (force, length) = self.system, self.units
+        usual = abs(system.stiffness / system.mass) ** 0.5
+        # As much as a spring of critical damping: a nominal damping may be next to nothing.
+        critical = 2.0 * usual * system.mass
+        return (
+            _about("m", f"{force} s^2/{length}", system.mass, 0.01),
+            Parameter(
+                "c",
+                f"{force} s/{length}",
+                system.damping,
+                abs(0.03 * system.damping) + abs(1e-4 * critical),
+                min(0.0, 10.0 * critical),
+                max(0.0, 10.0 * critical),
+            ),
+            _about("k", f"{force}/{length}", system.stiffness, 0.01),
+            Parameter("initial position", length, system.position, 0.02 * self.size, initial=True),
+            Parameter("initial rate", f"{length}/s", system.rate, 0.02 * self.size * usual, initial=True),
+        )
+
+    def frame(self, scene: Scene, output: Signal) -> Frame:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        return of_output(scene, output)
+
+    def simulate(
+        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+    ) -> Signal:
+        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        mass, damping, stiffness, position, rate = map(float, values)
+        gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
+        begins = np.zeros(x.size, dtype=bool)
+        begins[0] = True
+        y = np.empty(x.size)
+        balance(
+            *(x * gain + offset, scene.midway_of(x) * gain + offset),
+            *(scene.dt, mass, damping, stiffness),
+            elements_of(forces, scene, balance=True),
+            *(begins, np.full(x.size, position), np.full(x.size, rate), y),
+        )
+        return y
+
+
+def second_order(given: Mapping[str, float], record: Dataset) -> SecondOrderCore:
+    """Return the core of parameters that are given; what is missing is estimated from a record."""
+    found = second_order_of(record.u[:, 0], record.y, record.dt, given)
+    units = (record.input_units[0] or "1", record.output_unit or "1")
+    return SecondOrderCore(found, units, float(np.std(record.y)))
+
+
+def _about(name: str, unit: str, nominal: float, part: float) -> Parameter:
+    ends = (0.05 * nominal, 20.0 * nominal)
+    return Parameter(name, unit, nominal, part * abs(nominal), min(ends), max(ends))

@@ -1,0 +1,55 @@
+"""From a structure to a model: constraint, regressor matrix, constrained least squares."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.estimation.parameter_constraints import constraint
+from islands.model.expression import Lagged
+from islands.model.model import Model, canonical_order
+from islands.model.regressor import Regressor
+from islands.program.regressor_matrix import regressor_matrix
+from islands.simulation.outcome import Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Estimated:
+    """A model with parameters, and the variance of its equation error (the residual one step ahead)."""
+
+    model: Model
+    residual_variance: float
+
+
+def estimate(
+    regressors: Sequence[Regressor], record: Dataset, constraints: str = "none", warm_up: int | None = None
+) -> Estimated | Outcome:
+    """Estimate the parameters of a structure on a record.
+
+    Parameters
+    ----------
+    constraints : str
+        An entry of ``CONSTRAINTS``; a regressor whose parameter it forces to zero is left out.
+    warm_up : int or None
+        Samples before the first row; None takes the deepest lag.
+
+    Returns
+    -------
+    Estimated or Outcome
+        The failure's outcome: INFEASIBLE, SINGULAR or TOO_FEW_ROWS.
+    """
+    constrained = constraint(constraints).constrain(canonical_order(regressors))
+    if isinstance(constrained, Outcome):
+        return constrained
+    structure = Model(constrained.regressors, None, record.input_names, record.output_name, record.dt)
+    first = structure.maximum_lag if warm_up is None else warm_up
+    *psi, y = regressor_matrix([*structure.regressors, Lagged(0, 0)], record, first)
+    found = constrained_least_squares(np.array(psi), y, constrained.S, constrained.c)
+    if not found.outcome:
+        return found.outcome
+    return Estimated(
+        structure.with_parameters(found.theta.tolist(), found.standard_errors.tolist()),
+        found.residual_variance,
+    )

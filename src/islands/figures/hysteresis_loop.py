@@ -1,0 +1,81 @@
+"""Hysteresis loops: the output against the inputs, as the paper's Figures 5 and 7 show them."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.figures.diverging_lines import broken, divergence, drawable, limits, within_reach
+from islands.figures.downsampling import thin
+from islands.figures.style import (
+    MEASURED,
+    MEASURED_WIDTH,
+    SIMULATED,
+    SIMULATED_WIDTH,
+    blank,
+    house_style,
+    label,
+    settled,
+)
+from islands.figures.windows import LOOPS, last_loops, loop_starts
+
+#: Panels side by side.
+_COLUMNS = 3
+
+
+@house_style()
+def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") -> Figure:
+    """Draw the measured and the simulated output against every input.
+
+    Of a record with more loops the last five are shown.
+
+    Parameters
+    ----------
+    record : Dataset
+    simulated : ndarray, shape (samples,)
+        NaN where there is no prediction; in the unit of the output.
+    title : str
+
+    Returns
+    -------
+    Figure
+        One axes for each input.
+
+    Raises
+    ------
+    SettingsError
+        The simulation has not one value for every sample.
+    """
+    yhat = drawable(record, simulated)
+    rows = last_loops(record)
+    shown, shown_yhat = record[rows], yhat[rows]
+    columns = min(record.inputs, _COLUMNS)
+    height = -(-record.inputs // columns)
+    figure = blank(0.4 + (4.2 if columns == 1 else 3.4 if columns == 2 else 2.7) * height, title)
+    panels = figure.subplots(height, columns, squeeze=False, sharey=True).flat
+    for channel, axes in zip(range(height * columns), panels, strict=True):
+        if channel < record.inputs:
+            _loop(axes, shown, shown_yhat, channel)
+        else:
+            axes.remove()
+    first = figure.axes[0]
+    diverged = bool(divergence(record, yhat))
+    first.set_ylim(limits(shown.y, within_reach(record, shown_yhat) if diverged else shown_yhat))
+    figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    part = f"the last {LOOPS} of {len(loop_starts(record))} loops" if shown.samples < record.samples else ""
+    lost = "no simulated value" if np.isnan(yhat).all() else "the simulation diverged" if diverged else ""
+    first.set_title("; ".join(filter(None, (part, lost))), fontsize=8.0)
+    return settled(figure)
+
+
+def _loop(axes: Axes, record: Dataset, yhat: NDArray[np.float64], channel: int) -> None:
+    u = broken(record, record.u[:, channel])
+    for values, colour, width, name in (
+        (record.y, MEASURED, 0.8 * MEASURED_WIDTH, "measured"),
+        (yhat, SIMULATED, SIMULATED_WIDTH, "simulated"),
+    ):
+        axes.plot(*thin(u, broken(record, values)), color=colour, lw=width, label=name)
+    axes.set_xlabel(label(record.input_names[channel], record.input_units[channel]))
+    if channel % _COLUMNS == 0:
+        axes.set_ylabel(label(record.output_name, record.output_unit))

@@ -1,0 +1,93 @@
+"""Files that hold one array per column, which NumPy archives, MAT-files and Parquet have in common."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.errors import RecordError
+from islands.io.records.column_names import structures_of
+from islands.io.records.table import Columns, Rows, select
+from islands.io.records.validation import check_equal_length
+
+#: Names, in lower case, under which a file states its sampling, and the sampling time in seconds.
+SAMPLING: dict[str, Callable[[float], float]] = {
+    "dt": lambda seconds: seconds,
+    "ts": lambda seconds: seconds,
+    "fs": lambda hertz: 1.0 / hertz,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channels:
+    """A file of arrays; an array is loaded when it is asked for.
+
+    Attributes
+    ----------
+    file : str
+        The file's name.
+    names : tuple of str
+        Names of the arrays.
+    load : callable
+        The array of a name as it stands in the file; raises `RecordError`.
+    scalars : sequence of str
+        Arrays that may be single numbers: those called as in `SAMPLING` state the sampling.
+    """
+
+    file: str
+    names: tuple[str, ...]
+    load: Callable[[str], NDArray[Any]]
+    scalars: Sequence[str] = ()
+
+    def stated(self, structure: str) -> Mapping[str, float]:
+        """Return the sampling times that the file states; see `islands.io.records.table.Table`."""
+        structures = structures_of(self.names)
+        stated: dict[str, float] = {}
+        for home in dict.fromkeys((structure, "")):
+            for name in self.scalars:
+                convert = SAMPLING.get(name.removeprefix(home).lower()) if structures[name] == home else None
+                array = np.empty(0) if convert is None else self.load(name)
+                if convert is not None and array.size == 1:
+                    stated[name] = convert(_positive(array, name, self.file))
+            if stated:
+                break
+        return stated
+
+    def read(self, names: Sequence[str], rows: slice | None) -> Columns:
+        """Convert the named arrays over the selected rows; see `islands.io.records.table.Table`."""
+        channels = {name: _channel(self.load(name), name, self.file) for name in names}
+        check_equal_length({name: len(channel) for name, channel in channels.items()}, self.file)
+        chosen = select(rows, len(channels[names[0]]), self.file)
+        return Columns(
+            Rows(self.file, "sample", chosen),
+            {name: channel[chosen.start : chosen.stop] for name, channel in channels.items()},
+            chosen.start,
+        )
+
+    def remarks(self, names: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002
+        """Return nothing: arrays leave nothing to infer."""
+        return ()
+
+
+def _positive(array: NDArray[Any], name: str, file: str) -> float:
+    value = float(array.item()) if array.dtype.kind in "fiu" else float("nan")
+    if not (np.isfinite(value) and value > 0):
+        raise RecordError(
+            f"{file}: array {name} states the sampling as {array.item()!r}: it is a positive number, "
+            "dt and Ts in seconds, fs in hertz"
+        )
+    return value
+
+
+def _channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
+    if array.dtype.kind not in "fiub":
+        raise RecordError(f"{file}: column {name} holds {array.dtype} where real numbers are expected")
+    if not (array.ndim == 1 or (array.ndim == 2 and 1 in array.shape)):
+        raise RecordError(
+            f"{file}: column {name} has the shape {array.shape}, a channel has (samples,): save one "
+            "array per channel and recording"
+        )
+    with np.errstate(invalid="ignore"):  # of a NaN that signals, which becomes a quiet one
+        return array.ravel().astype(np.float64)

@@ -1,0 +1,217 @@
+"""A result folder: ``result.json``, one file a model, and a summary to read."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.io.models import terms_document, write_model
+from islands.model.equations import equation, latex_equation
+from islands.search_result import Assessed, Findings
+from islands.validation.assessment import PARTS
+from islands.validation.physics import Physics
+from islands.validation.residual_tests import ResidualTests
+
+SCHEMA = "islands._result/1"
+
+
+def result_json(findings: Findings) -> str:
+    """Write ``result.json``."""
+    return json.dumps(result_document(findings), indent=2, allow_nan=False) + "\n"
+
+
+def result_document(findings: Findings) -> dict[str, Any]:
+    """Describe a result; numbers that JSON does not know (NaN, infinity) become null."""
+    search = findings.search
+    document = {
+        "schema": SCHEMA,
+        "record": record_document(findings.record),
+        "seed": findings.seed,
+        "settings": dict(findings.settings),
+        "search": {
+            "evaluations": search.evaluations,
+            "evaluations_per_second": search.evaluations_per_second,
+            "wall_s": search.wall_s,
+            "outcomes": dict(search.outcomes),
+            "full_set": dict(search.full_set),
+            "generations": search.generations,
+            "ended_by": search.ended_by,
+            "duplicates": search.duplicates,
+            "feasible_share": search.feasible_share,
+            "caches": {
+                name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
+            },
+        },
+        "models": [_model_document(rank, entry) for rank, entry in enumerate(findings.models, start=1)],
+    }
+    described: dict[str, Any] = _finite(document)
+    return described
+
+
+def record_document(record: Dataset) -> dict[str, Any]:
+    """Describe a record."""
+    return {
+        "sha256": record.sha256 or content_sha256(record),
+        "samples": record.samples,
+        "dt": record.dt,
+        "start": record.start,
+        "names": {"inputs": list(record.input_names), "output": record.output_name},
+        "units": {"inputs": list(record.input_units), "output": record.output_unit},
+        "segments": list(record.segments),
+    }
+
+
+def content_sha256(record: Dataset) -> str:
+    """Return the hash of a record that came from no file: of its numbers, sampling time and segments."""
+    digest = hashlib.sha256(np.ascontiguousarray(record.u).tobytes())
+    digest.update(record.y.tobytes())
+    digest.update(repr((record.dt, record.segments)).encode())
+    return digest.hexdigest()
+
+
+def _model_document(rank: int, entry: Assessed) -> dict[str, Any]:
+    model, assessment = entry.model, entry.assessment
+    return {
+        "rank": rank,
+        "size": model.size,
+        "equation": equation(model),
+        "latex": latex_equation(model),
+        "terms": terms_document(model),
+        "metrics": {
+            part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
+        },
+        "outcomes": {
+            part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
+        },
+        "information": asdict(assessment.information),
+        "physics": physics_document(assessment.physics),
+        "residual_tests": residual_tests_document(assessment.residual_tests),
+    }
+
+
+def physics_document(physics: Physics) -> dict[str, Any]:
+    """Describe a physics check."""
+    return {
+        "property_1": physics.property_1,
+        "clusters": [asdict(entry) for entry in physics.clusters],
+        "hold_drift_percent": physics.hold_drift_percent,
+        "holds": [asdict(entry) for entry in physics.holds],
+        "excursions": [asdict(entry) for entry in physics.excursions],
+    }
+
+
+def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
+    """Describe residual tests."""
+    return {
+        "passed": tests.passed,
+        "whiteness_p": tests.whiteness_p,
+        "ljung_box": tests.ljung_box,
+        "tests": [
+            {
+                "name": test.name,
+                "input": test.input,
+                "passed": test.passed,
+                "inside_percent": test.inside_percent,
+                "limit": test.limit,
+                "largest": float(
+                    np.abs(test.values[test.lags != 0] if test.name == "xi_xi" else test.values).max()
+                ),
+                "note": test.note,
+            }
+            for test in tests.tests
+        ],
+    }
+
+
+def write_result(findings: Findings, folder: Path) -> None:
+    """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``.
+
+    Models of a result that was in the folder are removed.
+    """
+    models = folder / "models"
+    models.mkdir(parents=True, exist_ok=True)
+    for path in models.glob("[0-9][0-9]*.json"):
+        path.unlink()
+    for rank, entry in enumerate(findings.models, start=1):
+        write_model(entry.model, models / f"{rank:02d}.json")
+    (folder / "summary.txt").write_text(summary(findings), encoding="utf-8")
+    (folder / "result.json").write_text(result_json(findings), encoding="utf-8")
+
+
+def summary(findings: Findings) -> str:
+    """Write the result as plain text."""
+    record, search = findings.record, findings.search
+    outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
+    full = search.full_set
+    lines = [
+        f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
+        ", ".join(f"{name} {value}" for name, value in findings.settings.items()) + f", seed {findings.seed}",
+        f"{search.evaluations} models estimated: {outcomes}",
+        f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
+        "",
+        *table(findings.models),
+        "",
+        *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(findings.models, start=1)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+#: Columns of the table of models: heading, format, and where the number is found.
+COLUMNS = (
+    "rank",
+    "terms",
+    "MAPE est. %",
+    "MAPE val. %",
+    "R2 val.",
+    "hold drift %",
+    "Property 1",
+    "residuals",
+)
+
+
+def table(models: Sequence[Assessed]) -> list[str]:
+    """Return a table of models as lines of equal width, errors those of the free run."""
+    rows = [COLUMNS, *(row(rank, entry) for rank, entry in enumerate(models, start=1))]
+    widths = [max(len(line[column]) for line in rows) for column in range(len(COLUMNS))]
+    return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in rows]
+
+
+def row(rank: int, entry: Assessed) -> tuple[str, ...]:
+    """Return one model's row of the table."""
+    metrics, physics = entry.assessment.metrics, entry.assessment.physics
+    estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
+    estimated, validated = (bool(entry.assessment.outcomes[part]["free_run"]) for part in PARTS)
+    rests = all(hold.bounded for hold in physics.holds)
+    return (
+        str(rank),
+        str(entry.model.size),
+        number(estimation.mape, "{:.4f}", estimated),
+        number(validation.mape, "{:.4f}", validated),
+        number(validation.r2, "{:.5f}", validated),
+        number(physics.hold_drift_percent, "{:.3f}", rests),
+        "yes" if physics.property_1 else "no",
+        "pass" if entry.assessment.residual_tests.passed else "fail",
+    )
+
+
+def number(value: float, form: str, bounded: bool) -> str:
+    """Format a number, or say that the simulation behind it diverged; "-" where the output has no range."""
+    if not bounded:
+        return "diverged"
+    return form.format(value) if isfinite(value) else "-"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return _finite(value.item())
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value

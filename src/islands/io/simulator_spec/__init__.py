@@ -1,0 +1,1 @@
+"""Specifications of simulators: schema, factory, extended simulations as JSON. Read `schema` first."""

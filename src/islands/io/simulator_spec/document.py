@@ -1,0 +1,156 @@
+"""Extended simulations as documents: ``extended.json``, which is read as a simulation again."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from islands.data.dataset import Dataset
+from islands.discrepancy.calibration.levenberg_marquardt import Calibrated
+from islands.discrepancy.effects import model_form
+from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.simulators.intersample import Between, Hold
+from islands.discrepancy.simulators.linear import LinearCore
+from islands.discrepancy.simulators.narx import NarxCore
+from islands.discrepancy.simulators.python_function import ProgramCore
+from islands.discrepancy.simulators.recorded_output import ColumnCore
+from islands.discrepancy.simulators.saved_extension import ExtensionCore
+from islands.io.models import model_json
+from islands.io.simulator_spec.schema import (
+    ColumnSpec,
+    EffectSpec,
+    FrameSpec,
+    LinearSpec,
+    LocalExtendedSpec,
+    LocalSpec,
+    ModelSpec,
+    PhysicalSpec,
+    ProgramSpec,
+    ScalesSpec,
+    ValueSpec,
+)
+
+
+def extended_json(fit: Calibrated, record: Dataset) -> str:
+    """Write a simulation with its effects, and the values of both."""
+    return json.dumps(extended_document(fit, record), indent=2, allow_nan=False) + "\n"
+
+
+def extended_document(fit: Calibrated, record: Dataset) -> dict[str, Any]:
+    """Describe a simulation with its effects, and the values of both.
+
+    A parameter that was found to be wrong is put right, and terms that a model lacks are written into it:
+    they are no effects any more.
+    """
+    simulation, values = fit.simulation, fit.values.copy()
+    names = [parameter.name for parameter in simulation.core.parameters]
+    for effect in simulation.effects:
+        if effect.site == Site.PARAMETER:
+            place = names.index(effect.name.partition(":")[2])
+            values[place] *= 1.0 + values[simulation.part(effect)][0]
+    parts = [(effect, simulation.part(effect)) for effect in simulation.effects]
+    shape = {
+        parameter.name: float(value)
+        for effect, part in parts
+        if effect.name == model_form.NAME
+        for parameter, value in zip(simulation.parameters[part], values[part], strict=True)
+    }
+    found = [
+        _effect(effect, simulation.parameters[part], values[part])
+        for effect, part in parts
+        if effect.site != Site.PARAMETER and effect.name != model_form.NAME
+    ]
+    names_of = (record.input_names, record.output_name)
+    return _extended(
+        simulation.core, values[: len(names)], found, simulation.scene, *names_of, shape
+    ).model_dump(mode="json", by_alias=True)
+
+
+def described(
+    core: Core,
+    values: Signal,
+    inputs: tuple[str, ...],
+    output: str,
+    shape: Mapping[str, float] | None = None,
+) -> LocalSpec:
+    """Say how a core with values is asked for; ``shape`` is what an identified model in it lacks.
+
+    What belongs to a record, the state at its first sample, is not said: another record begins elsewhere.
+    """
+    named = {
+        parameter.name: float(value)
+        for parameter, value in zip(core.parameters, values, strict=True)
+        if not parameter.initial
+    }
+    match core:
+        case ExtensionCore():
+            own, found, at = len(core.core.parameters), [], 0
+            for effect in core.added:
+                parameters = effect.parameters(core.scales)
+                here = slice(own + at, own + at + len(parameters))
+                found.append(_effect(effect, parameters, values[here]))
+                at += len(parameters)
+            return _extended(core.core, values[:own], found, core.scales, inputs, output, shape)
+        case NarxCore():
+            model = core.with_shape(values, shape) if shape else core.with_values(values)
+            return ModelSpec(kind="model", model=json.loads(model_json(model)), name=core.name)
+        case ColumnCore():
+            return ColumnSpec(kind="column", column=core.column)
+        case LinearCore():
+            order = core.denominator.size
+            coefficients = tuple(map(float, values))
+            return LinearSpec(
+                kind="linear",
+                order=order,
+                delay=core.delay,
+                numerator=coefficients[: order + 1],
+                denominator=coefficients[order + 1 : 2 * order + 1],
+                level=coefficients[2 * order + 1],
+            )
+        case ProgramCore():
+            path, _, function = core.source.rpartition(":")
+            return ProgramSpec(kind="python", path=path, function=function, parameters=named)
+    return PhysicalSpec(kind=core.name, parameters=named)  # type: ignore[arg-type]
+
+
+def _extended(
+    core: Core,
+    values: Signal,
+    effects: Sequence[EffectSpec],
+    scales: Scene,
+    inputs: tuple[str, ...],
+    output: str,
+    shape: Mapping[str, float] | None = None,
+) -> LocalExtendedSpec:
+    hold, times, inner = Hold.FIRST, 1, core
+    if isinstance(core, Between):
+        hold, times, inner = core.hold, core.times, core.core
+    return LocalExtendedSpec(
+        inputs=inputs,
+        output=output,
+        core=described(inner, values, inputs, output, shape),
+        hold=hold.value,
+        times=times,
+        effects=tuple(effects),
+        scales=ScalesSpec(
+            dt=scales.dt,
+            input_peak=scales.input_peak,
+            output_peak=scales.output_peak,
+            fitted_s=scales.fitted,
+            duration_s=scales.duration,
+            frame=FrameSpec.model_validate(asdict(scales.frame)),
+        ),
+    )
+
+
+def _effect(effect: Effect, parameters: Sequence[Parameter], values: Signal) -> EffectSpec:
+    return EffectSpec(
+        name=effect.name,
+        site=str(effect.site),
+        parameters={
+            parameter.name: ValueSpec(value=float(value), unit=parameter.unit)
+            for parameter, value in zip(parameters, values, strict=True)
+        },
+    )

@@ -1,0 +1,255 @@
+"""Constrained least squares from inner products: every constraint fixes the sum of a group of parameters.
+
+``sum of w_j theta_j over a group = c``, and groups have no member in common (the clusters of the paper,
+section 3). One member of each group, the pivot, is eliminated: the others then stand for ``psi_j - (w_j /
+w_p) psi_p``, the target for ``y - (c / w_p) psi_p``, and what is left is free. That is equation (4) in the
+null space of its constraints, without an inverse.
+
+Sums over columns that are differences belong to one individual alone: they are folded chunk by chunk.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.kernels.jit_cache import kernel
+from islands.kernels.regressor_columns import arena_for, evaluate
+from islands.kernels.simd import VECTOR, fold, load, multiply, room, splat, store, subtract
+from islands.kernels.summation import CHUNK, dot_chunk
+
+#: Squared pivots under this, beside the regressors' own norms, leave fewer than about six digits of the
+#: parameters.
+ILL_CONDITIONED = 1e-10
+
+#: Squared pivots under this are rounding.
+SINGULAR = 1e-13
+
+
+class Factor(NamedTuple):
+    """A Cholesky factor of an equilibrated matrix.
+
+    Attributes
+    ----------
+    lower : ndarray of float64, shape (free, free)
+    scale : ndarray of float64, shape (free,)
+        What the matrix was multiplied by from both sides.
+    """
+
+    lower: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+
+class Reduction(NamedTuple):
+    """How the parameters follow from the free ones.
+
+    Attributes
+    ----------
+    pivot : ndarray of int64, shape (terms,)
+        The pivot of a term's group; -1: the term has no group.
+    share : ndarray of float64, shape (terms,)
+        ``w_j / w_p``.
+    fixed : ndarray of float64, shape (terms,)
+        ``c / w_p`` at a pivot, 0 elsewhere.
+    free : ndarray of int64, shape (free,)
+        Terms that are no pivot.
+    """
+
+    pivot: NDArray[np.int64]
+    share: NDArray[np.float64]
+    fixed: NDArray[np.float64]
+    free: NDArray[np.int64]
+
+
+@kernel
+def reduce(
+    gram,  # float64 [term + 1, term + 1]: inner products of the terms and, last, the target
+    terms,
+    group,  # int64 [term]: the group of each, -1 for none
+    weight,  # float64 [term]
+    wanted,  # float64 [term]: what the term's group sums to
+):
+    """Choose the pivots, of every group the member with the largest weight beside its norm."""
+    pivot = np.full(terms, -1, np.int64)
+    share = np.zeros(terms)
+    fixed = np.zeros(terms)
+    for j in range(terms):
+        if group[j] < 0 or pivot[j] >= 0:
+            continue
+        best, largest = j, -1.0
+        for i in range(j, terms):
+            if group[i] == group[j]:
+                size = abs(weight[i]) / np.sqrt(gram[i, i])
+                if size > largest:
+                    best, largest = i, size
+        fixed[best] = wanted[j] / weight[best]
+        for i in range(j, terms):
+            if group[i] == group[j]:
+                pivot[i] = best
+                share[i] = weight[i] / weight[best]
+    return Reduction(pivot, share, fixed, np.flatnonzero(pivot != np.arange(terms)))
+
+
+@kernel
+def from_gram(gram, terms, reduction, factor, eta):
+    """Estimate the free parameters from the Gram matrix; return the least squared pivot, 0 without a factor.
+
+    ``eta``, out, float64 [free]; ``factor``, out, is what `correct` takes. Under `ILL_CONDITIONED` the result
+    needs a correction, under `SINGULAR` it is none.
+    """
+    free = reduction.free
+    count = free.size
+    reduced, right = np.empty((count, count)), np.empty(count)
+    norms = np.empty(count)
+    for a in range(count):
+        norms[a] = gram[free[a], free[a]]
+        for b in range(a + 1):
+            reduced[a, b] = _product(gram, reduction, free[a], free[b])
+        right[a] = _left(gram, reduction, free[a], terms)
+        for p in range(terms):
+            if reduction.fixed[p] != 0.0:
+                right[a] -= reduction.fixed[p] * _left(gram, reduction, free[a], p)
+    least = _factorise(reduced, norms, factor)
+    if least > 0.0:
+        _solve(factor, right, eta)
+    return least
+
+
+@kernel
+def from_columns(program, rows, terms, reduction, factor, eta):
+    """Do the same from the columns: the pivots' share is taken off them before they are squared.
+
+    The program's last term is the target. The result needs a correction.
+    """
+    free = reduction.free
+    count = free.size
+    arena, place = arena_for(program)
+    chunk = room((terms + 1) * CHUNK)
+    reduced, right = np.zeros((count, count)), np.zeros(count)
+    for index in range(rows.offset.size):
+        evaluate(program, rows, index, arena, place, chunk)
+        _reduce_columns(chunk, terms, reduction)
+        for a in range(count):
+            one = free[a] * CHUNK
+            right[a] += fold(dot_chunk(chunk, one, chunk, terms * CHUNK))
+            for b in range(a + 1):
+                reduced[a, b] += fold(dot_chunk(chunk, one, chunk, free[b] * CHUNK))
+    least = _factorise(reduced, np.diag(reduced), factor)
+    if least > 0.0:
+        _solve(factor, right, eta)
+    return least
+
+
+@kernel
+def correct(program, rows, terms, reduction, factor, eta):
+    """Correct the free parameters by the corrected seminormal equations (Bjorck 1987).
+
+    What the residual still holds of the columns is solved for once more. The program's last term is the
+    target.
+    """
+    free = reduction.free
+    arena, place = arena_for(program)
+    chunk = room((terms + 1) * CHUNK)
+    target = terms * CHUNK
+    right, correction = np.zeros(free.size), np.empty(free.size)
+    for index in range(rows.offset.size):
+        evaluate(program, rows, index, arena, place, chunk)
+        _reduce_columns(chunk, terms, reduction)
+        for a in range(free.size):
+            _take_off(chunk, target, eta[a], free[a] * CHUNK)
+        for a in range(free.size):
+            right[a] += fold(dot_chunk(chunk, free[a] * CHUNK, chunk, target))
+    _solve(factor, right, correction)
+    eta += correction
+
+
+@kernel
+def expand(reduction, eta, theta):
+    """Return to all parameters, ``theta``: those of the pivots make up what their groups' sums still lack."""
+    theta[:] = reduction.fixed
+    for a in range(eta.size):
+        j = reduction.free[a]
+        theta[j] = eta[a]
+        if reduction.pivot[j] >= 0:
+            theta[reduction.pivot[j]] -= reduction.share[j] * eta[a]
+
+
+@kernel
+def _product(gram, reduction, i, j):
+    """Return the inner product of two reduced columns."""
+    total = _left(gram, reduction, i, j)
+    if reduction.pivot[j] >= 0:
+        total -= reduction.share[j] * _left(gram, reduction, i, reduction.pivot[j])
+    return total
+
+
+@kernel
+def _left(gram, reduction, i, column):
+    """Return the inner product of a reduced column and one of the Gram matrix."""
+    if reduction.pivot[i] < 0:
+        return gram[i, column]
+    return gram[i, column] - reduction.share[i] * gram[reduction.pivot[i], column]
+
+
+@kernel
+def _reduce_columns(chunk, terms, reduction):
+    for j in range(terms):
+        p = reduction.pivot[j]
+        if reduction.fixed[j] != 0.0:
+            _take_off(chunk, terms * CHUNK, reduction.fixed[j], j * CHUNK)
+        if p >= 0 and p != j:
+            _take_off(chunk, j * CHUNK, reduction.share[j], p * CHUNK)
+
+
+@kernel(forceinline=True)
+def _take_off(chunk, at, share, other):
+    """``chunk[at] -= share * chunk[other]``, a column each."""
+    for row in range(0, CHUNK, 4 * VECTOR):
+        part = multiply(splat(share, 4), load(chunk, other + row, 4))
+        store(chunk, at + row, subtract(load(chunk, at + row, 4), part))
+
+
+@kernel
+def _factorise(matrix, norms, factor):
+    """Factor the equilibrated matrix, ``lower lower' = scale matrix scale`` (Cholesky), given its lower half.
+
+    Return the least squared pivot beside the ``norms``, or 0 where one is not positive.
+    """
+    lower, scale = factor
+    least = np.inf
+    for i in range(norms.size):
+        if not (matrix[i, i] > 0.0 and np.isfinite(matrix[i, i])):
+            return 0.0
+        scale[i] = 1.0 / np.sqrt(matrix[i, i])
+    for i in range(norms.size):
+        for j in range(i + 1):
+            total = matrix[i, j] * scale[i] * scale[j]
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            if i > j:
+                lower[i, j] = total / lower[j, j]
+            elif total > 0.0:
+                lower[i, i] = np.sqrt(total)
+                least = min(least, total * matrix[i, i] / norms[i])
+            else:
+                return 0.0
+    return least
+
+
+@kernel
+def _solve(factor, right, solution):
+    """Solve ``matrix solution = right`` with the factor of the equilibrated matrix."""
+    lower, scale = factor
+    count = right.size
+    for i in range(count):
+        total = right[i] * scale[i]
+        for k in range(i):
+            total -= lower[i, k] * solution[k]
+        solution[i] = total / lower[i, i]
+    for i in range(count - 1, -1, -1):
+        total = solution[i]
+        for k in range(i + 1, count):
+            total -= lower[k, i] * solution[k]
+        solution[i] = total / lower[i, i]
+    for i in range(count):
+        solution[i] *= scale[i]

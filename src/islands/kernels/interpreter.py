@@ -1,0 +1,118 @@
+"""The row machine: a flat program, and what one of its instructions does to a row of lanes.
+
+A program never touches single numbers. Its operands are rows of consecutive float64, given by their
+addresses, so the cost of decoding an instruction is shared by the whole row.
+
+Nothing here is a reduction, so the processor's vector width cannot change a result.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from islands.kernels.jit_cache import kernel
+from islands.kernels.simd import VECTOR, add, multiply, read, sign, subtract, write
+
+#: Instructions built into the machine; every other one calls a row function through its address.
+ADD, SUBTRACT, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SIGN_OF_PRODUCT, CALL = range(7)
+
+#: The largest number of factors that one term multiplies on the fly.
+MAX_FACTORS = 4
+
+#: In the place of an operand's channel: it is no signal.
+TEMPORARY = -1
+
+
+class Program(NamedTuple):
+    """A flat three-address program over rows, and the terms that it prepares.
+
+    Attributes
+    ----------
+    code : ndarray of int64, shape (instructions, 4)
+        Operation, target temporary, first operand, second operand.
+    addresses : ndarray of int64, shape (instructions,)
+        Machine address of the row function that a CALL calls, else 0.
+    operands : ndarray of int64, shape (operands, 2)
+        Channel and lag, or `TEMPORARY` and its index. Channel 0 is the output.
+    constants : ndarray of float64
+        The first temporaries hold these.
+    temporaries : int
+        Rows of temporaries, those of the constants included.
+    factors : ndarray of int64, shape (terms, 4)
+        Operands whose product is the term.
+    degree : ndarray of int64, shape (terms,)
+        How many factors a term has.
+    """
+
+    code: NDArray[np.int64]
+    addresses: NDArray[np.int64]
+    operands: NDArray[np.int64]
+    constants: NDArray[np.float64]
+    temporaries: int
+    factors: NDArray[np.int64]
+    degree: NDArray[np.int64]
+
+
+_DOUBLES = ir.DoubleType().as_pointer()
+
+
+@intrinsic
+def call_row(_typingctx, address, target, first, second, lanes):
+    """Call ``void (double *target, double *first, double *second, int64 lanes)`` at a machine address."""
+
+    def generate(context, builder, _signature, arguments):
+        integer = ir.IntType(64)
+        prototype = ir.FunctionType(ir.VoidType(), [_DOUBLES, _DOUBLES, _DOUBLES, integer])
+        function = builder.inttoptr(arguments[0], prototype.as_pointer())
+        rows = [builder.inttoptr(argument, _DOUBLES) for argument in arguments[1:4]]
+        builder.call(function, [*rows, arguments[4]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64, types.int64, types.int64), generate
+
+
+@kernel(forceinline=True)
+def execute(operation, target, first, second, function, count, times):
+    """Carry out one instruction on rows: ``target = operation(first, second)``.
+
+    ``target``, ``first`` and ``second`` are addresses; ``function`` is that of a CALL. A row is ``times``
+    times ``count`` vectors, both constants, of which ``count`` are worked at once.
+    """
+    step, size = 8 * VECTOR * count, 8 * VECTOR * count * times
+    if operation == CALL:
+        call_row(function, target, first, second, VECTOR * count * times)
+    elif operation == MULTIPLY:
+        for at in range(0, size, step):
+            write(target + at, multiply(read(first + at, count), read(second + at, count)))
+    elif operation == SUBTRACT:
+        for at in range(0, size, step):
+            write(target + at, subtract(read(first + at, count), read(second + at, count)))
+    elif operation == SIGN_OF_DIFFERENCE:
+        for at in range(0, size, step):
+            write(target + at, sign(subtract(read(first + at, count), read(second + at, count))))
+    elif operation == SIGN_OF_PRODUCT:
+        for at in range(0, size, step):
+            write(target + at, sign(multiply(read(first + at, count), read(second + at, count))))
+    elif operation == SIGN:
+        for at in range(0, size, step):
+            write(target + at, sign(read(first + at, count)))
+    else:
+        for at in range(0, size, step):
+            write(target + at, add(read(first + at, count), read(second + at, count)))
+
+
+@kernel(forceinline=True)
+def multiply_factors(a, b, c, d, degree, count):
+    """Return the product of the first ``degree`` of four rows, from the left; they are given as addresses."""
+    product = read(a, count)
+    if degree > 1:
+        product = multiply(product, read(b, count))
+        if degree > 2:
+            product = multiply(product, read(c, count))
+            if degree > 3:
+                product = multiply(product, read(d, count))
+    return product

@@ -1,0 +1,116 @@
+"""The regressor matrix and its Gram matrix over the rows of a record."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.errors import RecordError, SettingsError
+from islands.kernels import gram as gram_kernel
+from islands.kernels import regressor_columns as column_kernel
+from islands.kernels.interpreter import Program
+from islands.kernels.regressor_columns import LANES, TIMES, Rows
+from islands.kernels.simd import room
+from islands.program.term_pool import Term, link
+
+
+def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray[np.float64]:
+    """Return Psi transposed, shape (terms, rows): each term on every row of every segment after its warm-up.
+
+    A term may be a bare canonical expression of lag 0 and more: the target y(k) is ``Lagged(0, 0)``.
+
+    Raises
+    ------
+    RecordError
+        An output is missing, no segment is longer than the warm-up, or a term reads an input that the
+        record does not have.
+    SettingsError
+        The warm-up is shorter than the deepest lag of the terms.
+    """
+    program = link(terms)
+    _refuse_unreadable(program, record, warm_up)
+    rows = rows_of(record, warm_up)
+    out = np.empty((len(terms), rows.count))
+    column_kernel.columns(program, rows, out)
+    return out
+
+
+def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray[np.float64]:
+    """Return the inner products of all pairs of terms, shape (terms, terms), without holding the columns.
+
+    Raises
+    ------
+    RecordError, SettingsError
+        As in `regressor_matrix`.
+    """
+    program = link(terms)
+    _refuse_unreadable(program, record, warm_up)
+    out = np.empty((len(terms), len(terms)))
+    gram_kernel.gram(program, rows_of(record, warm_up), out)
+    return out
+
+
+def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
+    # The kernel does not check: it would read another signal's samples, or none of the record's.
+    read = program.operands[program.operands[:, 0] >= 0]
+    channel, lag = read.max(axis=0, initial=0)
+    if channel > record.inputs:
+        raise RecordError(f"the terms read input {channel}, the record has {record.inputs}")
+    if lag > warm_up:
+        raise SettingsError(f"the terms read {lag} samples back, the warm-up has {warm_up}")
+
+
+def rows_of(record: Dataset, warm_up: int) -> Rows:
+    """Return the rows that estimate: those of every segment after its warm-up.
+
+    Raises
+    ------
+    RecordError
+        An output is missing, or no segment is longer than the warm-up.
+    """
+    missing = np.flatnonzero(np.isnan(record.y))
+    if missing.size:
+        raise RecordError(
+            f"{record.output_name} is missing at sample {missing[0]}: estimation needs every sample, "
+            "cut the record there and pass the parts as segments"
+        )
+    spans = [
+        (begin + warm_up, end - begin - warm_up) for begin, end in record.bounds if end - begin > warm_up
+    ]
+    if not spans:
+        raise RecordError(
+            f"the longest recording has {max(record.segments)} samples and {warm_up} are needed before the "
+            "first row: take a longer recording or smaller lags"
+        )
+    return arranged(np.vstack([record.y, record.u.T]), spans, warm_up)
+
+
+def arranged(signals: NDArray[np.float64], spans: Sequence[tuple[int, int]], warm_up: int) -> Rows:
+    """Arrange signals in chunks of times and lanes.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (channel, sample)
+    spans : sequence of pairs of int
+        Of every segment the sample of its first row, and how many rows it has.
+    warm_up : int
+        Samples before each first row that may be read.
+    """
+    samples, chunks = [], []
+    flat = count = 0
+    for first, rows in spans:
+        length = -(-rows // LANES)
+        times = -(-length // TIMES) * TIMES
+        time, lane = np.arange(times), np.arange(LANES)
+        samples.append(first + np.arange(-warm_up, times)[:, None] + length * lane)
+        begin = flat + (warm_up + time[::TIMES]) * LANES
+        full = np.where(time < length, -(-(rows - time) // length), 0).reshape(-1, TIMES)
+        chunks.append((begin, full, (count + time).reshape(-1, TIMES), np.full(begin.size, length)))
+        flat, count = flat + (warm_up + times) * LANES, count + rows
+    # What stands behind a segment's last row is read and never counted.
+    places = np.minimum(np.concatenate(samples), signals.shape[1] - 1).reshape(-1)
+    gathered = room(len(signals) * flat).reshape(-1, flat)
+    gathered[:] = signals[:, places]
+    offset, lanes, row, apart = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
+    return Rows(gathered, offset, lanes, row, apart, count)

@@ -1,0 +1,260 @@
+"""MAT-files that are damaged or lie: each is refused in words, before memory is taken for what it claims."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.io.records import columns_of, read_record
+from islands.io.records.mat.workspace import ADVICE
+from islands.io.records.size_limits import MOST_SAMPLES
+
+K = np.arange(60)
+U, Y = K % 7 - 3.0, K * K % 11 + 0.5
+
+INT8, INT32, UINT32, DOUBLE, MATRIX, COMPRESSED = 1, 5, 6, 9, 14, 15
+CLASSES = {"cell": 1, "struct": 2, "double": 6, "function_handle": 16}
+
+
+def element(kind, content, size=None):
+    """Write an element of version 5; a size that is given is a lie."""
+    written = struct.pack("<2I", kind, len(content) if size is None else size) + content
+    return written + b"\0" * (0 if kind == COMPRESSED else -len(content) % 8)
+
+
+def matrix(name, kind, shape, *parts, size=None):
+    flags = element(UINT32, struct.pack("<2I", CLASSES[kind], 0))
+    dimensions = element(INT32, struct.pack(f"<{len(shape)}i", *shape))
+    return element(MATRIX, flags + dimensions + element(INT8, name.encode()) + b"".join(parts), size)
+
+
+def numbers(name, values, shape=None, kind=DOUBLE, size=None):
+    return matrix(name, "double", shape or (len(values), 1), element(kind, values.tobytes(), size))
+
+
+def structure(name, **fields):
+    table = b"".join(field.encode().ljust(32, b"\0") for field in fields)
+    width = struct.pack("<2Hi", INT32, 4, 32)
+    return matrix(name, "struct", (1, 1), width, element(INT8, table), *fields.values())
+
+
+def opaque(name, kind):
+    flags = element(UINT32, struct.pack("<2I", 17, 0))
+    words = b"".join(element(INT8, word.encode()) for word in (name, "MCOS", kind))
+    return element(MATRIX, flags + words + numbers("", np.array([3707764736.0, 2.0])))
+
+
+def packed(variable):
+    return element(COMPRESSED, zlib.compress(variable))
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a MAT-file of version 5 from elements, u, y and Ts always among them."""
+
+    def write(*elements):
+        header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x100) + b"IM"
+        sound = numbers("u", U) + numbers("y", Y) + numbers("Ts", np.array([0.1]))
+        (tmp_path / "bad.mat").write_bytes(header + sound + b"".join(elements))
+        return tmp_path / "bad.mat"
+
+    return write
+
+
+def test_the_sound_file_of_these_tests_is_read(write):
+    file = write(numbers("x", U), packed(numbers("z", Y)), packed(structure("s", a=numbers("", U))))
+    assert columns_of(file) == ("u", "y", "Ts", "x", "z", "s.a")
+    record = read_record(file, ["x", "z", "s.a"], "y")
+    assert record.u.tolist() == np.column_stack([U, Y, U]).tolist()
+
+
+@pytest.mark.parametrize("kind", ["timeseries", "timetable", "iddata", "mine"])
+@pytest.mark.parametrize("wrapped", [bytes, packed])
+def test_an_object_does_no_harm_even_if_it_is_called_ts_and_is_refused_with_advice(
+    write, kind, wrapped, refusal
+):
+    file = write(wrapped(opaque("ts", kind)))
+    assert read_record(file, ["u"], "y").dt == pytest.approx(0.1)
+    message = refusal(file, ["ts"])
+    assert f"bad.mat: column ts holds {kind} where real numbers are expected: save " in message
+    assert ADVICE.get(kind, "one vector per channel").format(x="ts") in message
+
+
+def test_what_matlab_keeps_for_itself_is_no_column(write):
+    file = write(numbers("", U), numbers("__function_workspace__", U))
+    assert columns_of(file) == ("u", "y", "Ts")
+
+
+def test_a_function_handle_is_refused_with_advice(write, refusal):
+    assert "column x holds function_handle" in refusal(write(matrix("x", "function_handle", (1, 1))))
+
+
+# Other files, and parts of files
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty: save it anew"),
+        (b"t,u,y\n" + b"0,1,2\n" * 60, "is not a MAT-file"),
+        (b"PK\x03\x04" + bytes(200), "is not a MAT-file"),
+        (bytes(500), "is not a MAT-file"),
+        (
+            b"# Created by Octave 7.3.0\n# name: u\n",
+            "is text in Octave's own format: save it by save -v7 bad.mat",
+        ),
+        (b"\x89HDF\r\n\x1a\n" + bytes(500), "is damaged or cut short"),
+    ],
+)
+def test_a_file_that_is_no_mat_file_is_refused_for_what_it_is(tmp_path, content, words, refusal):
+    (tmp_path / "bad.mat").write_bytes(content)
+    assert f"bad.mat {words}" in refusal(tmp_path / "bad.mat")
+
+
+@pytest.mark.parametrize("version", ["4", "6", "7", "7.3"])
+def test_a_file_that_is_cut_short_is_refused_wherever_it_is_cut(save, version):
+    variables = {"u": U, "y": Y} | ({} if version == "4" else {"s": {"a": U, "b": Y}})
+    file = save(version, **variables, Ts=0.1)
+    content = file.read_bytes()
+    for length in range(1, len(content) - 1, 331 if version == "7.3" else 37):
+        file.write_bytes(content[:length])
+        with pytest.raises(RecordError, match=r"r\.mat"):
+            read_record(file, ["u"], "y", dt=0.1)
+
+
+def test_a_flipped_bit_in_packed_numbers_is_noticed_in_that_column_alone(write, refusal):
+    noise = np.random.default_rng(0).normal(size=500)
+    variable = bytearray(packed(numbers("x", noise)))
+    variable[-60] ^= 1
+    file = write(bytes(variable))
+    assert read_record(file, ["u"], "y").samples == len(U)
+    assert "column x cannot be read" in refusal(file)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda stream: stream[:-4] + bytes(4), "incorrect data check"),
+        (lambda stream: stream[:-9], "it claims 4056 bytes, and as many are not packed"),
+    ],
+)
+def test_packed_numbers_of_another_checksum_or_without_an_end_are_refused(write, change, words, refusal):
+    variable = numbers("x", np.random.default_rng(0).normal(size=500))
+    file = write(element(COMPRESSED, change(zlib.compress(variable))))
+    assert read_record(file, ["u"], "y").samples == len(U)
+    message = refusal(file)
+    assert "column x cannot be read (" in message
+    assert words in message
+
+
+def test_more_packed_bytes_than_claimed_are_refused(write, refusal):
+    file = write(element(COMPRESSED, zlib.compress(numbers("x", U) + bytes(8))))
+    assert "column x cannot be read (it claims 536 bytes, and as many are not packed)" in refusal(file)
+
+
+def test_numbers_of_a_type_that_nobody_knows_are_refused(write, refusal):
+    """SciPy 1.17 looks this type up behind the end of its table and ends the process."""
+    file = write(numbers("x", U, kind=0xFFFF))
+    assert "column x cannot be read (its numbers are of the unknown type 65535)" in refusal(file)
+
+
+def test_a_structure_that_cannot_be_read_does_no_harm(write, refusal):
+    lie = matrix("", "double", (60, 1), element(DOUBLE, U.tobytes()), size=8000)
+    file = write(packed(structure("s", a=numbers("", Y), b=lie)), structure("r", b=lie))
+    assert read_record(file, ["u"], "y").samples == len(U)
+    for name in "sr":
+        assert f"column {name} cannot be read (an element claims 8000 bytes" in refusal(file, [name])
+
+
+def test_an_empty_field_may_take_no_bytes_at_all(write, refusal):
+    file = write(structure("s", a=element(MATRIX, b""), b=numbers("", U)))
+    assert read_record(file, ["s.b"], "y").samples == len(U)
+    assert "column s.a has the shape (0, 0)" in refusal(file, ["s.a"])
+
+
+def test_a_field_that_cannot_be_read_does_no_harm(write, refusal):
+    file = write(structure("s", a=numbers("", Y, shape=(61, 1)), b=numbers("", U)))
+    assert read_record(file, ["s.b"], "y").samples == len(U)
+    assert "column s.a cannot be read (it claims the shape (61, 1)" in refusal(file, ["s.a"])
+
+
+def test_structures_in_structures_end_somewhere(write, refusal):
+    nested = numbers("", U)
+    for _ in range(100):
+        nested = structure("", a=nested)
+    message = refusal(write(structure("s", a=nested)), ["s"])
+    assert "column s cannot be read (structures stand in one another more than 32 deep" in message
+
+
+def test_a_file_of_too_many_variables_is_refused(write, monkeypatch, refusal):
+    monkeypatch.setattr("islands.io.records.mat.workspace.MOST_VARIABLES", 50)
+    many = [numbers(f"v{index}", U) for index in range(48)]
+    assert len(columns_of(write(*many[:47]))) == 50
+    assert "bad.mat holds more than 50 variables" in refusal(write(*many))
+
+
+# Lies
+
+
+def test_a_shape_that_its_numbers_do_not_fill_is_refused(write, refusal):
+    for variable in (numbers("x", U, shape=(2**27, 1)), packed(numbers("x", U, shape=(2**27, 1)))):
+        message = refusal(write(variable))
+        assert "it claims the shape (134217728, 1) and holds 60 numbers" in message
+
+
+@pytest.mark.parametrize("shape", [(2**28, 1), (2**31 - 1, 2**31 - 1)])
+def test_more_samples_than_any_record_has_are_refused(write, shape, refusal):
+    message = refusal(write(numbers("x", U, shape=shape)))
+    assert (
+        f"column x claims {shape[0] * shape[1]} samples, and a record has {MOST_SAMPLES} at most" in message
+    )
+
+
+@pytest.mark.parametrize("shape", [(-60, 1), (60, -1), (60,)])
+def test_impossible_dimensions_are_refused(write, shape, refusal):
+    assert "an array has the dimensions" in refusal(write(numbers("x", U, shape=shape)))
+
+
+def test_an_element_larger_than_what_it_is_in_is_refused(write, refusal):
+    assert "an element claims 2147483648 bytes" in refusal(write(numbers("x", U, size=2**31)))
+    assert "an element claims 4000000000 bytes" in refusal(
+        write(matrix("x", "double", (60, 1), element(DOUBLE, U.tobytes()), size=4_000_000_000))
+    )
+
+
+def test_a_short_element_holds_four_bytes_at_most(write, refusal):
+    dimensions = struct.pack("<2H", INT32, 8) + struct.pack("<2i", 60, 1)
+    flags = element(UINT32, struct.pack("<2I", CLASSES["double"], 0))
+    lie = element(MATRIX, flags + dimensions + element(INT8, b"x") + element(DOUBLE, U.tobytes()))
+    assert "bad.mat is damaged or cut short (an element claims 8 bytes" in refusal(write(lie))
+
+
+def test_packed_bytes_that_claim_more_than_deflate_can_hold_are_refused(write, refusal):
+    lie = matrix("x", "double", (2**20, 1), element(DOUBLE, U.tobytes(), 2**23), size=2**23 + 48)
+    message = refusal(write(packed(lie)))
+    assert "column x cannot be read (it claims 8388656 bytes, packed in" in message
+
+
+def test_a_variable_of_version_4_that_claims_too_much_is_refused(save, refusal):
+    file = save("4", u=U, y=Y)
+    content = bytearray(file.read_bytes())
+    content[4:8] = struct.pack("<i", 2**28)
+    file.write_bytes(content)
+    assert f"r.mat is damaged or cut short (variable u claims {8 * 60 * 2**28} bytes where" in refusal(file)
+
+
+@pytest.mark.parametrize(
+    ("place", "number"), [(0, 2000), (0, 60), (4, -60), (8, -1), (12, 2), (16, 1), (16, 2**20)]
+)
+def test_a_header_of_version_4_that_cannot_be_is_refused(save, place, number, refusal):
+    """Byte orders of VAX, unknown types, negative dimensions, names of no length."""
+    file = save("4", u=U, y=Y)
+    content = bytearray(file.read_bytes())
+    content[place : place + 4] = struct.pack("<i", number)
+    file.write_bytes(content)
+    assert "r.mat is not a MAT-file" in refusal(file)
+    second = content[: len(content) // 2]
+    file.write_bytes(save("4", u=U, y=Y).read_bytes()[: len(second)] + content)
+    assert "r.mat is damaged or cut short (no variable begins at byte" in refusal(file)

@@ -1,0 +1,117 @@
+"""NumPy archives that lie about their size: header, directory and bytes are held against each other."""
+
+import io
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+
+from islands.io.records import read_record
+from islands.io.records.size_limits import MOST_SAMPLES
+
+K = np.arange(60)
+U, Y = K % 7 - 3.0, K * K % 11 + 0.5
+
+
+def member(array, shape=None):
+    """Write an array as numpy.save does, its header claiming another shape if one is given."""
+    stream = io.BytesIO()
+    header = {"descr": np.lib.format.dtype_to_descr(array.dtype), "fortran_order": False}
+    np.lib.format.write_array_header_1_0(stream, header | {"shape": array.shape if shape is None else shape})
+    return stream.getvalue() + array.tobytes()
+
+
+@pytest.fixture
+def archive(tmp_path):
+    """Write an archive of sound arrays u, y and dt beside what is given as bytes."""
+
+    def archive(packing=zipfile.ZIP_STORED, **members):
+        sound = {"u": member(U), "y": member(Y), "dt": member(np.array(0.1))}
+        with zipfile.ZipFile(tmp_path / "bad.npz", "w", packing) as file:
+            for name, content in (sound | members).items():
+                file.writestr(f"{name}.npy", content)
+        return tmp_path / "bad.npz"
+
+    return archive
+
+
+def test_the_sound_archive_of_these_tests_is_read(archive):
+    assert read_record(archive(x=member(U)), ["x"], "y").u[:, 0].tolist() == U.tolist()
+
+
+def test_a_header_that_claims_more_than_its_member_holds_is_refused(archive, refusal):
+    for samples in (61, 2**26):
+        message = refusal(archive(x=member(U, (samples,))))
+        assert f"bad.npz: column x claims {8 * samples} bytes, and the file stores 480 for it" in message
+        assert "write it anew" in message
+
+
+@pytest.mark.parametrize("shape", [(2**28,), (2**40, 1), (2**62, 2**62)])
+def test_more_samples_than_any_record_has_are_refused(archive, shape, refusal):
+    message = refusal(archive(x=member(U, shape)))
+    assert (
+        f"claims {shape[0] * (shape[1:] or (1,))[0]} samples, and a record has {MOST_SAMPLES} at most"
+        in message
+    )
+
+
+def test_more_samples_of_nothing_are_refused_too(archive, refusal):
+    assert f"claims {2**40} samples" in refusal(archive(x=member(np.zeros(60, "V0"), (2**40,))))
+
+
+def test_a_header_of_a_shape_that_cannot_be_is_refused(archive, refusal):
+    assert "column x cannot be read" in refusal(archive(x=member(U, (-60,))))
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_a_directory_that_claims_more_than_its_bytes_can_hold_is_refused(archive, packing, refusal):
+    """The directory at the archive's end says 512 MB, and so does the header of the array."""
+    content = member(U, (2**26,))
+    claimed = len(content) - U.nbytes + 8 * 2**26
+    file = archive(packing, x=content)
+    written = file.read_bytes()
+    entry = written.rindex(b"PK\x01\x02")
+    sizes = struct.pack("<I", len(content))
+    assert written[entry + 24 : entry + 28] == sizes
+    file.write_bytes(written[: entry + 24] + struct.pack("<I", claimed) + written[entry + 28 :])
+    message = refusal(file)
+    assert f"column x claims {claimed} bytes, and the file stores" in message
+    assert message.count(", packed") == (packing == zipfile.ZIP_DEFLATED)
+
+
+def test_a_directory_that_claims_more_than_the_whole_file_is_refused(archive, refusal):
+    file = archive(x=member(U, (2**26,)))
+    written = file.read_bytes()
+    entry = written.rindex(b"PK\x01\x02")
+    claimed = struct.pack("<I", 8 * 2**26 + 128)
+    file.write_bytes(written[: entry + 20] + 2 * claimed + written[entry + 28 :])
+    assert f"claims {8 * 2**26 + 128} bytes, and the file stores {len(written)} for it" in refusal(file)
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_archive_that_numpy_does_not_write_is_refused(archive, packing, refusal):
+    assert "cannot be read (it is packed in another way than numpy.savez" in refusal(archive(packing), ["u"])
+
+
+def test_an_array_with_names_in_unicode_is_refused(archive, refusal):
+    stream = io.BytesIO()
+    np.lib.format.write_array(stream, np.zeros(60, [("µ", "f8")]), version=(3, 0))
+    assert "its format has the version (3, 0), which no array of numbers has" in refusal(
+        archive(x=stream.getvalue())
+    )
+
+
+def test_a_lie_in_an_array_that_nobody_asks_for_does_no_harm(archive):
+    assert read_record(archive(x=member(U, (2**40,))), ["u"], "y").samples == 60
+
+
+def test_a_signal_that_hardly_changes_may_be_packed_as_tightly_as_deflate_can(tmp_path):
+    hold = np.repeat([0.0, 1.0], 500_000)
+    np.savez_compressed(tmp_path / "r.npz", u=hold, y=hold, dt=0.1)
+    assert read_record(tmp_path / "r.npz", ["u"], "y").samples == 1_000_000
+
+
+def test_arrays_without_a_sample_are_refused(archive, refusal):
+    nothing = member(np.empty(0))
+    assert "bad.npz has not a single sample" in refusal(archive(x=nothing, y=nothing))

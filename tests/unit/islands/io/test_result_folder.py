@@ -1,0 +1,256 @@
+"""A result folder: every field of the contract, no number that JSON does not know, nothing left over."""
+
+import hashlib
+import json
+from dataclasses import replace
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.io.models import read_model, terms_document
+from islands.io.result_folder import content_sha256, number, result_json, summary, table, write_result
+from islands.search_result import Assessed
+from islands.simulation.outcome import Outcome, Verdict
+
+LOST = Outcome(Verdict.DIVERGED, "|y| left 1e+06 at sample 17")
+
+
+def record(samples=300, seed=0, **changes):
+    rng = np.random.default_rng(seed)
+    u, y = np.cumsum(rng.normal(size=samples)) / 5, np.zeros(samples)
+    for k in range(2, samples):
+        y[k] = y[k - 1] + 0.5 * (u[k - 1] - u[k - 2]) - 0.1 * y[k - 1] * abs(u[k - 1] - u[k - 2])
+    y += 0.01 * rng.normal(size=samples)
+    return Dataset(u, y, **({"dt": 0.1} | changes))
+
+
+@pytest.fixture(scope="module")
+def findings():
+    data = record(input_names=("u_V",), output_name="y_um", input_units=("V",), output_unit="um")
+    return islands.fit(data, max_terms=4, seed=7).with_wall_time(0.5).findings
+
+
+def refuse(word):
+    raise AssertionError(f"{word} is no JSON")
+
+
+def loaded(findings):
+    return json.loads(result_json(findings), parse_constant=refuse)
+
+
+def with_best(findings, **changes):
+    """Change what is known of the best model."""
+    best, *others = findings.models
+    changed = Assessed(best.model, replace(best.assessment, **changes))
+    return replace(findings, models=(changed, *others))
+
+
+# The contract: the fields that issue 2 lists, and those that docs/reference.md adds.
+
+
+def test_a_result_has_every_field_of_the_contract(findings):
+    result = loaded(findings)
+    assert list(result) == ["schema", "record", "seed", "settings", "search", "models"]
+    assert result["schema"] == "islands._result/1"
+    assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]
+    contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
+    assert list(result["search"])[:5] == contract
+    assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
+    for model in result["models"]:
+        assert list(model) == [
+            *("rank", "size", "equation", "latex", "terms", "metrics", "outcomes"),
+            *("information", "physics", "residual_tests"),
+        ]
+        for term in model["terms"]:
+            assert list(term) == ["regressor", "parameter", "standard_error"]
+        for named, inner in (("metrics", {"mape", "r2", "rmse", "fit_percent"}), ("outcomes", None)):
+            assert set(model[named]) == {"estimation", "validation"}
+            for modes in model[named].values():
+                assert set(modes) == {"one_step_ahead", "multiple_shooting", "free_run"}
+                assert all(inner is None or set(mode) == inner for mode in modes.values())
+        assert set(model["information"]) == {"aic", "bic", "fpe"}
+
+
+def test_a_result_says_what_ended_an_evolution_and_nothing_did_end_another_search(findings):
+    assert loaded(findings)["search"]["ended_by"] is None
+    evolved = replace(findings, search=replace(findings.search, ended_by="target error"))
+    assert loaded(evolved)["search"]["ended_by"] == "target error"
+
+
+def test_the_physics_and_the_residual_tests_are_told_one_by_one(findings):
+    for model in loaded(findings)["models"]:
+        physics, tests = model["physics"], model["residual_tests"]
+        assert set(physics) == {"property_1", "clusters", "hold_drift_percent", "holds", "excursions"}
+        assert physics["property_1"] is True
+        assert physics["clusters"] == [{"cluster": "y", "sum": pytest.approx(1.0), "target": 1.0}]
+        assert len(physics["holds"]) == 10
+        assert set(physics["holds"][0]) == {"level", "loading", "bounded", "constant", "drift_percent"}
+        assert len(physics["excursions"]) == 4
+        assert set(tests) == {"passed", "whiteness_p", "ljung_box", "tests"}
+        assert [test["name"] for test in tests["tests"]] == ["xi_xi", "u_xi", "xi_xiu", "u2_xi", "u2_xi2"]
+        for test in tests["tests"]:
+            assert set(test) == {"name", "input", "passed", "inside_percent", "limit", "largest", "note"}
+            assert test["passed"] is (test["largest"] <= test["limit"])
+            assert 0.0 < test["largest"] < 1.0
+
+
+def test_a_result_says_what_was_given_and_what_was_done(findings):
+    result = loaded(findings)
+    assert result["seed"] == 7
+    assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
+    assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
+    assert (result["record"]["samples"], result["record"]["dt"]) == (300, 0.1)
+    assert result["record"]["segments"] == [300]
+    assert result["search"]["evaluations"] == 4
+    assert result["search"]["evaluations_per_second"] == pytest.approx(8.0)
+    assert result["search"]["outcomes"] == {"ok": 4}
+    # Equation (5): C(6 + 5, 5) terms of 3 + 3 lags to degree 5, over 225 rows less 3.
+    assert result["search"]["full_set"] == {"candidates": 462, "bytes": 8 * 462 * 222}
+
+
+def test_models_stand_in_their_order_with_the_numbers_that_were_found(findings):
+    result = loaded(findings)
+    assert [model["rank"] for model in result["models"]] == [1, 2, 3, 4]
+    for model, entry in zip(result["models"], findings.models, strict=True):
+        assert model["size"] == entry.model.size == len(model["terms"])
+        assert model["terms"] == terms_document(entry.model)
+        free_run = entry.assessment.metrics["validation"]["free_run"]
+        assert model["metrics"]["validation"]["free_run"]["mape"] == free_run.mape
+        assert model["physics"]["hold_drift_percent"] == entry.assessment.physics.hold_drift_percent
+        assert model["outcomes"]["validation"]["free_run"] == "ok"
+
+
+def test_what_json_does_not_know_becomes_null(findings):
+    best = findings.models[0].assessment
+    lost = replace(best.metrics["validation"]["free_run"], mape=nan, r2=-inf, rmse=inf)
+    metrics = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": lost}}
+    outcomes = {**best.outcomes, "validation": {**best.outcomes["validation"], "free_run": LOST}}
+    holds = (replace(best.physics.holds[0], bounded=False, drift_percent=inf), *best.physics.holds[1:])
+    changed = with_best(
+        findings,
+        metrics=metrics,
+        outcomes=outcomes,
+        information=replace(best.information, aic=-inf, bic=nan),
+        physics=replace(best.physics, holds=holds),
+    )
+    model = loaded(changed)["models"][0]
+    found = model["metrics"]["validation"]["free_run"]
+    assert (found["mape"], found["r2"], found["rmse"]) == (None, None, None)
+    assert found["fit_percent"] == lost.fit_percent
+    assert model["outcomes"]["validation"]["free_run"].startswith("diverged: |y| left 1e+06 at sample 17; ")
+    assert (model["information"]["aic"], model["information"]["bic"]) == (None, None)
+    assert model["physics"]["hold_drift_percent"] is None
+    assert model["physics"]["holds"][0]["drift_percent"] is None
+    assert model["physics"]["property_1"] is False
+
+
+def test_settings_that_are_numpys_numbers_are_written_as_numbers(findings):
+    settings = {"max_terms": np.int64(4), "validation": np.float64(0.25), "flag": np.bool_(True), "x": np.nan}
+    result = loaded(replace(findings, settings=settings))
+    assert result["settings"] == {"max_terms": 4, "validation": 0.25, "flag": True, "x": None}
+
+
+# The record's hash.
+
+
+def test_a_record_from_a_file_is_known_by_the_files_hash(findings):
+    named = replace(findings, record=replace(findings.record, sha256="ab" * 32))
+    assert loaded(named)["record"]["sha256"] == "ab" * 32
+    assert loaded(findings)["record"]["sha256"] == content_sha256(findings.record)
+
+
+def test_a_record_from_no_file_is_known_by_its_numbers():
+    plain = content_sha256(record())
+    assert plain == content_sha256(record(output_name="z", input_units=("V",)))
+    assert len(plain) == len(hashlib.sha256().hexdigest())
+    y = record().y.copy()
+    y[-1] += 1e-15
+    others = [record(seed=1), record(dt=0.2), record(segments=(100, 200)), Dataset(record().u, y, 0.1)]
+    assert len({plain, *map(content_sha256, others)}) == 5
+
+
+# The folder.
+
+
+def test_the_folder_holds_a_file_a_model_and_what_is_said_of_all(findings, tmp_path):
+    write_result(findings, tmp_path / "out")
+    files = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*.*"))
+    assert files == [*(f"models/0{rank}.json" for rank in range(1, 5)), "result.json", "summary.txt"]
+    for rank, entry in enumerate(findings.models, start=1):
+        assert read_model(tmp_path / "out" / "models" / f"0{rank}.json") == entry.model
+    assert (tmp_path / "out" / "result.json").read_text() == result_json(findings)
+    assert (tmp_path / "out" / "summary.txt").read_text() == summary(findings)
+
+
+def test_models_of_an_earlier_result_are_removed_and_nothing_else(findings, tmp_path):
+    write_result(findings, tmp_path)
+    (tmp_path / "models" / "mine.json").write_text("{}")
+    write_result(replace(findings, models=findings.models[:2]), tmp_path)
+    assert sorted(path.name for path in (tmp_path / "models").iterdir()) == [
+        "01.json",
+        "02.json",
+        "mine.json",
+    ]
+    assert len(json.loads((tmp_path / "result.json").read_text())["models"]) == 2
+
+
+def test_model_files_do_not_depend_on_the_folder_or_the_clock(findings, tmp_path, monkeypatch):
+    for name, seconds in (("here", 1.0), ("there", 2.0)):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        write_result(replace(findings, search=replace(findings.search, wall_s=seconds)), tmp_path / name)
+    names = ["summary.txt", *(f"models/0{rank}.json" for rank in range(1, 5))]
+    for name in names:
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+    assert str(tmp_path) not in "".join((tmp_path / "here" / name).read_text() for name in names)
+
+
+# What is read by people.
+
+
+def test_the_summary_shows_record_settings_table_and_equations(findings):
+    lines = summary(findings).splitlines()
+    assert lines[0] == "300 samples, 0.1 s: u_V to y_um"
+    assert "library phi-polynomial" in lines[1]
+    assert lines[1].endswith("seed 7")
+    assert lines[2] == "4 models estimated: 4 ok"
+    assert lines[3].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
+    assert lines[5:10] == table(findings.models)
+    assert lines[-4].startswith(" 1  y(k) = 1*y(k-1) ")
+
+
+def test_the_table_has_a_row_a_model_and_columns_of_one_width(findings):
+    head, *rows = table(findings.models)
+    assert head.split("  ")[0] == "rank"
+    assert len(rows) == 4
+    assert len({len(line) for line in (head, *rows)}) == 1
+    best = findings.models[0].assessment
+    assert rows[0].split()[:3] == [
+        "1",
+        str(findings.models[0].model.size),
+        f"{best.metrics['estimation']['free_run'].mape:.4f}",
+    ]
+    assert rows[0].split()[-2] == "yes"
+
+
+def test_the_table_tells_a_divergence_from_an_output_without_a_range(findings):
+    best = findings.models[0].assessment
+    flat = replace(best.metrics["validation"]["free_run"], mape=nan, r2=nan)
+    without = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": flat}}
+    cells = table(with_best(findings, metrics=without).models)[1].split()
+    assert cells[3:5] == ["-", "-"]
+    outcomes = {**best.outcomes, "validation": {**best.outcomes["validation"], "free_run": LOST}}
+    cells = table(with_best(findings, metrics=without, outcomes=outcomes).models)[1].split()
+    assert cells[2:5] == [f"{best.metrics['estimation']['free_run'].mape:.4f}", "diverged", "diverged"]
+    holds = (replace(best.physics.holds[0], bounded=False, drift_percent=inf), *best.physics.holds[1:])
+    cells = table(with_best(findings, physics=replace(best.physics, holds=holds)).models)[1].split()
+    assert cells[5:7] == ["diverged", "no"]
+
+
+def test_a_number_is_shown_as_it_is_asked_for():
+    assert number(0.12345, "{:.3f}", True) == "0.123"
+    assert number(inf, "{:.3f}", True) == number(nan, "{:.3f}", True) == "-"
+    assert number(0.12345, "{:.3f}", False) == "diverged"

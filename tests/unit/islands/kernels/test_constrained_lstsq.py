@@ -1,0 +1,350 @@
+"""Least squares from inner products: by one of three routes, or a word that they have no digits.
+
+The error grows as the least squared pivot falls: see `ERROR`. Seven digits are left well away from the
+thresholds, three at worst.
+
+The oracle is `constrained_least_squares`, an orthogonal factorisation of the columns.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.data.dataset import Dataset
+from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.kernels import constrained_lstsq
+from islands.kernels.constrained_lstsq import (
+    ILL_CONDITIONED,
+    SINGULAR,
+    Factor,
+    correct,
+    expand,
+    from_columns,
+    from_gram,
+)
+from islands.model.expression import Lagged
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.program.regressor_matrix import arranged, gram_matrix, regressor_matrix, rows_of
+from islands.program.term_pool import link
+from islands.simulation.outcome import OK
+
+seeds = st.integers(0, 2**32 - 1)
+
+#: A group of every term, -1 for none; the groups of a term's weights sum to `WANTED`.
+WANTED = (1.0, 0.0, -0.5)
+
+
+def gram_of(psi, y):
+    """All inner products of the regressors and, last, the target."""
+    rows = np.vstack([psi, y])
+    return rows @ rows.T
+
+
+def regression(terms=3, rows=200, seed=0, noise=0.1):
+    rng = np.random.default_rng(seed)
+    psi = rng.normal(size=(terms, rows))
+    return psi, rng.normal(size=terms) @ psi + noise * rng.normal(size=rows)
+
+
+def sums(group, weight):
+    """Return the groups as ``S theta = c``."""
+    names = sorted(set(group) - {-1})
+    S = [[w if g == name else 0.0 for g, w in zip(group, weight, strict=True)] for name in names]
+    return np.array(S).reshape(len(names), len(group)), np.array([WANTED[name] for name in names])
+
+
+def reduced(gram, group=None, weight=None):
+    """Choose the pivots; without groups every term is free."""
+    terms = len(gram) - 1
+    group = np.full(terms, -1) if group is None else np.array(group)
+    weight = np.ones(terms) if weight is None else np.array(weight)
+    wanted = np.array([WANTED[name] if name >= 0 else 0.0 for name in group])
+    return constrained_lstsq.reduce(gram, terms, group, weight, wanted)
+
+
+#: The least squared pivot that each route is trusted with.
+LEAST = {"gram": ILL_CONDITIONED, "corrected": SINGULAR, "columns": SINGULAR}
+
+
+def solved(route, gram, program, rows, reduction):
+    """Return theta by the Gram matrix, by it and a correction, or by the columns and one; None: refused."""
+    terms, count = len(gram) - 1, reduction.free.size
+    factor, eta = Factor(np.full((count, count), np.nan), np.full(count, np.nan)), np.full(count, np.nan)
+    if route == "columns":
+        least = from_columns(program, rows, terms, reduction, factor, eta)
+    else:
+        least = from_gram(gram, terms, reduction, factor, eta)
+    if least < LEAST[route]:
+        return None
+    if route != "gram":
+        correct(program, rows, terms, reduction, factor, eta)
+    theta = np.full(terms, np.nan)
+    expand(reduction, eta, theta)
+    return theta
+
+
+def columns_as_record(psi, y):
+    """Return the program and the rows of a record whose inputs, one sample back, are the columns."""
+    terms = len(psi)
+    signals = np.vstack([np.append(0.0, y), np.append(psi, np.zeros((terms, 1)), axis=1)])
+    program = link([*(Lagged(index + 1, 1) for index in range(terms)), Lagged(0, 0)])
+    return program, arranged(signals, [(1, len(y))], 1)
+
+
+def estimated(route, psi, y, group=None, weight=None):
+    gram = gram_of(psi, y)
+    return solved(route, gram, *columns_as_record(psi, y), reduced(gram, group, weight))
+
+
+every_route = pytest.mark.parametrize("route", LEAST)
+
+
+@every_route
+@given(
+    st.integers(1, 6),
+    st.lists(st.integers(-1, 2), min_size=6, max_size=6),
+    seeds,
+    st.lists(st.floats(-6, 6), min_size=6, max_size=6),
+)
+def test_it_equals_constrained_least_squares_on_well_conditioned_data(route, terms, group, seed, orders):
+    """With groups and without, and whatever the regressors' sizes: twelve orders of magnitude."""
+    rng = np.random.default_rng(seed)
+    psi, y = regression(terms, seed=seed)
+    psi = psi * 10.0 ** np.array(orders[:terms])[:, None]
+    size = np.abs(psi).max(axis=1)
+    weight = rng.choice([-1.0, 1.0], terms) * rng.uniform(0.5, 2.0, terms) * size
+    found = estimated(route, psi, y, group[:terms], weight)
+    expected = constrained_least_squares(psi, y, *sums(group[:terms], weight))
+    assert expected.outcome
+    assert found is not None
+    assert np.abs((found - expected.theta) * size).max() < 1e-9 * np.abs(expected.theta * size).max() + 1e-12
+
+
+@every_route
+def test_the_constraints_hold_to_rounding(route):
+    psi, y = regression(5)
+    group, weight = [0, 1, -1, 1, 0], [1.0, 2.0, 1.0, -1.0, 0.5]
+    S, c = sums(group, weight)
+    assert S @ estimated(route, psi, y, group, weight) == pytest.approx(c, abs=1e-14)
+    assert np.abs(S @ estimated(route, psi, y) - c).max() > 0.1
+
+
+@every_route
+def test_as_many_groups_as_terms_leave_nothing_to_the_data(route):
+    psi, y = regression(3)
+    assert estimated(route, psi, y, [2, 0, 1], [0.5, 4.0, 1.0]).tolist() == [-1.0, 0.25, 0.0]
+
+
+@every_route
+@given(st.permutations(range(5)), seeds)
+def test_the_order_of_the_terms_does_not_matter(route, order, seed):
+    psi, y = regression(5, seed=seed)
+    group, weight = np.array([0, 1, -1, 1, 0]), np.array([1.0, 2.0, 1.0, -1.0, 0.5])
+    order = list(order)
+    here, there = (
+        estimated(route, psi, y, group, weight),
+        estimated(route, psi[order], y, group[order], weight[order]),
+    )
+    assert here[order] == pytest.approx(there, rel=1e-10, abs=1e-10)
+
+
+# The pivots.
+
+
+def test_the_pivot_of_a_group_is_the_member_with_the_largest_weight_beside_its_norm():
+    gram = np.diag([1.0, 4.0, 9.0, 0.01, 100.0, 5.0])
+    found = reduced(gram, [0, -1, 0, 0, 1], [1.0, 1.0, -6.0, 0.1, 3.0])
+    assert found.pivot.tolist() == [2, -1, 2, 2, 4]
+    assert found.share.tolist() == pytest.approx([-1 / 6, 0.0, 1.0, -0.1 / 6, 1.0])
+    assert found.fixed.tolist() == pytest.approx([0.0, 0.0, -1 / 6, 0.0, 0.0])
+    assert found.free.tolist() == [0, 1, 3]
+
+
+def test_without_groups_all_is_free():
+    found = reduced(np.eye(5))
+    assert found.pivot.tolist() == [-1] * 4
+    assert found.free.tolist() == [0, 1, 2, 3]
+    assert found.fixed.tolist() == [0.0] * 4
+
+
+def test_of_equals_the_first_is_the_pivot():
+    assert reduced(np.eye(4), [1, 1, 1], [2.0, -2.0, 2.0]).pivot.tolist() == [0, 0, 0]
+
+
+# Where the digits end.
+
+
+@every_route
+@pytest.mark.parametrize("group", [None, [0, -1, 0]])
+def test_a_regressor_that_is_zero_is_refused(route, group):
+    psi, y = regression()
+    psi[1] = 0.0
+    assert estimated(route, psi, y, group) is None
+
+
+@every_route
+@pytest.mark.parametrize("value", [1e200, np.inf, np.nan])
+@pytest.mark.parametrize("group", [None, [0, -1, 0], [0, 0, 0]])
+def test_a_regressor_that_overflows_is_refused(route, value, group):
+    psi, y = regression()
+    psi[1, 50] = value
+    with np.errstate(all="ignore"):
+        assert estimated(route, psi, y, group) is None
+
+
+def nearly_dependent(distance, seed=1):
+    """Two regressors of norm one whose difference has a squared norm of about ``distance``, and another."""
+    rng = np.random.default_rng(seed)
+    one, other, third = np.linalg.qr(rng.normal(size=(300, 3)))[0].T
+    psi = np.array([one, third, np.sqrt(1 - distance) * one + np.sqrt(distance) * other])
+    return psi, psi.sum(axis=0) + 1e-3 * rng.normal(size=300)
+
+
+#: Bounds of the relative error of a trusted result: a factor, and the power of ``eps / distance`` that it
+#: multiplies. A correction squares the error of the Gram matrix. The data, and so the error, depend on the
+#: processor: over 60 seeds on two processors the largest errors were a quarter of these bounds.
+ERROR = {"gram": (100.0, 1), "corrected": (1000.0, 2), "columns": (1e-4, 0)}
+
+
+@pytest.mark.parametrize("distance", [1e-6, 1e-9, 1.2e-10, 1e-11, 1e-12, 3e-13, 1.5e-13])
+@pytest.mark.parametrize("group", [None, [0, 1, 0]])
+@every_route
+def test_a_result_that_is_trusted_has_its_digits(distance, group, route):
+    """With a group one direction is left of the two, their difference: beside itself it is of full size."""
+    for seed in range(5):
+        psi, y = nearly_dependent(distance, seed)
+        found = estimated(route, psi, y, group)
+        assert (found is not None) == (route != "gram" or distance > ILL_CONDITIONED)
+        if found is not None:
+            expected = constrained_least_squares(psi, y, *sums(group or [-1] * 3, np.ones(3))).theta
+            factor, power = ERROR[route]
+            bound = factor * (np.finfo(float).eps / distance) ** power + 1e-7
+            assert found == pytest.approx(expected, rel=bound, abs=1e-12)
+
+
+@pytest.mark.parametrize(("distance", "group"), [(1e-15, None), (0.0, None), (0.0, [0, 1, 0])])
+@every_route
+def test_a_result_without_digits_is_refused(distance, group, route):
+    psi, y = nearly_dependent(distance)
+    assert estimated(route, psi, y, group) is None
+
+
+@pytest.mark.parametrize("distance", [1e-6, 1e-12, 1e-15, 1e-18])
+def test_a_difference_that_a_group_leaves_is_made_before_it_is_squared(distance):
+    """Beside itself it is no small number: nothing but the rounding of the columns is left in it."""
+    psi, y = nearly_dependent(distance)
+    difference, rest = psi[2] - psi[0], y - psi[0]
+    eta = (difference @ rest) / (difference @ difference)
+    found = estimated("columns", psi, y, [0, 1, 0])
+    assert found == pytest.approx([1.0 - eta, 0.0, eta], rel=1e-9)
+    assert (estimated("corrected", psi, y, [0, 1, 0]) is None) == (distance < SINGULAR)
+
+
+#: A slow input: neighbouring lags differ little, and their differences still less.
+LAGS = ["y(k-1)", "y(k-2)", "y(k-3)", "u(k-1)", "u(k-2)", "u(k-3)"]
+
+
+def slow(frequency, segments):
+    k = np.arange(4000)
+    u = np.sin(frequency * k) + 0.3 * np.sin(0.37 * frequency * k + 1)
+    y = np.zeros(4000)
+    for at in range(3, 4000):
+        y[at] = 0.9 * y[at - 1] + 0.05 * u[at - 1] + 0.02 * u[at - 2]
+    return Dataset(u, y + 1e-4 * np.random.default_rng(3).normal(size=4000), 0.01, segments=segments)
+
+
+@pytest.mark.parametrize("segments", [(4000,), (1500, 900, 3, 1597)])
+@pytest.mark.parametrize(
+    ("texts", "group"),
+    [
+        (["y(k-1)", "u(k-1)", "u(k-2)", "u(k-3)"], None),
+        (LAGS, None),
+        (LAGS, [0, 0, 0, 1, 1, 1]),
+        (["y(k-1)", "u(k-1)", "u(k-2)", "u(k-3)"], [0, 1, 1, 1]),
+    ],
+)
+def test_lags_of_a_slow_input_need_the_columns_which_keep_six_digits(texts, group, segments):
+    record, count = slow(0.003, segments), len(texts)
+    terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]
+    gram, program, rows = gram_matrix(terms, record, 3), link(terms), rows_of(record, 3)
+    reduction = reduced(gram, group)
+    psi = regressor_matrix(terms, record, 3)
+    expected = constrained_least_squares(psi[:-1], psi[-1], *sums(group or [-1] * count, np.ones(count)))
+    assert expected.outcome == OK
+    assert solved("gram", gram, program, rows, reduction) is None
+    for route in ("corrected", "columns"):
+        theta = solved(route, gram, program, rows, reduction)
+        assert np.abs(theta - expected.theta).max() < 1e-6 * np.abs(expected.theta).max()
+
+
+@pytest.mark.parametrize("route", ["corrected", "columns"])
+def test_lags_of_an_input_that_hardly_moves_are_refused(route):
+    record = slow(0.001, (4000,))
+    terms = [*(regressor(parse(text))[1] for text in LAGS), Lagged(0, 0)]
+    gram, program, rows = gram_matrix(terms, record, 3), link(terms), rows_of(record, 3)
+    assert solved(route, gram, program, rows, reduced(gram)) is None
+    # Their sums fixed, what is left has digits again.
+    assert solved(route, gram, program, rows, reduced(gram, [0, 0, 0, 1, 1, 1])) is not None
+
+
+@every_route
+@pytest.mark.parametrize("group", [None, [-1, 0, -1, 0]])
+def test_dependent_columns_are_refused(route, group):
+    psi, y = regression(4)
+    psi[2] = 2.0 * psi[0]
+    assert estimated(route, psi, y, group) is None
+    psi, y = regression(4)
+    psi[3] = psi[1] - 3.0 * psi[2] + psi[0]
+    assert estimated(route, psi, y) is None
+
+
+@every_route
+def test_equal_columns_whose_sum_is_fixed_are_refused(route):
+    psi, y = regression(3)
+    psi[2] = psi[1]
+    assert estimated(route, psi, y, [-1, 0, 0]) is None
+
+
+@every_route
+def test_fewer_rows_than_free_parameters_are_refused(route):
+    psi, y = regression(5, rows=4)
+    assert estimated(route, psi, y) is None
+
+
+@every_route
+def test_nothing_that_is_given_is_changed(route):
+    psi, y = regression(4)
+    gram = gram_of(psi, y)
+    program, rows = columns_as_record(psi, y)
+    given_ = [gram, *reduced(gram, [0, 0, -1, 1]), rows.signals]
+    before = [array.copy() for array in given_]
+    assert solved(route, gram, program, rows, constrained_lstsq.Reduction(*given_[1:5])) is not None
+    for left, right in zip(given_, before, strict=True):
+        assert np.array_equal(left, right)
+
+
+@every_route
+def test_as_good_a_result_is_corrected_to_itself(route):
+    """The residual of a good result holds nothing more of the columns."""
+    psi, y = regression(4, rows=700)
+    group, weight = [0, -1, 0, -1], [1.0, 1.0, -2.0, 1.0]
+    theta = estimated(route, psi, y, group, weight)
+    S, _ = sums(group, weight)
+    normal = psi @ (y - theta @ psi)
+    assert np.abs(normal - S.T @ np.linalg.lstsq(S.T, normal, rcond=None)[0]).max() < 1e-11
+
+
+def test_a_gram_matrix_may_be_larger_than_the_terms():
+    psi, y = regression(3)
+    gram, larger = gram_of(psi, y), np.full((7, 7), np.nan)
+    larger[:4, :4] = gram
+    found = []
+    for matrix in (gram, larger):
+        reduction = constrained_lstsq.reduce(
+            matrix, 3, np.array([0, -1, 0]), np.ones(3), np.array([1.0, 0.0, 1.0])
+        )
+        factor, eta = Factor(np.empty((2, 2)), np.empty(2)), np.empty(2)
+        found.append((from_gram(matrix, 3, reduction, factor, eta), *eta, *factor.scale))
+    assert found[0] == found[1]

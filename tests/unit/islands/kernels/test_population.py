@@ -1,0 +1,278 @@
+"""A population is evaluated in one call as each individual is on its own, step by step on columns."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.data.dataset import Dataset
+from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.estimation.froe import froe
+from islands.kernels.pair_table import FREE, Pairs
+from islands.kernels.population import (
+    ABANDONED,
+    DEPENDENT,
+    DIVERGED,
+    INFEASIBLE,
+    NO_TERMS,
+    OK,
+    OVERFLOW,
+    TOO_FEW_ROWS,
+    Groups,
+    evaluate,
+)
+from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
+from islands.model.expression import Lagged
+from islands.model.model import Model
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, rows_of
+from islands.program.term_pool import Store
+from islands.simulation.layout import layout
+from islands.simulation.predictors import bound_of, multiple_shooting
+
+TOLERANCE, INTERVAL, WARM_UP = 1e-3, 20, 4
+TEXTS = [
+    "y(k-1)",
+    "y(k-2)",
+    "u(k-1)",
+    "u(k-2)",
+    "u(k-4)",
+    "y(k-1)*u(k-1)",
+    "y(k-2)*u(k-3)",
+    "sign(u(k-1) - u(k-2))",
+    "(u(k-1) - u(k-2))*abs(u(k-1) - u(k-2))",
+    "tanh(y(k-1)*u(k-1))",
+    "1",
+    "y(k-3)^2",
+]
+TERMS = sorted((regressor(parse(text))[1] for text in TEXTS), key=lambda item: item.content)
+
+
+def record(seed=0, segments=(400, 150)):
+    rng = np.random.default_rng(seed)
+    samples = sum(segments)
+    u, y = rng.normal(size=samples), np.zeros(samples)
+    for k in range(2, samples):
+        y[k] = 0.5 * y[k - 1] + 0.2 * y[k - 2] + 0.4 * u[k - 1] - 0.2 * y[k - 1] * u[k - 1]
+    return Dataset(u, y + 0.1 * rng.normal(size=samples), 0.1, segments=segments)
+
+
+RECORD = record()
+
+
+def groups_of(terms, constrained):
+    """Return the clusters of the terms (the target first), that of y in front, as the kernel reads them."""
+    group, weight = np.full(len(terms) + 1, -1), np.zeros(len(terms) + 1)
+    if not constrained:
+        return Groups(group, weight, np.empty(0), 0)
+    names = {OUTPUT_AT_REST: 0}
+    for number, item in enumerate(terms, 1):
+        size, state = steady_state(item)
+        if size:
+            group[number], weight[number] = names.setdefault(state, len(names)), size
+    return Groups(group, weight, np.array([1.0, *[0.0] * (len(names) - 1)]), 1)
+
+
+def table(places=1 << 12):
+    return Pairs(np.full(places, FREE), np.zeros(places), np.zeros(1, np.int64))
+
+
+def evaluated(
+    structures, pruned, data=RECORD, terms=TERMS, constrained=False, pairs=None, allowed=math.inf, before=()
+):
+    """Return kept positions, theta, error and ending of every structure, a list of positions in ``terms``."""
+    store = Store()
+    store.terms([Lagged(0, 0), *terms])
+    store.terms(before)
+    most = max(map(len, structures))
+    numbers = np.full((len(structures), most), -1)
+    for row, structure in zip(numbers, structures, strict=True):
+        row[: len(structure)] = np.array(structure, np.int64) + 1
+    kept, lengths = np.full((len(structures), most), -7), np.full(len(structures), -7)
+    theta, error = np.full((len(structures), most), np.nan), np.full(len(structures), np.nan)
+    ending = np.full(len(structures), -7)
+    evaluate(
+        numbers,
+        np.array([len(structure) for structure in structures]),
+        np.array(pruned),
+        0,
+        TOLERANCE,
+        store.nodes,
+        groups_of(terms, constrained),
+        table() if pairs is None else pairs,
+        rows_of(data, WARM_UP),
+        layout(data, WARM_UP, INTERVAL),
+        bound_of(data),
+        np.full(most + 1, allowed),
+        kept,
+        lengths,
+        theta,
+        error,
+        ending,
+    )
+    return [
+        (tuple(positions[:length].tolist()), tuple(parameters[:length].tolist()), squares, end)
+        for positions, length, parameters, squares, end in zip(
+            kept, lengths.tolist(), theta, error.tolist(), ending.tolist(), strict=True
+        )
+    ]
+
+
+def step_by_step(structure, pruned, constrained):
+    """Prune, constrain, estimate and simulate on columns; return kept positions, theta, ending, error."""
+    left = list(range(len(structure)))
+    terms = [TERMS[position] for position in structure]
+    if pruned:
+        found = froe(gram_matrix([*terms, Lagged(0, 0)], RECORD, WARM_UP))
+        left = sorted(item for item, err in zip(found.order, found.err, strict=True) if err > TOLERANCE)
+    S, c = np.empty((0, len(left))), np.empty(0)
+    if constrained:
+        lone = {
+            group.members[0]
+            for group in clusters([terms[item] for item in left])
+            if len(group.members) == 1 and group.steady_state != OUTPUT_AT_REST
+        }
+        left = [item for rank, item in enumerate(left) if rank not in lone]
+        groups = clusters([terms[item] for item in left])
+        S, c = np.zeros((len(groups), len(left))), np.zeros(len(groups))
+        for row, group in enumerate(groups):
+            S[row, group.members] = group.weights
+            c[row] = group.steady_state == OUTPUT_AT_REST
+        if left and not c.any():
+            return tuple(left), None, INFEASIBLE
+    if not left:
+        return (), None, NO_TERMS
+    kept = [terms[item] for item in left]
+    psi = regressor_matrix([*kept, Lagged(0, 0)], RECORD, WARM_UP)
+    theta = constrained_least_squares(psi[:-1], psi[-1], S, c).theta
+    model = Model(tuple(kept), tuple(theta.tolist()), RECORD.input_names, RECORD.output_name, RECORD.dt)
+    found = multiple_shooting(model, RECORD, INTERVAL, WARM_UP)
+    squares = found.mean_squared_error * np.isfinite(found.y).sum()
+    return tuple(left), theta, OK if found.outcome else DIVERGED, squares
+
+
+positions = st.lists(st.integers(0, len(TERMS) - 1), min_size=1, max_size=6, unique=True).map(sorted)
+population = st.lists(st.tuples(positions, st.booleans()), min_size=1, max_size=6)
+
+
+@pytest.mark.parametrize("constrained", [False, True])
+@given(drawn=population)
+def test_it_is_pruning_constraining_estimating_and_simulating(constrained, drawn):
+    found = evaluated(*zip(*drawn, strict=True), constrained=constrained)
+    for (structure, pruned), (kept, theta, error, ending) in zip(drawn, found, strict=True):
+        left, parameters, expected, *squares = step_by_step(structure, pruned, constrained)
+        assert (kept, ending) == (left, expected)
+        if ending == OK:
+            np.testing.assert_allclose(theta, parameters, rtol=1e-8, atol=1e-10)
+            assert error == pytest.approx(squares[0], rel=1e-8)
+        else:
+            assert error == math.inf
+
+
+def same(left, right):
+    """Equal to the last bit; what a failure leaves in theta is nobody's business."""
+    strip = [
+        [(kept, theta if ending == OK else (), error, ending) for kept, theta, error, ending in found]
+        for found in (left, right)
+    ]
+    return strip[0] == strip[1]
+
+
+@pytest.mark.parametrize("constrained", [False, True])
+@given(drawn=population, earlier=population)
+def test_no_bit_depends_on_the_table_or_on_one_another(constrained, drawn, earlier):
+    structures, pruned = zip(*drawn, strict=True)
+    together = evaluated(structures, pruned, constrained=constrained)
+    alone = [evaluated([one], [each], constrained=constrained)[0] for one, each in drawn]
+    assert same(together, alone)
+    pairs = table()
+    evaluated(*zip(*earlier, strict=True), constrained=constrained, pairs=pairs)
+    assert same(together, evaluated(structures, pruned, constrained=constrained, pairs=pairs))
+    taken = pairs.taken[0]
+    assert taken == np.count_nonzero(pairs.keys != FREE)
+    assert same(together, evaluated(structures, pruned, constrained=constrained, pairs=pairs))
+    assert pairs.taken[0] == taken
+
+
+@given(population)
+def test_no_bit_depends_on_what_else_the_store_knows(drawn):
+    structures, pruned = zip(*drawn, strict=True)
+    others = [regressor(parse(f"exp(u(k-{lag}))*y(k-1)^{lag}"))[1] for lag in range(1, 4)]
+    assert same(evaluated(structures, pruned), evaluated(structures, pruned, before=others))
+
+
+@given(positions, st.booleans(), st.floats(0.0, 2.0))
+def test_what_is_allowed_abandons_only_what_is_beyond_it(structure, pruned, share):
+    (whole,) = evaluated([structure], [pruned])
+    (_, _, error, ending) = whole
+    if ending != OK:
+        return
+    (found,) = evaluated([structure], [pruned], allowed=share * error)
+    if found[-1] == ABANDONED:
+        assert share < 1.0
+        assert found[2] == math.inf
+    else:
+        assert share > 1.0 - 1e-8
+        assert same([found], [whole])
+
+
+def ending_of(texts, data=RECORD, constrained=False, pruned=False):
+    terms = sorted((regressor(parse(text))[1] for text in texts), key=lambda item: item.content)
+    ((*_, error, ending),) = evaluated([range(len(terms))], [pruned], data, terms, constrained)
+    assert (error == math.inf) == (ending != OK)
+    return ending
+
+
+@pytest.mark.parametrize(
+    ("texts", "ending"),
+    [
+        (["y(k-1)", "u(k-1)"], OK),
+        (["u(k-1)", "u(k-2)", "u(k-1) + u(k-2)"], DEPENDENT),
+        (["y(k-1)", "u(k-1)", "u(k-1) + 0.0000000001*u(k-2)"], DEPENDENT),
+        (["y(k-1)", "y(k-2)", "exp(50 + u(k-1))^9"], OVERFLOW),
+    ],
+)
+def test_a_structure_ends_as_its_columns_let_it(texts, ending):
+    assert ending_of(texts) == ending
+
+
+def test_a_structure_that_runs_away_has_diverged():
+    # One segment triples with every sample and fixes the parameter, which is too large for the other one.
+    y = np.concatenate([3.0 ** np.arange(15), np.full(60, 1e5)])
+    assert ending_of(["y(k-1)"], Dataset(np.zeros(75), y, 0.1, segments=(15, 60))) == DIVERGED
+    assert ending_of(["y(k-1)"], Dataset(np.zeros(15), y[:15], 0.1)) == OK
+
+
+def test_a_structure_without_y_cannot_meet_the_constraint():
+    assert ending_of(["u(k-1)", "u(k-2)"], constrained=True) == INFEASIBLE
+    assert ending_of(["u(k-1)"], constrained=True) == NO_TERMS
+    assert ending_of(["y(k-1)", "u(k-1)"], constrained=True) == OK
+
+
+def test_what_explains_nothing_leaves_no_terms():
+    noise = np.random.default_rng(2).normal(size=(2, 3000))
+    assert ending_of(["sign(u(k-1))"], Dataset(noise[0], noise[1], 0.1), pruned=True) == NO_TERMS
+
+
+@pytest.mark.parametrize(("rows", "ending"), [(1, TOO_FEW_ROWS), (3, TOO_FEW_ROWS), (6, OK)])
+def test_more_parameters_than_rows_are_said_to_be_too_many(rows, ending):
+    texts = ["y(k-1)", "u(k-1)", "u(k-2)", "u(k-3)"]
+    data = record(segments=(WARM_UP + rows,))
+    assert ending_of(texts, data) == ending
+
+
+def test_a_slow_record_is_estimated_to_six_digits():
+    k = np.arange(4000)
+    u = np.sin(0.003 * k) + 0.3 * np.sin(0.0011 * k + 1)
+    y = np.convolve(u, [0.0, 0.05, 0.02, 0.01])[:4000] + 1e-4 * np.random.default_rng(3).normal(size=4000)
+    data = Dataset(u, y, 0.01)
+    terms = [regressor(parse(text))[1] for text in ("u(k-1)", "u(k-2)", "u(k-3)")]
+    ((_, theta, error, ending),) = evaluated([[0, 1, 2]], [False], data, terms)
+    psi = regressor_matrix([*terms, Lagged(0, 0)], data, WARM_UP)
+    expected = constrained_least_squares(psi[:-1], psi[-1], np.empty((0, 3)), np.empty(0)).theta
+    assert ending == OK
+    np.testing.assert_allclose(theta, expected, rtol=1e-6)
+    assert error == pytest.approx(float(np.sum((psi[-1] - expected @ psi[:-1]) ** 2)), rel=1e-9)

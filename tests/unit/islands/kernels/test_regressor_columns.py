@@ -1,0 +1,98 @@
+"""A column holds what the algebra says a term is, on every row of every segment."""
+
+import numpy as np
+import pytest
+
+from islands.kernels.regressor_columns import columns
+from islands.kernels.summation import CHUNK
+from islands.model.expression import Constant, Lagged, value
+from islands.model.parsing import parse
+from islands.model.primitives import PRIMITIVES
+from islands.model.regressor import regressor
+from islands.program.regressor_matrix import arranged
+from islands.program.term_pool import link
+
+TERMS = [
+    "y(k-1)",
+    "u2(k-9)",
+    "y(k-1)*u1(k-4)",
+    "u1(k-1)*u1(k-1)*y(k-2)",
+    "y(k-1)*y(k-2)*u1(k-1)*u2(k-1)",
+    "y(k-1)^2*u1(k-1)^2*u2(k-3)^3",
+    "u1(k-2)*sign(u1(k-2) - u1(k-3))*(u1(k-2) - u1(k-3))",
+    "max(u1(k-1), abs(y(k-5)))/(2 + y(k-1)*y(k-1))",
+    "sqrt(y(k-1))*min(u1(k-1), u2(k-1))",
+]
+
+#: Segments around the kernel's 256 rows, with 9 samples before each first row.
+LENGTHS = (10, 9 + CHUNK - 1, 9 + CHUNK, 9 + CHUNK + 1, 9 + 3 * CHUNK + 5)
+
+
+def made(text):
+    return regressor(parse(text))[1]
+
+
+def evaluated(terms, signals, first, rows, warm_up):
+    out = np.full((len(terms), sum(rows)), np.nan)
+    columns(link(terms), arranged(signals, list(zip(first, rows, strict=True)), warm_up), out)
+    return out
+
+
+def oracle(terms, signals, first, rows):
+    samples = [begin + row for begin, count in zip(first, rows, strict=True) for row in range(count)]
+    channels = signals.tolist()
+    return np.array(
+        [
+            [value(term, lambda channel, lag, k=k: channels[channel][k - lag]) for k in samples]
+            for term in terms
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def signals():
+    return np.random.default_rng(0).normal(size=(3, sum(LENGTHS)))
+
+
+def test_every_row_of_every_segment_is_the_value_of_the_expression(signals):
+    begin = np.cumsum((0, *LENGTHS[:-1]))
+    first, rows = (begin + 9).tolist(), [length - 9 for length in LENGTHS]
+    terms = [made(text) for text in TERMS]
+    found = evaluated(terms, signals, first, rows, 9)
+    assert np.array_equal(found, oracle([term.expression for term in terms], signals, first, rows))
+
+
+def test_a_longer_warm_up_only_leaves_rows_out(signals):
+    terms = [made(text) for text in TERMS]
+    short, long = (evaluated(terms, signals, [first], [600 - first], first) for first in (9, 40))
+    assert np.array_equal(short[:, 31:], long)
+
+
+def test_the_present_may_be_a_term(signals):
+    target = Lagged(0, 0)
+    assert np.array_equal(evaluated([target, made("y(k-1)")], signals, [1], [500], 1)[0], signals[0, 1:501])
+    assert np.array_equal(evaluated([target], signals, [0], [500], 0)[0], signals[0, :500])
+
+
+def test_a_constant_term_is_a_column_of_ones(signals):
+    assert np.array_equal(evaluated([made("1"), made("y(k-1)")], signals, [1], [300], 1)[0], np.ones(300))
+    assert made("1").expression == Constant(1.0)
+
+
+def test_a_term_does_not_depend_on_the_terms_beside_it(signals):
+    terms = [made(text) for text in TERMS]
+    together = evaluated(terms, signals, [9], [400], 9)
+    for position, term in enumerate(terms):
+        assert np.array_equal(evaluated([term], signals, [9], [400], 9)[0], together[position])
+
+
+@pytest.mark.parametrize("name", [name for name in PRIMITIVES if name not in ("phi1", "phi2")])
+def test_every_primitive_of_the_table_is_what_its_scalar_function_says(name):
+    # Arguments that are not simplified away: of several sizes and signs, and exactly zero.
+    axis = np.array([0.0, 1e-12, -1e-12, 0.3, -0.3, 1.0, -2.0, 7.5, -60.0, 1e3])
+    signals = np.zeros((3, 100))
+    signals[1], signals[2] = np.repeat(axis, 10), np.tile(axis, 10)
+    arguments = "u1(k-1)" if PRIMITIVES[name].arity == 1 else "u1(k-1), u2(k-1)"
+    term = made(f"{name}({arguments})")
+    found = evaluated([term], signals, [1], [99], 1)
+    np.testing.assert_allclose(found, oracle([term.expression], signals, [1], [99]), rtol=1e-15, atol=0)

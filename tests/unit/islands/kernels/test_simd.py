@@ -1,0 +1,229 @@
+"""Every operation on lanes is numpy's, number by number: NaN, infinities and both zeros included."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.kernels import simd
+from islands.kernels.simd import (
+    VECTOR,
+    address,
+    fold,
+    gather,
+    load,
+    outer,
+    outer_upper,
+    outside,
+    read,
+    repeat,
+    room,
+    sign,
+    splat,
+    store,
+    write,
+)
+
+#: How many vectors an operation takes at once; each is compiled for itself.
+COUNTS = (1, 13, *(pytest.param(count, marks=pytest.mark.nightly) for count in (3, 4)))
+
+
+@cache
+def compiled(function):
+    from numba import njit
+
+    return njit(function)
+
+
+def njit(function):
+    """Compile a function when it is first called."""
+
+    def run(*arguments):
+        return compiled(function)(*arguments)
+
+    return run
+
+
+SPECIAL = [0.0, -0.0, 1.0, -1.0, np.nan, np.inf, -np.inf, 5e-324, -5e-324, 1e308, -1e308, 1 / 3]
+every_number = st.sampled_from(SPECIAL) | st.floats()
+
+
+def rows(count, several=2):
+    """Rows of numbers, as many as lanes, with what is special among them."""
+    row = st.lists(every_number, min_size=VECTOR * count, max_size=VECTOR * count).map(np.array)
+    return st.tuples(*[row] * several)
+
+
+def same(found, expected):
+    """Tell whether two arrays agree in every bit, but for what a NaN carries."""
+    nan = np.isnan(expected)
+    return np.array_equal(np.isnan(found), nan) and found[~nan].tobytes() == expected[~nan].tobytes()
+
+
+@cache
+def pairwise(name, count):
+    operation = getattr(simd, name)
+
+    @njit
+    def run(x, y, out):
+        zero = 0
+        store(out, zero, operation(load(x, zero, count), load(y, zero, count)))
+
+    return run
+
+
+@cache
+def signs(count):
+    @njit
+    def run(x, out):
+        store(out, 0, sign(load(x, 0, count)))
+
+    return run
+
+
+@njit
+def gathered(x, a, b, c, d, out):
+    store(out, 0, gather(x, a, b, c, d))
+
+
+@njit
+def repeated(x, out):
+    store(out, 0, repeat(load(x, 0, 1)))
+
+
+@njit
+def products(x, y, whole, upper):
+    store(whole, 0, outer(load(x, 0, 4), load(y, 0, 4)))
+    store(upper, 0, outer_upper(load(x, 0, 4)))
+
+
+@cache
+def bounded(count):
+    @njit
+    def run(x, bound):
+        return outside(load(x, 0, count), bound)
+
+    return run
+
+
+@njit
+def folded(x):
+    return fold(load(x, 0, 1))
+
+
+@njit
+def moved(x, x_at, out, out_at):
+    store(out, np.uint64(out_at), load(x, np.uint64(x_at), 3))
+
+
+@njit
+def filled(number, out, at):
+    store(out, np.uint64(at), splat(number, 3))
+
+
+@njit
+def moved_by_address(x, x_at, out, out_at):
+    write(address(out, out_at), read(address(x, x_at), 3))
+    # Both arrays are named once more, so that they live until here.
+    return x.size + out.size
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", ["add", "subtract", "multiply"])
+@given(st.data())
+def test_arithmetic_is_that_of_every_lane(name, count, data):
+    x, y = data.draw(rows(count))
+    out = np.empty_like(x)
+    pairwise(name, count)(x, y, out)
+    with np.errstate(all="ignore"):
+        assert same(out, getattr(np, name)(x, y))
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@given(st.data())
+def test_the_sign_is_one_minus_one_or_zero(count, data):
+    (x,) = data.draw(rows(count, 1))
+    out = np.empty_like(x)
+    signs(count)(x, out)
+    assert same(out, np.where(x > 0, 1.0, np.where(x < 0, -1.0, 0.0)))
+
+
+def test_gathered_vectors_are_those_that_begin_at_the_offsets():
+    x, out = np.arange(100.0), np.empty(32)
+    gathered(x, 3, 50, 0, 17, out)
+    assert out.tolist() == [*range(3, 11), *range(50, 58), *range(8), *range(17, 25)]
+
+
+@given(st.data())
+def test_products_of_four_vectors_with_four_others_stand_row_by_row(data):
+    x, y = data.draw(rows(4, 2))
+    whole, upper, four = np.empty(128), np.empty(80), np.empty(32)
+    products(x, y, whole, upper)
+    repeated(x, four)
+    with np.errstate(all="ignore"):
+        one, other = x.reshape(4, 1, 8), y.reshape(1, 4, 8)
+        assert same(whole, (one * other).reshape(-1))
+        squares = (one * x.reshape(1, 4, 8))[np.triu_indices(4)]
+        assert same(upper, squares.reshape(-1))
+    assert same(four, np.tile(x[:8], 4))
+
+
+@given(rows(1, 1))
+def test_a_fold_halves_until_one_number_is_left(drawn):
+    (x,) = drawn
+    with np.errstate(all="ignore"):
+        a, b, c, d = x[:4] + x[4:]
+        expected = (a + c) + (b + d)
+    assert same(np.array([folded(x)]), np.array([expected]))
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@given(st.data())
+def test_outside_finds_a_lane_that_is_not_between_the_bounds(count, data):
+    (x,) = data.draw(rows(count, 1))
+    bound = data.draw(st.floats(0.0, allow_nan=False))
+    assert (bounded(count)(x, bound) != 0) == (not np.all(np.abs(x) <= bound))
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_outside_looks_at_every_lane(count):
+    for lane in range(VECTOR * count):
+        for value in (2.0000001, -2.0000001, np.nan, np.inf, -np.inf):
+            x = np.full(VECTOR * count, 2.0)
+            assert bounded(count)(x, 2.0) == 0
+            x[lane] = value
+            assert bounded(count)(x, 2.0) != 0
+
+
+def test_nothing_is_below_a_bound_that_is_negative():
+    assert bounded(1)(np.zeros(VECTOR), -1.0) != 0
+
+
+@pytest.mark.parametrize("move", [moved, moved_by_address], ids=["offset", "address"])
+@given(st.integers(0, 20), st.integers(0, 20))
+def test_lanes_are_read_and_written_from_anywhere_and_nothing_beside_them(move, x_at, out_at):
+    x, out = np.arange(50.0), np.full(50, -1.0)
+    move(x, x_at, out, out_at)
+    expected = np.full(50, -1.0)
+    expected[out_at : out_at + 24] = x[x_at : x_at + 24]
+    assert np.array_equal(out, expected)
+
+
+@given(every_number, st.integers(0, 20))
+def test_a_splat_fills_every_lane(number, at):
+    out, expected = np.full(50, -1.0), np.full(50, -1.0)
+    filled(number, out, at)
+    expected[at : at + 24] = number
+    assert same(out, expected)
+
+
+@pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 1000])
+def test_a_room_has_its_size_and_begins_at_a_line_of_the_cache(size):
+    rooms = [room(size) for _ in range(20)]
+    for found in rooms:
+        assert found.shape == (size,)
+        assert found.dtype == np.float64
+        assert found.ctypes.data % 64 == 0 or size == 0
+        found[:] = 1.0

@@ -1,0 +1,110 @@
+"""Every sum has an order written in the source: no bit depends on the width of the processor's registers."""
+
+import os
+import platform
+import subprocess
+import sys
+
+import pytest
+from llvmlite.binding import get_host_cpu_features
+
+#: Processors to compile for, and what the host has to have to run their code.
+PROCESSORS = {
+    "nehalem": {"sse4.2", "popcnt"},
+    "haswell": {"avx2", "fma", "bmi", "bmi2", "f16c", "lzcnt", "movbe"},
+    "skylake-avx512": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl", "clwb", "adx"},
+}
+
+#: The registers that they have, the widest of them.
+REGISTERS = {"nehalem": "xmm", "haswell": "ymm", "skylake-avx512": "zmm"}
+
+DIGEST = """
+import hashlib
+import numpy as np
+from islands.data.dataset import Dataset
+from islands.estimation.froe import froe
+from islands.estimation.least_squares import factor
+from islands.kernels import simulate as kernel
+from islands.kernels.population import Groups, evaluate
+from islands.model.expression import Lagged
+from islands.model.model import Model
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, rows_of
+from islands.kernels.pair_table import pair_table
+from islands.program.term_pool import Store
+from islands.simulation.layout import layout
+from islands.simulation.predictors import bound_of, multiple_shooting
+
+texts = ["y(k-1)", "y(k-2)", "u(k-1)", "u(k-2)", "u(k-3)", "u(k-1)*y(k-1)", "u(k-2)^3*y(k-1)",
+         "sign(u(k-1) - u(k-2))*u(k-2)", "tanh(y(k-3)) + u(k-3)^2", "y(k-1)/(2 + abs(u(k-4)))"]
+terms = [regressor(parse(text))[1] for text in texts]
+count = len(terms)
+rng = np.random.default_rng(0)
+u, y = rng.normal(size=3100).cumsum() / 20, np.zeros(3100)
+for k in range(2, 3100):
+    y[k] = 0.6 * y[k-1] + 0.2 * y[k-2] + 0.3 * u[k-1] - 0.1 * np.tanh(u[k-1] * y[k-1])
+record = Dataset(u, y + 0.01 * rng.normal(size=3100), 0.1, segments=(2200, 5, 895))
+psi = regressor_matrix([*terms, Lagged(0, 0)], record, 4)
+gram = gram_matrix([*terms, Lagged(0, 0)], record, 4)
+made, chosen = factor(psi[:-1], psi[-1]), froe(gram)
+found = {"columns": psi, "gram": gram, "triangle": made.triangle, "projection": made.projection,
+         "order": np.array(chosen.order), "err": np.array(chosen.err)}
+
+store = Store()
+store.terms([Lagged(0, 0), *terms])
+sizes = np.array([count, 4, 6, 3])
+structures = np.zeros((4, count), np.int64)
+for row, size in zip(structures, sizes):
+    row[:size] = np.arange(size) + 1
+structures[3, :3] = 3, 4, 5
+weight = np.ones(count + 1)
+clusters = Groups(np.array([-1, 0, 0, 1, 1, 1, *[-1] * (count - 5)]), weight, np.array([1.0, 0.0]), 1)
+free = Groups(np.full(count + 1, -1), weight, np.empty(0), 0)
+for name, groups in (("clusters", clusters), ("free", free)):
+    for interval in (1, 50, 1000):
+        cut = layout(record, 4, interval)
+        out = {"kept": np.zeros((4, count), np.int64), "lengths": np.zeros(4, np.int64),
+               "theta": np.zeros((4, count)), "error": np.zeros(4), "ending": np.zeros(4, np.int64)}
+        evaluate(structures, sizes, np.array([True, False, False, False]), 0, 1e-4, store.nodes, groups,
+                 pair_table(1 << 16), rows_of(record, 4), cut, bound_of(record), np.full(count + 1, np.inf),
+                 *out.values())
+        found |= {f"{name}, {interval}, {part}": array for part, array in out.items()}
+        print(name, interval, "width", cut.width, "endings", out["ending"])
+model = Model(tuple(terms[:4]), tuple(found["free, 50, theta"][1][:4].tolist()), ("u",), "y", 0.1)
+for interval in (1, 3, 50, None):
+    simulated = multiple_shooting(model, record, interval)
+    found[f"simulation, {interval}"] = np.append(simulated.y, simulated.mean_squared_error)
+for name, array in found.items():
+    print(name, hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest())
+code = "".join(kernel._wide.inspect_asm().values())
+print(max((name for name in ("xmm", "ymm", "zmm") if f"%{name}" in code), default="none"))
+"""
+
+
+def digest(folder, processor=None):
+    """Return the digest of every result, and the widest registers of the code that made them."""
+    environment = os.environ | {"ISLANDS_CACHE_DIR": str(folder / (processor or "host"))}
+    if processor:
+        # Without a list of features Numba would add the host's to those of the named processor.
+        environment |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", DIGEST], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    *results, registers = done.stdout.splitlines()
+    return results, registers
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(900)
+@pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="names of x86 processors")
+def test_bits_do_not_depend_on_the_processor(tmp_path):
+    expected, _ = digest(tmp_path)
+    # The lags of u alone cannot meet the constraint; all else is well.
+    assert expected[0] == "clusters 1 width 104 endings [0 0 0 4]"
+    assert expected[5] == "free 1000 width 8 endings [0 0 0 0]"
+    assert len(expected) == 46
+    host = {name for name, has in get_host_cpu_features().items() if has}
+    for processor in (name for name, needed in PROCESSORS.items() if needed <= host):
+        assert digest(tmp_path, processor) == (expected, REGISTERS[processor]), processor

@@ -1,0 +1,182 @@
+"""Text of expressions, case by case; what cannot be read says why."""
+
+import pytest
+
+from islands.errors import ModelError
+from islands.model.expression import Apply, Constant, Lagged, Shift
+from islands.model.parsing import parse
+from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
+from islands.model.rendering import LARGEST_POWER, at_rest, latex, plain
+
+U, Y = Lagged(1, 1), Lagged(0, 1)
+
+
+def mul(*factors):
+    return Apply(MUL, factors)
+
+
+def add(*terms):
+    return Apply(ADD, terms)
+
+
+def sub(first, second):
+    return Apply(SUB, (first, second))
+
+
+def div(first, second):
+    return Apply(PRIMITIVES["div"], (first, second))
+
+
+@pytest.mark.parametrize(
+    ("expression", "text"),
+    [
+        (Lagged(2, 12), "u2(k-12)"),
+        (Lagged(1, 0), "u(k)"),
+        (Constant(-2.0), "-2"),
+        (Constant(1e-5), "1e-05"),
+        (mul(U, U, U, Y), "u(k-1)^3*y(k-1)"),
+        (mul(U, Y, U), "u(k-1)*y(k-1)*u(k-1)"),
+        (mul(add(U, Y), add(U, Y)), "(u(k-1) + y(k-1))^2"),
+        (mul(mul(U, Y), mul(U, Y)), "mul(u(k-1), y(k-1))^2"),
+        (mul(U, mul(U, Y)), "u(k-1)*mul(u(k-1), y(k-1))"),
+        (mul(Constant(-2.0), U), "(-2)*u(k-1)"),
+        (mul(Constant(-0.0), Constant(-0.0)), "(-0)^2"),
+        (mul(div(U, Y), U), "(u(k-1)/y(k-1))*u(k-1)"),
+        (mul(div(U, Y), div(U, Y)), "(u(k-1)/y(k-1))^2"),
+        (div(mul(U, Y), div(U, Y)), "(u(k-1)*y(k-1))/(u(k-1)/y(k-1))"),
+        (add(U, Y, Constant(-1.0)), "u(k-1) + y(k-1) + (-1)"),
+        (add(U, sub(U, Y)), "u(k-1) + sub(u(k-1), y(k-1))"),
+        (sub(add(U, Y), sub(U, Y)), "add(u(k-1), y(k-1)) - sub(u(k-1), y(k-1))"),
+        (sub(mul(U, Y), div(U, Y)), "u(k-1)*y(k-1) - u(k-1)/y(k-1)"),
+        (Shift(5, Shift(5, U)), "q5(q5(u(k-1)))"),
+        (Apply(PRIMITIVES["phi2"], (Lagged(1, 4), U)), "phi2(u(k-4), u(k-1))"),
+        (mul(*[U] * 243), "u(k-1)^99*u(k-1)^99*u(k-1)^45"),
+        (mul(*[U] * 100), "u(k-1)^99*u(k-1)"),
+    ],
+)
+def test_plain_text_of(expression, text):
+    assert plain(expression) == text
+    assert parse(text) == expression
+
+
+@pytest.mark.parametrize(
+    ("text", "expression"),
+    [
+        ("  u(k - 1) ", U),
+        ("u1(k-1)", U),
+        ("u(k-1)**2", mul(U, U)),
+        ("u(k-1)^1", U),
+        ("u(k-1)^1*y(k-1)^2", mul(U, Y, Y)),
+        ("u(k-1) - y(k-1) - u(k-1)", sub(sub(U, Y), U)),
+        ("u(k-1)*y(k-1)/u(k-1)", div(mul(U, Y), U)),
+        ("u(k-1)/y(k-1)*u(k-1)", mul(div(U, Y), U)),
+        ("-u(k-1)*y(k-1)", mul(mul(Constant(-1.0), U), Y)),
+        ("-3", Constant(-3.0)),
+        ("-2^2", mul(Constant(-1.0), mul(Constant(2.0), Constant(2.0)))),
+        ("mul(u(k-1), y(k-1), 2)", mul(U, Y, Constant(2.0))),
+        ("q12(y(k))", Shift(12, Lagged(0, 0))),
+    ],
+)
+def test_text_that_is_read(text, expression):
+    assert parse(text) == expression
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"cannot read '': write it like u\(k-1\)\*sign\(u\(k-1\) - u\(k-2\)\)"),
+        ("u(k-1", r"cannot read 'u\(k-1': write it like"),
+        ("u(k-1) y(k-1)", "write it like"),
+        ("\0", "write it like"),
+        ("u", "cannot read 'u': a leaf is y"),
+        ("'u'", "a leaf is y"),
+        ("True", "cannot read 'True': a leaf is y"),
+        ("-True", "cannot read 'True'"),
+        ("1e999", "a leaf is y"),
+        ("1" + "0" * 400, "a leaf is y"),
+        ("2j", "cannot read '2j'"),
+        ("u(k-1) if 1 else 2", "cannot read 'u.k - 1. if 1 else 2'"),
+        ("max(*u(k-1))", "max takes 2 arguments, got 1"),
+        ("max(a=1)", r"cannot read 'max\(a=1\)'"),
+        ("u(k-1) % 2", "cannot read"),
+        ("(1).real(2)", "cannot read"),
+        ("gauss(u(k-1))", "unknown function 'gauss': known are mul, sub, sign, phi1, phi2, add"),
+        ("y1(k-1)", "unknown function 'y1'"),
+        ("u0(k-1)", "unknown function 'u0'"),
+        ("u01(k-1)", "unknown function 'u01'"),
+        ("tanh(u(k-1), y(k-1))", "tanh takes 1 arguments, got 2"),
+        ("sub(u(k-1), y(k-1), 1)", "sub takes 2 arguments, got 3"),
+        ("mul(u(k-1))", "mul takes 2 arguments, got 1"),
+        ("u(k+1)", r"cannot read the lag 'k \+ 1': write k-1, k-2, ..."),
+        ("u(1)", "cannot read the lag '1'"),
+        ("u(k-y(k-1))", "cannot read the lag"),
+        ("u(k-1.5)", r"cannot read the lag 'k - 1\.5'"),
+        ("u(k--1)", "cannot read the lag"),
+        ("u(k-True)", "cannot read the lag 'k - True'"),
+        ("u(k-1)^0", r"cannot read 'u\(k - 1\) \*\* 0': a power is a whole number from 1 to 99"),
+        ("u(k-1)^100", "a power is a whole number from 1 to 99"),
+        ("u(k-1)^2.5", "a power is a whole number"),
+        ("u(k-1)^-1", "a power is a whole number"),
+        ("u(k-1)^True", "a power is a whole number"),
+        ("2^2^2", "a power is a whole number"),
+        ("-" * 5000 + "1", "cannot read '-{80}': write it like"),
+        ("+".join(["u(k-1)"] * 5000), "write it like"),
+    ],
+)
+def test_text_that_cannot_be_read_says_which_part_and_what_to_write(text, message):
+    with pytest.raises(ModelError, match=message):
+        parse(text)
+
+
+def test_the_largest_power_is_read():
+    assert len(parse(f"u(k-1)^{LARGEST_POWER}").arguments) == LARGEST_POWER
+
+
+def test_a_table_without_a_function_does_not_read_it():
+    table = {name: PRIMITIVES[name] for name in ("mul", "sub")}
+    with pytest.raises(ModelError, match=r"unknown function 'tanh': known are mul, sub$"):
+        parse("tanh(u(k-1))", table)
+
+
+@pytest.mark.parametrize(
+    ("expression", "inputs", "text"),
+    [
+        (mul(Lagged(0, 0), Lagged(1, 0)), 1, "y*u"),
+        (mul(Lagged(0, 0), Lagged(2, 0)), 2, "y*u2"),
+        (Constant(1.0), 1, "1"),
+    ],
+)
+def test_a_steady_state_is_written_without_time(expression, inputs, text):
+    assert at_rest(expression, inputs) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("y(k-12)", "y_{k-12}"),
+        ("u(k)", "u_{k}"),
+        ("u2(k-3)", "u_{2,k-3}"),
+        ("0.1*u(k-1)", "0.1 u_{k-1}"),
+        ("-2*u(k-1)", r"\left(-2\right) u_{k-1}"),
+        ("1e-5 + y(k-1)", r"1 \times 10^{-5} + y_{k-1}"),
+        ("u(k-1)*2*3", r"u_{k-1} \left(2\right) \left(3\right)"),
+        ("u(k-1)^3*(y(k-1) - 1)^2", r"u_{k-1}^{3} \left(y_{k-1} - 1\right)^{2}"),
+        ("phi1(u(k-1), u(k-2))^2", r"\left(u_{k-1} - u_{k-2}\right)^{2}"),
+        ("sign(u(k-1))^2", r"\operatorname{sign}(u_{k-1})^{2}"),
+        ("abs(u(k-1))^2", r"\left|u_{k-1}\right|^{2}"),
+        ("square(u(k-1))^2", r"\left(\left(u_{k-1}\right)^{2}\right)^{2}"),
+        ("(u(k-1)/y(k-1))^2", r"\left(\frac{u_{k-1}}{y_{k-1}}\right)^{2}"),
+        ("1e-5^2", r"\left(1 \times 10^{-5}\right)^{2}"),
+        ("sqrt(y(k-1) + 2*u(k-1))", r"\sqrt{\left|y_{k-1} + 2 u_{k-1}\right|}"),
+        ("q2(u(k-1)*y(k-1))", r"q^{-2} \left(u_{k-1} y_{k-1}\right)"),
+        ("u(k-1)*q1(y(k-1))", r"u_{k-1} \left(q^{-1} y_{k-1}\right)"),
+        ("max(u(k-1), exp(y(k-1)))", r"\max(u_{k-1}, \exp(y_{k-1}))"),
+        ("u(k-1) - (y(k-1) - 1)", r"u_{k-1} - \left(y_{k-1} - 1\right)"),
+    ],
+)
+def test_latex_of(text, written):
+    assert latex(parse(text)) == written
+
+
+def test_latex_does_not_split_a_large_power():
+    assert latex(mul(*[U] * 243)) == "u_{k-1}^{243}"

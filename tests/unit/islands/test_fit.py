@@ -1,0 +1,391 @@
+"""The facade of fitting: a record in, a result out, and every method of a result."""
+
+import json
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset, join
+from islands.errors import RecordError, SettingsError
+from islands.io.result_folder import record_document, result_json, summary
+from islands.model.equations import equation, latex_equation
+from islands.model.rendering import plain
+from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
+from support.undrawn import undrawn_figures
+
+
+def walk(samples, seed, inputs=1):
+    return 0.1 * np.cumsum(np.random.default_rng(seed).normal(size=(samples, inputs)), axis=0)
+
+
+def piezo(samples=600, seed=0, noise=0.002, **changes):
+    """Hysteresis out of the library phi-polynomial, a little noise on the measurement."""
+    u, y = walk(samples, seed), np.zeros(samples)
+    for k in range(3, samples):
+        new = u[k - 1, 0] - u[k - 2, 0]
+        y[k] = y[k - 1] + 0.8 * new - 0.3 * y[k - 1] * abs(new)
+    y += noise * np.random.default_rng(seed + 1).normal(size=samples)
+    return Dataset(u, y, **({"dt": 0.01, "input_names": ("u_V",), "output_name": "y_um"} | changes))
+
+
+TANK = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-1)^2": -0.2}
+
+
+def tank(samples=400, seed=0, size=1.0):
+    """A smooth system: y(k) = 0.6 y(k-1) + 0.5 u(k-1) - 0.2 u(k-1)^2 + e(k)."""
+    rng = np.random.default_rng(seed)
+    u, y = size * rng.uniform(-1, 1, samples), np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.6 * y[k - 1] + 0.5 * u[k - 1] - 0.2 * u[k - 1] ** 2 + 0.01 * rng.normal()
+    return Dataset(u, y, 1.0)
+
+
+def with_output(record, y):
+    return Dataset(record.u, y, record.dt, record.input_names, record.output_name)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return islands.fit(piezo(), max_terms=5)
+
+
+# What a result says and does.
+
+
+def test_the_best_model_reads_as_in_the_readme(result):
+    best = result.best
+    assert best.equation.startswith("y(k) = 1*y(k-1) ")
+    assert best.latex.startswith("y_{k} = 1 ")
+    assert best.metrics["validation"]["free_run"].mape < 1.0
+    assert best.physics.property_1 is True
+    assert isinstance(best.residual_tests.passed, bool)
+    assert (best.equation, best.latex) == (equation(best.model), latex_equation(best.model))
+    assert str(best) == best.equation
+    assert (best.model.input_names, best.model.output_name, best.model.dt) == (("u_V",), "y_um", 0.01)
+
+
+def test_models_come_best_first_and_know_their_rank(result):
+    assert [model.rank for model in result.models] == [1, 2, 3, 4, 5]
+    assert result.best.model == result.models[0].model
+    errors = [model.metrics["validation"]["free_run"].rmse for model in result.models]
+    assert errors == sorted(errors)
+    assert sorted(model.model.size for model in result.models) == [1, 2, 3, 4, 5]
+    assert str(result) == summary(result.findings)
+
+
+def test_a_model_simulates_any_record_in_three_ways(result):
+    record, model = piezo(200, seed=9), result.best.model
+    shooting = result.findings.settings["shooting"]
+    assert shooting == 45
+    expected = {
+        "one-step": one_step_ahead(model, record).y,
+        "shooting": multiple_shooting(model, record, shooting).y,
+        "free-run": free_run(model, record).y,
+    }
+    for mode, y in expected.items():
+        assert np.array_equal(result.best.simulate(record, mode).y, y, equal_nan=True)
+    assert np.array_equal(result.best.simulate(record).y, expected["free-run"], equal_nan=True)
+    assert not np.array_equal(expected["one-step"][10:], expected["shooting"][10:])
+    with pytest.raises(
+        SettingsError, match="unknown mode 'backwards': take one of one-step, shooting, free-run"
+    ):
+        result.best.simulate(record, "backwards")
+
+
+def test_a_free_run_needs_outputs_in_its_warm_up_alone(result):
+    record = piezo(200, seed=9)
+    y = record.y.copy()
+    y[result.best.model.maximum_lag :] = np.nan
+    blind = result.best.simulate(with_output(record, y))
+    assert np.array_equal(blind.y, result.best.simulate(record).y, equal_nan=True)
+
+
+KINDS = ("free-run", "loop", "hold", "residuals")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_model_draws_every_figure(result, kind):
+    figure = result.best.plot(kind)
+    assert figure.axes
+    assert any(axes.get_lines() or axes.collections for axes in figure.axes)
+
+
+def test_an_unknown_figure_is_refused(result):
+    with pytest.raises(SettingsError, match=r"unknown figure 'pie': take one of free-run, loop, "):
+        result.best.plot("pie")
+
+
+def test_a_model_is_exported_and_read_back(result, tmp_path):
+    assert result.best.export("plain") == result.best.equation
+    assert result.best.export("latex") == result.best.latex
+    namespace = {}
+    exec(result.best.export(), namespace)
+    record, lag = piezo(100, seed=9), result.best.model.maximum_lag
+    theirs = namespace["simulate"](record.u[:, 0].tolist(), record.y.tolist())
+    assert theirs[lag:] == result.best.simulate(record).y[lag:].tolist()
+    (tmp_path / "model.json").write_text(result.best.export("json"))
+    assert islands.read_model(tmp_path / "model.json") == result.best.model
+
+
+def test_a_result_is_saved_as_a_folder(result, tmp_path):
+    with undrawn_figures():
+        folder = result.with_wall_time(2.0).save(tmp_path / "new" / "out")
+    assert folder == tmp_path / "new" / "out"
+    assert {path.name for path in folder.iterdir()} == {"result.json", "models", "figures", "summary.txt"}
+    figures = {path.name for path in (folder / "figures").iterdir()}
+    assert figures >= {"free-run.svg", "loop.svg", "hold.svg", "residuals.svg"}
+    search = json.loads((folder / "result.json").read_text())["search"]
+    assert search["wall_s"] == 2.0
+    assert search["evaluations_per_second"] == pytest.approx(2.5)
+    assert result.findings.search.wall_s is None
+
+
+# What determines it.
+
+
+def test_the_same_record_and_settings_give_the_same_result_bit_for_bit(result):
+    again = islands.fit(piezo(), max_terms=5)
+    assert result_json(again.findings) == result_json(result.findings)
+    assert [model.export("json") for model in again.models] == [
+        model.export("json") for model in result.models
+    ]
+
+
+def test_the_seed_is_kept_and_draws_nothing():
+    first, second = (islands.fit(tank(), library="polynomial", max_terms=3, seed=seed) for seed in (1, 2))
+    assert (first.findings.seed, second.findings.seed) == (1, 2)
+    assert [model.model for model in first.models] == [model.model for model in second.models]
+
+
+def test_settings_say_what_was_chosen_where_nothing_was_asked():
+    settings = dict(islands.fit(tank(), library="polynomial", max_terms=2).findings.settings)
+    assert settings == {
+        "method": "fit",
+        "library": "polynomial",
+        "degree": 3,
+        "lags": 3,
+        "max_terms": 2,
+        "constraints": "none",
+        "shooting": 30,
+        "validation": 0.25,
+    }
+    asked = islands.fit(
+        tank(), library="polynomial", degree=2, lags=1, constraints="hysteresis", shooting=8, max_terms=2
+    ).findings
+    assert {name: asked.settings[name] for name in ("degree", "lags", "constraints", "shooting")} == {
+        "degree": 2,
+        "lags": 1,
+        "constraints": "hysteresis",
+        "shooting": 8,
+    }
+    assert asked.search.full_set == {"candidates": 6, "bytes": 8 * 6 * 299}
+
+
+def test_settings_may_be_numpys_numbers(tmp_path):
+    made = islands.fit(tank(), np.float64(0.5), library="polynomial", max_terms=np.int64(2), seed=np.int64(3))
+    with undrawn_figures():
+        made.save(tmp_path)
+    saved = json.loads((tmp_path / "result.json").read_text())
+    assert (saved["settings"]["max_terms"], saved["settings"]["validation"], saved["seed"]) == (2, 0.5, 3)
+
+
+# Validation data.
+
+
+def test_a_fraction_of_the_records_end_validates():
+    split = islands.fit(tank(), 0.1, library="polynomial", max_terms=2).findings.split
+    assert (split.estimation.samples, split.validation.samples) == (360, 40)
+    assert np.array_equal(split.validation.y, tank().y[360:])
+
+
+def test_a_record_of_its_own_validates_and_estimates_nothing():
+    whole = islands.fit(tank(), tank(150, seed=5), library="polynomial", max_terms=3)
+    other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
+    described = whole.findings.settings["validation"]
+    assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
+    assert whole.findings.split.estimation.samples == 400
+    assert whole.findings.split.validation.samples == 150
+    by_size = [{m.model.size: m for m in made.models} for made in (whole, other)]
+    for size in (1, 2, 3):
+        assert by_size[0][size].model == by_size[1][size].model
+        errors = [entry[size].metrics["validation"]["free_run"].rmse for entry in by_size]
+        assert errors[0] != errors[1]
+
+
+def test_validation_data_may_have_other_names_but_not_another_number_of_inputs_or_sampling_time():
+    record, renamed = piezo(), piezo(200, seed=1, input_names=("u_val_V",), output_name="y_val_um")
+    made = islands.fit(record, renamed, max_terms=2)
+    assert made.best.model.input_names == ("u_V",)
+    two = Dataset(walk(200, 0, inputs=2), piezo(200).y, 0.01)
+    with pytest.raises(RecordError, match=r"has 1 inputs, the validation data 2: give both the same inputs"):
+        islands.fit(record, two)
+    with pytest.raises(RecordError, match=r"sampled at 0\.01 s, the validation data at 0\.02 s: resample"):
+        islands.fit(record, piezo(200, dt=0.02))
+
+
+# Records of every kind.
+
+
+def test_several_recordings_are_fitted_together():
+    parts = tuple(tank(samples, seed) for seed, samples in enumerate((100, 3, 160, 2, 140)))
+    made = islands.fit(join(parts), library="polynomial", max_terms=4)
+    assert made.findings.record.segments == (100, 3, 160, 2, 140)
+    assert made.findings.split.estimation.segments == (100, 3, 160, 2, 39)
+    # Rows behind a warm-up of three samples in each.
+    assert made.findings.search.full_set["bytes"] == 8 * 84 * (97 + 157 + 36)
+    model = {m.model.size: m.model for m in made.models}[3]
+    terms = {plain(item.expression): theta for item, theta in zip(model.regressors, model.theta, strict=True)}
+    assert terms == {name: pytest.approx(theta, abs=0.02) for name, theta in TANK.items()}
+
+
+def test_two_inputs_are_fitted_by_every_library():
+    u = walk(600, 0, inputs=2)
+    y = np.zeros(600)
+    for k in range(2, 600):
+        y[k] = y[k - 1] + 0.5 * (u[k - 1, 0] - u[k - 2, 0]) - 0.3 * (u[k - 1, 1] - u[k - 2, 1])
+    record = Dataset(u, y, 0.1, ("left_V", "right_V"))
+    by_size = {m.model.size: m for m in islands.fit(record, max_terms=3).models}
+    assert by_size[3].equation == "y(k) = 1*y(k-1) + 0.5*(u1(k-1) - u1(k-2)) - 0.3*(u2(k-1) - u2(k-2))"
+    assert by_size[3].model.input_names == ("left_V", "right_V")
+    assert by_size[3].physics.property_1 is True
+    smooth = islands.fit(record, library="polynomial", degree=1, max_terms=5)
+    # Three lags of y and of both inputs, and the constant.
+    assert smooth.findings.search.full_set == {"candidates": 10, "bytes": 8 * 10 * 447}
+    assert smooth.best.metrics["validation"]["free_run"].rmse < 1e-9
+
+
+def test_one_term_is_a_model():
+    made = islands.fit(piezo(), max_terms=1)
+    assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
+    assert islands.fit(tank(), library="polynomial", max_terms=1).best.model.size == 1
+
+
+@pytest.fixture(params=["undrawn", pytest.param("drawn", marks=pytest.mark.ci)])
+def drawing(request):
+    """A result's folder without the pictures in its figures, and at the level ci with them."""
+    with undrawn_figures() if request.param == "undrawn" else nullcontext():
+        yield
+
+
+def test_an_output_that_never_moves_is_its_own_model(tmp_path, drawing):
+    still = with_output(piezo(), np.full(600, 3.0))
+    made = islands.fit(still)
+    assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
+    assert made.best.metrics["validation"]["free_run"].rmse == 0.0
+    assert made.best.physics.hold_drift_percent == 0.0
+    assert "-" in str(made).splitlines()[6].split()
+    made.save(tmp_path)
+
+
+@pytest.mark.ci
+def test_a_model_that_diverges_even_one_step_ahead_spoils_no_fit(tmp_path, drawing):
+    calm, u = tank(), tank().u.copy()
+    u[200] = 1e5
+    made = islands.fit(calm, Dataset(u, calm.y, 1.0), library="polynomial", max_terms=6)
+    lost = [m for m in made.models if not m.assessed.assessment.outcomes["validation"]["one_step_ahead"]]
+    assert 0 < len(lost) < len(made.models)
+    assert [m.rank for m in lost] == list(range(len(made.models) - len(lost) + 1, len(made.models) + 1))
+    assert not any(m.residual_tests.passed for m in lost)
+    for kind in KINDS:
+        assert lost[0].plot(kind).axes
+    made.save(tmp_path)
+
+
+def test_structures_that_cannot_be_estimated_are_counted_with_their_reason():
+    # Nine samples estimate: six rows behind the warm-up, enough for five parameters.
+    made = islands.fit(tank(9), tank(100, seed=1), library="polynomial", max_terms=10)
+    outcomes = made.findings.search.outcomes
+    assert set(outcomes) == {"ok", "too_few_rows"}
+    assert outcomes["ok"] == len(made.models) == 5
+    assert sum(outcomes.values()) == made.findings.search.evaluations
+
+
+# Progress.
+
+
+@pytest.mark.parametrize("samples", [9, 400])
+def test_progress_only_ever_goes_on(samples):
+    told = []
+    islands.fit(
+        tank(samples), tank(100, seed=1), library="polynomial", progress=lambda *news: told.append(news)
+    )
+    texts, shares = zip(*told, strict=True)
+    assert texts[0] == "inner products of 84 candidates"
+    assert texts[1] == "model of 1 terms"
+    assert shares[0] == 0.0
+    assert list(shares) == sorted(shares)
+    assert shares[-1] <= 1.0
+    assert samples == 9 or shares[-1] == 1.0
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"library": "wavelets"}, "unknown library 'wavelets': take one of phi-polynomial, polynomial"),
+        ({"constraints": "passive"}, "unknown constraints 'passive': take one of none, hysteresis"),
+        ({"max_terms": 0}, "a model has at least one term, got max_terms = 0"),
+        ({"degree": 0}, "degree and lags are at least 1, got 0 and 3"),
+        ({"lags": 1}, "phi-polynomial needs lags of at least 2"),
+        (
+            {"library": "polynomial", "degree": 5, "lags": 11},
+            "80730 candidates are more than a library may have",
+        ),
+        ({"shooting": 0}, "a shooting interval has at least 1 sample, got 0"),
+        ({"validation": 1.0}, "the validation fraction lies between 0 and 1, got 1.0"),
+        ({"validation": 0.0001}, "leaves a part empty"),
+    ],
+)
+def test_a_setting_out_of_range_is_refused(settings, message):
+    with pytest.raises(SettingsError) as caught:
+        islands.fit(piezo(), **settings)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("samples", "error", "message"),
+    [
+        (1, SettingsError, "leaves a part empty"),
+        (4, RecordError, "has 3 samples and 3 are needed before the first row: take a longer recording"),
+        (
+            5,
+            SettingsError,
+            "no model could be estimated: {'too_few_rows': 1}; take another library or a longer",
+        ),
+        (10, RecordError, "has 2 samples and the warm-up takes 3: take a longer recording"),
+        (20, RecordError, "has 5 samples, of which the warm-up takes 3: testing the residual takes 3 more"),
+    ],
+)
+def test_a_record_that_is_too_short_is_refused_with_advice(samples, error, message):
+    with pytest.raises(error) as caught:
+        islands.fit(tank(samples), library="polynomial")
+    assert message in str(caught.value)
+
+
+def test_the_shortest_record_that_can_be_fitted_is_fitted():
+    assert islands.fit(tank(24), library="polynomial").models
+
+
+@pytest.mark.parametrize(
+    ("sample", "message"),
+    [
+        (100, "y_um is missing at sample 100: estimation needs every sample"),
+        (500, "the output is missing at sample 50, where a simulation starts from it"),
+    ],
+)
+def test_an_incomplete_record_is_refused(sample, message):
+    y = piezo().y.copy()
+    y[sample] = np.nan
+    with pytest.raises(RecordError) as caught:
+        islands.fit(with_output(piezo(), y))
+    assert message in str(caught.value)
+
+
+def test_an_output_of_zeros_leaves_nothing_to_explain():
+    zeros = with_output(tank(), np.zeros(400))
+    with pytest.raises(SettingsError, match=r"no model could be estimated: \{\}; take another library"):
+        islands.fit(zeros, library="polynomial")
