@@ -12,7 +12,7 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from acceptance import test_hidden as checks
-from islands.discrepancy.calibration.levenberg_marquardt import preparation
+from islands.discrepancy.calibration import preparation
 from islands.discrepancy.effects import CATALOGUE
 from islands.trials.injection.piezo import PIEZO
 from islands.trials.trial import Outcome, Trial

@@ -9,7 +9,7 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import preparation
+from islands.discrepancy.calibration import preparation
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.errors import IslandsError, RecordError, SettingsError

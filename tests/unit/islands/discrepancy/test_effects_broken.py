@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import preparation
+from islands.discrepancy.calibration import preparation
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Effect

@@ -104,7 +104,7 @@ def sources(tmp_path: Path) -> None:
     package = tmp_path / "islands" / "kernels"
     package.mkdir(parents=True)
     (package.parent / "__init__.py").touch()
-    (package / "compilation.py").write_bytes(SOURCE.read_bytes())
+    (package / "jit_cache.py").write_bytes(SOURCE.read_bytes())
     (tmp_path / "toys.py").write_text(KERNELS)
 
 
