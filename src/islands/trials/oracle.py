@@ -38,7 +38,7 @@ def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str
     effects = effects_for(simulation.core, simulation.scene, tolerance)
     told = found.base
     # That its own form is wrong is no gain of a cause: both are held against the model with that mended.
-    for form in (effect for effect in effects if effect.name == model_form.NAME):
+    for form in (effect for effect in effects if effect.name == model_form.CORE_SHAPE):
         told = _fitted(told, form, target)
     before = _error(found, told)
     for name in names:

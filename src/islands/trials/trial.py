@@ -141,7 +141,7 @@ def carried_out(trial: Trial) -> Outcome:
         simulated.free,
     )
     found = diagnose(hiding.record, simulated.made(hiding), simulated.tolerance, trial.seed)
-    causes = [each for each in found.effects if each.eta is not None and each.name != model_form.NAME]
+    causes = [each for each in found.effects if each.eta is not None and each.name != model_form.CORE_SHAPE]
     asked = trial.oracle and trial.effects
     return Outcome(
         trial,
@@ -150,10 +150,10 @@ def carried_out(trial: Trial) -> Outcome:
         tuple(finding.name for finding in causes),
         tuple(finding.name for finding in found.effects if finding.eta is None),
         tuple(finding.equivalents for finding in causes),
-        tuple(each.name for each in found.candidates if each.name != model_form.NAME)[:3],
+        tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,
         share_of_gain(found, trial.effects, simulated.tolerance) if asked else None,
-        any(finding.name == model_form.NAME for finding in found.effects),
+        any(finding.name == model_form.CORE_SHAPE for finding in found.effects),
     )
 
 

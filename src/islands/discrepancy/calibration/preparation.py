@@ -7,7 +7,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.effects.wrong_parameter import wrong_parameter
+from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.interfaces.effect import Effect, Scene, Site
 from islands.discrepancy.interfaces.simulator import Core
 from islands.discrepancy.simulators.coordinates import peak

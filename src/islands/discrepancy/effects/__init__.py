@@ -1,114 +1,96 @@
-"""The catalogue of effects: what the analysis looks for, in the order in which maps act on a signal.
+"""Catalogue of effects: what the analysis searches for, one file per family.
 
-An effect is one file with one `EFFECT`; a line here puts it into the analysis, the report, the trials and the
-guide.
+To add an effect, define it in the file of its family and add it to `EFFECTS`.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from inspect import getmodule
+from collections.abc import Iterable, Mapping
 
-from islands.discrepancy.effects import (
-    absolute_value_sensor,
-    ageing,
-    baseline,
-    clock_skew,
-    creep,
-    dead_zone,
-    disturbance,
-    even_nonlinearity,
-    friction,
-    hysteresis,
-    input_offset,
-    input_saturation,
-    jump,
-    linear_drift,
-    logarithmic_creep,
-    loop_asymmetry,
-    model_form,
-    nonlinearity,
-    outflow_law,
-    output_saturation,
-    periodic_disturbance,
-    quadratic_drag,
-    rate_dependent_loop,
-    relaxation,
-    resonance,
-    scale,
-    second_hysteresis,
-    sensor_gain,
-    sensor_lag,
-    state_clip,
-    stiction,
-    thermal_drift,
-    time_variation,
-    timing,
-    viscous,
-    viscous_asymmetry,
-    wrong_parameter,
+from islands.discrepancy.effects.baseline import INPUT_OFFSET, JUMP, LINEAR_DRIFT, OFFSET, THERMAL_DRIFT
+from islands.discrepancy.effects.creep import EXPONENTIAL_CREEP, LOGARITHMIC_CREEP
+from islands.discrepancy.effects.disturbance import CROSS_COUPLING, PERIODIC_DISTURBANCE
+from islands.discrepancy.effects.friction import (
+    COULOMB_FRICTION,
+    QUADRATIC_DRAG,
+    VISCOUS,
+    VISCOUS_ASYMMETRY,
 )
-from islands.discrepancy.interfaces.effect import Effect
+from islands.discrepancy.effects.hysteresis import (
+    BACKLASH,
+    LOOP_ASYMMETRY,
+    RATE_DEPENDENT_LOOP,
+    RELAXATION,
+    SECOND_HYSTERESIS,
+    STICTION,
+)
+from islands.discrepancy.effects.model_form import MODEL_FORM
+from islands.discrepancy.effects.nonlinearity import (
+    ABSOLUTE_VALUE_SENSOR,
+    CUBIC_STIFFNESS,
+    DEAD_ZONE,
+    EVEN_NONLINEARITY,
+    INPUT_SATURATION,
+    OUTFLOW_LAW,
+    OUTPUT_SATURATION,
+    STATE_CLIP,
+)
+from islands.discrepancy.effects.scale import INPUT_GAIN, SENSOR_GAIN, WRONG_PARAMETER
+from islands.discrepancy.effects.time_variation import AGEING, GAIN_STEP
+from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RESONANCE, SENSOR_LAG
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
 
-_MODULES = {
-    module.EFFECT.name: module
-    for module in (
-        timing,
-        clock_skew,
-        scale,
-        dead_zone,
-        input_saturation,
-        hysteresis,
-        stiction,
-        relaxation,
-        rate_dependent_loop,
-        loop_asymmetry,
-        second_hysteresis,
-        time_variation,
-        ageing,
-        viscous,
-        friction,
-        viscous_asymmetry,
-        quadratic_drag,
-        even_nonlinearity,
-        nonlinearity,
-        creep,
-        logarithmic_creep,
-        sensor_lag,
-        resonance,
-        absolute_value_sensor,
-        output_saturation,
-        sensor_gain,
-        baseline,
-        linear_drift,
-        jump,
-        thermal_drift,
-        disturbance,
-        periodic_disturbance,
-    )
-}
+#: All effects, in the order in which maps act on a signal. It breaks ties: another order changes results.
+EFFECTS: tuple[Effect, ...] = (
+    DELAY,
+    CLOCK_SKEW,
+    INPUT_GAIN,
+    DEAD_ZONE,
+    INPUT_SATURATION,
+    BACKLASH,
+    STICTION,
+    RELAXATION,
+    RATE_DEPENDENT_LOOP,
+    LOOP_ASYMMETRY,
+    SECOND_HYSTERESIS,
+    GAIN_STEP,
+    AGEING,
+    VISCOUS,
+    COULOMB_FRICTION,
+    VISCOUS_ASYMMETRY,
+    QUADRATIC_DRAG,
+    EVEN_NONLINEARITY,
+    CUBIC_STIFFNESS,
+    EXPONENTIAL_CREEP,
+    LOGARITHMIC_CREEP,
+    SENSOR_LAG,
+    RESONANCE,
+    ABSOLUTE_VALUE_SENSOR,
+    OUTPUT_SATURATION,
+    SENSOR_GAIN,
+    OFFSET,
+    LINEAR_DRIFT,
+    JUMP,
+    THERMAL_DRIFT,
+    CROSS_COUPLING,
+    PERIODIC_DISTURBANCE,
+)
 
-CATALOGUE: Mapping[str, Effect] = {name: module.EFFECT for name, module in _MODULES.items()}
+#: Effects by name.
+CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}
 
-#: Effects that a simulation's own parameters and states have, one of each.
-OF_EACH: Mapping[str, Callable[..., Effect]] = {
-    module.NAME: make
-    for module, make in (
-        (wrong_parameter, wrong_parameter.wrong_parameter),
-        (state_clip, state_clip.state_clip),
-        (input_offset, input_offset.input_offset),
-        (outflow_law, outflow_law.outflow_law),
-        (model_form, model_form.core_shape),
-    )
+#: Effects that exist once for each state, parameter or model of a simulation, by name.
+OF_EACH: Mapping[str, EffectTemplate] = {
+    template.name: template
+    for template in (WRONG_PARAMETER, STATE_CLIP, INPUT_OFFSET, OUTFLOW_LAW, MODEL_FORM)
 }
 
 
 def sentence(name: str) -> str:
-    """Return what an effect is, in a sentence with its form."""
+    """Return the summary of an effect, given its name with or without a state or parameter."""
     cause = name.partition(":")[0]
-    module = _MODULES[cause] if cause in _MODULES else getmodule(OF_EACH[cause])
-    return (module.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    return (CATALOGUE.get(cause) or OF_EACH[cause]).summary
 
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Return effects in the order in which they act."""
+    """Return effects in the order of the catalogue."""
     places = {name: place for place, name in enumerate(CATALOGUE)}
     return tuple(sorted(effects, key=lambda effect: places.get(effect.name, -1)))

@@ -1,27 +1,144 @@
-"""The output is measured from another zero: y + c."""
+"""Effects on the baseline: offsets, drifts and jumps."""
 
+from islands.discrepancy.effects.channels import channel, channel_unit, spread, there
+from islands.discrepancy.effects.time_variation import after, bounds, instants
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Scene, Signal, Site
 
 
-def _form(y: Signal, values: Signal, _scene: Scene) -> Signal:
+def _offset_form(y: Signal, values: Signal, _scene: Scene) -> Signal:
     return y + values[0]
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _offset_parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _offset_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * scene.output_peak,),)
 
 
-EFFECT = Effect(
+OFFSET = Effect(
     name="offset",
+    summary="The output is measured from another zero: y + c",
     family="baseline",
     site=Site.OUTPUT,
-    parameters=_parameters,
-    grid=_grid,
-    form=_form,
+    parameters=_offset_parameters,
+    grid=_offset_grid,
+    form=_offset_form,
     source="Doebelin, Measurement Systems, section 3",
+)
+
+
+def input_offset(state: str) -> Effect:
+    """Return the effect on one state, in the unit of the input."""
+    label = f"input-offset:{state}"
+
+    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+        return (Parameter(label, scene.input_unit, 0.0, 0.01 * scene.input_peak),)
+
+    def grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return ((0.02 * scene.input_peak,),)
+
+    return Effect(
+        name=label,
+        summary=INPUT_OFFSET.summary,
+        family="baseline",
+        site=Site.CORE,
+        parameters=parameters,
+        grid=grid,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+    )
+
+
+#: The effect for one state or parameter.
+INPUT_OFFSET = EffectTemplate(
+    "input-offset",
+    "Something flows in, or pushes, beside the input: + c in the balance of one state",
+    input_offset,
+)
+
+
+def _linear_drift_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    return y + values[0] * scene.time / scene.duration
+
+
+def _linear_drift_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
+
+
+def _linear_drift_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * scene.output_peak,),)
+
+
+LINEAR_DRIFT = Effect(
+    name="linear-drift",
+    summary="The output drifts: y + c t / T over the record's duration T",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_linear_drift_parameters,
+    grid=_linear_drift_grid,
+    form=_linear_drift_form,
+    source="Doebelin, Measurement Systems, section 3",
+)
+
+
+def _jump_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    return y + values[0] * after(scene, values[1])
+
+
+def _jump_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),
+        Parameter("instant", "s", 0.0, 0.3 * scene.fitted / 45, *bounds(scene)),
+    )
+
+
+def _jump_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02 * scene.output_peak, instant) for instant in instants(scene))
+
+
+JUMP = Effect(
+    name="jump",
+    summary="The output's zero jumps: y + c behind an instant",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_jump_parameters,
+    grid=_jump_grid,
+    form=_jump_form,
+    source="Basseville and Nikiforov, Detection of Abrupt Changes",
+    searched=1,
+)
+
+
+def _thermal_drift_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    return y + values[0] * channel(scene, True)
+
+
+def _thermal_drift_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "k",
+            f"{scene.output_unit}/{channel_unit(scene, True)}",
+            0.0,
+            0.01 * scene.output_peak / spread(scene, True),
+        ),
+    )
+
+
+def _thermal_drift_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * scene.output_peak / spread(scene, True),),)
+
+
+THERMAL_DRIFT = Effect(
+    name="thermal-drift",
+    summary="The output follows a temperature: y + k (T - T(0)), T a given channel",
+    family="baseline",
+    site=Site.OUTPUT,
+    parameters=_thermal_drift_parameters,
+    grid=_thermal_drift_grid,
+    form=_thermal_drift_form,
+    source="Doebelin, Measurement Systems, section 2",
+    applies=lambda scene: there(scene, True),
 )

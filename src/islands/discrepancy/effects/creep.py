@@ -1,4 +1,4 @@
-"""The output creeps: y + kappa times y behind a low-pass of time constant tau."""
+"""Creep: exponential and logarithmic."""
 
 import numpy as np
 
@@ -7,28 +7,58 @@ from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
-def _form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _exponential_creep_form(y: Signal, values: Signal, scene: Scene) -> Signal:
     return y + values[0] * (low_pass(y, float(np.exp(values[1])), scene.dt) - y[0])
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _exponential_creep_parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (
         Parameter("kappa", "", 0.0, 0.02, -0.5, 1.0),
         Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * scene.dt), np.log(1.5 * scene.fitted)),
     )
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _exponential_creep_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     taus = (max(part * scene.fitted, 6 * scene.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
     return tuple((0.03, float(np.log(tau))) for tau in taus)
 
 
-EFFECT = Effect(
+EXPONENTIAL_CREEP = Effect(
     name="exponential-creep",
+    summary="The output creeps: y + kappa times y behind a low-pass of time constant tau",
     family="memory",
     site=Site.OUTPUT,
-    parameters=_parameters,
-    grid=_grid,
-    form=_form,
+    parameters=_exponential_creep_parameters,
+    grid=_exponential_creep_grid,
+    form=_exponential_creep_form,
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
+)
+
+#: Time constants in seconds.
+TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
+
+
+def _logarithmic_creep_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    return y + values[0] * sum(low_pass(y, tau, scene.dt) - y[0] for tau in TAUS)
+
+
+def _logarithmic_creep_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("kappa", "", 0.0, 0.005, -0.3, 0.3),)
+
+
+def _logarithmic_creep_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01,),)
+
+
+LOGARITHMIC_CREEP = Effect(
+    name="logarithmic-creep",
+    summary=(
+        "The output creeps with the logarithm of time: y + kappa times a sum of low-passes, two to a decade"
+    ),
+    family="memory",
+    site=Site.OUTPUT,
+    parameters=_logarithmic_creep_parameters,
+    grid=_logarithmic_creep_grid,
+    form=_logarithmic_creep_form,
+    source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
 )

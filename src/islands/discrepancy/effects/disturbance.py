@@ -1,15 +1,17 @@
-"""A neighbour couples in: y + k w, w a given channel."""
+"""Disturbances: coupling of another channel, a periodic disturbance."""
+
+import numpy as np
 
 from islands.discrepancy.effects.channels import channel, channel_unit, spread, there
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
-def _form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _cross_coupling_form(y: Signal, values: Signal, scene: Scene) -> Signal:
     return y + values[0] * channel(scene, False)
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _cross_coupling_parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "k",
@@ -20,17 +22,59 @@ def _parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _cross_coupling_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.output_peak / spread(scene, False),),)
 
 
-EFFECT = Effect(
+CROSS_COUPLING = Effect(
     name="cross-coupling",
+    summary="A neighbour couples in: y + k w, w a given channel",
     family="disturbance",
     site=Site.OUTPUT,
-    parameters=_parameters,
-    grid=_grid,
-    form=_form,
+    parameters=_cross_coupling_parameters,
+    grid=_cross_coupling_grid,
+    form=_cross_coupling_form,
     source="Ljung, System Identification, 2nd ed., section 13",
     applies=lambda scene: there(scene, False),
+)
+
+
+def _periodic_disturbance_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    angle = 2 * np.pi * values[2] * scene.time
+    return y + values[0] * np.cos(angle) + values[1] * np.sin(angle)
+
+
+def _periodic_disturbance_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter("cosine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
+        Parameter("sine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
+        Parameter("frequency", "Hz", 0.0, 0.1 / scene.fitted, 2.0 / scene.fitted, 0.499 / scene.dt),
+    )
+
+
+def _periodic_disturbance_grid(scene: Scene, residual: Signal) -> tuple[tuple[float, ...], ...]:
+    # The strongest line of what is left, between the samples of its spectrum.
+    fitted = int(scene.fitted / scene.dt)
+    seen = residual[:fitted] * np.hanning(fitted)
+    spectrum = np.abs(np.fft.rfft(seen, 4 * fitted))
+    frequencies = np.fft.rfftfreq(4 * fitted, scene.dt)
+    spectrum[frequencies < 2.0 / scene.fitted] = 0.0
+    strongest = float(frequencies[np.argmax(spectrum)])
+    angle = 2 * np.pi * strongest * scene.time[:fitted]
+    waves = np.column_stack([np.cos(angle), np.sin(angle)])
+    cosine, sine = np.linalg.lstsq(waves, residual[:fitted], rcond=None)[0]
+    return ((float(cosine), float(sine), strongest),)
+
+
+PERIODIC_DISTURBANCE = Effect(
+    name="periodic-disturbance",
+    summary="A sine of a frequency of its own is added",
+    family="disturbance",
+    site=Site.OUTPUT,
+    parameters=_periodic_disturbance_parameters,
+    grid=_periodic_disturbance_grid,
+    form=_periodic_disturbance_form,
+    source="Stoica and Moses, Spectral Analysis of Signals, section 4",
+    linear=2,
+    searched=2,
 )

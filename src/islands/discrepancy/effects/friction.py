@@ -1,4 +1,4 @@
-"""Dry friction: - F sign(x')."""
+"""Friction: viscous, dry, one-sided, and quadratic drag."""
 
 from math import tanh
 from typing import Any
@@ -7,30 +7,111 @@ from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
 
 
-def _force(_x: float, rate: float, _z: float, numbers: Any) -> float:
+def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
     # Smooth within a part of the usual rate: a step would have no derivative.
     return numbers[0] * tanh(rate / numbers[1])
 
 
-def _turning(scene: Scene) -> tuple[float, ...]:
+def _coulomb_friction_turning(scene: Scene) -> tuple[float, ...]:
     return (scene.frame.sharp * scene.frame.rate,)
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _coulomb_friction_parameters(scene: Scene) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.least),)
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _coulomb_friction_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * scene.frame.force,),)
 
 
-EFFECT = Effect(
+COULOMB_FRICTION = Effect(
     name="coulomb-friction",
+    summary="Dry friction: - F sign(x')",
     family="memory",
     site=Site.FORCE,
-    parameters=_parameters,
-    grid=_grid,
-    form=Element(_force, constants=_turning, dissipative=True),
+    parameters=_coulomb_friction_parameters,
+    grid=_coulomb_friction_grid,
+    form=Element(_coulomb_friction_force, constants=_coulomb_friction_turning, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+)
+
+
+def _viscous_force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * rate
+
+
+def _viscous_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    frame = scene.frame
+    return (
+        Parameter(
+            "c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate, frame.least
+        ),
+    )
+
+
+def _viscous_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * scene.frame.force / scene.frame.rate,),)
+
+
+VISCOUS = Effect(
+    name="viscous",
+    summary="A force against the rate: - c x'",
+    family="timing",
+    site=Site.FORCE,
+    parameters=_viscous_parameters,
+    grid=_viscous_grid,
+    form=Element(_viscous_force, dissipative=True),
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+)
+
+
+def _viscous_asymmetry_force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * abs(rate)
+
+
+def _viscous_asymmetry_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    frame = scene.frame
+    return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
+
+
+def _viscous_asymmetry_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * scene.frame.force / scene.frame.rate,),)
+
+
+VISCOUS_ASYMMETRY = Effect(
+    name="viscous-asymmetry",
+    summary="Friction that differs between the directions: - c |x'|",
+    family="memory",
+    site=Site.FORCE,
+    parameters=_viscous_asymmetry_parameters,
+    grid=_viscous_asymmetry_grid,
+    form=Element(_viscous_asymmetry_force, dissipative=True),
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+)
+
+
+def _quadratic_drag_force(_x: float, rate: float, _z: float, c: Any) -> float:
+    return c[0] * abs(rate) * rate
+
+
+def _quadratic_drag_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    frame = scene.frame
+    unit = f"{frame.force_unit} s^2/{frame.unit}^2"
+    return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.least),)
+
+
+def _quadratic_drag_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * scene.frame.force / scene.frame.rate**2,),)
+
+
+QUADRATIC_DRAG = Effect(
+    name="quadratic-drag",
+    summary="Drag of a turbulent flow: - c |x'| x'",
+    family="shape",
+    site=Site.FORCE,
+    parameters=_quadratic_drag_parameters,
+    grid=_quadratic_drag_grid,
+    form=Element(_quadratic_drag_force, dissipative=True),
+    source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )

@@ -1,30 +1,189 @@
-"""The input acts through a play of half width b."""
+"""Effects with hysteresis: stiction, backlash, a second hysteresis, asymmetric loops."""
 
-from islands.discrepancy.effects import stiction
+from typing import Any
+
+import numpy as np
+
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
-from islands.systems.hysteresis_operators import played
+from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
+from islands.systems.hysteresis_operators import played, slider
 
 
-def _form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+def _stiction_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+    if values[0] <= 0.0:
+        return u
+    moved = np.empty_like(u)
+    slider(u, values[0], moved)
+    return moved
+
+
+def _stiction_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter("breakaway", scene.input_unit, 0.0, 0.005 * scene.input_peak, 0.0, 0.3 * scene.input_peak),
+    )
+
+
+def _stiction_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    # It changes by leaps, so that no derivative leads to the best one: a fine grid has to.
+    return tuple((float(part) * scene.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
+
+
+STICTION = Effect(
+    name="stiction",
+    summary="The input acts in slips: it moves only beyond a breakaway distance",
+    family="memory",
+    site=Site.INPUT,
+    parameters=_stiction_parameters,
+    grid=_stiction_grid,
+    form=_stiction_form,
+    source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
+    linear=0,
+)
+
+
+def _backlash_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
     return played(u, values[0]) if values[0] > 0.0 else u
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _backlash_parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (Parameter("b", scene.input_unit, 0.0, 0.005 * scene.input_peak, 0.0, 0.3 * scene.input_peak),)
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _backlash_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((part * scene.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
 
 
-EFFECT = Effect(
+BACKLASH = Effect(
     name="backlash",
+    summary="The input acts through a play of half width b",
     family="memory",
     site=Site.INPUT,
-    parameters=_parameters,
-    grid=_grid,
-    form=_form,
+    parameters=_backlash_parameters,
+    grid=_backlash_grid,
+    form=_backlash_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
-    alike=(stiction.EFFECT, 2.0),
+    alike=(STICTION, 2.0),
+)
+
+
+def _relaxation_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),)
+
+
+def _relaxation_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.1,), (1.0,))
+
+
+RELAXATION = Effect(
+    name="relaxation",
+    summary="The hysteretic state decays: - h / tau in h'",
+    family="memory",
+    site=Site.CORE,
+    parameters=_relaxation_parameters,
+    grid=_relaxation_grid,
+    form=None,
+    source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
+)
+
+
+def _rate_dependent_loop_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "rate-dependent-loop",
+            f"s/{scene.input_unit}",
+            0.0,
+            0.05 / scene.frame.rate,
+            -0.6 / scene.frame.rate,
+            5.0 / scene.frame.rate,
+        ),
+    )
+
+
+def _rate_dependent_loop_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.1 / scene.frame.rate,),)
+
+
+RATE_DEPENDENT_LOOP = Effect(
+    name="rate-dependent-loop",
+    summary="The loop's shape changes with the rate: beta, gamma (1 + k |u'|)",
+    family="memory",
+    site=Site.CORE,
+    parameters=_rate_dependent_loop_parameters,
+    grid=_rate_dependent_loop_grid,
+    form=None,
+    source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
+)
+
+
+def _loop_asymmetry_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "loop-asymmetry",
+            f"1/{scene.input_unit}",
+            0.0,
+            0.02 / scene.input_peak,
+            -0.35 / scene.input_peak,
+            0.35 / scene.input_peak,
+        ),
+    )
+
+
+def _loop_asymmetry_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.04 / scene.input_peak,),)
+
+
+LOOP_ASYMMETRY = Effect(
+    name="loop-asymmetry",
+    summary="The loop is not symmetric: - delta |u'| |h| in h'",
+    family="memory",
+    site=Site.CORE,
+    parameters=_loop_asymmetry_parameters,
+    grid=_loop_asymmetry_grid,
+    form=None,
+    source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
+)
+
+#: Starting points: how quickly it turns, in one over the coordinate's peak, and g in parts of chi.
+_SECOND_HYSTERESIS_QUICK, _SECOND_HYSTERESIS_BENT = (0.3, 1.0, 2.5, 8.0, 25.0), (0.0, 0.8, -1.2)
+
+
+def _second_hysteresis_force(_x: float, _rate: float, z: float, numbers: Any) -> float:
+    return numbers[0] * z
+
+
+def _second_hysteresis_memory(_x: float, rate: float, z: float, numbers: Any) -> float:
+    return rate - numbers[1] * abs(rate) * z - numbers[2] * rate * abs(z)
+
+
+def _second_hysteresis_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    frame = scene.frame
+    turn = 1.0 / frame.peak
+    return (
+        Parameter("k", f"{frame.force_unit}/{frame.unit}", 0.0, 0.01 * frame.force * turn, frame.least),
+        Parameter("chi", f"1/{frame.unit}", turn, 0.3 * turn, 0.0, 100.0 * turn),
+        Parameter("g", f"1/{frame.unit}", 0.0, 0.3 * turn, -50.0 * turn, 50.0 * turn),
+        Parameter(
+            "z0", frame.unit, 0.0, 0.05 * frame.peak, -3.0 * frame.peak, 3.0 * frame.peak, initial=True
+        ),
+    )
+
+
+def _second_hysteresis_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    frame = scene.frame
+    return tuple(
+        (0.03 * frame.force / frame.peak, quick / frame.peak, bent * quick / frame.peak, 0.0)
+        for quick in _SECOND_HYSTERESIS_QUICK
+        for bent in _SECOND_HYSTERESIS_BENT
+    )
+
+
+SECOND_HYSTERESIS = Effect(
+    name="second-hysteresis",
+    summary="A hysteretic element, beside one that may be there: + k z, z' = x' - chi |x'| z - g x' |z|",
+    family="memory",
+    site=Site.FORCE,
+    parameters=_second_hysteresis_parameters,
+    grid=_second_hysteresis_grid,
+    form=Element(_second_hysteresis_force, _second_hysteresis_memory, begins=3),
+    source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
 )

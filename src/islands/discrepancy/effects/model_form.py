@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Scene, Signal, Site
 from islands.discrepancy.interfaces.simulator import Core
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
@@ -15,8 +15,11 @@ from islands.model.primitives import MUL, PRIMITIVES, SUB
 from islands.model.regressor import Regressor, regressor
 from islands.model.rendering import plain
 
-#: The name of the effect, and of the slope c.
-NAME, SLOPE = "core-shape", "core-shape c"
+#: The name of the effect.
+CORE_SHAPE = "core-shape"
+
+#: The name of the slope c.
+SLOPE = f"{CORE_SHAPE} c"
 
 #: How the slope is read within a term.
 _SLOPE_READ = re.compile(r"u2\(k-\d+\)")
@@ -92,7 +95,7 @@ def missing(model: Model, among: Sequence[int]) -> tuple[Missing, ...]:
         if item is not None and item not in known:
             known.add(item)
             text = plain(item.expression, inputs=2).replace("u1(", "u(")
-            name = f"{NAME} {_SLOPE_READ.sub('c', text)}"
+            name = f"{CORE_SHAPE} {_SLOPE_READ.sub('c', text)}"
             found.append(Missing(name, item, place, folded))
     return tuple(found)
 
@@ -161,7 +164,8 @@ def core_shape(core: Core, model: Model, terms: Sequence[Missing]) -> Effect:
         return tuple(point for _, point in sorted(tried)[:_STARTS])
 
     return Effect(
-        name=NAME,
+        name=CORE_SHAPE,
+        summary=MODEL_FORM.summary,
         family="shape",
         site=Site.CORE,
         parameters=parameters,
@@ -181,3 +185,11 @@ def _at(expression: Expression, slope: float) -> Expression:
         case Apply(primitive, arguments):
             return Apply(primitive, tuple(_at(argument, slope) for argument in arguments))
     return expression
+
+
+#: The effect for a model and the terms that it lacks.
+MODEL_FORM = EffectTemplate(
+    CORE_SHAPE,
+    "The model's own form is wrong: it lacks psi |y - c u|, |psi| (y - c u), psi(k-1), psi its regressors",
+    core_shape,
+)

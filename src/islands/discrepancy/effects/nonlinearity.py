@@ -1,30 +1,247 @@
-"""An odd part of the characteristic: + k x^3, of a stiffness on the side of what resists."""
+"""Static nonlinearities of input, coordinate, state and output."""
 
 from typing import Any
 
+import numpy as np
+
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Element, Scene, Signal, Site
 
 
-def _force(x: float, _rate: float, _z: float, k: Any) -> float:
+def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:
     return k[0] * x * x * x
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _cubic_stiffness_parameters(scene: Scene) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^3", 0.0, 0.01 * frame.force / frame.peak**3),)
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _cubic_stiffness_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.frame.force / scene.frame.peak**3,),)
 
 
-EFFECT = Effect(
+CUBIC_STIFFNESS = Effect(
     name="cubic-stiffness",
+    summary="An odd part of the characteristic: + k x^3, of a stiffness on the side of what resists",
     family="shape",
     site=Site.FORCE,
-    parameters=_parameters,
-    grid=_grid,
-    form=Element(_force),
+    parameters=_cubic_stiffness_parameters,
+    grid=_cubic_stiffness_grid,
+    form=Element(_cubic_stiffness_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+)
+
+
+def _even_nonlinearity_force(x: float, _rate: float, _z: float, k: Any) -> float:
+    return k[0] * x * x
+
+
+def _even_nonlinearity_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    frame = scene.frame
+    return (Parameter("k", f"{frame.force_unit}/{frame.unit}^2", 0.0, 0.01 * frame.force / frame.peak**2),)
+
+
+def _even_nonlinearity_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * scene.frame.force / scene.frame.peak**2,),)
+
+
+EVEN_NONLINEARITY = Effect(
+    name="even-nonlinearity",
+    summary="An even part of the characteristic: + k x^2, of a stiffness on the side of what resists",
+    family="shape",
+    site=Site.FORCE,
+    parameters=_even_nonlinearity_parameters,
+    grid=_even_nonlinearity_grid,
+    form=Element(_even_nonlinearity_force),
+    source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+)
+
+#: Part of its peak within which an input has to come to zero.
+_DEAD_ZONE_NEAR = 0.05
+
+
+def _dead_zone_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+    return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
+
+
+def _dead_zone_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            "d",
+            scene.input_unit,
+            0.0,
+            0.005 * scene.input_peak,
+            -0.2 * scene.input_peak,
+            0.3 * scene.input_peak,
+        ),
+    )
+
+
+def _dead_zone_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * scene.input_peak,) for part in (0.0075, 0.025, 0.075))
+
+
+def _dead_zone_crossed(scene: Scene) -> bool:
+    # Of an input that is never near zero nobody can say more than that it is smaller.
+    return float(np.min(np.abs(scene.u))) < _DEAD_ZONE_NEAR * scene.input_peak
+
+
+DEAD_ZONE = Effect(
+    name="dead-zone",
+    summary="Nothing happens around zero: u is smaller by d, and zero below it",
+    family="shape",
+    site=Site.INPUT,
+    parameters=_dead_zone_parameters,
+    grid=_dead_zone_grid,
+    form=_dead_zone_form,
+    applies=_dead_zone_crossed,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+)
+
+
+def _input_saturation_form(u: Signal, values: Signal, scene: Scene) -> Signal:
+    level = scene.input_peak * (1.0 - max(values[0], 0.0))
+    return np.clip(u, -level, level)
+
+
+def _input_saturation_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
+
+
+def _input_saturation_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((cut,) for cut in (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
+
+
+INPUT_SATURATION = Effect(
+    name="input-saturation",
+    summary="The amplifier saturates: u is cut off a part of its peak below it",
+    family="shape",
+    site=Site.INPUT,
+    parameters=_input_saturation_parameters,
+    grid=_input_saturation_grid,
+    form=_input_saturation_form,
+    source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    linear=0,
+)
+
+
+def _output_saturation_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    level = scene.output_peak * (1.0 - max(values[0], 0.0))
+    return np.clip(y, -level, level) if values[0] > 0.0 else y
+
+
+def _output_saturation_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
+
+
+def _output_saturation_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((cut,) for cut in (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
+
+
+OUTPUT_SATURATION = Effect(
+    name="output-saturation",
+    summary="The sensor ends a part of the output's peak below it",
+    family="shape",
+    site=Site.OUTPUT,
+    parameters=_output_saturation_parameters,
+    grid=_output_saturation_grid,
+    form=_output_saturation_form,
+    source="Doebelin, Measurement Systems, section 3",
+    linear=0,
+)
+
+
+def _absolute_value_sensor_form(y: Signal, values: Signal, _scene: Scene) -> Signal:
+    return y + values[0] * np.abs(y)
+
+
+def _absolute_value_sensor_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("k", "", 0.0, 0.01, -0.8, 0.8),)
+
+
+def _absolute_value_sensor_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02,),)
+
+
+ABSOLUTE_VALUE_SENSOR = Effect(
+    name="absolute-value-sensor",
+    summary="The sensor adds a part of the absolute value: y + k |y|",
+    family="shape",
+    site=Site.OUTPUT,
+    parameters=_absolute_value_sensor_parameters,
+    grid=_absolute_value_sensor_grid,
+    form=_absolute_value_sensor_form,
+    source="Doebelin, Measurement Systems, section 3",
+)
+
+
+def outflow_law(state: str) -> Effect:
+    """Return the effect on one state, in 1/s."""
+    label = f"outflow-law:{state}"
+
+    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+        return (Parameter(label, "1/s", 0.0, 1.0 / scene.fitted),)
+
+    def grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return tuple((times / scene.fitted,) for times in (1.0, 5.0, 25.0))
+
+    return Effect(
+        name=label,
+        summary=OUTFLOW_LAW.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        grid=grid,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+    )
+
+
+#: The effect for one state or parameter.
+OUTFLOW_LAW = EffectTemplate(
+    "outflow-law",
+    "The outflow has a linear part beside that of Bernoulli's law: + l x in the flow out of one state",
+    outflow_law,
+)
+
+
+#: Starting points: the level in parts of the output's peak, and the part that spills on.
+_LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.5)
+_CAUGHT = (0.0, 0.5)
+
+#: Further than this, in the output's peak, no state goes.
+_FAR = 4.0
+
+
+def state_clip(state: str) -> Effect:
+    """Return the effect on one state; the last one of a chain spills nowhere."""
+    label = f"state-clip:{state}"
+
+    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+        peak = scene.output_peak
+        level = Parameter(label, scene.output_unit, _FAR * peak, 0.01 * peak, 0.1 * peak, _FAR * peak)
+        return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0))
+
+    def grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return tuple((level * scene.output_peak, caught) for level in _LEVELS for caught in _CAUGHT)
+
+    return Effect(
+        name=label,
+        summary=STATE_CLIP.summary,
+        family="shape",
+        site=Site.CORE,
+        parameters=parameters,
+        grid=grid,
+        form=None,
+        source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
+        linear=0,
+    )
+
+
+#: The effect for one state or parameter.
+STATE_CLIP = EffectTemplate(
+    "state-clip",
+    "A state stops at a level, as a tank's at its rim: what is above it is lost, or spills on in part",
+    state_clip,
 )

@@ -1,28 +1,84 @@
-"""The amplifier's gain is off: (1 + k) u."""
+"""Effects on scale: gains of input and output, a parameter beyond its tolerance."""
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Scene, Signal, Site
 
 
-def _form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+def _input_gain_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
     return (1.0 + values[0]) * u
 
 
-def _parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _input_gain_parameters(_scene: Scene) -> tuple[Parameter, ...]:
     return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
 
 
-def _grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _input_gain_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02,),)
 
 
-EFFECT = Effect(
+INPUT_GAIN = Effect(
     name="input-gain",
+    summary="The amplifier's gain is off: (1 + k) u",
     family="scale",
     site=Site.INPUT,
-    parameters=_parameters,
-    grid=_grid,
-    form=_form,
+    parameters=_input_gain_parameters,
+    grid=_input_gain_grid,
+    form=_input_gain_form,
     source="Doebelin, Measurement Systems, section 3",
     gain=True,
+)
+
+
+def _sensor_gain_form(y: Signal, values: Signal, _scene: Scene) -> Signal:
+    return (1.0 + values[0]) * y
+
+
+def _sensor_gain_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
+
+
+def _sensor_gain_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02,),)
+
+
+SENSOR_GAIN = Effect(
+    name="sensor-gain",
+    summary="The sensor's gain is off: (1 + k) y",
+    family="scale",
+    site=Site.OUTPUT,
+    parameters=_sensor_gain_parameters,
+    grid=_sensor_gain_grid,
+    form=_sensor_gain_form,
+    source="Doebelin, Measurement Systems, section 3",
+    gain=True,
+)
+
+
+def wrong_parameter(parameter: Parameter) -> Effect:
+    """Return the effect of one parameter of a simulation: it is (1 + r) times what it is taken for."""
+    label = f"wrong-parameter:{parameter.name}"
+
+    def parameters(_scene: Scene) -> tuple[Parameter, ...]:
+        return (Parameter(label, "", 0.0, 0.02, -0.8, 4.0),)
+
+    def grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return ((0.05,), (-0.05,))
+
+    return Effect(
+        name=label,
+        summary=WRONG_PARAMETER.summary,
+        family="scale",
+        site=Site.PARAMETER,
+        parameters=parameters,
+        grid=grid,
+        form=None,
+        source="Ljung, System Identification, 2nd ed., section 7",
+    )
+
+
+#: The effect for one state or parameter.
+WRONG_PARAMETER = EffectTemplate(
+    "wrong-parameter",
+    "A parameter of the simulation is off: it is another one than its tolerance allows",
+    wrong_parameter,
 )

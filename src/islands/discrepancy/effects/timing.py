@@ -1,30 +1,124 @@
-"""The input acts later than it is recorded: u(t - tau)."""
+"""Effects on time: delay, clock skew, lag and resonance of the sensor."""
 
 import numpy as np
+import scipy
 
-from islands.discrepancy.effects.shifts import at_samples
+from islands.discrepancy.effects.filters import at_samples, low_pass
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
 
 
-def _form(u: Signal, values: Signal, scene: Scene) -> Signal:
+def _delay_form(u: Signal, values: Signal, scene: Scene) -> Signal:
     return at_samples(u, np.arange(u.size) - values[0] / scene.dt)
 
 
-def _parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _delay_parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (Parameter("tau", "s", 0.0, scene.dt, -0.2 * scene.dt, min(30 * scene.dt, scene.fitted / 4)),)
 
 
-def _grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _delay_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.5 * scene.dt,), (2 * scene.dt,), (6 * scene.dt,))
 
 
-EFFECT = Effect(
+DELAY = Effect(
     name="delay",
+    summary="The input acts later than it is recorded: u(t - tau)",
     family="timing",
     site=Site.INPUT,
-    parameters=_parameters,
-    grid=_grid,
-    form=_form,
+    parameters=_delay_parameters,
+    grid=_delay_grid,
+    form=_delay_form,
     source="Ljung, System Identification, 2nd ed., section 16",
+)
+
+
+def _clock_skew_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+    return at_samples(u, np.arange(u.size) * (1.0 + values[0]))
+
+
+def _clock_skew_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("e", "", 0.0, 0.01 * scene.dt / scene.fitted, -0.02, 0.02),)
+
+
+def _clock_skew_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.5 * scene.dt / scene.fitted,), (-0.5 * scene.dt / scene.fitted,))
+
+
+CLOCK_SKEW = Effect(
+    name="clock-skew",
+    summary="The clocks of input and output run apart: u(t (1 + e))",
+    family="timing",
+    site=Site.INPUT,
+    parameters=_clock_skew_parameters,
+    grid=_clock_skew_grid,
+    form=_clock_skew_form,
+    source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
+)
+
+
+def _sensor_lag_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    return low_pass(y, values[0], scene.dt) if values[0] > 0.0 else y
+
+
+def _sensor_lag_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (Parameter("tau", "s", 0.0, scene.dt, 0.0, scene.fitted / 4),)
+
+
+def _sensor_lag_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.3 * scene.dt,), (2 * scene.dt,), (6 * scene.dt,))
+
+
+SENSOR_LAG = Effect(
+    name="sensor-lag",
+    summary="The sensor follows with a time constant: tau y' + y = v",
+    family="timing",
+    site=Site.OUTPUT,
+    parameters=_sensor_lag_parameters,
+    grid=_sensor_lag_grid,
+    form=_sensor_lag_form,
+    source="Doebelin, Measurement Systems, section 3",
+)
+
+#: Radians of a sample: a faster mode is not there for this record.
+FASTEST = 2.6
+
+
+def _resonance_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+    period, zeta = values
+    w = 2 * np.pi / period if period > 0.0 else np.inf
+    if w * scene.dt > FASTEST:
+        return y
+    # Bilinear, with the resonance itself kept where it is. In finer steps, the output interpolated between
+    # its samples, it takes the place of a delay where these are sparse (the gas furnace, the hair dryer).
+    k = w / np.tan(w * scene.dt / 2)
+    scale = k * k + 2 * zeta * w * k + w * w
+    b = w * w / scale
+    a1, a2 = 2 * (w * w - k * k) / scale, (k * k - 2 * zeta * w * k + w * w) / scale
+    followed, _ = scipy.signal.lfilter([b, 2 * b, b], [1.0, a1, a2], y - y[0], zi=[0.0, 0.0])
+    out: Signal = followed + y[0]
+    return out
+
+
+def _resonance_parameters(scene: Scene) -> tuple[Parameter, ...]:
+    return (
+        Parameter("period", "s", 0.0, scene.dt, 0.0, scene.fitted / 8),
+        Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
+    )
+
+
+def _resonance_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple(
+        (period * scene.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
+    )
+
+
+RESONANCE = Effect(
+    name="resonance",
+    summary="A second-order mode follows the output: y'' + 2 zeta w y' + w^2 y = w^2 v",
+    family="timing",
+    site=Site.OUTPUT,
+    parameters=_resonance_parameters,
+    grid=_resonance_grid,
+    form=_resonance_form,
+    source="Ljung, System Identification, 2nd ed., section 4",
 )

@@ -90,7 +90,7 @@ def explained(
 
 def _causes(found: Explanation) -> int:
     """Count causes: that the form of an identified model is wrong stands beside them."""
-    return sum(effect.cause != model_form.NAME for effect in found.effects)
+    return sum(effect.cause != model_form.CORE_SHAPE for effect in found.effects)
 
 
 def _remembered(followed: list[Explanation], target: Target) -> tuple[list[Explanation], Target]:

@@ -7,7 +7,7 @@ from enum import StrEnum
 from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
 from islands.discrepancy.interfaces.force import Element
 
-__all__ = ["Effect", "Element", "Scene", "Signal", "Site"]
+__all__ = ["Effect", "EffectTemplate", "Element", "Scene", "Signal", "Site"]
 
 
 class Site(StrEnum):
@@ -30,7 +30,10 @@ class Effect:
 
     Attributes
     ----------
-    name, family : str
+    name : str
+    summary : str
+        What it is, in one sentence with its form.
+    family : str
     site : Site
     parameters : callable
         ``scene -> tuple of Parameter``: strength first, then shape.
@@ -56,6 +59,7 @@ class Effect:
     """
 
     name: str
+    summary: str
     family: str
     site: Site
     parameters: Callable[[Scene], tuple[Parameter, ...]]
@@ -72,3 +76,20 @@ class Effect:
     def cause(self) -> str:
         """Its name in the catalogue: without the state or the parameter that it is about."""
         return self.name.partition(":")[0]
+
+
+@dataclass(frozen=True, slots=True)
+class EffectTemplate:
+    """An entry of the catalogue that exists once for each state, parameter or model of a simulation.
+
+    Attributes
+    ----------
+    name, summary : str
+        As in `Effect`; the name of an effect is followed by a colon and the name of its state or parameter.
+    make : callable
+        Makes the effect.
+    """
+
+    name: str
+    summary: str
+    make: Callable[..., Effect]

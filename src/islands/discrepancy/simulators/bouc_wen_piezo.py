@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from islands.discrepancy.effects.changes import gain_over_time
+from islands.discrepancy.effects.time_variation import gain_over_time
 from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import beside

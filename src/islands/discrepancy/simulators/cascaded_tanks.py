@@ -7,10 +7,9 @@ from math import inf, sqrt
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.effects.changes import gain_over_time
-from islands.discrepancy.effects.input_offset import input_offset
-from islands.discrepancy.effects.outflow_law import outflow_law
-from islands.discrepancy.effects.state_clip import state_clip
+from islands.discrepancy.effects.baseline import input_offset
+from islands.discrepancy.effects.nonlinearity import outflow_law, state_clip
+from islands.discrepancy.effects.time_variation import gain_over_time
 from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Forces

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.effects import friction
-from islands.discrepancy.effects.changes import gain_over_time
-from islands.discrepancy.effects.input_offset import input_offset
+from islands.discrepancy.effects.baseline import input_offset
+from islands.discrepancy.effects.time_variation import gain_over_time
 from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
 from islands.discrepancy.interfaces.effect import Effect, Element, Site
 from islands.discrepancy.interfaces.force import elements_of
@@ -91,7 +91,7 @@ class RigidAxisCore:
         """See `islands.discrepancy.interfaces.simulator.Core`."""
         mass, damping, dry, turns = map(float, values)
         gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
-        dry_friction = friction.EFFECT.form
+        dry_friction = friction.COULOMB_FRICTION.form
         assert isinstance(dry_friction, Element)
         elements = elements_of([*forces, (dry_friction, np.array([dry, turns]))], scene, balance=True)
         times = x.size // self.measured.size

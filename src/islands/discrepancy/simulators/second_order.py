@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.effects.changes import gain_over_time
-from islands.discrepancy.effects.input_offset import input_offset
+from islands.discrepancy.effects.baseline import input_offset
+from islands.discrepancy.effects.time_variation import gain_over_time
 from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import elements_of

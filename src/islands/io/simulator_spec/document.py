@@ -54,13 +54,13 @@ def extended_document(fit: Calibrated, record: Dataset) -> dict[str, Any]:
     shape = {
         parameter.name: float(value)
         for effect, part in parts
-        if effect.name == model_form.NAME
+        if effect.name == model_form.CORE_SHAPE
         for parameter, value in zip(simulation.parameters[part], values[part], strict=True)
     }
     found = [
         _effect(effect, simulation.parameters[part], values[part])
         for effect, part in parts
-        if effect.site != Site.PARAMETER and effect.name != model_form.NAME
+        if effect.site != Site.PARAMETER and effect.name != model_form.CORE_SHAPE
     ]
     names_of = (record.input_names, record.output_name)
     return _extended(

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.discrepancy.effects import second_hysteresis
+from islands.discrepancy.effects import hysteresis
 from islands.systems.mechanics import WIDTH, Elements, along, balance, compiled
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def test_so_does_one_with_a_cubic_spring() -> None:
 
 
 def test_so_does_one_with_a_hysteresis() -> None:
-    form, numbers = second_hysteresis.EFFECT.form, (60.0, 40.0, -15.0, 0.01)
+    form, numbers = hysteresis.SECOND_HYSTERESIS.form, (60.0, 40.0, -15.0, 0.01)
     parts = elements((form.force, form.memory, -1.0, 0.01, numbers))
     known = reference(
         lambda _x, _v, z: numbers[0] * z,

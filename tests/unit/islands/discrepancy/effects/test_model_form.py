@@ -7,7 +7,7 @@ import pytest
 
 from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate, held_against
 from islands.discrepancy.calibration.preparation import scene_of
-from islands.discrepancy.effects.model_form import NAME, SLOPE
+from islands.discrepancy.effects.model_form import CORE_SHAPE, SLOPE
 from islands.discrepancy.simulators.extended import Extended
 from islands.discrepancy.simulators.narx import NarxCore
 from islands.io.models import model_from_json
@@ -57,7 +57,7 @@ def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: Extended) 
     names = [parameter.name for parameter in extended.parameters]
     assert len(set(names)) == len(names)
     own = {item.text for item in extended.core.model.regressors}
-    assert not own & {name.removeprefix(f"{NAME} ").replace("u(", "u1(") for name in names}
+    assert not own & {name.removeprefix(f"{CORE_SHAPE} ").replace("u(", "u1(") for name in names}
     assert names[-1] == SLOPE
 
 
