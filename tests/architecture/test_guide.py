@@ -1,13 +1,12 @@
 """The guide of the discrepancy analysis says what the code has: effects, simulations, verdicts, pictures."""
 
 import re
-from inspect import getmodule
 
 import numpy as np
 import pytest
 
-from islands.discrepancy.detectors import DETECTORS
 from islands.discrepancy.effects import CATALOGUE, OF_EACH, sentence
+from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import Scene
 from islands.io.simulator_spec.schema import KINDS
@@ -23,9 +22,7 @@ ROWS = {
 
 
 def said(name: str) -> str:
-    if name not in DETECTORS:
-        return sentence(name)
-    return (getmodule(DETECTORS[name].detect).__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    return DETECTORS[name].summary if name in DETECTORS else sentence(name)
 
 
 def test_the_guide_has_every_effect_and_no_other() -> None:
@@ -33,7 +30,7 @@ def test_the_guide_has_every_effect_and_no_other() -> None:
 
 
 @pytest.mark.parametrize("name", [*CATALOGUE, *OF_EACH, *DETECTORS])
-def test_the_guide_says_what_an_effect_is_as_its_file_does(name: str) -> None:
+def test_the_guide_has_the_summary_of_every_effect(name: str) -> None:
     family, what, parameters, alike, apart = ROWS[name]
     assert what == said(name)
     assert parameters

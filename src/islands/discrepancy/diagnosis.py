@@ -9,9 +9,9 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.intersample_selection import settled, solved_alike
 from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
 from islands.discrepancy.calibration.preparation import checked, effects_for, fitted_samples, scene_of
-from islands.discrepancy.detectors import DETECTORS
 from islands.discrepancy.inference.experiment_design import decisive
 from islands.discrepancy.inference.holdout import Gain, gain_of
+from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.screening import Rung, ladder
 from islands.discrepancy.inference.stepwise_search import LEAST, Tell, silent
 from islands.discrepancy.inference.strategies import Evidence, by_misfit, by_noise, first_of, judged

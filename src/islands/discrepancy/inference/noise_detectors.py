@@ -1,8 +1,11 @@
-"""A detector: finds in a record what its sampling and its noise have done to it."""
+"""Detectors of what sampling and noise do to a record: quantisation, outliers, coloured noise, and others."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from islands.discrepancy.calibration.noise_model import noise_of
 from islands.discrepancy.interfaces.effect import Scene, Signal
 
 
@@ -28,7 +31,10 @@ class Detector:
 
     Attributes
     ----------
-    name, family : str
+    name : str
+    summary : str
+        What it is, in one sentence.
+    family : str
     detect : callable
         ``(y, residual, scene) -> Detection or None``: the measured output and what the best simulation leaves
         of it, both over the fitted samples.
@@ -38,7 +44,162 @@ class Detector:
     """
 
     name: str
+    summary: str
     family: str
     detect: Callable[[Signal, Signal, Scene], Detection | None]
     source: str
     excluded_by: tuple[str, ...] = ()
+
+
+#: A lattice is coarse enough to matter where its step is this part of what is left, and known as one where
+#: there are this many samples for each of its levels.
+_QUANTISATION_COARSE, _QUANTISATION_CROWDED = 0.5, 3.0
+
+
+def _detect_quantisation(y: Signal, residual: Signal, scene: Scene) -> Detection | None:
+    levels = np.unique(y)
+    if levels.size < 3 or y.size < _QUANTISATION_CROWDED * levels.size:
+        return None
+    step = float(np.min(np.diff(levels)))
+    places = (y - levels[0]) / step
+    off = float(np.max(np.abs(places - np.round(places))))
+    if off > 1e-3 or step < _QUANTISATION_COARSE * float(np.std(residual)):
+        return None
+    return Detection({"step": (step, scene.output_unit)}, float(y.size))
+
+
+QUANTISATION = Detector(
+    "quantisation",
+    "The output lies on a lattice: the converter's or the file's resolution",
+    "data",
+    _detect_quantisation,
+    "Widrow and Kollar, Quantization Noise, section 1",
+)
+
+
+#: Equal neighbours that make a burst, and bursts that are no chance.
+_HELD_SAMPLES_RUN, _HELD_SAMPLES_BURSTS = 3, 2
+
+#: Levels of a lattice repeat by themselves: so many samples a level are none.
+_HELD_SAMPLES_CROWDED = 3.0
+
+
+def _detect_held_samples(y: Signal, _residual: Signal, scene: Scene) -> Detection | None:
+    if y.size >= _HELD_SAMPLES_CROWDED * np.unique(y).size:
+        return None
+    same = np.concatenate([[False], np.diff(y) == 0.0, [False]])
+    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    lengths = edges[1::2] - edges[::2] + 1
+    bursts = lengths[lengths >= _HELD_SAMPLES_RUN]
+    if bursts.size < _HELD_SAMPLES_BURSTS:
+        return None
+    share = float(np.sum(bursts - 1)) / y.size
+    return Detection(
+        {"share": (share, ""), "longest": (float(bursts.max()) * scene.dt, "s")},
+        float(np.sum(bursts)) * float(np.log(y.size)),
+    )
+
+
+HELD_SAMPLES = Detector(
+    "held-samples",
+    "Bursts of repeated values: samples that were lost, and the last one sent again",
+    "data",
+    _detect_held_samples,
+    "Little and Rubin, Statistical Analysis with Missing Data",
+)
+
+
+#: Scaled median deviations beyond which a sample is none of the others, and the least number of them.
+_OUTLIERS_FAR, _OUTLIERS_LEAST = 5.5, 3
+
+#: A median absolute deviation of normal noise in standard deviations.
+_OUTLIERS_MAD = 0.6745
+
+
+def _detect_outliers(_y: Signal, residual: Signal, scene: Scene) -> Detection | None:
+    left = noise_of(residual).whiten(residual)
+    scale = float(np.median(np.abs(left - np.median(left)))) / _OUTLIERS_MAD
+    if scale == 0.0:
+        return None
+    far = np.abs(left) / scale
+    count = int(np.count_nonzero(far > _OUTLIERS_FAR))
+    if count < _OUTLIERS_LEAST:
+        return None
+    usual = left[far <= _OUTLIERS_FAR]
+    n = left.size
+    gained = n * float(np.log(np.mean(left**2)) - np.log(np.mean(usual**2))) - 2 * count * float(np.log(n))
+    size = float(np.median(np.abs(left[far > _OUTLIERS_FAR])))
+    return Detection({"share": (count / n, ""), "size": (size, scene.output_unit)}, gained)
+
+
+OUTLIERS = Detector(
+    "outliers",
+    "Single samples far from their neighbours' errors",
+    "data",
+    _detect_outliers,
+    "Hampel, The influence curve and its role in robust estimation, 1974",
+    ("held-samples",),
+)
+
+
+#: Strengths that are tried, relative to the largest output.
+_HETEROSCEDASTIC_NOISE_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
+
+
+def _detect_heteroscedastic_noise(y: Signal, residual: Signal, scene: Scene) -> Detection | None:
+    noise = noise_of(residual)
+    left = noise.whiten(residual)
+    size = np.abs(y) / np.max(np.abs(y))
+    n = left.size
+    # A few outliers at large outputs would look the same: nobody weighs more than four deviations.
+    scale = float(np.median(np.abs(left))) / 0.6745
+    if scale == 0.0:  # most of it is no noise at all
+        return None
+    squares = np.minimum(left**2, (4 * scale * (1.0 + size)) ** 2)
+    costs = [
+        n * float(np.log(np.mean(squares / (1.0 + k * size) ** 2))) + 2 * float(np.sum(np.log1p(k * size)))
+        for k in _HETEROSCEDASTIC_NOISE_STRENGTHS
+    ]
+    best = int(np.argmin(costs))
+    gained = costs[0] - costs[best] - float(np.log(n))
+    if gained <= 0.0:
+        return None
+    strength = float(_HETEROSCEDASTIC_NOISE_STRENGTHS[best]) / float(np.max(np.abs(y)))
+    return Detection({"k": (strength, f"1/{scene.output_unit}")}, gained)
+
+
+HETEROSCEDASTIC_NOISE = Detector(
+    "heteroscedastic-noise",
+    "Noise that grows with the output: sigma (1 + k |y|)",
+    "data",
+    _detect_heteroscedastic_noise,
+    "Davidian and Carroll, Variance function estimation, 1987",
+    ("held-samples", "outliers"),
+)
+
+
+def _detect_coloured_noise(_y: Signal, residual: Signal, _scene: Scene) -> Detection | None:
+    noise = noise_of(residual)
+    if noise.order == 0:
+        return None
+    white = residual.size * float(np.log(np.mean(residual**2)))
+    gained = white - noise.minus_twice_log_likelihood
+    pole = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
+    return Detection({"pole": (pole, ""), "order": (float(noise.order), "")}, gained)
+
+
+COLOURED_NOISE = Detector(
+    "coloured-noise",
+    "Noise that remembers, where the best simulation leaves nothing else",
+    "data",
+    _detect_coloured_noise,
+    "Ljung, System Identification, 2nd ed., section 4",
+    ("held-samples",),
+)
+
+
+#: Detectors by name, in the order in which they are tried.
+DETECTORS: Mapping[str, Detector] = {
+    detector.name: detector
+    for detector in (QUANTISATION, HELD_SAMPLES, OUTLIERS, HETEROSCEDASTIC_NOISE, COLOURED_NOISE)
+}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from islands.discrepancy.detectors import DETECTORS
+from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.stepwise_search import LEAST
 from islands.discrepancy.interfaces.effect import Scene
 
