@@ -24,8 +24,8 @@ for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np  # noqa: E402 - after what it reads
 
 import islands  # noqa: E402
-from islands.discrepancy.detectability import probed  # noqa: E402
-from islands.discrepancy.surrogates import Probe, injections, surrogates_of  # noqa: E402
+from islands.discrepancy.detectability import diagnose_surrogate  # noqa: E402
+from islands.discrepancy.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402
 from islands.io.simulator_spec.document import extended_document  # noqa: E402
 from islands.io.simulator_spec.factory import simulation  # noqa: E402
 
@@ -190,16 +190,18 @@ def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> d
     leaves, so that it is more than half of what is wrong.
     """
     core = simulation(case.simulation, found.record)
-    source = surrogates_of(found, core, {})
-    called = [probed(source, Probe(None, seed)).called for seed in range(clean)]
+    source = make_surrogates(found, core, {})
+    called = [diagnose_surrogate(source, SurrogateCase(None, seed)).called for seed in range(clean)]
     rng, told = np.random.default_rng(1), []
     names = rng.permutation(sorted(source.effects)).tolist()
     while names and len(told) < injected:
         strong = [
-            each for each in injections(source, source.effects[names.pop()], rng) if 1.0 < each.misfit < 4.0
+            each
+            for each in injection_strengths(source, source.effects[names.pop()], rng)
+            if 1.0 < each.misfit < 4.0
         ]
         if strong:
-            answer = probed(source, Probe(strong[0], len(told)))
+            answer = diagnose_surrogate(source, SurrogateCase(strong[0], len(told)))
             told.append((strong[0].cause, answer.called, answer.recognised))
     return {"clean": called, "injected": told}
 

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as diagnosed
-from islands.discrepancy.inference.stepwise_search import Tell, silent
+from islands.discrepancy.inference.stepwise_search import Tell, ignore_progress
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.simulator_spec.factory import simulation as made
 from islands.io.simulator_spec.schema import LocalSpec, SimulationSpec
 from islands.parallel import Spread
@@ -15,12 +15,12 @@ from islands.parallel import Spread
 
 def diagnose(
     record: Dataset,
-    simulation: str | SimulationSpec | LocalSpec | Core,
+    simulation: str | SimulationSpec | LocalSpec | Simulator,
     *,
     tolerance: Mapping[str, float] | None = None,
     columns: Mapping[str, Signal] | None = None,
     seed: int = 0,
-    progress: Tell = silent,
+    progress: Tell = ignore_progress,
     spread: Spread = map,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record, why, and what mending it is worth.
@@ -29,7 +29,7 @@ def diagnose(
     ----------
     record : Dataset
         Its first input drives the simulation; further ones are channels that may couple in.
-    simulation : str, spec or Core
+    simulation : str, spec or Simulator
         As on the command line: ``second-order``, ``linear:2``, ``model:FILE.json``,
         ``python:FILE.py:FUNCTION``, ... Or one that is made already.
     tolerance : mapping, optional

@@ -9,7 +9,7 @@ import numpy as np
 
 from islands._identify import identify
 from islands.data.dataset import Dataset
-from islands.discrepancy.diagnosis import Diagnosis, Proposal
+from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.evolution.engine import Engine
 from islands.model.equations import equation
@@ -27,7 +27,7 @@ WORTH = 0.1
 LEFT, SIMULATED = "residual", "simulated"
 
 
-def proposed(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> Proposal | None:
+def proposed(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> ResidualFormula | None:
     """Look for a formula of what has no name; None where nothing is left, or none is worth it.
 
     The islands search on the samples that the analysis was fitted to. The locked ones say what it is worth.
@@ -58,4 +58,6 @@ def proposed(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> P
     if best is None:
         return None
     names = {"u1": record.input_names[0], "u2": SIMULATED, "y": LEFT}
-    return Proposal(re.sub(r"\b(u1|u2|y)(?=\()", lambda name: names[name[1]], equation(best)), explains)
+    return ResidualFormula(
+        re.sub(r"\b(u1|u2|y)(?=\()", lambda name: names[name[1]], equation(best)), explains
+    )

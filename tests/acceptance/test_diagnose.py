@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from islands.discrepancy.detectability import NOTHING, Answer, SelfTest, self_test
+from islands.discrepancy.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.surrogates import Probe
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.surrogates import SurrogateCase
 from islands.io.records import write_record
 from islands.parallel import Spread
 from islands.trials.injection.measurement import hide
@@ -95,15 +95,15 @@ def self_tested(base: Path, out: str, *options: object) -> tuple[str, dict]:
     return said, json.loads((base / out / "discrepancy.json").read_text())
 
 
-def answered(_analyse: object, probes: Sequence[Probe]) -> Iterator[Answer]:
+def answered(_analyse: object, probes: Sequence[SurrogateCase]) -> Iterator[SurrogateOutcome]:
     """Answer probes without an analysis: what is larger than a third of the noise is named."""
     for probe in probes:
         named = probe.injection is not None and probe.injection.misfit > 0.33
-        yield Answer("offset" if named else NOTHING, named, 1.0)
+        yield SurrogateOutcome("offset" if named else NOTHING, named, 1.0)
 
 
 def quick_self_test(
-    found: Diagnosis, core: Core, tolerance: dict, seed: int, _run: Spread, **asked: Any
+    found: Diagnosis, core: Simulator, tolerance: dict, seed: int, _run: Spread, **asked: Any
 ) -> SelfTest:
     return self_test(found, core, tolerance, seed, answered, **asked)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, held_against
-from islands.discrepancy.calibration.preparation import fitted_samples, scene_of
+from islands.discrepancy.calibration.levenberg_marquardt import Target, evaluate_fit
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.records import write_record
 from islands.io.simulator_spec.document import extended_json
 from support.command_line import fail, succeed
@@ -29,13 +29,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     asked = made()["bouc-wen-piezo"]
     effect, record = CATALOGUE["cubic-stiffness"], asked.record
     core = asked.core
-    simulation = Extended(core, (effect,), scene_of(record, core, fitted_samples(record)))
+    simulation = ExtendedSimulator(core, (effect,), make_context(record, core, count_fitted_samples(record)))
     values = simulation.nominal
     values[simulation.part(effect)] = STRENGTH
     measured = replace(record, y=simulation.simulate(values))
     target = Target(measured.y, np.ones(record.samples, dtype=bool), None, {})
     write_record(measured, base / "record.csv")
-    (base / "extended.json").write_text(extended_json(held_against(simulation, target, values), measured))
+    (base / "extended.json").write_text(extended_json(evaluate_fit(simulation, target, values), measured))
     return base
 
 

@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from islands.discrepancy.effects import CATALOGUE, OF_EACH, sentence
+from islands.discrepancy.effects import CATALOGUE, OF_EACH, summary_of
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.effect import Scene
+from islands.discrepancy.interfaces.effect import SimulationContext
 from islands.io.simulator_spec.schema import KINDS
 from support.repository import DOCS
 
@@ -22,7 +22,7 @@ ROWS = {
 
 
 def said(name: str) -> str:
-    return DETECTORS[name].summary if name in DETECTORS else sentence(name)
+    return DETECTORS[name].summary if name in DETECTORS else summary_of(name)
 
 
 def test_the_guide_has_every_effect_and_no_other() -> None:
@@ -41,7 +41,7 @@ def test_the_guide_has_the_summary_of_every_effect(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_the_guide_has_an_effects_parameters(name: str, scene: Scene) -> None:
+def test_the_guide_has_an_effects_parameters(name: str, scene: SimulationContext) -> None:
     in_guide = re.findall(r"`([^`]+)`", ROWS[name][2])
     assert [each.name for each in CATALOGUE[name].parameters(scene)] == in_guide
 
@@ -70,6 +70,6 @@ def test_pictures_are_small_and_all_are_shown() -> None:
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def scene() -> SimulationContext:
     u = np.sin(np.arange(400) / 20)
-    return Scene(u, 0.01, {"T": u, "w": u}, {"T": "K", "w": "V"}, 1.0, 1.0, "V", "um", 3.0)
+    return SimulationContext(u, 0.01, {"T": u, "w": u}, {"T": "K", "w": "V"}, 1.0, 1.0, "V", "um", 3.0)

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.preparation import effects_for, fitted_samples, scene_of
-from islands.discrepancy.interfaces.context import Scene
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.discrepancy.interfaces.context import SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators import (
     bouc_wen_piezo,
     cascaded_tanks,
@@ -21,21 +21,21 @@ from islands.discrepancy.simulators import (
     saved_extension,
     second_order,
 )
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from support.simulated_records import made
 
 #: By name, what each has to be; the held one is within the extension.
 KINDS = {
-    "bouc-wen-piezo": bouc_wen_piezo.BoucWenPiezoCore,
-    "second-order": second_order.SecondOrderCore,
-    "rigid-axis": rigid_axis.RigidAxisCore,
-    "cascaded-tanks": cascaded_tanks.CascadedTanksCore,
-    "linear": linear.LinearCore,
-    "model": narx.NarxCore,
-    "column": recorded_output.ColumnCore,
-    "python": python_function.ProgramCore,
-    "held": intersample.Between,
-    "extended": saved_extension.ExtensionCore,
+    "bouc-wen-piezo": bouc_wen_piezo.BoucWenPiezoSimulator,
+    "second-order": second_order.SecondOrderSimulator,
+    "rigid-axis": rigid_axis.RigidAxisSimulator,
+    "cascaded-tanks": cascaded_tanks.CascadedTanksSimulator,
+    "linear": linear.LinearSimulator,
+    "model": narx.NarxSimulator,
+    "column": recorded_output.RecordedOutput,
+    "python": python_function.PythonFunctionSimulator,
+    "held": intersample.ResampledSimulator,
+    "extended": saved_extension.SavedExtension,
 }
 
 
@@ -45,26 +45,26 @@ def name(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def core(name: str) -> Core:
+def core(name: str) -> Simulator:
     found = made()[name].core
     return found.core if name == "held" else found
 
 
 @pytest.fixture
-def scene(name: str, core: Core) -> Scene:
+def scene(name: str, core: Simulator) -> SimulationContext:
     record = made()[name].record
-    return scene_of(record, core, fitted_samples(record))
+    return make_context(record, core, count_fitted_samples(record))
 
 
 @pytest.fixture
-def alone(core: Core, scene: Scene) -> Extended:
-    return Extended(core, (), scene)
+def alone(core: Simulator, scene: SimulationContext) -> ExtendedSimulator:
+    return ExtendedSimulator(core, (), scene)
 
 
-def effects(core: Core, scene: Scene) -> list[Effect]:
+def effects(core: Simulator, scene: SimulationContext) -> list[Effect]:
     """Return all that can enter: gains and parameters as well, where every parameter is trusted."""
-    free = effects_for(core, scene, {})
-    trusted = effects_for(core, scene, {each.name: 0.1 for each in core.parameters if not each.initial})
+    free = select_effects(core, scene, {})
+    trusted = select_effects(core, scene, {each.name: 0.1 for each in core.parameters if not each.initial})
     return list({each.name: each for each in (*free, *trusted)}.values())
 
 
@@ -74,31 +74,35 @@ def test_every_core_is_here() -> None:
     assert modules - {"__init__", "coordinates", "around", "extended"} == here
 
 
-def test_it_is_what_it_says(name: str, core: Core) -> None:
+def test_it_is_what_it_says(name: str, core: Simulator) -> None:
     assert isinstance(core, KINDS[name])
     assert core.name
     assert set(core.sites) <= set(Site)
     assert isinstance(core.integrates, bool)
 
 
-def test_a_simulation_has_a_value_for_every_sample(alone: Extended, scene: Scene) -> None:
+def test_a_simulation_has_a_value_for_every_sample(
+    alone: ExtendedSimulator, scene: SimulationContext
+) -> None:
     simulated = alone.simulate(alone.nominal)
     assert simulated.shape == scene.u.shape
     assert simulated.dtype == np.float64
     assert np.isfinite(simulated).all()
 
 
-def test_the_same_input_gives_the_same_bits(name: str, alone: Extended, core: Core, scene: Scene) -> None:
+def test_the_same_input_gives_the_same_bits(
+    name: str, alone: ExtendedSimulator, core: Simulator, scene: SimulationContext
+) -> None:
     u = scene.u.copy()
     first = alone.simulate(alone.nominal)
-    again = Extended(core, (), scene)
+    again = ExtendedSimulator(core, (), scene)
     assert np.array_equal(again.simulate(again.nominal), first)
-    other = Extended(made()[name].core if name != "held" else core, (), scene)
+    other = ExtendedSimulator(made()[name].core if name != "held" else core, (), scene)
     assert np.array_equal(other.simulate(other.nominal), first)
     assert np.array_equal(scene.u, u)
 
 
-def test_nominal_values_are_within_bounds_and_can_move(alone: Extended) -> None:
+def test_nominal_values_are_within_bounds_and_can_move(alone: ExtendedSimulator) -> None:
     lower, upper = alone.bounds
     assert np.isfinite(alone.nominal).all()
     assert (lower <= alone.nominal).all()
@@ -107,7 +111,7 @@ def test_nominal_values_are_within_bounds_and_can_move(alone: Extended) -> None:
     assert (alone.scales > 0.0).all()
 
 
-def test_every_parameter_changes_the_output(name: str, alone: Extended) -> None:
+def test_every_parameter_changes_the_output(name: str, alone: ExtendedSimulator) -> None:
     at_rest = alone.simulate(alone.nominal)
     for place, parameter in enumerate(alone.parameters):
         values = alone.nominal
@@ -117,17 +121,17 @@ def test_every_parameter_changes_the_output(name: str, alone: Extended) -> None:
         assert np.max(np.abs(changed)) > 0.0, parameter
 
 
-def test_names_are_unique(core: Core, scene: Scene) -> None:
+def test_names_are_unique(core: Simulator, scene: SimulationContext) -> None:
     names = [each.name for each in core.parameters]
     assert len(set(names)) == len(names)
-    found = effects_for(core, scene, {})
+    found = select_effects(core, scene, {})
     assert len({each.name for each in found}) == len(found)
     for effect in effects(core, scene):
         own = [each.name for each in effect.parameters(scene)]
         assert len(set(own)) == len(own), effect.name
 
 
-def test_the_frame_has_scales(core: Core, scene: Scene) -> None:
+def test_the_frame_has_scales(core: Simulator, scene: SimulationContext) -> None:
     frame = scene.frame
     assert min(frame.peak, frame.rate, frame.force, frame.sharp) > 0.0
     assert frame.unit
@@ -136,7 +140,9 @@ def test_the_frame_has_scales(core: Core, scene: Scene) -> None:
     assert frame.least == (0.0 if frame.dissipates else -np.inf)
 
 
-def test_an_effect_at_rest_does_nothing(core: Core, alone: Extended, scene: Scene) -> None:
+def test_an_effect_at_rest_does_nothing(
+    core: Simulator, alone: ExtendedSimulator, scene: SimulationContext
+) -> None:
     at_rest = alone.simulate(alone.nominal)
     found = effects(core, scene)
     assert found
@@ -145,7 +151,9 @@ def test_an_effect_at_rest_does_nothing(core: Core, alone: Extended, scene: Scen
         assert np.array_equal(extended.simulate(extended.nominal), at_rest), effect.name
 
 
-def test_an_effect_enters_where_the_core_lets_it(core: Core, alone: Extended, scene: Scene) -> None:
+def test_an_effect_enters_where_the_core_lets_it(
+    core: Simulator, alone: ExtendedSimulator, scene: SimulationContext
+) -> None:
     """At the first point of its grid every one of them does something that is a number."""
     at_rest = alone.simulate(alone.nominal)
     residual = 0.01 * scene.output_peak * np.sin(2 * np.pi * 7.3 * scene.time)

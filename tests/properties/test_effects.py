@@ -4,47 +4,47 @@ import numpy as np
 import pytest
 
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.effect import Scene, Site
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.interfaces.effect import SimulationContext, Site
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def scene() -> SimulationContext:
     rng = np.random.default_rng(3)
     time = np.arange(1500) * 0.01
     u = 40 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.11 * time)
     channels = {"T_K": np.cumsum(rng.normal(size=time.size)), "w_V": rng.normal(size=time.size)}
-    return Scene(u, 0.01, channels, {"T_K": "K", "w_V": "V"}, 40.0, 33.0, "V", "um", 11.0)
+    return SimulationContext(u, 0.01, channels, {"T_K": "K", "w_V": "V"}, 40.0, 33.0, "V", "um", 11.0)
 
 
 @pytest.fixture(scope="module")
-def alone(scene: Scene) -> Extended:
-    return Extended(BoucWenPiezoCore(), (), scene)
+def alone(scene: SimulationContext) -> ExtendedSimulator:
+    return ExtendedSimulator(BoucWenPiezoSimulator(), (), scene)
 
 
 @pytest.fixture(params=CATALOGUE)
-def extended(request: pytest.FixtureRequest, alone: Extended) -> Extended:
+def extended(request: pytest.FixtureRequest, alone: ExtendedSimulator) -> ExtendedSimulator:
     return alone.with_effects([CATALOGUE[request.param]])
 
 
-def at(extended: Extended, point: tuple[float, ...]) -> np.ndarray:
+def at(extended: ExtendedSimulator, point: tuple[float, ...]) -> np.ndarray:
     values = extended.nominal
     values[extended.part(extended.effects[0])] = point
     return values
 
 
-def grid(extended: Extended) -> tuple[tuple[float, ...], ...]:
+def grid(extended: ExtendedSimulator) -> tuple[tuple[float, ...], ...]:
     residual = 0.1 * np.sin(2 * np.pi * 7.3 * extended.scene.time)
     return tuple(extended.effects[0].grid(extended.scene, residual))
 
 
-def test_at_rest_an_effect_does_nothing(extended: Extended, alone: Extended) -> None:
+def test_at_rest_an_effect_does_nothing(extended: ExtendedSimulator, alone: ExtendedSimulator) -> None:
     assert np.array_equal(extended.simulate(extended.nominal), alone.simulate(alone.nominal))
 
 
 def test_every_point_that_a_search_begins_from_does_something_and_is_allowed(
-    extended: Extended, alone: Extended
+    extended: ExtendedSimulator, alone: ExtendedSimulator
 ) -> None:
     lower, upper = extended.bounds
     points = grid(extended)
@@ -59,7 +59,7 @@ def test_every_point_that_a_search_begins_from_does_something_and_is_allowed(
         assert np.max(np.abs(simulated - at_rest)) > 1e-4
 
 
-def test_what_is_called_linear_is(extended: Extended, alone: Extended) -> None:
+def test_what_is_called_linear_is(extended: ExtendedSimulator, alone: ExtendedSimulator) -> None:
     """Half a strength has half the response; a small one nearly, where a core lies between."""
     effect = extended.effects[0]
     if effect.linear == 0:
@@ -78,7 +78,7 @@ def test_what_is_called_linear_is(extended: Extended, alone: Extended) -> None:
     assert wrong <= (1e-9 if exact else 0.1) * float(np.std(responses[0]) + abs(np.mean(responses[0])))
 
 
-def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: Extended) -> None:
+def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: ExtendedSimulator) -> None:
     """Steps of a hundredth and of a fiftieth of a parameter's scale agree within a fifth."""
     if extended.effects[0].name == "stiction":
         pytest.skip("it changes by leaps")
@@ -102,7 +102,7 @@ def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: Extended) -> No
         assert np.linalg.norm(slopes[1] - slopes[0]) < 0.2 * size
 
 
-def test_an_effect_says_where_it_comes_from(extended: Extended) -> None:
+def test_an_effect_says_where_it_comes_from(extended: ExtendedSimulator) -> None:
     effect = extended.effects[0]
     parameters = effect.parameters(extended.scene)
     assert parameters
@@ -115,11 +115,11 @@ def test_an_effect_says_where_it_comes_from(extended: Extended) -> None:
     assert effect.site != Site.CORE or effect.name in extended.core.understood
 
 
-def test_a_memory_of_simulations_changes_none(alone: Extended) -> None:
+def test_a_memory_of_simulations_changes_none(alone: ExtendedSimulator) -> None:
     values = alone.nominal
     first = alone.simulate(values).copy()
     for factor in (1.1, 0.9, 1.2, 0.8, 1.3, 1.0):
         moved = values * factor
-        fresh = Extended(alone.core, alone.effects, alone.scene).simulate(moved)
+        fresh = ExtendedSimulator(alone.core, alone.effects, alone.scene).simulate(moved)
         assert np.array_equal(alone.simulate(moved), fresh)
     assert np.array_equal(alone.simulate(values), first)

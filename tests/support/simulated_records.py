@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.simulator_spec.factory import simulation
 from islands.io.simulator_spec.schema import (
     ColumnSpec,
@@ -49,7 +49,7 @@ class Made:
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @cached_property
-    def core(self) -> Core:
+    def core(self) -> Simulator:
         return simulation(self.spec, self.record, self.columns)
 
 

@@ -11,9 +11,9 @@ import typer
 from islands._explain_residual import proposed
 from islands.data.dataset import Dataset
 from islands.discrepancy.detectability import SelfTest, self_test
-from islands.discrepancy.diagnosis import Diagnosis, Proposal
+from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.diagnosis import diagnose as diagnosed
-from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records import read_record
 from islands.io.records.row_range import rows_of
@@ -85,7 +85,7 @@ def write(
     name: str,
     wall_s: float,
     tested: SelfTest | None = None,
-    proposal: Proposal | None = None,
+    proposal: ResidualFormula | None = None,
 ) -> None:
     """Write a diagnosis: the document last, so that where it is everything is."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -100,7 +100,7 @@ def write(
 
 def _self_tested(
     found: Diagnosis,
-    core: Core,
+    core: Simulator,
     tolerance: Mapping[str, float],
     seed: int,
     spread: Spread,

@@ -6,7 +6,7 @@ from time import monotonic
 import structlog
 
 from islands._explain_residual import proposed
-from islands.discrepancy.diagnosis import Diagnosis, Proposal, diagnose
+from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula, diagnose
 from islands.evolution.engine import Engine
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
@@ -79,7 +79,9 @@ def discrepancy(
     )
 
 
-def _summary(found: Diagnosis, proposal: Proposal | None, simulated: str, wall_s: float) -> dict[str, object]:
+def _summary(
+    found: Diagnosis, proposal: ResidualFormula | None, simulated: str, wall_s: float
+) -> dict[str, object]:
     return {
         "simulation": simulated,
         "verdict": str(found.verdict),

@@ -5,7 +5,7 @@ import io
 from typing import Any
 
 from islands.discrepancy.detectability import NOTHING, SelfTest
-from islands.discrepancy.diagnosis import Diagnosis, Proposal
+from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Finding, Verdict
 from islands.discrepancy.surrogates import STRENGTHS
 from islands.figures.discrepancy import DISCREPANCY_FIGURES
@@ -33,7 +33,7 @@ _CAPTIONS = {
 _NOISE = "Nothing significant: within this record's noise, which has a name, the simulation is right."
 
 
-def in_words(found: Diagnosis, proposal: Proposal | None = None) -> str:
+def in_words(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     """Say a diagnosis in a few plain lines."""
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
@@ -125,7 +125,7 @@ def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
 
 
 def report(
-    name: str, found: Diagnosis, tested: SelfTest | None = None, proposal: Proposal | None = None
+    name: str, found: Diagnosis, tested: SelfTest | None = None, proposal: ResidualFormula | None = None
 ) -> bytes:
     """Write the report of a diagnosis.
 
@@ -135,7 +135,7 @@ def report(
         Of the record.
     tested : SelfTest, optional
         What the analysis can do on it.
-    proposal : Proposal, optional
+    proposal : ResidualFormula, optional
         A formula for what has no name.
     """
     figures = [(_CAPTIONS[each], _inline(draw(found))) for each, draw in DISCREPANCY_FIGURES.items()]

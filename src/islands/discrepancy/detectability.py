@@ -15,8 +15,14 @@ from scipy.special import betaincinv
 
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.surrogates import Injection, Probe, Surrogates, injections, surrogates_of
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.surrogates import (
+    Injection,
+    SurrogateCase,
+    Surrogates,
+    injection_strengths,
+    make_surrogates,
+)
 from islands.parallel import Spread
 
 #: Clean surrogates.
@@ -30,7 +36,7 @@ _OUTSIDE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class SurrogateOutcome:
     """What the analysis said of a probe.
 
     Attributes
@@ -49,7 +55,7 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class DetectionRate:
     """A part of some surrogates, with Clopper and Pearson's 95 % interval."""
 
     value: float
@@ -65,7 +71,7 @@ class SelfTest:
     ----------
     detection_limits : mapping of str to Injection or None
         The smallest injection of each effect that is named; None where none is.
-    false_alarm_rate : Rate
+    false_alarm_rate : DetectionRate
         Of clean surrogates that got a name.
     p_value : float
         How often chance alone makes a candidate as good as the record's best one.
@@ -74,12 +80,12 @@ class SelfTest:
     """
 
     detection_limits: Mapping[str, Injection | None]
-    false_alarm_rate: Rate
+    false_alarm_rate: DetectionRate
     p_value: float
     confusion: Mapping[tuple[str, str], int]
 
 
-def probed(source: Surrogates, probe: Probe) -> Answer:
+def diagnose_surrogate(source: Surrogates, probe: SurrogateCase) -> SurrogateOutcome:
     """Draw a surrogate and diagnose it."""
     found = diagnose(source.drawn(probe), source.core, source.tolerance, probe.seed)
     # That the noise remembers is true of a surrogate whose noise does.
@@ -87,7 +93,7 @@ def probed(source: Surrogates, probe: Probe) -> Answer:
     # Causes of a misfit stand before what is said of the noise.
     said = {name for each in named for name in (each.name, *each.equivalents)}
     otherwise = UNKNOWN if found.verdict == Verdict.UNKNOWN else NOTHING
-    return Answer(
+    return SurrogateOutcome(
         named[0].name if named else otherwise,
         probe.injection is not None and probe.injection.cause in said,
         _best(found),
@@ -100,7 +106,7 @@ def _quiet(_ended: int, _of: int) -> None:
 
 def self_test(
     diagnosis: Diagnosis,
-    core: Core,
+    core: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
     run: Spread = map,
@@ -127,9 +133,9 @@ def self_test(
     tell : callable
         Told how many probes have ended, and of how many at the most.
     """
-    source = surrogates_of(diagnosis, core, dict(tolerance or {}))
+    source = make_surrogates(diagnosis, core, dict(tolerance or {}))
     ladders = {
-        name: injections(source, effect, _lot(seed, name))
+        name: injection_strengths(source, effect, _lot(seed, name))
         for name, effect in source.effects.items()
         if effects is None or name in effects
     }
@@ -138,14 +144,14 @@ def self_test(
     # The last step that is known not to be named, and the first that is.
     between = {name: (-1, len(steps)) for name, steps in ladders.items()}
     confusion: Counter[tuple[str, str]] = Counter()
-    cleans: list[Answer] = []
-    asked = [Probe(None, int(_lot(seed, NOTHING, turn).integers(2**32))) for turn in range(clean)]
+    cleans: list[SurrogateOutcome] = []
+    asked = [SurrogateCase(None, int(_lot(seed, NOTHING, turn).integers(2**32))) for turn in range(clean)]
     asked += _middles(ladders, between, seeds)
     ended = 0
     while asked:
         left = sum((high - low - 1).bit_length() for low, high in between.values())
         most = ended + left + sum(probe.injection is None for probe in asked)
-        for probe, answer in zip(asked, run(partial(probed, source), asked), strict=True):
+        for probe, answer in zip(asked, run(partial(diagnose_surrogate, source), asked), strict=True):
             ended += 1
             tell(ended, most)
             hidden = probe.injection
@@ -163,27 +169,27 @@ def self_test(
             name: steps[high] if (high := between[name][1]) < len(steps) else None
             for name, steps in ladders.items()
         },
-        rate(sum(answer.called not in (NOTHING, UNKNOWN) for answer in cleans), len(cleans)),
+        estimate_rate(sum(answer.called not in (NOTHING, UNKNOWN) for answer in cleans), len(cleans)),
         (1 + as_good) / (1 + len(cleans)),
         dict(sorted(confusion.items())),
     )
 
 
-def rate(count: int, of: int) -> Rate:
+def estimate_rate(count: int, of: int) -> DetectionRate:
     """Return a rate with its bounds."""
     low = float(betaincinv(count, of - count + 1, _OUTSIDE / 2)) if count else 0.0
     high = float(betaincinv(count + 1, of - count, 1 - _OUTSIDE / 2)) if count < of else 1.0
-    return Rate(count / of if of else 0.0, (low, high), of)
+    return DetectionRate(count / of if of else 0.0, (low, high), of)
 
 
 def _middles(
     ladders: Mapping[str, tuple[Injection, ...]],
     between: Mapping[str, tuple[int, int]],
     seeds: Mapping[str, int],
-) -> list[Probe]:
+) -> list[SurrogateCase]:
     """Return the next probe of every effect whose limit is not known yet."""
     return [
-        Probe(ladders[name][(low + high) // 2], seeds[name])
+        SurrogateCase(ladders[name][(low + high) // 2], seeds[name])
         for name, (low, high) in between.items()
         if high - low > 1
     ]

@@ -6,26 +6,37 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.intersample_selection import settled, solved_alike
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
-from islands.discrepancy.calibration.preparation import checked, effects_for, fitted_samples, scene_of
-from islands.discrepancy.inference.experiment_design import decisive
-from islands.discrepancy.inference.holdout import Gain, gain_of
+from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.preparation import (
+    count_fitted_samples,
+    make_context,
+    select_effects,
+    validate_prior,
+)
+from islands.discrepancy.inference.experiment_design import suggest_experiment
+from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
 from islands.discrepancy.inference.noise_detectors import DETECTORS
-from islands.discrepancy.inference.screening import Rung, ladder
-from islands.discrepancy.inference.stepwise_search import LEAST, Tell, silent
-from islands.discrepancy.inference.strategies import Evidence, by_misfit, by_noise, first_of, judged
+from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
+from islands.discrepancy.inference.stepwise_search import LEAST, Tell, ignore_progress
+from islands.discrepancy.inference.strategies import (
+    SearchOutcome,
+    assess_evidence,
+    best_single,
+    search_with_ar_noise,
+    search_with_model_error,
+)
 from islands.discrepancy.inference.verdict import (
     TEMPER,
     Finding,
     Value,
     Verdict,
-    findings,
-    share,
+    describe_effects,
+    explained_fraction,
 )
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.parallel import Spread
 
 #: Times that causes are looked for anew because with them the record asks for another hold or step.
@@ -56,7 +67,7 @@ class Diagnosis:
         The most important first; empty for "nothing" and "unknown".
     candidates : tuple of Candidate
         All effects beside the simulation, the best first.
-    gain : Gain or None
+    gain : HoldoutGain or None
         On data that nothing else has seen; None where nothing was added to the simulation.
     remainder : mapping of str to float
         Maps in which what is left is no chance, with their distance in standard deviations.
@@ -65,7 +76,7 @@ class Diagnosis:
     record : Dataset
     fitted : int
         Samples, from the first on, that estimation has seen; the rest is locked.
-    base, best : Calibrated
+    base, best : CalibrationResult
         The simulation calibrated without the effects, and with them.
     noise_floor : float
         RMSE that no simulation is expected to be below.
@@ -79,13 +90,13 @@ class Diagnosis:
     verdict: Verdict
     effects: tuple[Finding, ...]
     candidates: tuple[Candidate, ...]
-    gain: Gain | None
+    gain: HoldoutGain | None
     remainder: Mapping[str, float]
     decisive_experiment: str
     record: Dataset
     fitted: int
-    base: Calibrated
-    best: Calibrated
+    base: CalibrationResult
+    best: CalibrationResult
     noise_floor: float
     measured_floor: bool
     as_given: float
@@ -93,10 +104,10 @@ class Diagnosis:
 
 def diagnose(
     record: Dataset,
-    core: Core,
+    core: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
-    tell: Tell = silent,
+    tell: Tell = ignore_progress,
     spread: Spread = map,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record.
@@ -105,7 +116,7 @@ def diagnose(
     ----------
     record : Dataset
         Its first input drives the simulation; further ones are channels that may couple in.
-    core : Core
+    core : Simulator
         The simulation.
     tolerance : mapping, optional
         Relative standard deviations of the simulation's parameters about their nominal values. Who is not
@@ -124,45 +135,45 @@ def diagnose(
     SettingsError
         A tolerance is not positive, or of a parameter that the simulation does not have.
     """
-    known = checked(tolerance or {}, core)
-    fitted = fitted_samples(record)
-    scene = scene_of(record, core, fitted)
+    known = validate_prior(tolerance or {}, core)
+    fitted = count_fitted_samples(record)
+    scene = make_context(record, core, fitted)
     rng = np.random.default_rng(seed)
-    simulation = Extended(core, (), scene)
+    simulation = ExtendedSimulator(core, (), scene)
     target = Target(record.y, np.arange(record.samples) < fitted, None, known)
     tell("calibrating the simulation")
     plain = calibrate(simulation, target, simulation.nominal)
-    core = settled(plain, target)
-    effects = effects_for(core, scene, known)
+    core = select_intersample(plain, target)
+    effects = select_effects(core, scene, known)
     for _ in range(ROUNDS):
         plain = calibrate(replace(simulation, core=core), target, plain.values)
         tell(f"looking for each of {len(effects)} effects")
-        rungs = ladder(plain, target, effects, spread)
-        again = settled(first_of(plain, rungs), target)
-        if solved_alike(again, core):
-            evidence = by_noise(plain, rungs, target, effects, tell, spread)
-            again = settled(evidence.found.fit, evidence.target)
-        if solved_alike(again, core):
+        rungs = screen_effects(plain, target, effects, spread)
+        again = select_intersample(best_single(plain, rungs), target)
+        if same_discretisation(again, core):
+            evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
+            again = select_intersample(evidence.found.fit, evidence.target)
+        if same_discretisation(again, core):
             break
         # With a cause in it another hold, or a finer step, fits better: it was the cause that hid that.
         tell("once more: the input between its samples")
         core = again
     else:
-        evidence = by_noise(plain, rungs, target, effects, tell, spread)
+        evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
     tell("what is left over")
-    evidence = judged(evidence, fitted, rng)
+    evidence = assess_evidence(evidence, fitted, rng)
     if evidence.verdict == Verdict.UNKNOWN or (
         evidence.verdict == Verdict.NOTHING and evidence.found.fit.noise.order
     ):
-        second = judged(by_misfit(plain, target, effects, tell, spread), fitted, rng)
+        second = assess_evidence(search_with_model_error(plain, target, effects, tell, spread), fitted, rng)
         evidence = second if second.verdict != Verdict.UNKNOWN else evidence
     return _told(record, evidence, plain, effects, fitted, rng, tell, spread)
 
 
 def _told(
     record: Dataset,
-    evidence: Evidence,
-    plain: Calibrated,
+    evidence: SearchOutcome,
+    plain: CalibrationResult,
     effects: Sequence[Effect],
     fitted: int,
     rng: np.random.Generator,
@@ -175,15 +186,15 @@ def _told(
     locked = slice(fitted, record.samples)
     gain = None
     if verdict in (Verdict.NAMED, Verdict.REMAINDER):
-        gain = gain_of(record, plain.output, found.fit.output, locked, floor**0.5, rng)
+        gain = measure_gain(record, plain.output, found.fit.output, locked, floor**0.5, rng)
         if found.effects and gain.ci95[1] < -REFUTED:
             # What nothing has seen speaks against it: there is something, but it is not this.
             gain, verdict = None, Verdict.UNKNOWN
     named: tuple[Finding, ...] = ()
-    instead: tuple[Rung, ...] = ()
+    instead: tuple[ScreenedEffect, ...] = ()
     if gain is not None:
         tell("what else could be the cause")
-        named, instead = findings(found, base, rungs, evidence.target, effects, floor, spread)
+        named, instead = describe_effects(found, base, rungs, evidence.target, effects, floor, spread)
     residual = (record.y - found.fit.output)[:fitted]
     scene = found.fit.simulation.scene
     noise = _noise(record.y[:fitted], residual, scene) if verdict != Verdict.UNKNOWN else ()
@@ -193,10 +204,12 @@ def _told(
     return Diagnosis(
         Verdict.NAMED if noise and verdict == Verdict.NOTHING else verdict,
         (*named, *noise),
-        tuple(Candidate(r.effect.cause, r.gained(base), share(base, r.fit, floor)) for r in rungs),
+        tuple(
+            Candidate(r.effect.cause, r.gained(base), explained_fraction(base, r.fit, floor)) for r in rungs
+        ),
         gain,
         evidence.remainder,
-        decisive(found.fit, instead),
+        suggest_experiment(found.fit, instead),
         record,
         fitted,
         plain,
@@ -207,7 +220,7 @@ def _told(
     )
 
 
-def _noise(y: Signal, residual: Signal, scene: Scene) -> tuple[Finding, ...]:
+def _noise(y: Signal, residual: Signal, scene: SimulationContext) -> tuple[Finding, ...]:
     """Name what sampling and noise have done, the crudest first: what it explains is not blamed on others."""
     found: list[Finding] = []
     for detector in DETECTORS.values():
@@ -222,7 +235,7 @@ def _noise(y: Signal, residual: Signal, scene: Scene) -> tuple[Finding, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Proposal:
+class ResidualFormula:
     """A formula for what the best simulation leaves over.
 
     Attributes

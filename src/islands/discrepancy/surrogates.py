@@ -8,13 +8,13 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.noise_model import Noise, noise_of
-from islands.discrepancy.calibration.preparation import effects_for
+from islands.discrepancy.calibration.noise_model import NoiseModel, fit_ar_noise
+from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.inference.screening import carried
+from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Misfits of what is injected, in standard deviations of the residual.
 STRENGTHS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
@@ -54,7 +54,7 @@ class Injection:
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
+class SurrogateCase:
     """One surrogate to be diagnosed; without an injection it is a clean one."""
 
     injection: Injection | None
@@ -68,13 +68,13 @@ class Surrogates:
     Attributes
     ----------
     record : Dataset
-    core, tolerance : Core, mapping
+    core, tolerance : Simulator, mapping
         As they were diagnosed.
-    simulation : Extended
+    simulation : ExtendedSimulator
         Without effects.
     values : ndarray, shape (parameters,)
         Of the simulation.
-    noise : Noise
+    noise : NoiseModel
     sigma : float
         The residual's standard deviation.
     fitted : int
@@ -82,11 +82,11 @@ class Surrogates:
     """
 
     record: Dataset
-    core: Core
+    core: Simulator
     tolerance: Mapping[str, float]
-    simulation: Extended
+    simulation: ExtendedSimulator
     values: Signal
-    noise: Noise
+    noise: NoiseModel
     sigma: float
     fitted: int
 
@@ -95,14 +95,14 @@ class Surrogates:
         if effect is None:
             return self.simulation.simulate(self.values)
         extended = self.simulation.with_effects([effect])
-        moved = carried(self.values, self.simulation, extended)
+        moved = transfer_parameters(self.values, self.simulation, extended)
         moved[extended.part(effect)] = values
         return extended.simulate(moved)
 
     @property
     def effects(self) -> Mapping[str, Effect]:
         """What could enter the simulation, by name."""
-        offered = effects_for(self.simulation.core, self.simulation.scene, self.tolerance)
+        offered = select_effects(self.simulation.core, self.simulation.scene, self.tolerance)
         return {effect.name: effect for effect in offered}
 
     def murmur(self, seed: int) -> Signal:
@@ -114,7 +114,7 @@ class Surrogates:
         drawn: Signal = np.sqrt(self.noise.variance) * filtered[samples:]
         return drawn
 
-    def drawn(self, probe: Probe) -> Dataset:
+    def drawn(self, probe: SurrogateCase) -> Dataset:
         """Return the surrogate of a probe."""
         injection = probe.injection
         simulated = (
@@ -125,7 +125,7 @@ class Surrogates:
         return replace(self.record, y=simulated + self.murmur(probe.seed))
 
 
-def surrogates_of(diagnosis: Diagnosis, core: Core, tolerance: Mapping[str, float]) -> Surrogates:
+def make_surrogates(diagnosis: Diagnosis, core: Simulator, tolerance: Mapping[str, float]) -> Surrogates:
     """Return what surrogates of a diagnosed record are drawn from.
 
     Clean means: the simulation without effects is the truth. Where some were named it is the one that was
@@ -140,14 +140,16 @@ def surrogates_of(diagnosis: Diagnosis, core: Core, tolerance: Mapping[str, floa
         core,
         tolerance,
         simulation,
-        carried(best.values, best.simulation, simulation),
-        _fading(noise_of(left), diagnosis.record.samples),
+        transfer_parameters(best.values, best.simulation, simulation),
+        _fading(fit_ar_noise(left), diagnosis.record.samples),
         float(np.sqrt(np.mean(left**2))),
         diagnosis.fitted,
     )
 
 
-def injections(source: Surrogates, effect: Effect, rng: np.random.Generator) -> tuple[Injection, ...]:
+def injection_strengths(
+    source: Surrogates, effect: Effect, rng: np.random.Generator
+) -> tuple[Injection, ...]:
     """Return injections of one effect, each stronger than the one before.
 
     Its shape is a point of its grid, and its sign one of those that it may have, both by lot. Strengths are
@@ -205,7 +207,7 @@ def injections(source: Surrogates, effect: Effect, rng: np.random.Generator) -> 
     return tuple(found)
 
 
-def _fading(noise: Noise, samples: int) -> Noise:
+def _fading(noise: NoiseModel, samples: int) -> NoiseModel:
     """Return a noise that forgets within a record: one that was fitted to a drift may not, or may explode."""
     if noise.order == 0:
         return noise

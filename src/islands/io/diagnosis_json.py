@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis import Diagnosis, Proposal
+from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Finding
 from islands.io.result_folder import record_document
 
@@ -16,7 +16,7 @@ def diagnosis_document(
     diagnosis: Diagnosis,
     wall_s: float | None = None,
     tested: SelfTest | None = None,
-    proposal: Proposal | None = None,
+    proposal: ResidualFormula | None = None,
 ) -> dict[str, Any]:
     """Describe a diagnosis.
 
@@ -26,7 +26,7 @@ def diagnosis_document(
         Seconds that it took; the core knows no clock.
     tested : SelfTest, optional
         What the analysis can do on this record.
-    proposal : Proposal, optional
+    proposal : ResidualFormula, optional
         A formula for what has no name.
     """
     return {

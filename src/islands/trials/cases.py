@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.simulators.narx import NarxCore
-from islands.discrepancy.simulators.recorded_output import ColumnCore
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.narx import NarxSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
@@ -85,7 +85,7 @@ class Simulated:
     """
 
     system: System
-    made: Callable[[Hiding], Core]
+    made: Callable[[Hiding], Simulator]
     goals: Goals
     tolerance: Mapping[str, float]
     apart: bool = True
@@ -103,14 +103,14 @@ class Simulated:
         return (*self.system.unknown, *sorted(self.without))
 
 
-def _narx(hiding: Hiding) -> Core:
+def _narx(hiding: Hiding) -> Simulator:
     record = hiding.record
     alone = replace(record, u=record.u[:, :1], input_names=record.input_names[:1], input_units=("V",))
     model = identified(alone[: int(SEEN * record.samples)])
-    return NarxCore(model, "narx", record.y[: model.maximum_lag])
+    return NarxSimulator(model, "narx", record.y[: model.maximum_lag])
 
 
-def _estimated(name: str) -> Callable[[Hiding], Core]:
+def _estimated(name: str) -> Callable[[Hiding], Simulator]:
     """Return what makes a physical system whose parameters are estimated from the record."""
     return lambda hiding: simulation(name, hiding.record)
 
@@ -123,7 +123,7 @@ _INPUT = frozenset(
 #: By name; a new one is an entry here, and where its system is new, a file in `islands.trials.injection`.
 CORES: Mapping[str, Simulated] = MappingProxyType(
     {
-        "bouc-wen-piezo": Simulated(PIEZO, lambda _: BoucWenPiezoCore(), EXACT, PIEZO.tolerance),
+        "bouc-wen-piezo": Simulated(PIEZO, lambda _: BoucWenPiezoSimulator(), EXACT, PIEZO.tolerance),
         "narx": Simulated(
             PIEZO,
             _narx,
@@ -133,7 +133,7 @@ CORES: Mapping[str, Simulated] = MappingProxyType(
         ),
         "column": Simulated(
             PIEZO,
-            lambda hiding: ColumnCore("column", hiding.nominal),
+            lambda hiding: RecordedOutput("column", hiding.nominal),
             replace(IDENTIFIED, first=85.0),
             {},
             apart=False,

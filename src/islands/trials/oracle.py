@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
-from islands.discrepancy.calibration.preparation import effects_for
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.preparation import select_effects
 from islands.discrepancy.diagnosis import Diagnosis
-from islands.discrepancy.effects import in_order, model_form
+from islands.discrepancy.effects import catalogue_order, model_form
 from islands.discrepancy.interfaces.effect import Effect
 
 #: Starts of each effect that are fitted, of those that promise most.
@@ -35,7 +35,7 @@ def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str
     """
     target = Target(found.record.y, np.arange(found.record.samples) < found.fitted, None, tolerance)
     simulation = found.base.simulation
-    effects = effects_for(simulation.core, simulation.scene, tolerance)
+    effects = select_effects(simulation.core, simulation.scene, tolerance)
     told = found.base
     # That its own form is wrong is no gain of a cause: both are held against the model with that mended.
     for form in (effect for effect in effects if effect.name == model_form.CORE_SHAPE):
@@ -52,15 +52,15 @@ def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str
     return (before - after) / (before - best) if best < (1.0 - _LEAST) * before else None
 
 
-def _error(found: Diagnosis, fit: Calibrated) -> float:
+def _error(found: Diagnosis, fit: CalibrationResult) -> float:
     """Return the RMSE over the locked samples."""
     return float(np.sqrt(np.mean((found.record.y - fit.output)[found.fitted :] ** 2)))
 
 
-def _fitted(fit: Calibrated, effect: Effect, target: Target) -> Calibrated:
+def _fitted(fit: CalibrationResult, effect: Effect, target: Target) -> CalibrationResult:
     """Return a simulation with one more effect in it, fitted from the starts that promise most."""
     old, scene = fit.simulation, fit.simulation.scene
-    extended = old.with_effects(in_order((*old.effects, effect)))
+    extended = old.with_effects(catalogue_order((*old.effects, effect)))
     part, own = extended.part(effect), len(old.core.parameters)
     residual = target.residual(fit.output)
     starts = []

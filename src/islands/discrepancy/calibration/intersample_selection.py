@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.intersample import Between, Hold
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 
 #: Steps a sample at the most, and the change that finer ones may make, in what is left over.
 FINEST, NOTICED = 32, 0.05
@@ -20,14 +20,14 @@ FINEST, NOTICED = 32, 0.05
 BETTER = 10.0
 
 
-def settled(fit: Calibrated, target: Target) -> Core:
+def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     """Return the core of a fit, solved as the record asks for it."""
     core = fit.simulation.core
     if not core.integrates:
         return core
-    inner, now = (core.core, core.hold) if isinstance(core, Between) else (core, Hold.FIRST)
+    inner, now = (core.core, core.hold) if isinstance(core, ResampledSimulator) else (core, InterSample.FIRST)
     held = {}
-    for hold in (now, *(each for each in Hold if each != now)):
+    for hold in (now, *(each for each in InterSample if each != now)):
         fine = _fine_enough(inner, hold, fit)
         again = calibrate(_solved(fit.simulation, fine), target, fit.values)
         held[hold] = (again.score, fine)
@@ -35,29 +35,29 @@ def settled(fit: Calibrated, target: Target) -> Core:
     return held[best if held[best][0] < held[now][0] - BETTER else now][1]
 
 
-def solved_alike(one: Core, other: Core) -> bool:
+def same_discretisation(one: Simulator, other: Simulator) -> bool:
     """Tell whether two cores are solved in the same way."""
     return _way(one) == _way(other)
 
 
-def _way(core: Core) -> tuple[Hold, int]:
-    return (core.hold, core.times) if isinstance(core, Between) else (Hold.FIRST, 1)
+def _way(core: Simulator) -> tuple[InterSample, int]:
+    return (core.hold, core.times) if isinstance(core, ResampledSimulator) else (InterSample.FIRST, 1)
 
 
-def _solved(simulation: Extended, core: Core) -> Extended:
+def _solved(simulation: ExtendedSimulator, core: Simulator) -> ExtendedSimulator:
     return replace(simulation, core=core)
 
 
-def _fine_enough(inner: Core, hold: Hold, fit: Calibrated) -> Core:
+def _fine_enough(inner: Simulator, hold: InterSample, fit: CalibrationResult) -> Simulator:
     """Halve the step until that changes nothing beside what is left over."""
     seen = NOTICED * float(np.sqrt(fit.mean_square))
     times = 1
-    coarse = _solved(fit.simulation, Between(inner, hold, times)).simulate(fit.values)
+    coarse = _solved(fit.simulation, ResampledSimulator(inner, hold, times)).simulate(fit.values)
     while times < FINEST:
-        finer = _solved(fit.simulation, Between(inner, hold, 2 * times)).simulate(fit.values)
+        finer = _solved(fit.simulation, ResampledSimulator(inner, hold, 2 * times)).simulate(fit.values)
         with np.errstate(over="ignore", invalid="ignore"):
             change = float(np.sqrt(np.mean((finer - coarse) ** 2)))
         if change < seen:
             break
         times, coarse = 2 * times, finer
-    return inner if times == 1 and hold == Hold.FIRST else Between(inner, hold, times)
+    return inner if times == 1 and hold == InterSample.FIRST else ResampledSimulator(inner, hold, times)

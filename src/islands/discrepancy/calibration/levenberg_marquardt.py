@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.noise_model import Noise, noise_of, white
+from islands.discrepancy.calibration.noise_model import NoiseModel, fit_ar_noise, white_noise
 from islands.discrepancy.interfaces.effect import Signal
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: Steps at the most, tries of each, and what one has to gain in minus twice the log-likelihood.
 STEPS, TRIES, WORTH = 25, 6, 0.02
@@ -27,7 +27,7 @@ class Target:
         The measured output.
     seen : ndarray of bool, shape (samples,)
         What estimation may see.
-    noise : Noise or None
+    noise : NoiseModel or None
         What residuals are whitened by; None takes them as they are.
     tolerance : mapping
         Relative standard deviations of the core's parameters about their nominal values; who is not named is
@@ -39,7 +39,7 @@ class Target:
 
     y: Signal
     seen: NDArray[np.bool_]
-    noise: Noise | None
+    noise: NoiseModel | None
     tolerance: Mapping[str, float]
     effective: float | None = None
 
@@ -53,28 +53,28 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibrated:
+class CalibrationResult:
     """A simulation with values, held against a record.
 
     Attributes
     ----------
-    simulation : Extended
+    simulation : ExtendedSimulator
     values : ndarray, shape (parameters,)
     output : ndarray, shape (samples,)
         Of the whole record.
     mean_square : float
         Of the residual over the samples that estimation saw.
-    noise : Noise
+    noise : NoiseModel
         Of that residual.
     penalty : float
         Squares of the deviations from tolerances.
     """
 
-    simulation: Extended
+    simulation: ExtendedSimulator
     values: Signal
     output: Signal
     mean_square: float
-    noise: Noise
+    noise: NoiseModel
     penalty: float
 
     @property
@@ -83,10 +83,12 @@ class Calibrated:
         return self.noise.minus_twice_log_likelihood + self.penalty
 
 
-def calibrate(simulation: Extended, target: Target, start: Signal, steps: int = STEPS) -> Calibrated:
+def calibrate(
+    simulation: ExtendedSimulator, target: Target, start: Signal, steps: int = STEPS
+) -> CalibrationResult:
     """Fit a simulation's values from a start."""
     lower, upper = simulation.bounds
-    pull, nominal = pull_of(simulation, target.tolerance)
+    pull, nominal = prior_precision(simulation, target.tolerance)
     scales = simulation.scales
     values = np.clip(start, lower, upper)
     output = simulation.simulate(values)
@@ -118,34 +120,34 @@ def calibrate(simulation: Extended, target: Target, start: Signal, steps: int = 
         damping /= 5
         if gained < WORTH:
             break
-    return held_against(simulation, target, values)
+    return evaluate_fit(simulation, target, values)
 
 
-def held_against(simulation: Extended, target: Target, values: Signal) -> Calibrated:
+def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) -> CalibrationResult:
     """Hold a simulation against a record with values as they are."""
     output = simulation.simulate(values)
     residual = (target.y - output)[target.seen]
-    pull, nominal = pull_of(simulation, target.tolerance)
+    pull, nominal = prior_precision(simulation, target.tolerance)
     penalty = float(np.sum((pull * (values - nominal)) ** 2))
     mean_square = float(np.mean(residual**2))
-    noise = noise_of(residual) if target.effective is None else white(mean_square, target.effective)
-    return Calibrated(simulation, values, output, mean_square, noise, penalty)
+    noise = fit_ar_noise(residual) if target.effective is None else white_noise(mean_square, target.effective)
+    return CalibrationResult(simulation, values, output, mean_square, noise, penalty)
 
 
-def covariance(fit: Calibrated, target: Target) -> NDArray[np.float64]:
+def covariance(fit: CalibrationResult, target: Target) -> NDArray[np.float64]:
     """Return the covariance of a fit's values, shape (parameters, parameters): the noise's memory counts."""
     simulation = fit.simulation
     whitened = Target(target.y, target.seen, fit.noise, target.tolerance)
     scales = simulation.scales
     jacobian = _jacobian(simulation, whitened, fit.values, fit.output)
-    pull, _ = pull_of(simulation, target.tolerance)
+    pull, _ = prior_precision(simulation, target.tolerance)
     worth = fit.noise.samples / np.count_nonzero(target.seen)
     information = worth * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((pull * scales) ** 2)
     inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
     return inverse
 
 
-def pull_of(simulation: Extended, tolerance: Mapping[str, float]) -> tuple[Signal, Signal]:
+def prior_precision(simulation: ExtendedSimulator, tolerance: Mapping[str, float]) -> tuple[Signal, Signal]:
     """Return one over each value's standard deviation, 0 where it is free; and where it is pulled to."""
     nominal = simulation.nominal
     pull = np.zeros(nominal.size)
@@ -155,7 +157,9 @@ def pull_of(simulation: Extended, tolerance: Mapping[str, float]) -> tuple[Signa
     return pull, nominal
 
 
-def _jacobian(simulation: Extended, target: Target, values: Signal, output: Signal) -> NDArray[np.float64]:
+def _jacobian(
+    simulation: ExtendedSimulator, target: Target, values: Signal, output: Signal
+) -> NDArray[np.float64]:
     """Return how the samples seen change with each scaled value, whitened, shape (seen, parameters)."""
     _, upper = simulation.bounds
     columns = np.empty((int(np.count_nonzero(target.seen)), values.size))

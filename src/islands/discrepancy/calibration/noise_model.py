@@ -12,7 +12,7 @@ HIGHEST = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Noise:
+class NoiseModel:
     """An autoregression ``r(k) = a1 r(k-1) + ... + e(k)``.
 
     Attributes
@@ -46,7 +46,7 @@ class Noise:
         return whitened
 
 
-def noise_of(residual: Signal, highest: int = HIGHEST) -> Noise:
+def fit_ar_noise(residual: Signal, highest: int = HIGHEST) -> NoiseModel:
     """Fit an autoregression by least squares; the order is BIC's.
 
     Parameters
@@ -54,10 +54,10 @@ def noise_of(residual: Signal, highest: int = HIGHEST) -> Noise:
     residual : ndarray, shape (samples,)
         Of one recording, without gaps.
     """
-    found: Noise | None = None
+    found: NoiseModel | None = None
     n = residual.size
     if np.isnan(residual).any():  # of a simulation that explodes
-        return Noise(np.zeros(0), float("inf"), n)
+        return NoiseModel(np.zeros(0), float("inf"), n)
     later = residual[highest:]
     # The same equations for every order: all lags' inner products at once.
     lagged = np.column_stack([residual[highest - lag : n - lag] for lag in range(1, highest + 1)])
@@ -69,16 +69,16 @@ def noise_of(residual: Signal, highest: int = HIGHEST) -> Noise:
             coefficients = np.asarray(np.linalg.lstsq(gram[:order, :order], moment[:order], rcond=None)[0])
             left = energy - float(coefficients @ moment[:order])
         variance = max(left / later.size, np.finfo(float).tiny)
-        tried = Noise(coefficients, variance, n)
+        tried = NoiseModel(coefficients, variance, n)
         if found is None or tried.minus_twice_log_likelihood < found.minus_twice_log_likelihood:
             found = tried
     assert found is not None
     return found
 
 
-def white(mean_square: float, samples: float) -> Noise:
+def white_noise(mean_square: float, samples: float) -> NoiseModel:
     """Return noise that does not remember."""
-    return Noise(np.zeros(0), max(mean_square, np.finfo(float).tiny), samples)
+    return NoiseModel(np.zeros(0), max(mean_square, np.finfo(float).tiny), samples)
 
 
 def effective_samples(residual: Signal) -> float:

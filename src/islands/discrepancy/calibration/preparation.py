@@ -8,10 +8,10 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.effects.scale import wrong_parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Site
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.coordinates import peak
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.coordinates import peak_amplitude
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError, SettingsError
 
 #: Part of the record that nothing but the gain ever sees: its end.
@@ -21,7 +21,7 @@ LOCKED = 0.25
 FEWEST = 200
 
 
-def effects_for(core: Core, scene: Scene, tolerance: Mapping[str, float]) -> list[Effect]:
+def select_effects(core: Simulator, scene: SimulationContext, tolerance: Mapping[str, float]) -> list[Effect]:
     """Return the effects that can enter a simulation and that a record could show."""
     trusted = {each.name for each in core.parameters if not each.initial} <= tolerance.keys()
     effects = [
@@ -37,7 +37,7 @@ def effects_for(core: Core, scene: Scene, tolerance: Mapping[str, float]) -> lis
     return effects + [wrong_parameter(each) for each in core.parameters if each.name in tolerance]
 
 
-def checked(tolerance: Mapping[str, float], core: Core) -> Mapping[str, float]:
+def validate_prior(tolerance: Mapping[str, float], core: Simulator) -> Mapping[str, float]:
     """Return tolerances, once it is known that the simulation has such parameters."""
     names = [parameter.name for parameter in core.parameters]
     for name, value in tolerance.items():
@@ -48,12 +48,12 @@ def checked(tolerance: Mapping[str, float], core: Core) -> Mapping[str, float]:
     return dict(tolerance)
 
 
-def seen(record: Dataset) -> Dataset:
+def estimation_part(record: Dataset) -> Dataset:
     """Return the part of a record that estimation may see: its end is locked away."""
     return record[: int((1.0 - LOCKED) * record.samples)]
 
 
-def fitted_samples(record: Dataset) -> int:
+def count_fitted_samples(record: Dataset) -> int:
     """Return how many samples estimation sees, once it is known that the record can be used."""
     if record.samples < FEWEST:
         raise RecordError(
@@ -64,7 +64,7 @@ def fitted_samples(record: Dataset) -> int:
         raise RecordError("the record is several recordings: diagnose one after the other")
     if np.isnan(record.y).any():
         raise RecordError("the measured output has gaps: repair them, or select rows without any")
-    fitted = seen(record).samples
+    fitted = estimation_part(record).samples
     for name, signal in zip((*record.input_names, record.output_name), (*record.u.T, record.y), strict=True):
         if np.ptp(signal[:fitted]) == 0.0:
             raise RecordError(f"column {name} is constant: a diagnosis needs signals that move")
@@ -74,10 +74,10 @@ def fitted_samples(record: Dataset) -> int:
     return fitted
 
 
-def scene_of(record: Dataset, core: Core, fitted: int) -> Scene:
+def make_context(record: Dataset, core: Simulator, fitted: int) -> SimulationContext:
     """Return what drives a simulation, and the scales of a record."""
     names, units = record.input_names, record.input_units
-    scene = Scene(
+    scene = SimulationContext(
         u=np.ascontiguousarray(record.u[:, 0]),
         dt=record.dt,
         channels={
@@ -90,12 +90,12 @@ def scene_of(record: Dataset, core: Core, fitted: int) -> Scene:
         output_unit=record.output_unit or "1",
         fitted=fitted * record.dt,
     )
-    simulation = Extended(core, (), scene)
+    simulation = ExtendedSimulator(core, (), scene)
     nominal = simulation.simulate(simulation.nominal)
     if not np.isfinite(nominal).all():
         raise RecordError(
             f"the simulation {core.name} diverges on this input: check its parameters, its units and the "
             "sampling time"
         )
-    scaled = replace(scene, output_peak=peak(nominal))
+    scaled = replace(scene, output_peak=peak_amplitude(nominal))
     return replace(scaled, frame=core.frame(scaled, nominal))

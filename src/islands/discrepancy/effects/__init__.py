@@ -84,13 +84,13 @@ OF_EACH: Mapping[str, EffectTemplate] = {
 }
 
 
-def sentence(name: str) -> str:
+def summary_of(name: str) -> str:
     """Return the summary of an effect, given its name with or without a state or parameter."""
     cause = name.partition(":")[0]
     return (CATALOGUE.get(cause) or OF_EACH[cause]).summary
 
 
-def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Return effects in the order of the catalogue."""
     places = {name: place for place, name in enumerate(CATALOGUE)}
     return tuple(sorted(effects, key=lambda effect: places.get(effect.name, -1)))

@@ -1,20 +1,20 @@
 """Effects on the baseline: offsets, drifts and jumps."""
 
-from islands.discrepancy.effects.channels import channel, channel_unit, spread, there
-from islands.discrepancy.effects.time_variation import after, bounds, instants
+from islands.discrepancy.effects.channels import channel, channel_unit, has_channel, spread
+from islands.discrepancy.effects.time_variation import instant_bounds, instant_grid, smooth_step
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
 
 
-def _offset_form(y: Signal, values: Signal, _scene: Scene) -> Signal:
+def _offset_form(y: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     return y + values[0]
 
 
-def _offset_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _offset_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
 
 
-def _offset_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _offset_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * scene.output_peak,),)
 
 
@@ -34,10 +34,10 @@ def input_offset(state: str) -> Effect:
     """Return the effect on one state, in the unit of the input."""
     label = f"input-offset:{state}"
 
-    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, scene.input_unit, 0.0, 0.01 * scene.input_peak),)
 
-    def grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
         return ((0.02 * scene.input_peak,),)
 
     return Effect(
@@ -60,15 +60,15 @@ INPUT_OFFSET = EffectTemplate(
 )
 
 
-def _linear_drift_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _linear_drift_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     return y + values[0] * scene.time / scene.duration
 
 
-def _linear_drift_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _linear_drift_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
 
 
-def _linear_drift_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _linear_drift_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * scene.output_peak,),)
 
 
@@ -84,19 +84,19 @@ LINEAR_DRIFT = Effect(
 )
 
 
-def _jump_form(y: Signal, values: Signal, scene: Scene) -> Signal:
-    return y + values[0] * after(scene, values[1])
+def _jump_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
+    return y + values[0] * smooth_step(scene, values[1])
 
 
-def _jump_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _jump_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),
-        Parameter("instant", "s", 0.0, 0.3 * scene.fitted / 45, *bounds(scene)),
+        Parameter("instant", "s", 0.0, 0.3 * scene.fitted / 45, *instant_bounds(scene)),
     )
 
 
-def _jump_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02 * scene.output_peak, instant) for instant in instants(scene))
+def _jump_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02 * scene.output_peak, instant) for instant in instant_grid(scene))
 
 
 JUMP = Effect(
@@ -112,11 +112,11 @@ JUMP = Effect(
 )
 
 
-def _thermal_drift_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _thermal_drift_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     return y + values[0] * channel(scene, True)
 
 
-def _thermal_drift_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _thermal_drift_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "k",
@@ -127,7 +127,7 @@ def _thermal_drift_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _thermal_drift_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _thermal_drift_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.output_peak / spread(scene, True),),)
 
 
@@ -140,5 +140,5 @@ THERMAL_DRIFT = Effect(
     grid=_thermal_drift_grid,
     form=_thermal_drift_form,
     source="Doebelin, Measurement Systems, section 2",
-    applies=lambda scene: there(scene, True),
+    applies=lambda scene: has_channel(scene, True),
 )

@@ -2,34 +2,34 @@
 
 import numpy as np
 
-from islands.discrepancy.interfaces.effect import Scene, Signal
+from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
 #: Units of temperatures.
 TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
 
 
-def there(scene: Scene, thermal: bool) -> bool:
+def has_channel(scene: SimulationContext, thermal: bool) -> bool:
     """Tell whether a channel was recorded that is a temperature, or one that is none, and that moves."""
     return _name(scene, thermal) is not None
 
 
-def channel(scene: Scene, thermal: bool) -> Signal:
+def channel(scene: SimulationContext, thermal: bool) -> Signal:
     """Return the channel; a temperature from its first value on, since its zero says nothing here."""
     signal = scene.channels[_name(scene, thermal) or ""]
     return signal - signal[0] if thermal else signal
 
 
-def channel_unit(scene: Scene, thermal: bool) -> str:
+def channel_unit(scene: SimulationContext, thermal: bool) -> str:
     """Return the channel's unit."""
     return scene.units[_name(scene, thermal) or ""] or "1"
 
 
-def spread(scene: Scene, thermal: bool) -> float:
+def spread(scene: SimulationContext, thermal: bool) -> float:
     """Return how far the channel moves."""
     return float(np.ptp(channel(scene, thermal)))
 
 
-def _name(scene: Scene, thermal: bool) -> str | None:
+def _name(scene: SimulationContext, thermal: bool) -> str | None:
     return next(
         (
             name

@@ -4,21 +4,21 @@ import numpy as np
 
 from islands.discrepancy.effects.filters import low_pass
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 
-def _exponential_creep_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _exponential_creep_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     return y + values[0] * (low_pass(y, float(np.exp(values[1])), scene.dt) - y[0])
 
 
-def _exponential_creep_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _exponential_creep_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("kappa", "", 0.0, 0.02, -0.5, 1.0),
         Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * scene.dt), np.log(1.5 * scene.fitted)),
     )
 
 
-def _exponential_creep_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _exponential_creep_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     taus = (max(part * scene.fitted, 6 * scene.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
     return tuple((0.03, float(np.log(tau))) for tau in taus)
 
@@ -38,15 +38,15 @@ EXPONENTIAL_CREEP = Effect(
 TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 
-def _logarithmic_creep_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _logarithmic_creep_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     return y + values[0] * sum(low_pass(y, tau, scene.dt) - y[0] for tau in TAUS)
 
 
-def _logarithmic_creep_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _logarithmic_creep_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("kappa", "", 0.0, 0.005, -0.3, 0.3),)
 
 
-def _logarithmic_creep_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _logarithmic_creep_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01,),)
 
 

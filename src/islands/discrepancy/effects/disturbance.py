@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from islands.discrepancy.effects.channels import channel, channel_unit, spread, there
+from islands.discrepancy.effects.channels import channel, channel_unit, has_channel, spread
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 
-def _cross_coupling_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _cross_coupling_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     return y + values[0] * channel(scene, False)
 
 
-def _cross_coupling_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _cross_coupling_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "k",
@@ -22,7 +22,7 @@ def _cross_coupling_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _cross_coupling_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _cross_coupling_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.output_peak / spread(scene, False),),)
 
 
@@ -35,16 +35,16 @@ CROSS_COUPLING = Effect(
     grid=_cross_coupling_grid,
     form=_cross_coupling_form,
     source="Ljung, System Identification, 2nd ed., section 13",
-    applies=lambda scene: there(scene, False),
+    applies=lambda scene: has_channel(scene, False),
 )
 
 
-def _periodic_disturbance_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _periodic_disturbance_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     angle = 2 * np.pi * values[2] * scene.time
     return y + values[0] * np.cos(angle) + values[1] * np.sin(angle)
 
 
-def _periodic_disturbance_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _periodic_disturbance_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("cosine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
         Parameter("sine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
@@ -52,7 +52,7 @@ def _periodic_disturbance_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _periodic_disturbance_grid(scene: Scene, residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _periodic_disturbance_grid(scene: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
     # The strongest line of what is left, between the samples of its spectrum.
     fitted = int(scene.fitted / scene.dt)
     seen = residual[:fitted] * np.hanning(fitted)

@@ -56,7 +56,7 @@ def _moments(step: float) -> Signal:
 _NEIGHBOURS = (-2, -1, 0, 1, 2, 3)
 
 
-def at_samples(signal: Signal, at: Signal) -> Signal:
+def interpolate_at(signal: Signal, at: Signal) -> Signal:
     """Interpolate through six neighbours (Lagrange) at positions counted in samples; the ends are held."""
     last = signal.size - 1
     at = np.clip(at, 0.0, last)

@@ -4,7 +4,7 @@ from math import tanh
 from typing import Any
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
 
 
 def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
@@ -12,16 +12,16 @@ def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> 
     return numbers[0] * tanh(rate / numbers[1])
 
 
-def _coulomb_friction_turning(scene: Scene) -> tuple[float, ...]:
+def _coulomb_friction_turning(scene: SimulationContext) -> tuple[float, ...]:
     return (scene.frame.sharp * scene.frame.rate,)
 
 
-def _coulomb_friction_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _coulomb_friction_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.least),)
 
 
-def _coulomb_friction_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _coulomb_friction_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * scene.frame.force,),)
 
 
@@ -32,7 +32,7 @@ COULOMB_FRICTION = Effect(
     site=Site.FORCE,
     parameters=_coulomb_friction_parameters,
     grid=_coulomb_friction_grid,
-    form=Element(_coulomb_friction_force, constants=_coulomb_friction_turning, dissipative=True),
+    form=ForceLaw(_coulomb_friction_force, constants=_coulomb_friction_turning, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )
 
@@ -41,7 +41,7 @@ def _viscous_force(_x: float, rate: float, _z: float, c: Any) -> float:
     return c[0] * rate
 
 
-def _viscous_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _viscous_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (
         Parameter(
@@ -50,7 +50,7 @@ def _viscous_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _viscous_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _viscous_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.frame.force / scene.frame.rate,),)
 
 
@@ -61,7 +61,7 @@ VISCOUS = Effect(
     site=Site.FORCE,
     parameters=_viscous_parameters,
     grid=_viscous_grid,
-    form=Element(_viscous_force, dissipative=True),
+    form=ForceLaw(_viscous_force, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )
 
@@ -70,12 +70,12 @@ def _viscous_asymmetry_force(_x: float, rate: float, _z: float, c: Any) -> float
     return c[0] * abs(rate)
 
 
-def _viscous_asymmetry_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _viscous_asymmetry_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
 
 
-def _viscous_asymmetry_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _viscous_asymmetry_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.frame.force / scene.frame.rate,),)
 
 
@@ -86,7 +86,7 @@ VISCOUS_ASYMMETRY = Effect(
     site=Site.FORCE,
     parameters=_viscous_asymmetry_parameters,
     grid=_viscous_asymmetry_grid,
-    form=Element(_viscous_asymmetry_force, dissipative=True),
+    form=ForceLaw(_viscous_asymmetry_force, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )
 
@@ -95,13 +95,13 @@ def _quadratic_drag_force(_x: float, rate: float, _z: float, c: Any) -> float:
     return c[0] * abs(rate) * rate
 
 
-def _quadratic_drag_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _quadratic_drag_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     unit = f"{frame.force_unit} s^2/{frame.unit}^2"
     return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.least),)
 
 
-def _quadratic_drag_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _quadratic_drag_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.frame.force / scene.frame.rate**2,),)
 
 
@@ -112,6 +112,6 @@ QUADRATIC_DRAG = Effect(
     site=Site.FORCE,
     parameters=_quadratic_drag_parameters,
     grid=_quadratic_drag_grid,
-    form=Element(_quadratic_drag_force, dissipative=True),
+    form=ForceLaw(_quadratic_drag_force, dissipative=True),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Element, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
 from islands.systems.hysteresis_operators import played, slider
 
 
-def _stiction_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+def _stiction_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     if values[0] <= 0.0:
         return u
     moved = np.empty_like(u)
@@ -17,13 +17,13 @@ def _stiction_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
     return moved
 
 
-def _stiction_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _stiction_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("breakaway", scene.input_unit, 0.0, 0.005 * scene.input_peak, 0.0, 0.3 * scene.input_peak),
     )
 
 
-def _stiction_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _stiction_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     # It changes by leaps, so that no derivative leads to the best one: a fine grid has to.
     return tuple((float(part) * scene.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
 
@@ -41,15 +41,15 @@ STICTION = Effect(
 )
 
 
-def _backlash_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+def _backlash_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     return played(u, values[0]) if values[0] > 0.0 else u
 
 
-def _backlash_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _backlash_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("b", scene.input_unit, 0.0, 0.005 * scene.input_peak, 0.0, 0.3 * scene.input_peak),)
 
 
-def _backlash_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _backlash_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((part * scene.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
 
 
@@ -66,11 +66,11 @@ BACKLASH = Effect(
 )
 
 
-def _relaxation_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _relaxation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),)
 
 
-def _relaxation_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _relaxation_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.1,), (1.0,))
 
 
@@ -86,7 +86,7 @@ RELAXATION = Effect(
 )
 
 
-def _rate_dependent_loop_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _rate_dependent_loop_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "rate-dependent-loop",
@@ -99,7 +99,7 @@ def _rate_dependent_loop_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _rate_dependent_loop_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _rate_dependent_loop_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.1 / scene.frame.rate,),)
 
 
@@ -115,7 +115,7 @@ RATE_DEPENDENT_LOOP = Effect(
 )
 
 
-def _loop_asymmetry_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _loop_asymmetry_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "loop-asymmetry",
@@ -128,7 +128,7 @@ def _loop_asymmetry_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _loop_asymmetry_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _loop_asymmetry_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.04 / scene.input_peak,),)
 
 
@@ -155,7 +155,7 @@ def _second_hysteresis_memory(_x: float, rate: float, z: float, numbers: Any) ->
     return rate - numbers[1] * abs(rate) * z - numbers[2] * rate * abs(z)
 
 
-def _second_hysteresis_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _second_hysteresis_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     turn = 1.0 / frame.peak
     return (
@@ -168,7 +168,7 @@ def _second_hysteresis_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _second_hysteresis_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _second_hysteresis_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     frame = scene.frame
     return tuple(
         (0.03 * frame.force / frame.peak, quick / frame.peak, bent * quick / frame.peak, 0.0)
@@ -184,6 +184,6 @@ SECOND_HYSTERESIS = Effect(
     site=Site.FORCE,
     parameters=_second_hysteresis_parameters,
     grid=_second_hysteresis_grid,
-    form=Element(_second_hysteresis_force, _second_hysteresis_memory, begins=3),
+    form=ForceLaw(_second_hysteresis_force, _second_hysteresis_memory, begins=3),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
 )

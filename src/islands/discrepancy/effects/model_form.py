@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Scene, Signal, Site
-from islands.discrepancy.interfaces.simulator import Core
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
+from islands.discrepancy.interfaces.simulator import Simulator
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
 from islands.model.primitives import MUL, PRIMITIVES, SUB
@@ -45,7 +45,7 @@ _STARTS, _FAR, _FAINT = 2, 10.0, 1e-2
 
 
 @dataclass(frozen=True, slots=True)
-class Missing:
+class MissingTerm:
     """A term that a model may lack; it vanishes wherever the model's own regressor does.
 
     Attributes
@@ -70,7 +70,7 @@ class Missing:
         return _at(self.regressor.expression, slope)
 
 
-def missing(model: Model, among: Sequence[int]) -> tuple[Missing, ...]:
+def missing_terms(model: Model, among: Sequence[int]) -> tuple[MissingTerm, ...]:
     """Return the terms that a model may lack, beside those of its regressors whose places are given.
 
     What a loop's width depends on is the distance of the output from a line over the input: a polynomial in
@@ -96,7 +96,7 @@ def missing(model: Model, among: Sequence[int]) -> tuple[Missing, ...]:
             known.add(item)
             text = plain(item.expression, inputs=2).replace("u1(", "u(")
             name = f"{CORE_SHAPE} {_SLOPE_READ.sub('c', text)}"
-            found.append(Missing(name, item, place, folded))
+            found.append(MissingTerm(name, item, place, folded))
     return tuple(found)
 
 
@@ -113,18 +113,18 @@ def _size(expression: Expression) -> Expression:
     return Apply(PRIMITIVES["abs"], (expression,))
 
 
-def core_shape(core: Core, model: Model, terms: Sequence[Missing]) -> Effect:
+def model_form(core: Simulator, model: Model, terms: Sequence[MissingTerm]) -> Effect:
     """Return the effect on a model: the coefficients of the terms that it lacks, and their slope.
 
     Parameters
     ----------
-    core : Core
+    core : Simulator
         The model as a simulation; the effect's parameters are its own, by their names.
-    terms : sequence of Missing
+    terms : sequence of MissingTerm
     """
     theta = model.parameters
 
-    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         found = []
         for term in terms:
             size = _SCALE * abs(theta[term.beside]) or _SCALE
@@ -133,7 +133,7 @@ def core_shape(core: Core, model: Model, terms: Sequence[Missing]) -> Effect:
         unit = f"{scene.output_unit}/{scene.input_unit}"
         return (*found, Parameter(SLOPE, unit, slope, 0.02 * slope, -_FAR * slope, _FAR * slope))
 
-    def grid(scene: Scene, residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def grid(scene: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
         seen = round(scene.fitted / scene.dt)
         own, added = core.parameters, parameters(scene)[:-1]
         at = np.array([each.nominal for each in own])
@@ -191,5 +191,5 @@ def _at(expression: Expression, slope: float) -> Expression:
 MODEL_FORM = EffectTemplate(
     CORE_SHAPE,
     "The model's own form is wrong: it lacks psi |y - c u|, |psi| (y - c u), psi(k-1), psi its regressors",
-    core_shape,
+    model_form,
 )

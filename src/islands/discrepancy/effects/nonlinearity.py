@@ -5,19 +5,26 @@ from typing import Any
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Element, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import (
+    Effect,
+    EffectTemplate,
+    ForceLaw,
+    Signal,
+    SimulationContext,
+    Site,
+)
 
 
 def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:
     return k[0] * x * x * x
 
 
-def _cubic_stiffness_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _cubic_stiffness_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^3", 0.0, 0.01 * frame.force / frame.peak**3),)
 
 
-def _cubic_stiffness_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _cubic_stiffness_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.frame.force / scene.frame.peak**3,),)
 
 
@@ -28,7 +35,7 @@ CUBIC_STIFFNESS = Effect(
     site=Site.FORCE,
     parameters=_cubic_stiffness_parameters,
     grid=_cubic_stiffness_grid,
-    form=Element(_cubic_stiffness_force),
+    form=ForceLaw(_cubic_stiffness_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )
 
@@ -37,12 +44,12 @@ def _even_nonlinearity_force(x: float, _rate: float, _z: float, k: Any) -> float
     return k[0] * x * x
 
 
-def _even_nonlinearity_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _even_nonlinearity_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     frame = scene.frame
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^2", 0.0, 0.01 * frame.force / frame.peak**2),)
 
 
-def _even_nonlinearity_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _even_nonlinearity_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * scene.frame.force / scene.frame.peak**2,),)
 
 
@@ -53,7 +60,7 @@ EVEN_NONLINEARITY = Effect(
     site=Site.FORCE,
     parameters=_even_nonlinearity_parameters,
     grid=_even_nonlinearity_grid,
-    form=Element(_even_nonlinearity_force),
+    form=ForceLaw(_even_nonlinearity_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )
 
@@ -61,11 +68,11 @@ EVEN_NONLINEARITY = Effect(
 _DEAD_ZONE_NEAR = 0.05
 
 
-def _dead_zone_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+def _dead_zone_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
 
 
-def _dead_zone_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _dead_zone_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "d",
@@ -78,11 +85,11 @@ def _dead_zone_parameters(scene: Scene) -> tuple[Parameter, ...]:
     )
 
 
-def _dead_zone_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _dead_zone_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((part * scene.input_peak,) for part in (0.0075, 0.025, 0.075))
 
 
-def _dead_zone_crossed(scene: Scene) -> bool:
+def _dead_zone_crossed(scene: SimulationContext) -> bool:
     # Of an input that is never near zero nobody can say more than that it is smaller.
     return float(np.min(np.abs(scene.u))) < _DEAD_ZONE_NEAR * scene.input_peak
 
@@ -100,16 +107,16 @@ DEAD_ZONE = Effect(
 )
 
 
-def _input_saturation_form(u: Signal, values: Signal, scene: Scene) -> Signal:
+def _input_saturation_form(u: Signal, values: Signal, scene: SimulationContext) -> Signal:
     level = scene.input_peak * (1.0 - max(values[0], 0.0))
     return np.clip(u, -level, level)
 
 
-def _input_saturation_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _input_saturation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
 
 
-def _input_saturation_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _input_saturation_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((cut,) for cut in (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
 
 
@@ -126,16 +133,16 @@ INPUT_SATURATION = Effect(
 )
 
 
-def _output_saturation_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _output_saturation_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     level = scene.output_peak * (1.0 - max(values[0], 0.0))
     return np.clip(y, -level, level) if values[0] > 0.0 else y
 
 
-def _output_saturation_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _output_saturation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
 
 
-def _output_saturation_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _output_saturation_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((cut,) for cut in (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
 
 
@@ -152,15 +159,17 @@ OUTPUT_SATURATION = Effect(
 )
 
 
-def _absolute_value_sensor_form(y: Signal, values: Signal, _scene: Scene) -> Signal:
+def _absolute_value_sensor_form(y: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     return y + values[0] * np.abs(y)
 
 
-def _absolute_value_sensor_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _absolute_value_sensor_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("k", "", 0.0, 0.01, -0.8, 0.8),)
 
 
-def _absolute_value_sensor_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _absolute_value_sensor_grid(
+    _scene: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.02,),)
 
 
@@ -180,10 +189,10 @@ def outflow_law(state: str) -> Effect:
     """Return the effect on one state, in 1/s."""
     label = f"outflow-law:{state}"
 
-    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, "1/s", 0.0, 1.0 / scene.fitted),)
 
-    def grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
         return tuple((times / scene.fitted,) for times in (1.0, 5.0, 25.0))
 
     return Effect(
@@ -218,12 +227,12 @@ def state_clip(state: str) -> Effect:
     """Return the effect on one state; the last one of a chain spills nowhere."""
     label = f"state-clip:{state}"
 
-    def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         peak = scene.output_peak
         level = Parameter(label, scene.output_unit, _FAR * peak, 0.01 * peak, 0.1 * peak, _FAR * peak)
         return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0))
 
-    def grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
         return tuple((level * scene.output_peak, caught) for level in _LEVELS for caught in _CAUGHT)
 
     return Effect(

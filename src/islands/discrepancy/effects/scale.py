@@ -1,18 +1,18 @@
 """Effects on scale: gains of input and output, a parameter beyond its tolerance."""
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
 
 
-def _input_gain_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
+def _input_gain_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     return (1.0 + values[0]) * u
 
 
-def _input_gain_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _input_gain_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
 
 
-def _input_gain_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _input_gain_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02,),)
 
 
@@ -29,15 +29,15 @@ INPUT_GAIN = Effect(
 )
 
 
-def _sensor_gain_form(y: Signal, values: Signal, _scene: Scene) -> Signal:
+def _sensor_gain_form(y: Signal, values: Signal, _scene: SimulationContext) -> Signal:
     return (1.0 + values[0]) * y
 
 
-def _sensor_gain_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _sensor_gain_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("k", "", 0.0, 0.01, -0.5, 0.5),)
 
 
-def _sensor_gain_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _sensor_gain_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02,),)
 
 
@@ -58,10 +58,10 @@ def wrong_parameter(parameter: Parameter) -> Effect:
     """Return the effect of one parameter of a simulation: it is (1 + r) times what it is taken for."""
     label = f"wrong-parameter:{parameter.name}"
 
-    def parameters(_scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, "", 0.0, 0.02, -0.8, 4.0),)
 
-    def grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
         return ((0.05,), (-0.05,))
 
     return Effect(

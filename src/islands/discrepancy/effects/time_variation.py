@@ -6,49 +6,49 @@ import numpy as np
 import scipy
 
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 #: Instants that a search begins from, and parts of the fitted record that are left free at its ends: what
 #: changes there can be told from nothing by a few samples alone.
 INSTANTS, MARGIN = 27, 0.06
 
 
-def instants(scene: Scene) -> tuple[float, ...]:
+def instant_grid(scene: SimulationContext) -> tuple[float, ...]:
     """Return times that a search for a change begins from, in seconds."""
-    first, last = bounds(scene)
+    first, last = instant_bounds(scene)
     return tuple(float(time) for time in np.linspace(first, last, INSTANTS))
 
 
-def bounds(scene: Scene) -> tuple[float, float]:
+def instant_bounds(scene: SimulationContext) -> tuple[float, float]:
     """Return the first and the last time at which a change may be looked for."""
     return MARGIN * scene.fitted, (1.0 - MARGIN) * scene.fitted
 
 
-def after(scene: Scene, instant: float) -> Signal:
+def smooth_step(scene: SimulationContext, instant: float) -> Signal:
     """Return 0 before an instant and 1 behind it, within a few samples: a jump would have no derivative."""
     out: Signal = scipy.special.expit((scene.time - instant) / (2 * scene.dt))
     return out
 
 
-def gain_over_time(own: Mapping[str, float], scene: Scene) -> Signal | float:
+def gain_over_time(own: Mapping[str, float], scene: SimulationContext) -> Signal | float:
     """Return the factor of a gain that steps or ages, for a core that understands both; 1 if it does not."""
     gain: Signal | float = 1.0
     if "gain-step" in own:
-        gain = gain * (1.0 + own["gain-step"] * after(scene, own["gain-step instant"]))
+        gain = gain * (1.0 + own["gain-step"] * smooth_step(scene, own["gain-step instant"]))
     if "ageing" in own:
         gain = gain * (1.0 + own["ageing"] * scene.time / scene.duration)
     return gain
 
 
-def _gain_step_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _gain_step_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("gain-step", "", 0.0, 0.01, -0.9, 2.0),
-        Parameter("gain-step instant", "s", 0.0, 0.3 * scene.fitted / 45, *bounds(scene)),
+        Parameter("gain-step instant", "s", 0.0, 0.3 * scene.fitted / 45, *instant_bounds(scene)),
     )
 
 
-def _gain_step_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02, instant) for instant in instants(scene))
+def _gain_step_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02, instant) for instant in instant_grid(scene))
 
 
 GAIN_STEP = Effect(
@@ -64,11 +64,11 @@ GAIN_STEP = Effect(
 )
 
 
-def _ageing_parameters(_scene: Scene) -> tuple[Parameter, ...]:
+def _ageing_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("ageing", "", 0.0, 0.01, -0.9, 2.0),)
 
 
-def _ageing_grid(_scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _ageing_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02,),)
 
 

@@ -3,20 +3,20 @@
 import numpy as np
 import scipy
 
-from islands.discrepancy.effects.filters import at_samples, low_pass
+from islands.discrepancy.effects.filters import interpolate_at, low_pass
 from islands.discrepancy.interfaces.context import Parameter
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal, Site
+from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 
-def _delay_form(u: Signal, values: Signal, scene: Scene) -> Signal:
-    return at_samples(u, np.arange(u.size) - values[0] / scene.dt)
+def _delay_form(u: Signal, values: Signal, scene: SimulationContext) -> Signal:
+    return interpolate_at(u, np.arange(u.size) - values[0] / scene.dt)
 
 
-def _delay_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _delay_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("tau", "s", 0.0, scene.dt, -0.2 * scene.dt, min(30 * scene.dt, scene.fitted / 4)),)
 
 
-def _delay_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _delay_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.5 * scene.dt,), (2 * scene.dt,), (6 * scene.dt,))
 
 
@@ -32,15 +32,15 @@ DELAY = Effect(
 )
 
 
-def _clock_skew_form(u: Signal, values: Signal, _scene: Scene) -> Signal:
-    return at_samples(u, np.arange(u.size) * (1.0 + values[0]))
+def _clock_skew_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
+    return interpolate_at(u, np.arange(u.size) * (1.0 + values[0]))
 
 
-def _clock_skew_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _clock_skew_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("e", "", 0.0, 0.01 * scene.dt / scene.fitted, -0.02, 0.02),)
 
 
-def _clock_skew_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _clock_skew_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.5 * scene.dt / scene.fitted,), (-0.5 * scene.dt / scene.fitted,))
 
 
@@ -56,15 +56,15 @@ CLOCK_SKEW = Effect(
 )
 
 
-def _sensor_lag_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _sensor_lag_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     return low_pass(y, values[0], scene.dt) if values[0] > 0.0 else y
 
 
-def _sensor_lag_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _sensor_lag_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("tau", "s", 0.0, scene.dt, 0.0, scene.fitted / 4),)
 
 
-def _sensor_lag_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _sensor_lag_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.3 * scene.dt,), (2 * scene.dt,), (6 * scene.dt,))
 
 
@@ -83,7 +83,7 @@ SENSOR_LAG = Effect(
 FASTEST = 2.6
 
 
-def _resonance_form(y: Signal, values: Signal, scene: Scene) -> Signal:
+def _resonance_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
     period, zeta = values
     w = 2 * np.pi / period if period > 0.0 else np.inf
     if w * scene.dt > FASTEST:
@@ -99,14 +99,14 @@ def _resonance_form(y: Signal, values: Signal, scene: Scene) -> Signal:
     return out
 
 
-def _resonance_parameters(scene: Scene) -> tuple[Parameter, ...]:
+def _resonance_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("period", "s", 0.0, scene.dt, 0.0, scene.fitted / 8),
         Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
     )
 
 
-def _resonance_grid(scene: Scene, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _resonance_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple(
         (period * scene.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
     )

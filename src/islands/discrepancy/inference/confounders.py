@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target
-from islands.discrepancy.effects import in_order
-from islands.discrepancy.inference.screening import carried
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
+from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal
 
 #: Parts of its strength that the other is simulated with: each comes at instants of its own.
@@ -26,7 +26,7 @@ NEAR = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Likeness:
+class Confounder:
     """Another cause in the place of one.
 
     Attributes
@@ -47,15 +47,15 @@ class Likeness:
     beside: float
 
 
-def likeness(fit: Calibrated, effect: Effect, target: Target) -> Likeness | None:
+def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> Confounder | None:
     """Return what an effect of a fit is like on the average, if there is such."""
     simulation = fit.simulation
     if effect.alike is None or effect.alike[0] in simulation.effects:
         return None
     other, times = effect.alike
     rest = (each for each in simulation.effects if each is not effect)
-    there = simulation.with_effects(in_order((*rest, other)))
-    values = carried(fit.values, simulation, there)
+    there = simulation.with_effects(catalogue_order((*rest, other)))
+    values = transfer_parameters(fit.values, simulation, there)
     beside, together = 0.0, np.zeros(np.count_nonzero(target.seen) - 1)
     for part in INSTANTS:
         values[there.part(other)] = part * times * fit.values[simulation.part(effect)]
@@ -63,7 +63,7 @@ def likeness(fit: Calibrated, effect: Effect, target: Target) -> Likeness | None
         beside += float(np.mean(left**2)) / len(INSTANTS)
         together += _neighbours(left) / len(INSTANTS)
     seen = _neighbours((target.y - fit.output)[target.seen])
-    return Likeness(other, times, _told(seen - seen.mean(), together - together.mean()), beside)
+    return Confounder(other, times, _told(seen - seen.mean(), together - together.mean()), beside)
 
 
 def _neighbours(signal: Signal) -> Signal:

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated
-from islands.discrepancy.inference.screening import Rung
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
+from islands.discrepancy.inference.screening import ScreenedEffect
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 #: How many standard deviations apart two causes have to be for a choice at twenty to one, and how much faster
 #: an excitation may get.
 NEEDED, FASTER = 2.7, (2, 4, 8, 16)
 
 
-def decisive(best: Calibrated, instead: Sequence[Rung]) -> str:
+def suggest_experiment(best: CalibrationResult, instead: Sequence[ScreenedEffect]) -> str:
     """Say what would tell a simulation from the nearest one with another cause.
 
     The same input is played faster, each simulation as it was fitted: what they differ by then, in noise.
@@ -41,10 +41,10 @@ def decisive(best: Calibrated, instead: Sequence[Rung]) -> str:
     return "; ".join(sayings)
 
 
-def _apart(one: Calibrated, other: Calibrated, times: int) -> float:
+def _apart(one: CalibrationResult, other: CalibrationResult, times: int) -> float:
     """Return how many standard deviations of noise two simulations are apart when all happens faster."""
     signals = [
-        Extended(
+        ExtendedSimulator(
             fit.simulation.core,
             fit.simulation.effects,
             replace(fit.simulation.scene, dt=fit.simulation.scene.dt / times),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
 from islands.discrepancy.interfaces.effect import Signal
 
 #: Blocks of a record, parts of them that are left out of a fit in turn, and draws of a bootstrap.
@@ -20,7 +20,7 @@ EVENT, LOST = 20.0, 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Error:
+class ErrorMetrics:
     """Errors of a simulation: RMSE in the output's unit, MAPE in percent of its range (equation 7)."""
 
     rmse: float
@@ -28,12 +28,12 @@ class Error:
 
 
 @dataclass(frozen=True, slots=True)
-class Gain:
+class HoldoutGain:
     """Errors over the locked part of a record.
 
     Attributes
     ----------
-    before, after, noise_floor : Error
+    before, after, noise_floor : ErrorMetrics
         Of the simulation calibrated without the effects, of the one with them, and of noise alone: an upper
         bound.
     reduction_percent : float
@@ -42,16 +42,16 @@ class Gain:
         Of that, by a bootstrap of blocks.
     """
 
-    before: Error
-    after: Error
-    noise_floor: Error
+    before: ErrorMetrics
+    after: ErrorMetrics
+    noise_floor: ErrorMetrics
     reduction_percent: float
     ci95: tuple[float, float]
 
 
-def gain_of(
+def measure_gain(
     record: Dataset, before: Signal, after: Signal, locked: slice, floor: float, rng: np.random.Generator
-) -> Gain:
+) -> HoldoutGain:
     """Measure a gain, once."""
     y = record.y[locked]
     spread = float(np.ptp(y)) or 1.0
@@ -63,20 +63,20 @@ def gain_of(
     rmse = [float(np.sqrt(np.mean(each**2))) for each in errors]
     mape = [100 * float(np.mean(np.abs(each))) / spread for each in errors]
     # Of normal noise the mean absolute value is sqrt(2 / pi) of the standard deviation.
-    quiet = Error(floor, 100 * floor * float(np.sqrt(2 / np.pi)) / spread)
-    return Gain(
-        Error(rmse[0], mape[0]),
-        Error(rmse[1], mape[1]),
+    quiet = ErrorMetrics(floor, 100 * floor * float(np.sqrt(2 / np.pi)) / spread)
+    return HoldoutGain(
+        ErrorMetrics(rmse[0], mape[0]),
+        ErrorMetrics(rmse[1], mape[1]),
         quiet,
         100 * (1 - rmse[1] / rmse[0]),
         (float(low), float(high)),
     )
 
 
-def held_out_gain(
-    before: Calibrated,
+def measure_holdout_gain(
+    before: CalibrationResult,
     as_given: bool,
-    after: Calibrated,
+    after: CalibrationResult,
     target: Target,
     fitted: int,
     rng: np.random.Generator,

@@ -5,32 +5,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
-from islands.discrepancy.effects import in_order
-from islands.discrepancy.inference.screening import EQUAL, Rung, carried, ladder, price
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.effects import catalogue_order
+from islands.discrepancy.inference.screening import (
+    EQUAL,
+    ScreenedEffect,
+    bic_penalty,
+    screen_effects,
+    transfer_parameters,
+)
 from islands.discrepancy.interfaces.effect import Effect
 from islands.parallel import Spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Explanation:
+class Hypothesis:
     """A simulation with the effects that explain a record best.
 
     Attributes
     ----------
-    fit : Calibrated
+    fit : CalibrationResult
     cost : float
         Its score with every effect's values paid for: less is better.
     effects : tuple of Effect
         The most important first.
-    rivals : tuple of Rivals
+    rivals : tuple of Alternatives
         Of each effect; empty where they were not asked for.
     """
 
-    fit: Calibrated
+    fit: CalibrationResult
     cost: float
     effects: tuple[Effect, ...]
-    rivals: "tuple[Rivals, ...]" = ()
+    rivals: "tuple[Alternatives, ...]" = ()
 
     @property
     def rank(self) -> int:
@@ -39,52 +45,52 @@ class Explanation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rivals:
+class Alternatives:
     """What could stand in the place of an effect.
 
     Attributes
     ----------
-    without : Explanation
+    without : Hypothesis
         All the others, fitted anew.
-    rungs : sequence of Rung
+    rungs : sequence of ScreenedEffect
         Each effect beside them, the best first.
     """
 
-    without: Explanation
-    rungs: Sequence[Rung]
+    without: Hypothesis
+    rungs: Sequence[ScreenedEffect]
 
 
-def extended(before: Explanation, rung: Rung) -> Explanation:
+def with_effect(before: Hypothesis, rung: ScreenedEffect) -> Hypothesis:
     """Return an explanation with a rung's effect in it."""
     cost = before.cost - rung.gained(before.fit)
-    return Explanation(rung.fit, cost, (*before.effects, rung.effect))
+    return Hypothesis(rung.fit, cost, (*before.effects, rung.effect))
 
 
-def refitted(found: Explanation, target: Target) -> Explanation:
+def refit(found: Hypothesis, target: Target) -> Hypothesis:
     """Return an explanation, fitted anew where that is better."""
     fit = calibrate(found.fit.simulation, target, found.fit.values)
-    other = Explanation(fit, found.cost + fit.score - found.fit.score, found.effects)
+    other = Hypothesis(fit, found.cost + fit.score - found.fit.score, found.effects)
     return other if other.rank < found.rank else found
 
 
-def without_effect(found: Explanation, effect: Effect, target: Target) -> Explanation:
+def without_effect(found: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
     """Return an explanation without one of its effects, fitted anew."""
     fit = found.fit
     left = tuple(each for each in found.effects if each is not effect)
-    simulation = fit.simulation.with_effects(in_order(left))
-    alone = calibrate(simulation, target, carried(fit.values, fit.simulation, simulation))
+    simulation = fit.simulation.with_effects(catalogue_order(left))
+    alone = calibrate(simulation, target, transfer_parameters(fit.values, fit.simulation, simulation))
     if not np.isfinite(alone.score):  # with the others' values it explodes: the effect held it in check
         alone = calibrate(simulation, target, simulation.nominal)
-    return Explanation(alone, alone.score + (found.cost - fit.score) - price(effect, fit), left)
+    return Hypothesis(alone, alone.score + (found.cost - fit.score) - bic_penalty(effect, fit), left)
 
 
-def rivals_of(
-    found: Explanation, target: Target, effects: Sequence[Effect], spread: Spread = map
-) -> tuple[Rivals, ...]:
+def find_alternatives(
+    found: Hypothesis, target: Target, effects: Sequence[Effect], spread: Spread = map
+) -> tuple[Alternatives, ...]:
     """Take each effect out, and try all others in its place."""
     rivals = []
     for effect in found.effects:
         without = without_effect(found, effect, target)
         others = [each for each in effects if each not in without.effects]
-        rivals.append(Rivals(without, ladder(without.fit, target, others, spread)))
+        rivals.append(Alternatives(without, screen_effects(without.fit, target, others, spread)))
     return tuple(rivals)

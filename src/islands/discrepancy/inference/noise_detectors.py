@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.calibration.noise_model import noise_of
-from islands.discrepancy.interfaces.effect import Scene, Signal
+from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
 
 @dataclass(frozen=True, slots=True)
-class Detection:
+class NoiseFinding:
     """What a detector has found.
 
     Attributes
@@ -26,7 +26,7 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
-class Detector:
+class NoiseDetector:
     """An entry of the catalogue that changes no simulation.
 
     Attributes
@@ -46,7 +46,7 @@ class Detector:
     name: str
     summary: str
     family: str
-    detect: Callable[[Signal, Signal, Scene], Detection | None]
+    detect: Callable[[Signal, Signal, SimulationContext], NoiseFinding | None]
     source: str
     excluded_by: tuple[str, ...] = ()
 
@@ -56,7 +56,7 @@ class Detector:
 _QUANTISATION_COARSE, _QUANTISATION_CROWDED = 0.5, 3.0
 
 
-def _detect_quantisation(y: Signal, residual: Signal, scene: Scene) -> Detection | None:
+def _detect_quantisation(y: Signal, residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
     levels = np.unique(y)
     if levels.size < 3 or y.size < _QUANTISATION_CROWDED * levels.size:
         return None
@@ -65,10 +65,10 @@ def _detect_quantisation(y: Signal, residual: Signal, scene: Scene) -> Detection
     off = float(np.max(np.abs(places - np.round(places))))
     if off > 1e-3 or step < _QUANTISATION_COARSE * float(np.std(residual)):
         return None
-    return Detection({"step": (step, scene.output_unit)}, float(y.size))
+    return NoiseFinding({"step": (step, scene.output_unit)}, float(y.size))
 
 
-QUANTISATION = Detector(
+QUANTISATION = NoiseDetector(
     "quantisation",
     "The output lies on a lattice: the converter's or the file's resolution",
     "data",
@@ -84,7 +84,7 @@ _HELD_SAMPLES_RUN, _HELD_SAMPLES_BURSTS = 3, 2
 _HELD_SAMPLES_CROWDED = 3.0
 
 
-def _detect_held_samples(y: Signal, _residual: Signal, scene: Scene) -> Detection | None:
+def _detect_held_samples(y: Signal, _residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
     if y.size >= _HELD_SAMPLES_CROWDED * np.unique(y).size:
         return None
     same = np.concatenate([[False], np.diff(y) == 0.0, [False]])
@@ -94,13 +94,13 @@ def _detect_held_samples(y: Signal, _residual: Signal, scene: Scene) -> Detectio
     if bursts.size < _HELD_SAMPLES_BURSTS:
         return None
     share = float(np.sum(bursts - 1)) / y.size
-    return Detection(
+    return NoiseFinding(
         {"share": (share, ""), "longest": (float(bursts.max()) * scene.dt, "s")},
         float(np.sum(bursts)) * float(np.log(y.size)),
     )
 
 
-HELD_SAMPLES = Detector(
+HELD_SAMPLES = NoiseDetector(
     "held-samples",
     "Bursts of repeated values: samples that were lost, and the last one sent again",
     "data",
@@ -116,8 +116,8 @@ _OUTLIERS_FAR, _OUTLIERS_LEAST = 5.5, 3
 _OUTLIERS_MAD = 0.6745
 
 
-def _detect_outliers(_y: Signal, residual: Signal, scene: Scene) -> Detection | None:
-    left = noise_of(residual).whiten(residual)
+def _detect_outliers(_y: Signal, residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
+    left = fit_ar_noise(residual).whiten(residual)
     scale = float(np.median(np.abs(left - np.median(left)))) / _OUTLIERS_MAD
     if scale == 0.0:
         return None
@@ -129,10 +129,10 @@ def _detect_outliers(_y: Signal, residual: Signal, scene: Scene) -> Detection | 
     n = left.size
     gained = n * float(np.log(np.mean(left**2)) - np.log(np.mean(usual**2))) - 2 * count * float(np.log(n))
     size = float(np.median(np.abs(left[far > _OUTLIERS_FAR])))
-    return Detection({"share": (count / n, ""), "size": (size, scene.output_unit)}, gained)
+    return NoiseFinding({"share": (count / n, ""), "size": (size, scene.output_unit)}, gained)
 
 
-OUTLIERS = Detector(
+OUTLIERS = NoiseDetector(
     "outliers",
     "Single samples far from their neighbours' errors",
     "data",
@@ -146,8 +146,10 @@ OUTLIERS = Detector(
 _HETEROSCEDASTIC_NOISE_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
 
 
-def _detect_heteroscedastic_noise(y: Signal, residual: Signal, scene: Scene) -> Detection | None:
-    noise = noise_of(residual)
+def _detect_heteroscedastic_noise(
+    y: Signal, residual: Signal, scene: SimulationContext
+) -> NoiseFinding | None:
+    noise = fit_ar_noise(residual)
     left = noise.whiten(residual)
     size = np.abs(y) / np.max(np.abs(y))
     n = left.size
@@ -165,10 +167,10 @@ def _detect_heteroscedastic_noise(y: Signal, residual: Signal, scene: Scene) -> 
     if gained <= 0.0:
         return None
     strength = float(_HETEROSCEDASTIC_NOISE_STRENGTHS[best]) / float(np.max(np.abs(y)))
-    return Detection({"k": (strength, f"1/{scene.output_unit}")}, gained)
+    return NoiseFinding({"k": (strength, f"1/{scene.output_unit}")}, gained)
 
 
-HETEROSCEDASTIC_NOISE = Detector(
+HETEROSCEDASTIC_NOISE = NoiseDetector(
     "heteroscedastic-noise",
     "Noise that grows with the output: sigma (1 + k |y|)",
     "data",
@@ -178,17 +180,17 @@ HETEROSCEDASTIC_NOISE = Detector(
 )
 
 
-def _detect_coloured_noise(_y: Signal, residual: Signal, _scene: Scene) -> Detection | None:
-    noise = noise_of(residual)
+def _detect_coloured_noise(_y: Signal, residual: Signal, _scene: SimulationContext) -> NoiseFinding | None:
+    noise = fit_ar_noise(residual)
     if noise.order == 0:
         return None
     white = residual.size * float(np.log(np.mean(residual**2)))
     gained = white - noise.minus_twice_log_likelihood
     pole = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
-    return Detection({"pole": (pole, ""), "order": (float(noise.order), "")}, gained)
+    return NoiseFinding({"pole": (pole, ""), "order": (float(noise.order), "")}, gained)
 
 
-COLOURED_NOISE = Detector(
+COLOURED_NOISE = NoiseDetector(
     "coloured-noise",
     "Noise that remembers, where the best simulation leaves nothing else",
     "data",
@@ -199,7 +201,7 @@ COLOURED_NOISE = Detector(
 
 
 #: Detectors by name, in the order in which they are tried.
-DETECTORS: Mapping[str, Detector] = {
+DETECTORS: Mapping[str, NoiseDetector] = {
     detector.name: detector
     for detector in (QUANTISATION, HELD_SAMPLES, OUTLIERS, HETEROSCEDASTIC_NOISE, COLOURED_NOISE)
 }

@@ -13,7 +13,7 @@ LAGS, MEMORIES, PLAYS = (1, 2, 4, 8, 16, 32), (5.0, 20.0, 80.0, 320.0), (0.1, 0.
 WAVES, STEEPNESS, FOLDS, RIDGES = 200, (0.15, 0.5), 6, (1e-4, 1e-2, 1.0)
 
 
-def explainable(residual: Signal, u: Signal, simulated: Signal, rng: np.random.Generator) -> float:
+def explainable_variance(residual: Signal, u: Signal, simulated: Signal, rng: np.random.Generator) -> float:
     """Return the part of a residual's mean square that a flexible fit foretells on blocks left out.
 
     Ridge regression on lags, rates, slow memories, plays and random waves of input and simulated output.
@@ -67,7 +67,7 @@ def _features(u: Signal, simulated: Signal) -> Signal:
 SHORTEST, ALIKE = 16, 1e-3
 
 
-def period_of(u: Signal) -> int | None:
+def detect_period(u: Signal) -> int | None:
     """Return after how many samples an input repeats itself; None where it does not, or not twice over."""
     n = u.size
     centred = u - u.mean()
@@ -82,7 +82,7 @@ def period_of(u: Signal) -> int | None:
     return None
 
 
-def repeated_noise(u: Signal, y: Signal) -> float | None:
+def noise_variance_from_periods(u: Signal, y: Signal) -> float | None:
     """Return the mean square of an output's noise from periods that repeat; None where none do.
 
     The first period is left out: whatever was before it dies away in it. What is level in the difference of
@@ -92,7 +92,7 @@ def repeated_noise(u: Signal, y: Signal) -> float | None:
     ----------
     u, y : ndarray, shape (samples,)
     """
-    period = period_of(u)
+    period = detect_period(u)
     if period is None or y.size < 3 * period:
         return None
     whole = y[y.size % period :].reshape(-1, period)[1:]

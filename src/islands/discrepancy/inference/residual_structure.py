@@ -5,15 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.noise_model import noise_of
-from islands.discrepancy.interfaces.effect import Scene, Signal
+from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
 #: Circular shifts that a map is compared with, and standard deviations beyond which it is no chance.
 SHIFTS, FLAGGED = 200, 4.5
 
 
-def remainder(
-    residual: Signal, simulated: Signal, scene: Scene, rng: np.random.Generator
+def describe_remainder(
+    residual: Signal, simulated: Signal, scene: SimulationContext, rng: np.random.Generator
 ) -> Mapping[str, float]:
     """Return maps in which a residual is no chance, each with its distance in standard deviations.
 
@@ -26,7 +26,7 @@ def remainder(
         Over the fitted samples, from the first on.
     """
     n = residual.size
-    left = noise_of(residual).whiten(residual)
+    left = fit_ar_noise(residual).whiten(residual)
     left = left - left.mean()
     if not left.any():
         return {}

@@ -8,15 +8,15 @@ import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
     STEP,
-    Calibrated,
+    CalibrationResult,
     Target,
     calibrate,
-    held_against,
-    pull_of,
+    evaluate_fit,
+    prior_precision,
 )
-from islands.discrepancy.effects import in_order
+from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.discrepancy.simulators.extended import Extended, broken
+from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
 from islands.parallel import Spread
 
 #: Points of a grid that a fit begins from, the steps that each may take before one is chosen, and how far a
@@ -31,34 +31,36 @@ EQUAL = 0.5
 PROMISING = 5
 
 #: A simulation to be fitted, and where that begins.
-Fit = tuple[Extended, Sequence[Signal]]
+Fit = tuple[ExtendedSimulator, Sequence[Signal]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rung:
+class ScreenedEffect:
     """A simulation with one more effect.
 
     Attributes
     ----------
     effect : Effect
-    fit : Calibrated
+    fit : CalibrationResult
     """
 
     effect: Effect
-    fit: Calibrated
+    fit: CalibrationResult
 
-    def gained(self, base: Calibrated) -> float:
+    def gained(self, base: CalibrationResult) -> float:
         """Return by how much it is better than without the effect, its values paid for."""
-        return base.score - self.fit.score - price(self.effect, base)
+        return base.score - self.fit.score - bic_penalty(self.effect, base)
 
 
-def price(effect: Effect, base: Calibrated) -> float:
+def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     """Return what an effect's values have to gain, as BIC has it: log n for each."""
     values = len(effect.parameters(base.simulation.scene)) + effect.searched
     return values * float(np.log(base.noise.samples))
 
 
-def ladder(base: Calibrated, target: Target, effects: Iterable[Effect], spread: Spread = map) -> list[Rung]:
+def screen_effects(
+    base: CalibrationResult, target: Target, effects: Iterable[Effect], spread: Spread = map
+) -> list[ScreenedEffect]:
     """Extend a simulation by each effect in turn; return the rungs, the best first.
 
     Parameters
@@ -69,7 +71,7 @@ def ladder(base: Calibrated, target: Target, effects: Iterable[Effect], spread: 
     space = _Projection(base, target)
     screened = []
     for effect in effects:
-        simulation = base.simulation.with_effects(in_order((*base.simulation.effects, effect)))
+        simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
         starts = _starts(base, simulation, effect, target, space)
         if starts:
             screened.append((starts[0][0], effect, simulation, [values for _, values in starts]))
@@ -79,11 +81,11 @@ def ladder(base: Calibrated, target: Target, effects: Iterable[Effect], spread: 
         screened = [
             each
             for place, each in enumerate(screened)
-            if place < PROMISING or space.gained(each[0]) > price(each[1], base)
+            if place < PROMISING or space.gained(each[0]) > bic_penalty(each[1], base)
         ]
     found = spread(partial(_fitted, target), [(simulation, starts) for _, _, simulation, starts in screened])
     rungs = [
-        Rung(effect, min((held_against(simulation, target, values) for values in ends), key=_score))
+        ScreenedEffect(effect, min((evaluate_fit(simulation, target, values) for values in ends), key=_score))
         for (_, effect, simulation, _), ends in zip(screened, found, strict=True)
     ]
     return sorted(rungs, key=lambda rung: -round(rung.gained(base) / EQUAL))
@@ -99,17 +101,17 @@ def _fitted(target: Target, asked: Fit) -> list[Signal]:
     return [calibrate(simulation, target, min(fits, key=_score).values).values]
 
 
-def same_fit(asked: Fit) -> Hashable:
+def is_same_fit(asked: Fit) -> Hashable:
     """Return what two fits of a simulation to a target have in common if they are the same."""
     simulation, starts = asked
     return tuple(effect.name for effect in simulation.effects), *(start.tobytes() for start in starts)
 
 
-def _score(fit: Calibrated) -> float:
+def _score(fit: CalibrationResult) -> float:
     return fit.score
 
 
-def carried(values: Signal, old: Extended, new: Extended) -> Signal:
+def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:
     """Return the values of a simulation for one with other effects; what is new does nothing yet."""
     moved = new.nominal
     own = len(old.core.parameters)
@@ -123,11 +125,11 @@ def carried(values: Signal, old: Extended, new: Extended) -> Signal:
 class _Projection:
     """What is left of a response when the base's own values have explained what they can."""
 
-    def __init__(self, base: Calibrated, target: Target) -> None:
+    def __init__(self, base: CalibrationResult, target: Target) -> None:
         simulation, values = base.simulation, base.values
         self._target, self._values = target, values.size
         self._sigma = float(np.std(target.residual(base.output))) or 1.0
-        pull, nominal = pull_of(simulation, target.tolerance)
+        pull, nominal = prior_precision(simulation, target.tolerance)
         columns = []
         for place, scale in enumerate(simulation.scales):
             moved = values.copy()
@@ -155,20 +157,22 @@ class _Projection:
         return np.concatenate([self._target.observed(response) / self._sigma, held])
 
 
-def _points(effect: Effect, simulation: Extended, residual: Signal) -> Sequence[tuple[float, ...]]:
+def _points(effect: Effect, simulation: ExtendedSimulator, residual: Signal) -> Sequence[tuple[float, ...]]:
     """Return where a search for an effect begins."""
     part = simulation.part(effect)
     try:
         points = effect.grid(simulation.scene, residual)
     except Exception as error:
-        raise broken(effect, f"its grid fails: {type(error).__name__}: {error}") from error
+        raise invalid_effect_error(effect, f"its grid fails: {type(error).__name__}: {error}") from error
     if any(len(point) != part.stop - part.start for point in points):
-        raise broken(effect, f"its grid has to give {part.stop - part.start} values at each point")
+        raise invalid_effect_error(
+            effect, f"its grid has to give {part.stop - part.start} values at each point"
+        )
     return points
 
 
 def _starts(
-    base: Calibrated, simulation: Extended, effect: Effect, target: Target, space: _Projection
+    base: CalibrationResult, simulation: ExtendedSimulator, effect: Effect, target: Target, space: _Projection
 ) -> list[tuple[float, Signal]]:
     """Return the points of an effect's grid that explain most, its strength fitted to what is left.
 
@@ -176,7 +180,7 @@ def _starts(
     """
     part = simulation.part(effect)
     lower, upper = simulation.bounds
-    at_rest = carried(base.values, base.simulation, simulation)
+    at_rest = transfer_parameters(base.values, base.simulation, simulation)
     tried = []
     for point in _points(effect, simulation, target.y - base.output):
         values = at_rest.copy()

@@ -7,17 +7,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target
 from islands.discrepancy.effects import model_form
 from islands.discrepancy.inference.hypothesis import (
-    Explanation,
-    Rivals,
-    extended,
-    refitted,
-    rivals_of,
+    Alternatives,
+    Hypothesis,
+    find_alternatives,
+    refit,
+    with_effect,
     without_effect,
 )
-from islands.discrepancy.inference.screening import EQUAL, Rung, ladder
+from islands.discrepancy.inference.screening import EQUAL, ScreenedEffect, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
 from islands.parallel import Spread
 
@@ -34,19 +34,19 @@ REFITS = 6
 Tell: TypeAlias = Callable[[str], None]
 
 
-def silent(_line: str) -> None:
+def ignore_progress(_line: str) -> None:
     """Tell nobody."""
 
 
-def explained(
-    base: Calibrated,
-    first: Sequence[Rung],
+def stepwise_search(
+    base: CalibrationResult,
+    first: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
     tell: Tell,
     spread: Spread = map,
     pairs: bool = False,
-) -> tuple[Explanation, Target]:
+) -> tuple[Hypothesis, Target]:
     """Return the best explanation, and what it was held against.
 
     From the simulation alone, effect after effect, as long as that pays. What the noise remembers is
@@ -54,14 +54,14 @@ def explained(
 
     Parameters
     ----------
-    base : Calibrated
+    base : CalibrationResult
         The simulation alone.
-    first : sequence of Rung
+    first : sequence of ScreenedEffect
         Its ladder.
     pairs : bool
         The first of two need not pay alone: two causes may hide each other.
     """
-    best = Explanation(base, base.score, ())
+    best = Hypothesis(base, base.score, ())
     followed = [best]
     most = MOST + 1 if pairs else MOST
     while followed and _causes(followed[0]) < most:
@@ -69,12 +69,12 @@ def explained(
         if not alone:
             tell(f"effects beside {' and '.join(effect.name for effect in followed[0].effects)}")
         least = LEAST if alone else _further(target, effects)
-        further: dict[frozenset[str], Explanation] = {}
+        further: dict[frozenset[str], Hypothesis] = {}
         for each in followed:
             others = [effect for effect in effects if effect not in each.effects]
-            rungs = first if alone else ladder(each.fit, target, others, spread)
+            rungs = first if alone else screen_effects(each.fit, target, others, spread)
             for rung in rungs[: SEEDS if alone and pairs else BEAM]:
-                found = extended(each, rung)
+                found = with_effect(each, rung)
                 key = frozenset(effect.name for effect in found.effects)
                 pays = (alone and pairs) or found.cost < each.cost - least
                 if pays and (key not in further or found.cost < further[key].cost):
@@ -85,33 +85,33 @@ def explained(
             best, target = followed[0], there
         elif not (alone and pairs):
             break
-    return improved(best, target, effects, tell, spread, most)
+    return refine_by_swaps(best, target, effects, tell, spread, most)
 
 
-def _causes(found: Explanation) -> int:
+def _causes(found: Hypothesis) -> int:
     """Count causes: that the form of an identified model is wrong stands beside them."""
     return sum(effect.cause != model_form.CORE_SHAPE for effect in found.effects)
 
 
-def _remembered(followed: list[Explanation], target: Target) -> tuple[list[Explanation], Target]:
+def _remembered(followed: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
     """Fit explanations anew, whitened by what the best of them has left."""
     for _ in range(REFITS if followed and target.effective is None else 0):
         before = followed[0].cost
         target = replace(target, noise=followed[0].fit.noise)
-        followed = sorted((refitted(each, target) for each in followed), key=attrgetter("rank"))
+        followed = sorted((refit(each, target) for each in followed), key=attrgetter("rank"))
         if followed[0].cost > before - EQUAL:
             break
     return followed, target
 
 
-def improved(
-    found: Explanation,
+def refine_by_swaps(
+    found: Hypothesis,
     target: Target,
     effects: Sequence[Effect],
     tell: Tell,
     spread: Spread = map,
     most: int = MOST,
-) -> tuple[Explanation, Target]:
+) -> tuple[Hypothesis, Target]:
     """Leave out what is not needed, put what explains more in an effect's place, and add what pays beside it.
 
     What came first may mislead, and be left out again: then there may be more to find. Scores fall with
@@ -119,22 +119,24 @@ def improved(
 
     Parameters
     ----------
-    found : Explanation
+    found : Hypothesis
         Beside all its effects together nothing pays, or they are as many as may be.
     """
     complete = found.effects
     least = _further(target, effects)
     found = _thinned(found, target, least)
     while found.effects:
-        rivals: tuple[Rivals, ...] = ()
+        rivals: tuple[Alternatives, ...] = ()
         further = []
         if len(found.effects) > 1:
             tell("what else could be the cause")
-            rivals = rivals_of(found, target, effects, spread)
-            further = [extended(each.without, rung) for each in rivals for rung in each.rungs[:1]]
+            rivals = find_alternatives(found, target, effects, spread)
+            further = [with_effect(each.without, rung) for each in rivals for rung in each.rungs[:1]]
         if len(found.effects) < len(complete) and _causes(found) < most:
             others = [effect for effect in effects if effect not in found.effects]
-            beside = [extended(found, rung) for rung in ladder(found.fit, target, others, spread)[:1]]
+            beside = [
+                with_effect(found, rung) for rung in screen_effects(found.fit, target, others, spread)[:1]
+            ]
             further += [each for each in beside if each.cost < found.cost - least]
         best = min(further, key=attrgetter("rank"), default=found)
         if best.cost > found.cost - EQUAL:
@@ -155,7 +157,7 @@ def _further(target: Target, effects: Sequence[Effect]) -> float:
     return LEAST if target.effective is not None else LEAST + 2.0 * float(np.log(len(effects)))
 
 
-def _thinned(found: Explanation, target: Target, least: float) -> Explanation:
+def _thinned(found: Hypothesis, target: Target, least: float) -> Hypothesis:
     """Leave out what is not needed any more beside what came later, and put the most important first.
 
     The last one as well: its own values and the noise's memory, found with it, may do without.
@@ -165,6 +167,6 @@ def _thinned(found: Explanation, target: Target, least: float) -> Explanation:
         cheapest = min(without.values(), key=attrgetter("rank"))
         if cheapest.cost - found.cost >= (least if len(found.effects) > 1 else LEAST):
             ranked = sorted(found.effects, key=lambda effect: -without[effect.name].cost)
-            return Explanation(found.fit, found.cost, tuple(ranked))
+            return Hypothesis(found.fit, found.cost, tuple(ranked))
         found = cheapest
     return found

@@ -10,14 +10,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate, held_against
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    Target,
+    calibrate,
+    evaluate_fit,
+)
 from islands.discrepancy.calibration.noise_model import effective_samples
-from islands.discrepancy.inference.hypothesis import Explanation
-from islands.discrepancy.inference.noise_floor import explainable, repeated_noise
-from islands.discrepancy.inference.residual_structure import remainder
-from islands.discrepancy.inference.screening import Rung, ladder, same_fit
-from islands.discrepancy.inference.stepwise_search import LEAST, Tell, explained
-from islands.discrepancy.inference.verdict import Verdict, confirmed, decided, reference, share
+from islands.discrepancy.inference.hypothesis import Hypothesis
+from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
+from islands.discrepancy.inference.residual_structure import describe_remainder
+from islands.discrepancy.inference.screening import ScreenedEffect, is_same_fit, screen_effects
+from islands.discrepancy.inference.stepwise_search import LEAST, Tell, stepwise_search
+from islands.discrepancy.inference.verdict import (
+    Verdict,
+    classify,
+    explained_fraction,
+    reference_variance,
+    validate_out_of_sample,
+)
 from islands.discrepancy.interfaces.effect import Effect
 from islands.parallel import Spread, once
 
@@ -29,18 +40,18 @@ NOTICEABLE = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
+class SearchOutcome:
     """What was found, and against what.
 
     Attributes
     ----------
-    base : Calibrated
+    base : CalibrationResult
         The simulation alone.
-    rungs : tuple of Rung
+    rungs : tuple of ScreenedEffect
         Its ladder.
     target : Target
         What all was held against.
-    found : Explanation
+    found : Hypothesis
     floor : float
         Mean square that no simulation is expected to be below.
     measured_floor : bool
@@ -50,80 +61,80 @@ class Evidence:
     verdict : Verdict
     """
 
-    base: Calibrated
-    rungs: Sequence[Rung]
+    base: CalibrationResult
+    rungs: Sequence[ScreenedEffect]
     target: Target
-    found: Explanation
+    found: Hypothesis
     floor: float
     measured_floor: bool
     remainder: Mapping[str, float]
     verdict: Verdict
 
 
-def by_noise(
-    base: Calibrated,
-    rungs: Sequence[Rung],
+def search_with_ar_noise(
+    base: CalibrationResult,
+    rungs: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
     tell: Tell,
     spread: Spread,
-) -> Evidence:
+) -> SearchOutcome:
     """Look for what explains a record, what is left being noise that may remember.
 
     Parameters
     ----------
-    base, rungs : Calibrated, sequence of Rung
+    base, rungs : CalibrationResult, sequence of ScreenedEffect
         The simulation alone, and its ladder by plain least squares.
     """
-    memory = first_of(base, rungs).noise
+    memory = best_single(base, rungs).noise
     if memory.order:
         # Once more, with what the noise remembers taken out: plain least squares would fit that as well.
         tell("the noise remembers: once more with that taken out")
         target = replace(target, noise=memory)
         base = calibrate(base.simulation, target, base.values)
-        rungs = ladder(base, target, effects, spread)
-    found, target = explained(base, rungs, target, effects, tell, spread)
+        rungs = screen_effects(base, target, effects, spread)
+    found, target = stepwise_search(base, rungs, target, effects, tell, spread)
     return _unjudged(base, rungs, target, found)
 
 
-def by_misfit(
-    base: Calibrated, target: Target, effects: Sequence[Effect], tell: Tell, spread: Spread
-) -> Evidence:
+def search_with_model_error(
+    base: CalibrationResult, target: Target, effects: Sequence[Effect], tell: Tell, spread: Spread
+) -> SearchOutcome:
     """Look for what explains a record's misfit, whatever is left being of the simulation's form."""
     tell("the form is wrong: once more by the misfit alone")
-    rungs: Sequence[Rung] = ()
-    found = Explanation(base, base.score, ())
-    spread = once(spread, same_fit)  # how many samples count changes what a fit is worth, and not the fit
+    rungs: Sequence[ScreenedEffect] = ()
+    found = Hypothesis(base, base.score, ())
+    spread = once(spread, is_same_fit)  # how many samples count changes what a fit is worth, and not the fit
     for _ in range(2):
         # Neighbours say less that is new the more misfit there is: counted anew with the best causes in.
         target = replace(target, effective=effective_samples(target.residual(found.fit.output)))
-        base = held_against(base.simulation, target, base.values)
-        rungs = ladder(base, target, effects, spread)
-        if not any(share(base, rung.fit, 0.0) > WORTHWHILE for rung in rungs):
+        base = evaluate_fit(base.simulation, target, base.values)
+        rungs = screen_effects(base, target, effects, spread)
+        if not any(explained_fraction(base, rung.fit, 0.0) > WORTHWHILE for rung in rungs):
             break
-        found, _ = explained(base, rungs, target, effects, tell, spread, pairs=True)
+        found, _ = stepwise_search(base, rungs, target, effects, tell, spread, pairs=True)
         if not found.effects:
             break
     return _unjudged(base, rungs, target, found)
 
 
-def judged(evidence: Evidence, fitted: int, rng: np.random.Generator) -> Evidence:
+def assess_evidence(evidence: SearchOutcome, fitted: int, rng: np.random.Generator) -> SearchOutcome:
     """Drop what does not foretell samples that were not fitted, look at what is left, and decide."""
     base, target = evidence.base, evidence.target
-    found = confirmed(evidence.found, base, target, fitted, rng)
+    found = validate_out_of_sample(evidence.found, base, target, fitted, rng)
     scene, output = found.fit.simulation.scene, found.fit.output[:fitted]
     residual = target.y[:fitted] - output
-    left = explainable(residual, scene.u[:fitted], output, rng)
-    maps = remainder(residual, output, scene, rng)
+    left = explainable_variance(residual, scene.u[:fitted], output, rng)
+    maps = describe_remainder(residual, output, scene, rng)
     mean_square = float(np.mean(residual**2))
-    repeated = repeated_noise(scene.u[:fitted], target.y[:fitted])
+    repeated = noise_variance_from_periods(scene.u[:fitted], target.y[:fitted])
     floor = max(mean_square - left, 0.0) if repeated is None else repeated
     remains = bool(maps) or left > NOTICEABLE * mean_square
     # By misfit nobody knows which part of it is noise: half of all of it has to be explained.
-    explained_share = share(
-        reference(found, base, target), found.fit, floor if target.effective is None else 0.0
+    explained_share = explained_fraction(
+        reference_variance(found, base, target), found.fit, floor if target.effective is None else 0.0
     )
-    verdict = decided(explained_share, bool(found.effects), remains, target.effective is not None)
+    verdict = classify(explained_share, bool(found.effects), remains, target.effective is not None)
     return replace(
         evidence,
         found=found,
@@ -134,10 +145,12 @@ def judged(evidence: Evidence, fitted: int, rng: np.random.Generator) -> Evidenc
     )
 
 
-def first_of(base: Calibrated, rungs: Sequence[Rung]) -> Calibrated:
+def best_single(base: CalibrationResult, rungs: Sequence[ScreenedEffect]) -> CalibrationResult:
     """Return the first rung's simulation where it pays, else the one without."""
     return rungs[0].fit if rungs and rungs[0].gained(base) > LEAST else base
 
 
-def _unjudged(base: Calibrated, rungs: Sequence[Rung], target: Target, found: Explanation) -> Evidence:
-    return Evidence(base, rungs, target, found, 0.0, False, {}, Verdict.UNKNOWN)
+def _unjudged(
+    base: CalibrationResult, rungs: Sequence[ScreenedEffect], target: Target, found: Hypothesis
+) -> SearchOutcome:
+    return SearchOutcome(base, rungs, target, found, 0.0, False, {}, Verdict.UNKNOWN)

@@ -6,11 +6,21 @@ from enum import StrEnum
 
 import numpy as np
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, covariance, held_against
-from islands.discrepancy.inference.confounders import Likeness, likeness
-from islands.discrepancy.inference.holdout import held_out_gain
-from islands.discrepancy.inference.hypothesis import Explanation, Rivals, rivals_of, without_effect
-from islands.discrepancy.inference.screening import Rung
+from islands.discrepancy.calibration.levenberg_marquardt import (
+    CalibrationResult,
+    Target,
+    covariance,
+    evaluate_fit,
+)
+from islands.discrepancy.inference.confounders import Confounder, find_confounder
+from islands.discrepancy.inference.holdout import measure_holdout_gain
+from islands.discrepancy.inference.hypothesis import (
+    Alternatives,
+    Hypothesis,
+    find_alternatives,
+    without_effect,
+)
+from islands.discrepancy.inference.screening import ScreenedEffect
 from islands.discrepancy.inference.stepwise_search import LEAST
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.parallel import Spread
@@ -82,16 +92,16 @@ class Finding:
     eta: float | None
 
 
-def confirmed(
-    found: Explanation, base: Calibrated, target: Target, fitted: int, rng: np.random.Generator
-) -> Explanation:
+def validate_out_of_sample(
+    found: Hypothesis, base: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
+) -> Hypothesis:
     """Leave out what does not foretell samples that were not fitted: without that gain there is no name.
 
     Beside a cause that no simulation is in step with, leave out what may be a part of that.
     """
     while found.effects:
-        before = reference(found, base, target)
-        if held_out_gain(before, before is not base, found.fit, target, fitted, rng) > 0.0:
+        before = reference_variance(found, base, target)
+        if measure_holdout_gain(before, before is not base, found.fit, target, fitted, rng) > 0.0:
             break
         found = without_effect(found, found.effects[-1], target)
     beside = _beside(found, target)
@@ -103,23 +113,23 @@ def confirmed(
     return found
 
 
-def _beside(found: Explanation, target: Target) -> float:
+def _beside(found: Hypothesis, target: Target) -> float:
     """Return the mean square of what causes do beside that no simulation is in step with."""
-    others = (likeness(found.fit, effect, target) for effect in found.effects)
+    others = (find_confounder(found.fit, effect, target) for effect in found.effects)
     return sum(other.beside for other in others if other is not None and other.gained > LEAST)
 
 
-def reference(found: Explanation, base: Calibrated, target: Target) -> Calibrated:
+def reference_variance(found: Hypothesis, base: CalibrationResult, target: Target) -> CalibrationResult:
     """Return what an explanation is held against: the simulation, calibrated.
 
     Calibration takes up a gain, or a parameter that is off: these are held against the simulation as given.
     """
     if all(effect.family == "scale" for effect in found.effects):
-        return held_against(base.simulation, target, base.simulation.nominal)
+        return evaluate_fit(base.simulation, target, base.simulation.nominal)
     return base
 
 
-def share(before: Calibrated, after: Calibrated, floor: float) -> float:
+def explained_fraction(before: CalibrationResult, after: CalibrationResult, floor: float) -> float:
     """Return the share of the explainable misfit that is gone; ``floor`` is the noise's mean square."""
     misfit = before.mean_square - floor
     if misfit <= 0.0:
@@ -127,7 +137,7 @@ def share(before: Calibrated, after: Calibrated, floor: float) -> float:
     return float(np.clip((before.mean_square - after.mean_square) / misfit, 0.0, 1.0))
 
 
-def decided(explained: float, named: bool, remains: bool, by_misfit: bool) -> Verdict:
+def classify(explained: float, named: bool, remains: bool, by_misfit: bool) -> Verdict:
     """Return the verdict on names that explain a share, where something remains or not.
 
     By misfit a form that is wrong may remain: a share of more than half is all that is asked for.
@@ -139,37 +149,37 @@ def decided(explained: float, named: bool, remains: bool, by_misfit: bool) -> Ve
     return Verdict.REMAINDER if remains else Verdict.NAMED
 
 
-def findings(
-    found: Explanation,
-    base: Calibrated,
-    first: Sequence[Rung],
+def describe_effects(
+    found: Hypothesis,
+    base: CalibrationResult,
+    first: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
     floor: float,
     spread: Spread = map,
-) -> tuple[tuple[Finding, ...], tuple[Rung, ...]]:
+) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
     """Say what was found, and which other rungs could stand in the place of one.
 
     Each effect is taken out, and all others are tried in its place.
 
     Parameters
     ----------
-    base, first : Calibrated, sequence of Rung
+    base, first : CalibrationResult, sequence of ScreenedEffect
         The simulation alone and its ladder: what is left, and has been tried, where one effect was found.
     """
     named, instead = [], []
     deviations = np.sqrt(np.maximum(np.diag(covariance(found.fit, target)), 0.0))
     if len(found.effects) == 1:
-        rivals: Sequence[Rivals] = (Rivals(Explanation(base, base.score, ()), first),)
+        rivals: Sequence[Alternatives] = (Alternatives(Hypothesis(base, base.score, ()), first),)
     else:
-        rivals = found.rivals or rivals_of(found, target, effects, spread)
+        rivals = found.rivals or find_alternatives(found, target, effects, spread)
     for effect, each in zip(found.effects, rivals, strict=True):
         without, rungs = each.without, each.rungs
         scores = {rung.effect.cause: rung.gained(without.fit) for rung in reversed(rungs)}
         own = max(scores.get(effect.cause, 0.0), without.cost - found.cost)
         scores[effect.cause] = own
         name, family, values = effect.cause, effect.family, _values(found.fit, effect, deviations)
-        if (other := likeness(found.fit, effect, target)) is not None:
+        if (other := find_confounder(found.fit, effect, target)) is not None:
             scores[other.effect.cause] = own + other.gained
             if other.gained > 0.0:
                 name, family = other.effect.cause, other.effect.family
@@ -184,7 +194,7 @@ def findings(
                 tuple(sorted(equal, key=lambda name: -scores[name])),
                 values,
                 scores[name],
-                share(reference(found, without.fit, target), found.fit, floor),
+                explained_fraction(reference_variance(found, without.fit, target), found.fit, floor),
             )
         )
     return tuple(named), tuple(instead)
@@ -195,7 +205,7 @@ def _confidence(own: float, scores: Mapping[str, float]) -> float:
     return 1.0 / sum(float(np.exp(min(score - own, 0.0) / (2 * TEMPER))) for score in rivals)
 
 
-def _times(other: Likeness, values: Mapping[str, Value], fit: Calibrated) -> Mapping[str, Value]:
+def _times(other: Confounder, values: Mapping[str, Value], fit: CalibrationResult) -> Mapping[str, Value]:
     """Return the values of a cause in the place of one that it is like."""
     parameters = other.effect.parameters(fit.simulation.scene)
     found = {}
@@ -206,7 +216,7 @@ def _times(other: Likeness, values: Mapping[str, Value], fit: Calibrated) -> Map
     return found
 
 
-def _values(fit: Calibrated, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
+def _values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
     part = fit.simulation.part(effect)
     found = {}
     for place in range(part.start, part.stop):

@@ -11,7 +11,7 @@ Signal = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class ForceCoordinate:
     """The coordinate that forces act on.
 
     Attributes
@@ -47,7 +47,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class SimulationContext:
     """What a simulation is driven by, and the scales of the record that it is held against.
 
     Attributes
@@ -70,7 +70,7 @@ class Scene:
         from sample to sample.
     lasts : float or None
         Seconds that strengths over the whole record refer to; None takes those of the input.
-    frame : Frame
+    frame : ForceCoordinate
         The coordinate that forces act on. Left out, it is the input, and forces add to the output.
     """
 
@@ -85,12 +85,14 @@ class Scene:
     fitted: float
     midway: Signal | None = None
     lasts: float | None = None
-    frame: Frame = None  # type: ignore[assignment]
+    frame: ForceCoordinate = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if self.frame is None:
             rate = float(np.std(np.diff(self.u))) / self.dt or 1.0
-            frame = Frame(self.input_unit, self.input_peak, rate, self.output_unit, self.output_peak)
+            frame = ForceCoordinate(
+                self.input_unit, self.input_peak, rate, self.output_unit, self.output_peak
+            )
             object.__setattr__(self, "frame", frame)
 
     @property

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
-from islands.discrepancy.interfaces.force import Element
+from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.force import ForceLaw
 
-__all__ = ["Effect", "EffectTemplate", "Element", "Scene", "Signal", "Site"]
+__all__ = ["Effect", "EffectTemplate", "ForceLaw", "Signal", "SimulationContext", "Site"]
 
 
 class Site(StrEnum):
@@ -21,7 +21,7 @@ class Site(StrEnum):
 
 
 #: What a map does: ``(signal, values, scene) -> signal``.
-Map = Callable[[Signal, Signal, Scene], Signal]
+Map = Callable[[Signal, Signal, SimulationContext], Signal]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Effect:
     grid : callable
         ``(scene, residual) -> points``: values that a search begins from; the residual is that of the
         simulation as it stands.
-    form : callable, Element or None
+    form : callable, ForceLaw or None
         What it does: a map, or the element that it puts on the coordinate. None: the simulation's own
         equation has its parameters, by their names.
     source : str
@@ -62,11 +62,11 @@ class Effect:
     summary: str
     family: str
     site: Site
-    parameters: Callable[[Scene], tuple[Parameter, ...]]
-    grid: Callable[[Scene, Signal], Sequence[tuple[float, ...]]]
-    form: Map | Element | None
+    parameters: Callable[[SimulationContext], tuple[Parameter, ...]]
+    grid: Callable[[SimulationContext, Signal], Sequence[tuple[float, ...]]]
+    form: Map | ForceLaw | None
     source: str
-    applies: Callable[[Scene], bool] = lambda _: True
+    applies: Callable[[SimulationContext], bool] = lambda _: True
     linear: int = 1
     gain: bool = False
     searched: int = 0

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from islands.discrepancy.interfaces.context import Scene, Signal
+from islands.discrepancy.interfaces.context import Signal, SimulationContext
 from islands.systems.mechanics import WIDTH, Elements, along, compiled
 
 #: ``(coordinate, rate, own state, numbers) -> number``, a scalar function that can be compiled.
@@ -14,7 +14,7 @@ Law = Callable[[float, float, float, Any], float]
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class ForceLaw:
     """What acts on a coordinate, written as what resists its motion.
 
     Attributes
@@ -33,12 +33,14 @@ class Element:
 
     force: Law
     memory: Law | None = None
-    constants: Callable[[Scene], tuple[float, ...]] = lambda _: ()
+    constants: Callable[[SimulationContext], tuple[float, ...]] = lambda _: ()
     dissipative: bool = False
     begins: int | None = None
 
 
-def elements_of(parts: Sequence[tuple[Element, Signal]], scene: Scene, balance: bool) -> Elements:
+def pack_force_laws(
+    parts: Sequence[tuple[ForceLaw, Signal]], scene: SimulationContext, balance: bool
+) -> Elements:
     """Return elements with their values as the kernels take them.
 
     Parameters
@@ -65,11 +67,13 @@ def elements_of(parts: Sequence[tuple[Element, Signal]], scene: Scene, balance: 
     )
 
 
-def beside(x: Signal, scene: Scene, parts: Sequence[tuple[Element, Signal]]) -> Signal:
+def add_output_forces(
+    x: Signal, scene: SimulationContext, parts: Sequence[tuple[ForceLaw, Signal]]
+) -> Signal:
     """Return what elements add to an output whose coordinate is ``x``: without inertia it answers at once."""
     total = np.zeros(x.size)
     if not parts:
         return total
     x = np.ascontiguousarray(x)
-    along(x, np.gradient(x, scene.dt), scene.dt, elements_of(parts, scene, balance=False), total)
+    along(x, np.gradient(x, scene.dt), scene.dt, pack_force_laws(parts, scene, balance=False), total)
     return total

@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
-from islands.discrepancy.interfaces.effect import Effect, Element, Site
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
 
 #: Elements that act on a core's coordinate, and the values of each.
-Forces = Sequence[tuple[Element, Signal]]
+Forces = Sequence[tuple[ForceLaw, Signal]]
 
 
-class Core(Protocol):
+class Simulator(Protocol):
     """What every simulation declares: its parameters, and where effects can enter it."""
 
     @property
@@ -41,11 +41,11 @@ class Core(Protocol):
     def integrates(self) -> bool:
         """Whether it solves an equation in steps, so that what its input does between samples matters."""
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the coordinate that forces act on; ``output`` is that of the nominal simulation."""
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """Simulate.
 
@@ -54,7 +54,7 @@ class Core(Protocol):
         values : ndarray, shape (parameters,)
         x : ndarray, shape (samples,)
             The input behind its map.
-        scene : Scene
+        scene : SimulationContext
         own : mapping
             Parameters of effects that it understands, by name; what is not named is zero.
         forces : sequence

@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from islands.discrepancy.effects.time_variation import gain_over_time
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_input
+from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.systems.bouc_wen import BoucWenPiezo
 from islands.systems.hysteresis_operators import bouc_wen
 
 
 @dataclass(frozen=True, slots=True)
-class BoucWenPiezoCore:
+class BoucWenPiezoSimulator:
     """``y = dp x - h + forces``, ``h' = A x' - beta |x'| h - gamma x' |h|``; the coordinate is the voltage.
 
     Attributes
@@ -48,14 +48,14 @@ class BoucWenPiezoCore:
             )
         )
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_input(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return input_coordinate(scene, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         A, beta, gamma, dp = values
         h = np.empty_like(x)
         bouc_wen(
@@ -68,7 +68,7 @@ class BoucWenPiezoCore:
             ),
             *(0.0, h),
         )
-        return dp * gain_over_time(own, scene) * x - h + beside(x, scene, forces)
+        return dp * gain_over_time(own, scene) * x - h + add_output_forces(x, scene, forces)
 
 
 def _about(nominal: float) -> tuple[float, float]:

@@ -10,10 +10,10 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.effects.baseline import input_offset
 from islands.discrepancy.effects.nonlinearity import outflow_law, state_clip
 from islands.discrepancy.effects.time_variation import gain_over_time
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_input
+from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.systems.tanks import cascade
 
 #: What the states are called.
@@ -25,7 +25,7 @@ _SLOW, _HIGH = np.geomspace(0.005, 0.2, 8), (0.3, 1.0, 3.0)
 
 
 @dataclass(frozen=True, slots=True)
-class CascadedTanksCore:
+class CascadedTanksSimulator:
     """``x1' = k3 u - k1 sqrt(x1)``, ``x2' = k1 sqrt(x1) - k2 sqrt(x2)``, ``y = x2``.
 
     Both tanks are as wide as each other: the level of the upper one, which nobody measures, has the unit of
@@ -77,14 +77,14 @@ class CascadedTanksCore:
             ),
         )
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_input(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return input_coordinate(scene, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], _forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], _forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         k1, k2, k3, upper, lower = map(float, values)
         gain, offset = k3 * gain_over_time(own, scene), k3 * own.get(f"input-offset:{UPPER}", 0.0)
         y = np.empty(x.size)
@@ -107,7 +107,7 @@ class CascadedTanksCore:
         return y
 
 
-def cascaded_tanks(given: Mapping[str, float], record: Dataset) -> CascadedTanksCore:
+def make_cascaded_tanks(given: Mapping[str, float], record: Dataset) -> CascadedTanksSimulator:
     """Return the core of parameters that are given; what is missing is estimated from a record.
 
     A start that holds the balance of mean flows for every pair of a grid, and the best of them: the analysis
@@ -123,11 +123,11 @@ def cascaded_tanks(given: Mapping[str, float], record: Dataset) -> CascadedTanks
             k1 = given.get("k1", k2 / sqrt(high))
             k3 = given.get("k3", k2 * sqrt(level) / pumped)
             start = max(float(y[0]), 0.0)
-            starts.append(CascadedTanksCore(k1, k2, k3, (start * high, start), units))
+            starts.append(CascadedTanksSimulator(k1, k2, k3, (start * high, start), units))
     return min(starts, key=lambda core: float(np.mean((y - _free_run(core, u, record.dt)) ** 2)))
 
 
-def _free_run(core: CascadedTanksCore, u: Signal, dt: float) -> Signal:
-    scene = Scene(u, dt, {}, {}, 1.0, 1.0, *core.units, u.size * dt)
+def _free_run(core: CascadedTanksSimulator, u: Signal, dt: float) -> Signal:
+    scene = SimulationContext(u, dt, {}, {}, 1.0, 1.0, *core.units, u.size * dt)
     values = np.array([parameter.nominal for parameter in core.parameters])
     return core.simulate(values, u, scene, {}, ())

@@ -2,21 +2,23 @@
 
 import numpy as np
 
-from islands.discrepancy.interfaces.context import Frame, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Signal, SimulationContext
 
 
-def of_input(scene: Scene, output: Signal) -> Frame:
+def input_coordinate(scene: SimulationContext, output: Signal) -> ForceCoordinate:
     """Return the input as the coordinate: forces add to the output at once."""
     rate = float(np.std(np.diff(scene.u))) / scene.dt or 1.0
-    return Frame(scene.input_unit, scene.input_peak, rate, scene.output_unit, peak(output))
+    return ForceCoordinate(
+        scene.input_unit, scene.input_peak, rate, scene.output_unit, peak_amplitude(output)
+    )
 
 
-def of_output(scene: Scene, output: Signal) -> Frame:
+def output_coordinate(scene: SimulationContext, output: Signal) -> ForceCoordinate:
     """Return the output as the coordinate: forces act beside the input, and move it."""
     rate = float(np.std(np.diff(output))) / scene.dt or 1.0
-    return Frame(
+    return ForceCoordinate(
         scene.output_unit,
-        peak(output),
+        peak_amplitude(output),
         rate,
         scene.input_unit,
         scene.input_peak,
@@ -25,6 +27,6 @@ def of_output(scene: Scene, output: Signal) -> Frame:
     )
 
 
-def peak(signal: Signal) -> float:
+def peak_amplitude(signal: Signal) -> float:
     """Return the largest absolute value."""
     return float(np.max(np.abs(signal))) or 1.0

@@ -7,9 +7,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
-from islands.discrepancy.interfaces.effect import Effect, Element, Site
-from islands.discrepancy.interfaces.simulator import Core, Forces
+from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
+from islands.discrepancy.interfaces.simulator import Forces, Simulator
 from islands.errors import SettingsError
 
 #: Outputs of the core that are remembered: derivatives ask for the same one again and again.
@@ -22,20 +22,20 @@ _EXPLODED = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Extended:
+class ExtendedSimulator:
     """A core and the effects in it, one vector of values for all: the core's first, then each effect's.
 
     Attributes
     ----------
-    core : Core
+    core : Simulator
     effects : tuple of Effect
         In the order of the catalogue, which is the order in which maps act.
-    scene : Scene
+    scene : SimulationContext
     """
 
-    core: Core
+    core: Simulator
     effects: tuple[Effect, ...]
-    scene: Scene
+    scene: SimulationContext
     parameters: tuple[Parameter, ...] = field(init=False)
     _parts: tuple[slice, ...] = field(init=False)
     _inner: NDArray[np.bool_] = field(init=False)
@@ -75,7 +75,7 @@ class Extended:
         """Return where an effect's values are."""
         return self._parts[self.effects.index(effect)]
 
-    def with_effects(self, effects: Sequence[Effect]) -> "Extended":
+    def with_effects(self, effects: Sequence[Effect]) -> "ExtendedSimulator":
         """Return the core with other effects in it."""
         return replace(self, effects=tuple(effects))
 
@@ -91,7 +91,7 @@ class Extended:
             y = self._simulate_core(values, own, forces) if more else self._behind_core(values)
             for effect, part in zip(self.effects, self._parts, strict=True):
                 if effect.site == Site.OUTPUT:
-                    y = mapped(effect, y, values[part], self.scene)
+                    y = apply_map(effect, y, values[part], self.scene)
             exploded = not float(np.max(np.abs(y))) < _EXPLODED * self.scene.output_peak
         return np.full_like(y, np.nan) if exploded else y
 
@@ -112,7 +112,7 @@ class Extended:
         for effect, part in zip(self.effects, self._parts, strict=True):
             match effect.site:
                 case Site.INPUT:
-                    x = mapped(effect, x, values[part], self.scene)
+                    x = apply_map(effect, x, values[part], self.scene)
                 case Site.CORE:
                     own |= {
                         parameter.name: float(value)
@@ -121,7 +121,7 @@ class Extended:
                 case Site.PARAMETER:
                     core[self._place(effect)] *= 1.0 + values[part][0]
                 case Site.FORCE:
-                    assert isinstance(effect.form, Element)
+                    assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
         return self.core.simulate(core, x, self.scene, own, forces)
 
@@ -130,19 +130,19 @@ class Extended:
         return [parameter.name for parameter in self.core.parameters].index(name)
 
 
-def mapped(effect: Effect, signal: Signal, values: Signal, scene: Scene) -> Signal:
+def apply_map(effect: Effect, signal: Signal, values: Signal, scene: SimulationContext) -> Signal:
     """Return a signal behind the map of an effect."""
     assert callable(effect.form)
     try:
         out = np.asarray(effect.form(signal, values, scene), dtype=np.float64)
     except Exception as error:
-        raise broken(effect, f"its form fails: {type(error).__name__}: {error}") from error
+        raise invalid_effect_error(effect, f"its form fails: {type(error).__name__}: {error}") from error
     if out.shape != signal.shape:
-        raise broken(effect, f"its form gives {out.shape} for {signal.shape}")
+        raise invalid_effect_error(effect, f"its form gives {out.shape} for {signal.shape}")
     return out
 
 
-def broken(effect: Effect, why: str) -> SettingsError:
+def invalid_effect_error(effect: Effect, why: str) -> SettingsError:
     """Return the error of an entry of the catalogue that does not do what it says."""
     file = effect.parameters.__code__.co_filename
     return SettingsError(

@@ -7,17 +7,17 @@ from enum import StrEnum
 import numpy as np
 import scipy
 
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Core, Forces
+from islands.discrepancy.interfaces.simulator import Forces, Simulator
 
 
-class Around:
+class SimulatorWrapper:
     """A core around another one; what it does not say itself, that one says."""
 
     __slots__ = ()
 
-    core: Core
+    core: Simulator
 
     @property
     def name(self) -> str:
@@ -54,8 +54,8 @@ class Around:
         """As the core's."""
         return self.core.integrates
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return self.core.frame(scene, output)
 
 
@@ -63,7 +63,7 @@ class Around:
 _REMEMBERED = 2
 
 
-class Hold(StrEnum):
+class InterSample(StrEnum):
     """What an input does between two samples."""
 
     FIRST = "first-order"
@@ -72,26 +72,26 @@ class Hold(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Between(Around):
+class ResampledSimulator(SimulatorWrapper):
     """A core that is simulated ``times`` as often as it is recorded.
 
     Attributes
     ----------
-    core : Core
-    hold : Hold
+    core : Simulator
+    hold : InterSample
         It runs straight from sample to sample, stays, or is the smoothest that passes through all samples.
     times : int
     """
 
-    core: Core
-    hold: Hold = Hold.FIRST
+    core: Simulator
+    hold: InterSample = InterSample.FIRST
     times: int = 1
     _known: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         u, midway = self._finer(x)
         finer = replace(scene, u=u, dt=scene.dt / self.times, midway=midway)
         return self.core.simulate(values, u, finer, own, forces)[:: self.times]
@@ -101,11 +101,11 @@ class Between(Around):
         if key not in self._known:
             while len(self._known) >= _REMEMBERED:
                 del self._known[next(iter(self._known))]
-            self._known[key] = finer(x, self.hold, self.times)
+            self._known[key] = resample_context(x, self.hold, self.times)
         return self._known[key]
 
 
-def finer(x: Signal, hold: Hold, times: int) -> tuple[Signal, Signal]:
+def resample_context(x: Signal, hold: InterSample, times: int) -> tuple[Signal, Signal]:
     """Return a signal ``times`` as often, and midway and at the end of each of its steps.
 
     Returns
@@ -115,13 +115,13 @@ def finer(x: Signal, hold: Hold, times: int) -> tuple[Signal, Signal]:
     ndarray, shape (2, times * samples)
     """
     match hold:
-        case Hold.ZERO:
+        case InterSample.ZERO:
             stays = np.repeat(x, times)
             return stays, np.stack([stays, stays])
-        case Hold.FIRST:
+        case InterSample.FIRST:
             at = np.arange(2 * times * x.size + 1) / (2 * times)
             straight = np.interp(at, np.arange(x.size), x)
-        case Hold.BAND:
+        case InterSample.BAND:
             # Its ends are led on by reflection: a filter that meets zeros rings.
             spare = min(64, x.size - 1)
             longer = np.concatenate([2 * x[0] - x[spare:0:-1], x, 2 * x[-1] - x[-2 : -spare - 2 : -1]])

@@ -7,11 +7,11 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_input
+from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import RecordError
 
 #: Rounds of Steiglitz and McBride.
@@ -22,7 +22,7 @@ _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinearCore:
+class LinearSimulator:
     """``A(q) (y - level) = B(q) u``, from a state of its own on: as many poles as zeros, delayed or not.
 
     Attributes
@@ -59,14 +59,14 @@ class LinearCore:
             *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
         )
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_input(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return input_coordinate(scene, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, _own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, _own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         order = self.denominator.size
         numerator, denominator = values[: order + 1], values[order + 1 : 2 * order + 1]
         late = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
@@ -75,10 +75,10 @@ class LinearCore:
         filtered, _ = scipy.signal.lfilter(
             numerator, np.concatenate([[1.0], -denominator]), late - x[0], zi=state
         )
-        return level + filtered + beside(x, scene, forces)
+        return level + filtered + add_output_forces(x, scene, forces)
 
 
-def linear(order: int, delay: int, record: Dataset) -> LinearCore:
+def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
     """Estimate a linear model by the method of Steiglitz and McBride (1965): least squares of its simulation.
 
     Raises
@@ -106,7 +106,7 @@ def linear(order: int, delay: int, record: Dataset) -> LinearCore:
             found, least = (numerator, denominator, level), missed
     if found is None:  # not stable: what does not move at all is
         found = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
-    return LinearCore(*found, delay, record.output_unit or "1")
+    return LinearSimulator(*found, delay, record.output_unit or "1")
 
 
 def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.discrepancy.effects.model_form import SLOPE, Missing, core_shape, missing
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.effects.model_form import SLOPE, MissingTerm, missing_terms, model_form
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_input
+from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import ModelError
 from islands.model.model import Model, model_of
 from islands.model.regressor import Regressor
@@ -22,7 +22,7 @@ _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NarxCore:
+class NarxSimulator:
     """A model's free run from the first measured samples on; its parameters are calibrated.
 
     Parameters that a constraint ties to each other stay as they are, so that the constraint holds: of the
@@ -48,7 +48,7 @@ class NarxCore:
     _moving: NDArray[np.int64] = field(init=False, repr=False)
     _theta: Signal = field(init=False, repr=False)
     _linked: LinkedModel = field(init=False, repr=False)
-    _missing: tuple[Missing, ...] = field(init=False, repr=False)
+    _missing: tuple[MissingTerm, ...] = field(init=False, repr=False)
     _wider: LinkedModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -60,11 +60,11 @@ class NarxCore:
         object.__setattr__(self, "_moving", np.array(moving, dtype=np.int64))
         object.__setattr__(self, "_theta", np.array(self.model.parameters))
         object.__setattr__(self, "_linked", LinkedModel(self.model.regressors))
-        lacking = missing(self.model, moving)
+        lacking = missing_terms(self.model, moving)
         further = tuple(term.regressor for term in lacking)
         object.__setattr__(self, "_missing", lacking)
         object.__setattr__(self, "_wider", LinkedModel((*self.model.regressors, *further)))
-        object.__setattr__(self, "effects", (core_shape(self, self.model, lacking),) if lacking else ())
+        object.__setattr__(self, "effects", (model_form(self, self.model, lacking),) if lacking else ())
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -103,19 +103,19 @@ class NarxCore:
         terms += [(term.at(shape[SLOPE]), shape[term.name]) for term in self._missing]
         return model_of(terms, model.input_names, model.output_name, model.dt)
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_input(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return input_coordinate(scene, output)
 
     def simulate(
         self,
         values: Signal,
         x: Signal,
-        scene: Scene,
+        scene: SimulationContext,
         own: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         theta = self._theta.copy()
         theta[self._moving] = values[:-1]
         warm_up = self._linked.warm_up
@@ -126,7 +126,7 @@ class NarxCore:
         else:
             simulated = self._linked.free_run(theta, x[:, None], start)
         simulated[:warm_up] = start
-        return simulated + beside(x, scene, forces) if forces else simulated
+        return simulated + add_output_forces(x, scene, forces) if forces else simulated
 
     def _run_wider(self, theta: Signal, x: Signal, start: Signal, slope: float) -> Signal:
         """Run with the terms that the model lacks: before the first sample all stood still."""

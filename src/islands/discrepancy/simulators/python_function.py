@@ -7,11 +7,11 @@ from math import isfinite
 
 import numpy as np
 
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_input
+from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import RecordError, SettingsError
 
 #: A change of a parameter that matters, relative to it, and how far one may go.
@@ -19,7 +19,7 @@ _SCALE, _FAR = 0.01, 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ProgramCore:
+class PythonFunctionSimulator:
     """``function(u, dt, **parameters) -> y``; what has a number for its default is a parameter.
 
     Attributes
@@ -78,14 +78,14 @@ class ProgramCore:
             for name, value in self.given.items()
         )
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_input(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return input_coordinate(scene, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, _own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, _own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         chosen = {name: float(value) for name, value in zip(self.given, values, strict=True)}
         # Its own copy: a function that writes into what it is given would spoil the record.
         try:
@@ -100,4 +100,4 @@ class ProgramCore:
                 f"{self.name} gave an output of shape {y.shape} for an input of {x.shape}: it has to give "
                 "one value a sample"
             )
-        return y + beside(x, scene, forces)
+        return y + add_output_forces(x, scene, forces)

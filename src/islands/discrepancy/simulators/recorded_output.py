@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import beside
+from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_input
+from islands.discrepancy.simulators.coordinates import input_coordinate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ColumnCore:
+class RecordedOutput:
     """An output as it was simulated elsewhere.
 
     What acts on its input or in its equation cannot be simulated anew: effects on the output, and forces of
@@ -39,17 +39,17 @@ class ColumnCore:
         """How it is asked for."""
         return f"column {self.column}"
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_input(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return input_coordinate(scene, output)
 
     def simulate(
         self,
         _values: Signal,
         x: Signal,
-        scene: Scene,
+        scene: SimulationContext,
         _own: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return np.asarray(self.simulated) + beside(x, scene, forces)
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return np.asarray(self.simulated) + add_output_forces(x, scene, forces)

@@ -11,11 +11,11 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.effects import friction
 from islands.discrepancy.effects.baseline import input_offset
 from islands.discrepancy.effects.time_variation import gain_over_time
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
-from islands.discrepancy.interfaces.effect import Effect, Element, Site
-from islands.discrepancy.interfaces.force import elements_of
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
+from islands.discrepancy.interfaces.force import pack_force_laws
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_output
+from islands.discrepancy.simulators.coordinates import output_coordinate
 from islands.errors import RecordError
 from islands.systems.mechanics import balance
 
@@ -30,7 +30,7 @@ _SHARP = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RigidAxisCore:
+class RigidAxisSimulator:
     """``m x'' + c x' + F tanh(x' / vs) = u + forces``, by multiple shooting; the coordinate is the output.
 
     Nothing pulls an axis back, so that a free run drifts away: it starts anew every half second, from a
@@ -81,19 +81,19 @@ class RigidAxisCore:
             Parameter("vs", f"{length}/s", self.turns, 0.3 * self.turns, 0.01 * self.turns, 20 * self.turns),
         )
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return replace(of_output(scene, output), sharp=_SHARP)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return replace(output_coordinate(scene, output), sharp=_SHARP)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         mass, damping, dry, turns = map(float, values)
         gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
         dry_friction = friction.COULOMB_FRICTION.form
-        assert isinstance(dry_friction, Element)
-        elements = elements_of([*forces, (dry_friction, np.array([dry, turns]))], scene, balance=True)
+        assert isinstance(dry_friction, ForceLaw)
+        elements = pack_force_laws([*forces, (dry_friction, np.array([dry, turns]))], scene, balance=True)
         times = x.size // self.measured.size
         starts = np.zeros(x.size, dtype=bool)
         starts[:: self.shot * times] = True
@@ -109,7 +109,7 @@ class RigidAxisCore:
 
         return np.repeat(self._freed(shots, scene.frame), times)
 
-    def _freed(self, shots: Callable[[Signal, Signal], Signal], frame: Frame) -> Signal:
+    def _freed(self, shots: Callable[[Signal, Signal], Signal], frame: ForceCoordinate) -> Signal:
         """Return the shots with their states as free as can be: by Newton and Gauss, from what is measured.
 
         All shots are fitted side by side: a state moves its own alone.
@@ -154,7 +154,7 @@ class RigidAxisCore:
         return position[which], rate[which]
 
 
-def rigid_axis(given: Mapping[str, float], record: Dataset, seen: int) -> RigidAxisCore:
+def make_rigid_axis(given: Mapping[str, float], record: Dataset, seen: int) -> RigidAxisSimulator:
     """Return the core of parameters that are given; what is missing is estimated from what may be seen.
 
     The estimate is that of the inverse dynamics: least squares of the force on smoothed acceleration, rate
@@ -179,4 +179,4 @@ def rigid_axis(given: Mapping[str, float], record: Dataset, seen: int) -> RigidA
     turns = given.get("vs", _SHARP * usual)
     shot = max(LEAST, round(SHOT / dt))
     units = (record.input_units[0] or "1", record.output_unit or "1")
-    return RigidAxisCore(mass, damping, dry, turns, np.asarray(y), rate, shot, units)
+    return RigidAxisSimulator(mass, damping, dry, turns, np.asarray(y), rate, shot, units)

@@ -5,32 +5,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.simulator import Core, Forces
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.intersample import Around
+from islands.discrepancy.interfaces.simulator import Forces, Simulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.intersample import SimulatorWrapper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ExtensionCore(Around):
+class SavedExtension(SimulatorWrapper):
     """A core and effects in it, with the values that were found.
 
     Attributes
     ----------
-    core : Core
+    core : Simulator
         Solved as the record asked for.
     added : tuple of Effect
     values : ndarray, shape (parameters,)
         Of the effects, one after the other: their nominal values from now on.
-    scales : Scene
+    scales : SimulationContext
         Of the record that they were found in: some strengths are parts of its peaks, or of its duration.
     """
 
-    core: Core
+    core: Simulator
     added: tuple[Effect, ...]
     values: Signal
-    scales: Scene
+    scales: SimulationContext
 
     @property
     def name(self) -> str:
@@ -59,9 +59,9 @@ class ExtensionCore(Around):
         return self.core.has | {effect.name for effect in self.added}
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         scales = self.scales
         inner = replace(
             scene,
@@ -72,4 +72,4 @@ class ExtensionCore(Around):
             lasts=scales.duration,
             frame=scales.frame,
         )
-        return Extended(self.core, self.added, inner).simulate(values, own, forces)
+        return ExtendedSimulator(self.core, self.added, inner).simulate(values, own, forces)

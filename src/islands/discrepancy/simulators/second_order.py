@@ -8,11 +8,11 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.discrepancy.effects.baseline import input_offset
 from islands.discrepancy.effects.time_variation import gain_over_time
-from islands.discrepancy.interfaces.context import Frame, Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.force import elements_of
+from islands.discrepancy.interfaces.force import pack_force_laws
 from islands.discrepancy.interfaces.simulator import Forces
-from islands.discrepancy.simulators.coordinates import of_output
+from islands.discrepancy.simulators.coordinates import output_coordinate
 from islands.systems.mechanics import balance
 from islands.systems.second_order import SecondOrder, second_order_of
 
@@ -21,7 +21,7 @@ FORCE = "force"
 
 
 @dataclass(frozen=True, slots=True)
-class SecondOrderCore:
+class SecondOrderSimulator:
     """``m x'' + c x' + k x = u + forces``; the coordinate is the output.
 
     Attributes
@@ -66,14 +66,14 @@ class SecondOrderCore:
             Parameter("initial rate", f"{length}/s", system.rate, 0.02 * self.size * usual, initial=True),
         )
 
-    def frame(self, scene: Scene, output: Signal) -> Frame:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
-        return of_output(scene, output)
+    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        return output_coordinate(scene, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: Scene, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Core`."""
+        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         mass, damping, stiffness, position, rate = map(float, values)
         gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
         begins = np.zeros(x.size, dtype=bool)
@@ -82,17 +82,17 @@ class SecondOrderCore:
         balance(
             *(x * gain + offset, scene.midway_of(x) * gain + offset),
             *(scene.dt, mass, damping, stiffness),
-            elements_of(forces, scene, balance=True),
+            pack_force_laws(forces, scene, balance=True),
             *(begins, np.full(x.size, position), np.full(x.size, rate), y),
         )
         return y
 
 
-def second_order(given: Mapping[str, float], record: Dataset) -> SecondOrderCore:
+def make_second_order(given: Mapping[str, float], record: Dataset) -> SecondOrderSimulator:
     """Return the core of parameters that are given; what is missing is estimated from a record."""
     found = second_order_of(record.u[:, 0], record.y, record.dt, given)
     units = (record.input_units[0] or "1", record.output_unit or "1")
-    return SecondOrderCore(found, units, float(np.std(record.y)))
+    return SecondOrderSimulator(found, units, float(np.std(record.y)))
 
 
 def _about(name: str, unit: str, nominal: float, part: float) -> Parameter:

@@ -6,17 +6,17 @@ from dataclasses import asdict
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.effects import model_form
-from islands.discrepancy.interfaces.context import Parameter, Scene, Signal
+from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.intersample import Between, Hold
-from islands.discrepancy.simulators.linear import LinearCore
-from islands.discrepancy.simulators.narx import NarxCore
-from islands.discrepancy.simulators.python_function import ProgramCore
-from islands.discrepancy.simulators.recorded_output import ColumnCore
-from islands.discrepancy.simulators.saved_extension import ExtensionCore
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
+from islands.discrepancy.simulators.linear import LinearSimulator
+from islands.discrepancy.simulators.narx import NarxSimulator
+from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.io.models import model_json
 from islands.io.simulator_spec.schema import (
     ColumnSpec,
@@ -33,12 +33,12 @@ from islands.io.simulator_spec.schema import (
 )
 
 
-def extended_json(fit: Calibrated, record: Dataset) -> str:
+def extended_json(fit: CalibrationResult, record: Dataset) -> str:
     """Write a simulation with its effects, and the values of both."""
     return json.dumps(extended_document(fit, record), indent=2, allow_nan=False) + "\n"
 
 
-def extended_document(fit: Calibrated, record: Dataset) -> dict[str, Any]:
+def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]:
     """Describe a simulation with its effects, and the values of both.
 
     A parameter that was found to be wrong is put right, and terms that a model lacks are written into it:
@@ -69,7 +69,7 @@ def extended_document(fit: Calibrated, record: Dataset) -> dict[str, Any]:
 
 
 def described(
-    core: Core,
+    core: Simulator,
     values: Signal,
     inputs: tuple[str, ...],
     output: str,
@@ -85,7 +85,7 @@ def described(
         if not parameter.initial
     }
     match core:
-        case ExtensionCore():
+        case SavedExtension():
             own, found, at = len(core.core.parameters), [], 0
             for effect in core.added:
                 parameters = effect.parameters(core.scales)
@@ -93,12 +93,12 @@ def described(
                 found.append(_effect(effect, parameters, values[here]))
                 at += len(parameters)
             return _extended(core.core, values[:own], found, core.scales, inputs, output, shape)
-        case NarxCore():
+        case NarxSimulator():
             model = core.with_shape(values, shape) if shape else core.with_values(values)
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=core.name)
-        case ColumnCore():
+        case RecordedOutput():
             return ColumnSpec(kind="column", column=core.column)
-        case LinearCore():
+        case LinearSimulator():
             order = core.denominator.size
             coefficients = tuple(map(float, values))
             return LinearSpec(
@@ -109,23 +109,23 @@ def described(
                 denominator=coefficients[order + 1 : 2 * order + 1],
                 level=coefficients[2 * order + 1],
             )
-        case ProgramCore():
+        case PythonFunctionSimulator():
             path, _, function = core.source.rpartition(":")
             return ProgramSpec(kind="python", path=path, function=function, parameters=named)
     return PhysicalSpec(kind=core.name, parameters=named)  # type: ignore[arg-type]
 
 
 def _extended(
-    core: Core,
+    core: Simulator,
     values: Signal,
     effects: Sequence[EffectSpec],
-    scales: Scene,
+    scales: SimulationContext,
     inputs: tuple[str, ...],
     output: str,
     shape: Mapping[str, float] | None = None,
 ) -> LocalExtendedSpec:
-    hold, times, inner = Hold.FIRST, 1, core
-    if isinstance(core, Between):
+    hold, times, inner = InterSample.FIRST, 1, core
+    if isinstance(core, ResampledSimulator):
         hold, times, inner = core.hold, core.times, core.core
     return LocalExtendedSpec(
         inputs=inputs,

@@ -12,22 +12,22 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.preparation import scene_of, seen
+from islands.discrepancy.calibration.preparation import estimation_part, make_context
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.interfaces.context import Frame, Scene
+from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.simulators.cascaded_tanks import cascaded_tanks
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.intersample import Between, Hold
-from islands.discrepancy.simulators.linear import LinearCore, linear
-from islands.discrepancy.simulators.narx import NarxCore
-from islands.discrepancy.simulators.python_function import ProgramCore
-from islands.discrepancy.simulators.recorded_output import ColumnCore
-from islands.discrepancy.simulators.rigid_axis import rigid_axis
-from islands.discrepancy.simulators.saved_extension import ExtensionCore
-from islands.discrepancy.simulators.second_order import second_order
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.cascaded_tanks import make_cascaded_tanks
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
+from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
+from islands.discrepancy.simulators.narx import NarxSimulator
+from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.discrepancy.simulators.rigid_axis import make_rigid_axis
+from islands.discrepancy.simulators.saved_extension import SavedExtension
+from islands.discrepancy.simulators.second_order import make_second_order
 from islands.errors import ModelError, RecordError, SettingsError, chosen
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.schema import (
@@ -53,7 +53,7 @@ def simulation(
     asked: str | SimulationSpec | LocalSpec,
     record: Dataset,
     columns: Mapping[str, Any] | None = None,
-) -> Core:
+) -> Simulator:
     """Return the simulation that is asked for.
 
     Parameters
@@ -75,9 +75,9 @@ def simulation(
         case PhysicalSpec(kind=kind, parameters=parameters):
             return PHYSICAL[kind](parameters, record)
         case LinearSpec(numerator=None):
-            return linear(found.order, found.delay, _estimable(record))
+            return estimate_linear(found.order, found.delay, _estimable(record))
         case LinearSpec():
-            return LinearCore(
+            return LinearSimulator(
                 *(np.array(found.numerator), np.array(found.denominator), found.level, found.delay),
                 record.output_unit or "1",
             )
@@ -107,7 +107,7 @@ def simulated(
     if isinstance(asked, Mapping):
         asked = LocalExtendedSpec.model_validate(asked)
     core = simulation(asked, record, columns)
-    alone = Extended(core, (), scene_of(record, core, record.samples))
+    alone = ExtendedSimulator(core, (), make_context(record, core, record.samples))
     begins = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
     if not begins:
         return alone.simulate(alone.nominal)
@@ -129,14 +129,14 @@ def simulated(
     return at(best.x)
 
 
-def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Core:
+def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
     core = simulation(document.core, record, columns)
-    solved: Core = core
+    solved: Simulator = core
     if (document.hold, document.times) != ("first-order", 1):
-        solved = Between(core, Hold(document.hold), document.times)
+        solved = ResampledSimulator(core, InterSample(document.hold), document.times)
     known = {**CATALOGUE, **{effect.name: effect for effect in core.effects}}
     given = document.scales
-    scales = Scene(
+    scales = SimulationContext(
         u=np.ascontiguousarray(record.u[:, 0]),
         dt=record.dt,
         channels={},
@@ -147,7 +147,7 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
         output_unit=record.output_unit or "1",
         fitted=given.fitted_s,
         lasts=given.duration_s,
-        frame=Frame(**given.frame.model_dump()),
+        frame=ForceCoordinate(**given.frame.model_dump()),
     )
     added: list[Effect] = []
     values: list[float] = []
@@ -162,10 +162,10 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
             raise ModelError(f"effect {each.name} has no value for {', '.join(missing)}: diagnose again")
         added.append(effect)
         values += [each.parameters[name].value for name in names]
-    return ExtensionCore(solved, tuple(added), np.array(values), scales)
+    return SavedExtension(solved, tuple(added), np.array(values), scales)
 
 
-def _column(name: str, found: Any, record: Dataset) -> Core:
+def _column(name: str, found: Any, record: Dataset) -> Simulator:
     output = np.asarray(found, dtype=np.float64)
     if output.shape != record.y.shape:
         raise RecordError(
@@ -174,24 +174,24 @@ def _column(name: str, found: Any, record: Dataset) -> Core:
         )
     if np.isnan(output).any():
         raise RecordError(f"column {name} has gaps: simulate all samples, or select rows without any")
-    return ColumnCore(name, output)
+    return RecordedOutput(name, output)
 
 
-def _piezo(given: Mapping[str, float], _record: Dataset) -> Core:
-    return BoucWenPiezoCore(replace(BoucWenPiezo(), **_known(given, "bouc-wen-piezo")))
+def _piezo(given: Mapping[str, float], _record: Dataset) -> Simulator:
+    return BoucWenPiezoSimulator(replace(BoucWenPiezo(), **_known(given, "bouc-wen-piezo")))
 
 
-def _second_order(given: Mapping[str, float], record: Dataset) -> Core:
-    return second_order(_known(given, "second-order"), _estimable(record))
+def _second_order(given: Mapping[str, float], record: Dataset) -> Simulator:
+    return make_second_order(_known(given, "second-order"), _estimable(record))
 
 
-def _axis(given: Mapping[str, float], record: Dataset) -> Core:
+def _axis(given: Mapping[str, float], record: Dataset) -> Simulator:
     known = _positive(_known(given, "rigid-axis"), "c", "F")
-    return rigid_axis(known, record, _estimable(record).samples)
+    return make_rigid_axis(known, record, _estimable(record).samples)
 
 
-def _tanks(given: Mapping[str, float], record: Dataset) -> Core:
-    return cascaded_tanks(_positive(_known(given, "cascaded-tanks")), _estimable(record))
+def _tanks(given: Mapping[str, float], record: Dataset) -> Simulator:
+    return make_cascaded_tanks(_positive(_known(given, "cascaded-tanks")), _estimable(record))
 
 
 def _estimable(record: Dataset) -> Dataset:
@@ -203,10 +203,10 @@ def _estimable(record: Dataset) -> Dataset:
         )
     if np.isnan(record.y).any():
         raise RecordError("the measured output has gaps: repair them, or select rows without any")
-    return seen(record)
+    return estimation_part(record)
 
 
-def _program(path: str, name: str, given: Mapping[str, float]) -> Core:
+def _program(path: str, name: str, given: Mapping[str, float]) -> Simulator:
     """Run a file of the user's own and take a function out of it."""
     try:
         function = runpy.run_path(path).get(name)
@@ -214,10 +214,10 @@ def _program(path: str, name: str, given: Mapping[str, float]) -> Core:
         raise SettingsError(f"{path} cannot be run: {type(error).__name__}: {error}") from error
     if not callable(function):
         raise SettingsError(f"{path} has no function {name!r}: write python:FILE.py:FUNCTION")
-    return ProgramCore(function, f"{path}:{name}", given)
+    return PythonFunctionSimulator(function, f"{path}:{name}", given)
 
 
-def _model(document: Mapping[str, Any], name: str, record: Dataset) -> Core:
+def _model(document: Mapping[str, Any], name: str, record: Dataset) -> Simulator:
     model = model_from_json(json.dumps(document), name)
     if model.dt is not None and abs(model.dt - record.dt) > 1e-3 * record.dt:
         raise SettingsError(
@@ -226,7 +226,7 @@ def _model(document: Mapping[str, Any], name: str, record: Dataset) -> Core:
         )
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
-    return NarxCore(model, name, record.y[: model.maximum_lag])
+    return NarxSimulator(model, name, record.y[: model.maximum_lag])
 
 
 def _known(given: Mapping[str, float], kind: str) -> Mapping[str, float]:
@@ -244,7 +244,7 @@ def _positive(given: Mapping[str, float], *perhaps_zero: str) -> Mapping[str, fl
 
 
 #: What makes a physical system of the parameters that are given; a new one is one entry here.
-PHYSICAL: Mapping[str, Callable[[Mapping[str, float], Dataset], Core]] = MappingProxyType(
+PHYSICAL: Mapping[str, Callable[[Mapping[str, float], Dataset], Simulator]] = MappingProxyType(
     {
         "bouc-wen-piezo": _piezo,
         "second-order": _second_order,

@@ -7,18 +7,33 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.noise_model import noise_of
-from islands.discrepancy.detectability import NOTHING, UNKNOWN, Answer, SelfTest, probed, rate, self_test
+from islands.discrepancy.calibration.noise_model import fit_ar_noise
+from islands.discrepancy.detectability import (
+    NOTHING,
+    UNKNOWN,
+    SelfTest,
+    SurrogateOutcome,
+    diagnose_surrogate,
+    estimate_rate,
+    self_test,
+)
 from islands.discrepancy.diagnosis import Candidate, Diagnosis, diagnose
 from islands.discrepancy.inference import noise_floor
-from islands.discrepancy.interfaces.effect import Effect, Scene, Signal
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.simulators.recorded_output import ColumnCore
-from islands.discrepancy.surrogates import STRENGTHS, Injection, Probe, Surrogates, injections, surrogates_of
+from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.discrepancy.surrogates import (
+    STRENGTHS,
+    Injection,
+    SurrogateCase,
+    Surrogates,
+    injection_strengths,
+    make_surrogates,
+)
 from islands.trials.injection.measurement import hide
 from islands.trials.trial import TOLERANCE
 
-CORE = BoucWenPiezoCore()
+CORE = BoucWenPiezoSimulator()
 FEW = ("offset", "jump")
 
 
@@ -36,14 +51,14 @@ def clean() -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def source() -> Surrogates:
-    return surrogates_of(clean(), CORE, TOLERANCE)
+    return make_surrogates(clean(), CORE, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
 def diagnosis(source: Surrogates, offered: Sequence[Effect]) -> Diagnosis:
     """Of a record with dry friction in it."""
     friction = next(each for each in offered if each.name == "coulomb-friction")
-    return diagnose(source.drawn(Probe(steps(source, friction)[-1], 11)), CORE, TOLERANCE)
+    return diagnose(source.drawn(SurrogateCase(steps(source, friction)[-1], 11)), CORE, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
@@ -52,31 +67,31 @@ def offered(source: Surrogates) -> list[Effect]:
 
 
 @pytest.fixture(scope="module")
-def column(source: Surrogates) -> tuple[Diagnosis, ColumnCore]:
+def column(source: Surrogates) -> tuple[Diagnosis, RecordedOutput]:
     """A clean record beside somebody else's simulation of it: that takes a tenth of the time."""
-    core = ColumnCore("theirs", source.simulated())
-    return diagnose(source.drawn(Probe(None, 12)), core), core
+    core = RecordedOutput("theirs", source.simulated())
+    return diagnose(source.drawn(SurrogateCase(None, 12)), core), core
 
 
 @pytest.fixture(scope="module")
-def tested(column: tuple[Diagnosis, ColumnCore]) -> SelfTest:
+def tested(column: tuple[Diagnosis, RecordedOutput]) -> SelfTest:
     return self_test(*column, seed=3, effects=FEW, clean=1)
 
 
 def steps(source: Surrogates, effect: Effect, seed: int = 0) -> tuple[Injection, ...]:
-    return injections(source, effect, np.random.default_rng(seed))
+    return injection_strengths(source, effect, np.random.default_rng(seed))
 
 
 def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
     hiding = hide([], np.random.default_rng(5), 6.0, 0.8, apart=False)
-    core = ColumnCore("theirs", hiding.nominal)
+    core = RecordedOutput("theirs", hiding.nominal)
     found = diagnose(hiding.record, core)
-    source = surrogates_of(found, core, {})
-    drawn = [source.drawn(Probe(None, seed)) for seed in range(12)]
+    source = make_surrogates(found, core, {})
+    drawn = [source.drawn(SurrogateCase(None, seed)) for seed in range(12)]
     assert all(np.array_equal(each.u, found.record.u) for each in drawn)
     noise = [each.y - source.simulated() for each in drawn]
     assert np.std(noise) == pytest.approx(source.sigma, rel=0.15)
-    assert np.mean([noise_of(each).coefficients[0] for each in noise]) == pytest.approx(
+    assert np.mean([fit_ar_noise(each).coefficients[0] for each in noise]) == pytest.approx(
         found.best.noise.coefficients[0], abs=0.1
     )
 
@@ -84,25 +99,25 @@ def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
 @pytest.mark.ci
 def test_what_was_named_is_taken_off(diagnosis: Diagnosis) -> None:
     assert [each.name for each in diagnosis.effects] == ["coulomb-friction"]
-    source = surrogates_of(diagnosis, CORE, TOLERANCE)
+    source = make_surrogates(diagnosis, CORE, TOLERANCE)
     assert source.sigma < 0.3 * np.sqrt(diagnosis.base.mean_square)
     assert np.std(diagnosis.best.output - source.simulated()) > 3 * source.sigma
-    assert probed(source, Probe(None, 1)).called == NOTHING
+    assert diagnose_surrogate(source, SurrogateCase(None, 1)).called == NOTHING
 
 
 def test_to_inject_nothing_leaves_the_surrogate(source: Surrogates, offered: Sequence[Effect]) -> None:
-    clean = source.drawn(Probe(None, 7)).y
+    clean = source.drawn(SurrogateCase(None, 7)).y
     for effect in offered:
         nominal = tuple(each.nominal for each in effect.parameters(source.simulation.scene))
         nothing = Injection(effect.name, nominal, 0.0, "", 0.0)
-        assert np.array_equal(source.drawn(Probe(nothing, 7)).y, clean), effect.name
+        assert np.array_equal(source.drawn(SurrogateCase(nothing, 7)).y, clean), effect.name
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.ci)])
 def test_a_stronger_injection_has_a_larger_misfit(
     source: Surrogates, offered: Sequence[Effect], seed: int
 ) -> None:
-    clean = source.drawn(Probe(None, 7)).y
+    clean = source.drawn(SurrogateCase(None, 7)).y
     for effect in offered:
         found = steps(source, effect, seed)
         assert found, effect.name
@@ -113,7 +128,7 @@ def test_a_stronger_injection_has_a_larger_misfit(
         parameters = effect.parameters(source.simulation.scene)
         for each in found:
             assert all(p.lower <= v <= p.upper for p, v in zip(parameters, each.values, strict=True))
-            changed = (source.drawn(Probe(each, 7)).y - clean)[: source.fitted]
+            changed = (source.drawn(SurrogateCase(each, 7)).y - clean)[: source.fitted]
             assert np.sqrt(np.mean(changed**2)) == pytest.approx(each.misfit * source.sigma), effect.name
 
 
@@ -129,7 +144,7 @@ def test_strengths_that_a_response_leaps_over_are_left_out(
 ) -> None:
     offset = next(each for each in offered if each.name == "offset")
 
-    def leaping(y: Signal, values: Signal, _scene: Scene) -> Signal:
+    def leaping(y: Signal, values: Signal, _scene: SimulationContext) -> Signal:
         return y + source.sigma * (0.15 if abs(values[0]) < 1.0 else 2.0 if abs(values[0]) < 2.0 else np.inf)
 
     found = steps(source, replace(offset, form=leaping))
@@ -158,7 +173,9 @@ def test_what_is_within_a_tolerance_has_no_limit(diagnosis: Diagnosis) -> None:
     assert found.p_value == 1.0
 
 
-def backwards(function: Callable[[Probe], Answer], probes: Sequence[Probe], /) -> Iterable[Answer]:
+def backwards(
+    function: Callable[[SurrogateCase], SurrogateOutcome], probes: Sequence[SurrogateCase], /
+) -> Iterable[SurrogateOutcome]:
     """Carry out probes in another process's order: copies of them, the last first."""
     function, probes = pickle.loads(pickle.dumps((function, probes)))
     return reversed([function(probe) for probe in reversed(probes)])
@@ -166,7 +183,7 @@ def backwards(function: Callable[[Probe], Answer], probes: Sequence[Probe], /) -
 
 @pytest.mark.ci
 def test_the_same_seed_has_the_same_result_in_any_order(
-    column: tuple[Diagnosis, ColumnCore], tested: SelfTest
+    column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
     assert any(tested.detection_limits.values())
     again = self_test(*column, seed=3, run=backwards, effects=FEW, clean=1)
@@ -177,20 +194,22 @@ def test_the_same_seed_has_the_same_result_in_any_order(
 
 
 @pytest.mark.ci
-def test_another_seed_has_another_result(column: tuple[Diagnosis, ColumnCore], tested: SelfTest) -> None:
+def test_another_seed_has_another_result(column: tuple[Diagnosis, RecordedOutput], tested: SelfTest) -> None:
     other = self_test(*column, seed=4, effects=FEW[-1:], clean=0)
     assert other.detection_limits[FEW[-1]] != tested.detection_limits[FEW[-1]]
 
 
 def test_an_effects_result_does_not_hang_on_the_others(
-    column: tuple[Diagnosis, ColumnCore], tested: SelfTest
+    column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
     alone = self_test(*column, seed=3, effects=FEW[-1:], clean=0)
     assert alone.detection_limits == {FEW[-1]: tested.detection_limits[FEW[-1]]}
 
 
-def answering(called: str, score: float, recognised: bool = False) -> Callable[..., Iterable[Answer]]:
-    return lambda _function, probes: [Answer(called, recognised, score) for _ in probes]
+def answering(
+    called: str, score: float, recognised: bool = False
+) -> Callable[..., Iterable[SurrogateOutcome]]:
+    return lambda _function, probes: [SurrogateOutcome(called, recognised, score) for _ in probes]
 
 
 def test_p_is_one_in_n_and_one_where_the_record_beats_all(diagnosis: Diagnosis) -> None:
@@ -203,7 +222,7 @@ def test_p_is_one_in_n_and_one_where_the_record_beats_all(diagnosis: Diagnosis) 
 @pytest.mark.parametrize(("called", "value"), [("delay", 1.0), (NOTHING, 0.0), (UNKNOWN, 0.0)])
 def test_a_false_alarm_is_a_name(diagnosis: Diagnosis, called: str, value: float) -> None:
     found = self_test(diagnosis, CORE, TOLERANCE, 0, answering(called, 0.0), (), 20)
-    assert found.false_alarm_rate == rate(int(20 * value), 20)
+    assert found.false_alarm_rate == estimate_rate(int(20 * value), 20)
     assert found.false_alarm_rate.value == value
     assert found.confusion == {(NOTHING, called): 20}
 
@@ -214,13 +233,16 @@ def test_the_limit_is_where_naming_begins(diagnosis: Diagnosis, source: Surrogat
         asked = []
 
         def run(
-            _function: object, probes: Sequence[Probe], first: int = first, asked: list[Probe] = asked
-        ) -> Iterable[Answer]:
+            _function: object,
+            probes: Sequence[SurrogateCase],
+            first: int = first,
+            asked: list[SurrogateCase] = asked,
+        ) -> Iterable[SurrogateOutcome]:
             asked += probes
             for probe in probes:
                 assert probe.injection is not None
                 named = first < len(STRENGTHS) and probe.injection.misfit > 0.9 * STRENGTHS[first]
-                yield Answer("offset" if named else NOTHING, named, 0.0)
+                yield SurrogateOutcome("offset" if named else NOTHING, named, 0.0)
 
         found = self_test(diagnosis, CORE, TOLERANCE, 0, run, ("offset",), 0)
         limit = found.detection_limits["offset"]
@@ -245,13 +267,13 @@ def test_noise_that_was_fitted_to_a_drift_stays_finite(diagnosis: Diagnosis) -> 
     left = np.concatenate([1e-3 * 1.02 ** np.arange(diagnosis.fitted), np.zeros(diagnosis.record.samples)])
     left = left[: diagnosis.record.samples]
     record = replace(diagnosis.record, y=diagnosis.best.output + left)
-    assert np.abs(np.roots([1.0, *-noise_of(left[: diagnosis.fitted]).coefficients])).max() > 1.0
-    source = surrogates_of(replace(diagnosis, record=record), CORE, TOLERANCE)
+    assert np.abs(np.roots([1.0, *-fit_ar_noise(left[: diagnosis.fitted]).coefficients])).max() > 1.0
+    source = make_surrogates(replace(diagnosis, record=record), CORE, TOLERANCE)
     assert np.abs(np.roots([1.0, *-source.noise.coefficients])).max() < 1.0
-    assert np.isfinite(source.drawn(Probe(None, 0)).y).all()
+    assert np.isfinite(source.drawn(SurrogateCase(None, 0)).y).all()
 
 
 def test_bounds_are_those_of_clopper_and_pearson() -> None:
-    assert rate(0, 40).ci95 == pytest.approx((0.0, 0.0881), abs=1e-4)
-    assert rate(2, 40).ci95 == pytest.approx((0.0061, 0.1692), abs=1e-4)
-    assert rate(40, 40).ci95[1] == 1.0
+    assert estimate_rate(0, 40).ci95 == pytest.approx((0.0, 0.0881), abs=1e-4)
+    assert estimate_rate(2, 40).ci95 == pytest.approx((0.0061, 0.1692), abs=1e-4)
+    assert estimate_rate(40, 40).ci95[1] == 1.0

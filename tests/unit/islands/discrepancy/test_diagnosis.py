@@ -9,8 +9,8 @@ from islands.data.dataset import Dataset, join
 from islands.discrepancy.calibration.preparation import FEWEST, LOCKED
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.simulators.recorded_output import ColumnCore
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.systems.bouc_wen import BoucWenPiezo
@@ -25,7 +25,7 @@ def record() -> Dataset:
 
 @pytest.fixture(scope="module")
 def found(record: Dataset) -> Diagnosis:
-    return diagnose(record, BoucWenPiezoCore(), TOLERANCE)
+    return diagnose(record, BoucWenPiezoSimulator(), TOLERANCE)
 
 
 def changed(record: Dataset, column: int, values: object) -> Dataset:
@@ -55,7 +55,7 @@ def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: 
 
 @pytest.mark.ci
 def test_the_same_question_has_the_same_answer(record: Dataset, found: Diagnosis) -> None:
-    again = diagnose(record, BoucWenPiezoCore(), TOLERANCE)
+    again = diagnose(record, BoucWenPiezoSimulator(), TOLERANCE)
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
 
 
@@ -63,7 +63,7 @@ def test_what_is_locked_away_is_seen_by_the_gain_alone(record: Dataset, found: D
     y = np.array(record.y)
     fitted = int((1 - LOCKED) * record.samples)
     y[fitted:] += 1.0
-    other = diagnose(replace(record, y=y), BoucWenPiezoCore(), TOLERANCE)
+    other = diagnose(replace(record, y=y), BoucWenPiezoSimulator(), TOLERANCE)
     assert (other.effects, other.candidates, other.verdict) == (
         found.effects,
         found.candidates,
@@ -80,7 +80,7 @@ def clean() -> Dataset:
 
 
 #: A simulation with two parameters that are far from those of the records.
-OFF = BoucWenPiezoCore(BoucWenPiezo(dp=1.3, A=0.7))
+OFF = BoucWenPiezoSimulator(BoucWenPiezo(dp=1.3, A=0.7))
 
 
 def test_a_parameter_without_a_tolerance_is_calibrated_and_no_discrepancy(clean: Dataset) -> None:
@@ -94,20 +94,20 @@ def test_a_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> No
 
 
 def test_a_column_is_a_simulation(record: Dataset) -> None:
-    simulated = np.array(BoucWenPiezoCore().simulate(*_nominal(record)))
+    simulated = np.array(BoucWenPiezoSimulator().simulate(*_nominal(record)))
     drifted = replace(
         record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
     )
-    found = diagnose(drifted, ColumnCore("theirs", simulated))
+    found = diagnose(drifted, RecordedOutput("theirs", simulated))
     assert [each.name for each in found.effects if each.eta is not None] == ["linear-drift"]
     assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)
 
 
 def _nominal(record: Dataset) -> tuple:
-    from islands.discrepancy.calibration.preparation import fitted_samples, scene_of
+    from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 
-    core = BoucWenPiezoCore()
-    scene = scene_of(record, core, fitted_samples(record))
+    core = BoucWenPiezoSimulator()
+    scene = make_context(record, core, count_fitted_samples(record))
     return np.array([each.nominal for each in core.parameters]), scene.u, scene, {}, ()
 
 
@@ -128,7 +128,7 @@ REFUSED = {
 def test_a_record_that_cannot_be_used_is_refused(record: Dataset, case: str) -> None:
     spoil, why = REFUSED[case]
     with pytest.raises(RecordError, match=why):
-        diagnose(spoil(record), BoucWenPiezoCore())
+        diagnose(spoil(record), BoucWenPiezoSimulator())
 
 
 @pytest.mark.parametrize(
@@ -141,9 +141,9 @@ def test_a_record_that_cannot_be_used_is_refused(record: Dataset, case: str) -> 
 )
 def test_a_tolerance_that_cannot_be_is_refused(record: Dataset, tolerance: dict, why: str) -> None:
     with pytest.raises(SettingsError, match=why):
-        diagnose(record, BoucWenPiezoCore(), tolerance)
+        diagnose(record, BoucWenPiezoSimulator(), tolerance)
 
 
 def test_a_simulation_that_diverges_is_refused(record: Dataset) -> None:
     with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
-        diagnose(record, BoucWenPiezoCore(BoucWenPiezo(gamma=-5.0)))
+        diagnose(record, BoucWenPiezoSimulator(BoucWenPiezo(gamma=-5.0)))

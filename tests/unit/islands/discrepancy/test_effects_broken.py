@@ -10,7 +10,7 @@ from islands.discrepancy.calibration import preparation
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.errors import SettingsError
 from support.simulated_records import recorded, wave
 
@@ -55,11 +55,11 @@ def test_a_broken_effect_is_named(record: Dataset, monkeypatch: pytest.MonkeyPat
     effect, why = BROKEN[case]
     monkeypatch.setattr(preparation, "CATALOGUE", {effect.name: effect, "jump": CATALOGUE["jump"]})
     with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {why}") as refused:
-        diagnose(record, BoucWenPiezoCore())
+        diagnose(record, BoucWenPiezoSimulator())
     assert str(refused.value).endswith(".py or take it out of the catalogue")
 
 
 def test_a_grid_without_points_leaves_an_effect_out(record: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     effect = replace(GOOD, grid=lambda _scene, _residual: ())
     monkeypatch.setattr(preparation, "CATALOGUE", {effect.name: effect, "jump": CATALOGUE["jump"]})
-    assert {each.name for each in diagnose(record, BoucWenPiezoCore()).candidates} <= {"jump"}
+    assert {each.name for each in diagnose(record, BoucWenPiezoSimulator()).candidates} <= {"jump"}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.preparation import effects_for, fitted_samples, scene_of
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.simulation.predictors import free_run
 from islands.trials.cases import CORES, identified
@@ -20,8 +20,8 @@ def test_what_is_hidden_is_what_a_simulation_can_name(name: str) -> None:
     system = simulated.system
     hiding = hide([], np.random.default_rng(4), system.seconds / 3, system=system, apart=simulated.apart)
     core = simulated.made(hiding)
-    scene = scene_of(hiding.record, core, fitted_samples(hiding.record))
-    found = {effect.name.partition(":")[0] for effect in effects_for(core, scene, simulated.tolerance)}
+    scene = make_context(hiding.record, core, count_fitted_samples(hiding.record))
+    found = {effect.name.partition(":")[0] for effect in select_effects(core, scene, simulated.tolerance)}
     assert set(simulated.nameable) == found & set(system.known)
     assert set(simulated.nameless) == (set(system.known) - found) | set(system.unknown)
 

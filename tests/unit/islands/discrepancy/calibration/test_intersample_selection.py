@@ -6,15 +6,15 @@ import scipy
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration.intersample_selection import settled, solved_alike
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, calibrate
-from islands.discrepancy.calibration.preparation import fitted_samples, scene_of
-from islands.discrepancy.interfaces.simulator import Core
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoCore
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.intersample import Between, Hold
-from islands.discrepancy.simulators.recorded_output import ColumnCore
-from islands.discrepancy.simulators.second_order import SecondOrderCore
+from islands.discrepancy.calibration.intersample_selection import same_discretisation, select_intersample
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
+from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.discrepancy.simulators.second_order import SecondOrderSimulator
 from islands.systems.second_order import SecondOrder
 from support.simulated_records import recorded
 
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 SAMPLES, DT, FINE = 800, 0.01, 20
 
 
-def oscillator(m: float = 0.5, c: float = 2.0, k: float = 500.0) -> SecondOrderCore:
-    return SecondOrderCore(SecondOrder(m, c, k), ("N", "m"), 0.05)
+def oscillator(m: float = 0.5, c: float = 2.0, k: float = 500.0) -> SecondOrderSimulator:
+    return SecondOrderSimulator(SecondOrder(m, c, k), ("N", "m"), 0.05)
 
 
 def moved(u: Array, m: float = 0.5, c: float = 2.0, k: float = 500.0, straight: bool = True) -> Array:
@@ -33,23 +33,23 @@ def moved(u: Array, m: float = 0.5, c: float = 2.0, k: float = 500.0, straight: 
     return np.asarray(scipy.signal.lsim(([1.0], [m, c, k]), u, t, interp=straight)[1])[::FINE]
 
 
-def inputs(hold: Hold) -> tuple[Array, Array]:
+def inputs(hold: InterSample) -> tuple[Array, Array]:
     """Return an input as it is sampled, and as it was between its samples."""
     t = DT / FINE * np.arange(SAMPLES * FINE)
     rng = np.random.default_rng(5)
-    if hold == Hold.BAND:
+    if hold == InterSample.BAND:
         lines = rng.uniform(0.3, 38.0, 40), rng.uniform(0, 2 * np.pi, 40)
         u = sum(np.sin(2 * np.pi * f * t + p) for f, p in zip(*lines, strict=True))
         return u[::FINE], u
     u = rng.standard_normal(SAMPLES)
-    if hold == Hold.ZERO:
+    if hold == InterSample.ZERO:
         return u, np.repeat(u, FINE)
     return u, np.interp(np.arange(t.size) / FINE, np.arange(SAMPLES), u)
 
 
-def fitted(record: Dataset, core: Core) -> tuple[Calibrated, Target]:
-    samples = fitted_samples(record)
-    simulation = Extended(core, (), scene_of(record, core, samples))
+def fitted(record: Dataset, core: Simulator) -> tuple[CalibrationResult, Target]:
+    samples = count_fitted_samples(record)
+    simulation = ExtendedSimulator(core, (), make_context(record, core, samples))
     target = Target(record.y, np.arange(record.samples) < samples, None, {})
     return calibrate(simulation, target, simulation.nominal), target
 
@@ -58,32 +58,33 @@ def noisy(y: Array, part: float = 0.01, seed: int = 8) -> Array:
     return y + part * y.std() * np.random.default_rng(seed).standard_normal(y.size)
 
 
-def way(core: Core) -> Hold:
-    return core.hold if isinstance(core, Between) else Hold.FIRST
+def way(core: Simulator) -> InterSample:
+    return core.hold if isinstance(core, ResampledSimulator) else InterSample.FIRST
 
 
-@pytest.mark.parametrize("hold", Hold)
-def test_the_hold_of_the_record_is_chosen(hold: Hold) -> None:
+@pytest.mark.parametrize("hold", InterSample)
+def test_the_hold_of_the_record_is_chosen(hold: InterSample) -> None:
     u, between = inputs(hold)
     fit, target = fitted(
-        recorded(u, noisy(moved(between, straight=hold != Hold.ZERO)), DT, ("N", "m")), oscillator()
+        recorded(u, noisy(moved(between, straight=hold != InterSample.ZERO)), DT, ("N", "m")), oscillator()
     )
-    assert way(settled(fit, target)) == hold
+    assert way(select_intersample(fit, target)) == hold
     again = fit
     for _ in range(2):  # beside what the right hold leaves, steps have to be finer
-        core = settled(again, target)
-        again = calibrate(Extended(core, (), fit.simulation.scene), target, again.values)
+        core = select_intersample(again, target)
+        again = calibrate(ExtendedSimulator(core, (), fit.simulation.scene), target, again.values)
     assert again.mean_square == pytest.approx((0.01 * target.y.std()) ** 2, rel=0.2)
     assert again.values[:3] == pytest.approx((0.5, 2.0, 500.0), rel=0.02)
     # Who has found it stays with it.
-    assert way(settled(again, target)) == hold
+    assert way(select_intersample(again, target)) == hold
 
 
-@pytest.mark.parametrize("hold", [Hold.ZERO, Hold.BAND])
-def test_a_wrong_hold_leaves_more_than_the_noise(hold: Hold) -> None:
+@pytest.mark.parametrize("hold", [InterSample.ZERO, InterSample.BAND])
+def test_a_wrong_hold_leaves_more_than_the_noise(hold: InterSample) -> None:
     u, between = inputs(hold)
     fit, target = fitted(
-        recorded(u, noisy(moved(between, straight=hold != Hold.ZERO), 0.003), DT, ("N", "m")), oscillator()
+        recorded(u, noisy(moved(between, straight=hold != InterSample.ZERO), 0.003), DT, ("N", "m")),
+        oscillator(),
     )
     assert fit.mean_square > 4 * (0.003 * target.y.std()) ** 2
 
@@ -91,14 +92,14 @@ def test_a_wrong_hold_leaves_more_than_the_noise(hold: Hold) -> None:
 def test_steps_are_halved_until_that_changes_nothing() -> None:
     """Six samples a period: one step a sample is far too coarse."""
     stiff = (0.5, 2.0, 5500.0)
-    u, between = inputs(Hold.FIRST)
+    u, between = inputs(InterSample.FIRST)
     y = noisy(moved(between, *stiff), 0.002)
     fit, target = fitted(recorded(u, y, DT, ("N", "m")), oscillator(*stiff))
-    core = settled(fit, target)
-    assert isinstance(core, Between)
-    assert core.hold == Hold.FIRST
+    core = select_intersample(fit, target)
+    assert isinstance(core, ResampledSimulator)
+    assert core.hold == InterSample.FIRST
     assert core.times >= 2
-    again = calibrate(Extended(core, (), fit.simulation.scene), target, fit.values)
+    again = calibrate(ExtendedSimulator(core, (), fit.simulation.scene), target, fit.values)
     assert again.values[:3] == pytest.approx(stiff, rel=0.01)
     assert again.mean_square < 0.3 * fit.mean_square
 
@@ -110,19 +111,21 @@ def test_a_slow_record_is_left_to_the_core_as_it_is(seed: int) -> None:
     u = np.sin(2 * np.pi * 0.6 * t) + 0.5 * np.sin(2 * np.pi * 1.1 * t)
     core = oscillator(k=50.0)
     fit, target = fitted(recorded(u[::FINE], noisy(moved(u, k=50.0), seed=seed), DT, ("N", "m")), core)
-    assert settled(fit, target) is core
+    assert select_intersample(fit, target) is core
 
 
 def test_a_core_that_is_not_integrated_in_steps_is_left_alone() -> None:
-    u, _ = inputs(Hold.ZERO)
-    core = ColumnCore("theirs", u)
+    u, _ = inputs(InterSample.ZERO)
+    core = RecordedOutput("theirs", u)
     fit, target = fitted(recorded(u, noisy(u)), core)
-    assert settled(fit, target) is core
+    assert select_intersample(fit, target) is core
 
 
 def test_ways_are_alike_or_not() -> None:
-    core = BoucWenPiezoCore()
-    assert solved_alike(core, core)
-    assert solved_alike(core, Between(core, Hold.FIRST, 1))
-    assert not solved_alike(core, Between(core, Hold.ZERO, 1))
-    assert not solved_alike(Between(core, Hold.ZERO, 2), Between(core, Hold.ZERO, 4))
+    core = BoucWenPiezoSimulator()
+    assert same_discretisation(core, core)
+    assert same_discretisation(core, ResampledSimulator(core, InterSample.FIRST, 1))
+    assert not same_discretisation(core, ResampledSimulator(core, InterSample.ZERO, 1))
+    assert not same_discretisation(
+        ResampledSimulator(core, InterSample.ZERO, 2), ResampledSimulator(core, InterSample.ZERO, 4)
+    )

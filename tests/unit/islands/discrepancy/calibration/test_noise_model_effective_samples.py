@@ -5,7 +5,7 @@ import pytest
 import scipy
 from numpy.typing import NDArray
 
-from islands.discrepancy.calibration.noise_model import effective_samples, white
+from islands.discrepancy.calibration.noise_model import effective_samples, white_noise
 
 N = 4000
 
@@ -41,4 +41,4 @@ def test_it_is_ten_at_least(residual: NDArray[np.float64]) -> None:
 
 
 def test_white_noise_of_nothing_has_a_likelihood() -> None:
-    assert np.isfinite(white(0.0, 100.0).minus_twice_log_likelihood)
+    assert np.isfinite(white_noise(0.0, 100.0).minus_twice_log_likelihood)

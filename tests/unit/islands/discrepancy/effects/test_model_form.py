@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate, held_against
-from islands.discrepancy.calibration.preparation import scene_of
+from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate, evaluate_fit
+from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.effects.model_form import CORE_SHAPE, SLOPE
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.narx import NarxCore
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulated
@@ -25,14 +25,14 @@ def hiding() -> Hiding:
 
 
 @pytest.fixture(scope="module")
-def extended(hiding: Hiding) -> Extended:
+def extended(hiding: Hiding) -> ExtendedSimulator:
     """Return an identified model with the terms that it lacks."""
     core = CORES["narx"].made(hiding)
-    scene = scene_of(hiding.record, core, 1500)
-    return Extended(core, core.effects, scene)
+    scene = make_context(hiding.record, core, 1500)
+    return ExtendedSimulator(core, core.effects, scene)
 
 
-def started(extended: Extended, hiding: Hiding) -> np.ndarray:
+def started(extended: ExtendedSimulator, hiding: Hiding) -> np.ndarray:
     """Return where a search for the terms begins."""
     (effect,) = extended.effects
     values = extended.nominal
@@ -46,14 +46,14 @@ def model(**terms: str) -> Model:
     return model_of([(parse(text), float(parameter)) for parameter, text in split])
 
 
-def test_terms_that_are_missing_do_nothing_until_they_have_coefficients(extended: Extended) -> None:
+def test_terms_that_are_missing_do_nothing_until_they_have_coefficients(extended: ExtendedSimulator) -> None:
     alone = extended.with_effects(())
     with_slope = extended.simulate(extended.nominal)
     assert with_slope == pytest.approx(alone.simulate(alone.nominal), abs=1e-9)
 
 
-def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: Extended) -> None:
-    assert isinstance(extended.core, NarxCore)
+def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: ExtendedSimulator) -> None:
+    assert isinstance(extended.core, NarxSimulator)
     names = [parameter.name for parameter in extended.parameters]
     assert len(set(names)) == len(names)
     own = {item.text for item in extended.core.model.regressors}
@@ -61,7 +61,7 @@ def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: Extended) 
     assert names[-1] == SLOPE
 
 
-def test_what_is_found_is_closer_to_the_record(extended: Extended, hiding: Hiding) -> None:
+def test_what_is_found_is_closer_to_the_record(extended: ExtendedSimulator, hiding: Hiding) -> None:
     alone = extended.with_effects(())
     target = Target(hiding.record.y, np.arange(2000) < 1500, None, {})
     before = calibrate(alone, target, alone.nominal)
@@ -70,14 +70,14 @@ def test_what_is_found_is_closer_to_the_record(extended: Extended, hiding: Hidin
     assert after.mean_square < 1.05 * hiding.sigma**2
 
 
-def test_where_the_search_begins_no_locked_sample_tells(extended: Extended) -> None:
+def test_where_the_search_begins_no_locked_sample_tells(extended: ExtendedSimulator) -> None:
     (effect,) = extended.effects
     seen = np.random.default_rng(1).standard_normal(2000)
     locked = np.where(np.arange(2000) < 1500, seen, 9.0)
     assert effect.grid(extended.scene, seen) == effect.grid(extended.scene, locked)
 
 
-def test_what_holds_still_at_a_constant_input_still_does(extended: Extended, hiding: Hiding) -> None:
+def test_what_holds_still_at_a_constant_input_still_does(extended: ExtendedSimulator, hiding: Hiding) -> None:
     values = started(extended, hiding)
     resting = np.where(np.arange(2000) < 1000, extended.scene.u, extended.scene.u[999])
     core = extended.core
@@ -86,14 +86,16 @@ def test_what_holds_still_at_a_constant_input_still_does(extended: Extended, hid
     assert np.ptp(y[1010:]) == 0.0
 
 
-def test_a_model_is_extended_by_writing_the_terms_into_it(extended: Extended, hiding: Hiding) -> None:
+def test_a_model_is_extended_by_writing_the_terms_into_it(
+    extended: ExtendedSimulator, hiding: Hiding
+) -> None:
     record, values = hiding.record, started(extended, hiding)
     target = Target(record.y, np.arange(record.samples) < 1500, None, {})
-    fit = held_against(extended, target, values)
+    fit = evaluate_fit(extended, target, values)
     document = extended_document(fit, record)
     assert document["effects"] == []
     written = model_from_json(json.dumps(document["core"]["model"]), "extended")
-    assert isinstance(extended.core, NarxCore)
+    assert isinstance(extended.core, NarxSimulator)
     assert written.size == extended.core.model.size + len(extended.parameters) - 8 - 1
     # It begins a sample later, with what was measured there.
     again = simulated(document, record)
@@ -102,8 +104,8 @@ def test_a_model_is_extended_by_writing_the_terms_into_it(extended: Extended, hi
 
 def test_a_model_of_one_delay_or_of_levels_alone_has_its_terms_too() -> None:
     start = np.zeros(3)
-    of_levels = NarxCore(model(a="0.5 * y(k-1)", b="0.4 * u(k-1)"), "levels", start)
+    of_levels = NarxSimulator(model(a="0.5 * y(k-1)", b="0.4 * u(k-1)"), "levels", start)
     (effect,) = of_levels.effects
     assert effect.family == "shape"
-    output_alone = NarxCore(model(a="0.5 * y(k-1)", b="0.1 * y(k-2)"), "output alone", start)
+    output_alone = NarxSimulator(model(a="0.5 * y(k-1)", b="0.1 * y(k-2)"), "output alone", start)
     assert output_alone.effects == ()

@@ -5,19 +5,19 @@ import pytest
 from numpy.typing import NDArray
 
 from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
-from islands.discrepancy.calibration.preparation import scene_of
+from islands.discrepancy.calibration.preparation import make_context
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.inference.confounders import Likeness, likeness
-from islands.discrepancy.inference.screening import ladder
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.linear import LinearCore
+from islands.discrepancy.inference.confounders import Confounder, find_confounder
+from islands.discrepancy.inference.screening import screen_effects
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.linear import LinearSimulator
 from islands.systems.hysteresis_operators import played, slider
 from support.simulated_records import recorded
 
 Array = NDArray[np.float64]
 
 #: A simulation that does what its input does.
-STIFF = LinearCore(np.ones(1), np.zeros(0), 0.0, 0, "um")
+STIFF = LinearSimulator(np.ones(1), np.zeros(0), 0.0, 0, "um")
 
 
 def test_slips_leave_a_play_of_half_the_breakaway_on_the_average() -> None:
@@ -52,16 +52,16 @@ def fast() -> Array:
     return sum(a * np.sin(2 * np.pi * f * time + f) for a, f in ((5.0, 0.31), (3.0, 0.53), (2.0, 0.83)))
 
 
-def asked(u: Array, y: Array, name: str) -> Likeness | None:
+def asked(u: Array, y: Array, name: str) -> Confounder | None:
     """Fit an effect, and ask what it is like."""
     record = recorded(u, y)
-    simulation = Extended(STIFF, (), scene_of(record, STIFF, u.size))
+    simulation = ExtendedSimulator(STIFF, (), make_context(record, STIFF, u.size))
     target = Target(y, np.ones(u.size, dtype=bool), None, {})
     base = calibrate(simulation, target, simulation.nominal)
-    return likeness(ladder(base, target, [CATALOGUE[name]])[0].fit, CATALOGUE[name], target)
+    return find_confounder(screen_effects(base, target, [CATALOGUE[name]])[0].fit, CATALOGUE[name], target)
 
 
-def compared(fast: Array, moved: Array, noise: float, seed: int) -> Likeness:
+def compared(fast: Array, moved: Array, noise: float, seed: int) -> Confounder:
     """Fit a play to one sample in ten, and return what is said of slips in its place."""
     chance = np.random.default_rng(seed).standard_normal(fast.size // 10)
     found = asked(fast[::10], moved[::10] + noise * chance, "backlash")

@@ -6,14 +6,14 @@ import scipy
 
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.stepwise_search import LEAST
-from islands.discrepancy.interfaces.effect import Scene
+from islands.discrepancy.interfaces.effect import SimulationContext
 
 SAMPLES, SIGMA = 4000, 0.14
 
 
-def scene() -> Scene:
+def scene() -> SimulationContext:
     u = np.zeros(SAMPLES)
-    return Scene(u, 0.01, {}, {}, 40.0, 45.0, "V", "um", 40.0)
+    return SimulationContext(u, 0.01, {}, {}, 40.0, 45.0, "V", "um", 40.0)
 
 
 def clean(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

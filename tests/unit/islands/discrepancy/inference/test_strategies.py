@@ -5,11 +5,11 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import Target, calibrate
-from islands.discrepancy.calibration.preparation import fitted_samples, scene_of
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 from islands.discrepancy.effects import CATALOGUE
-from islands.discrepancy.inference.strategies import by_misfit, judged
+from islands.discrepancy.inference.strategies import assess_evidence, search_with_model_error
 from islands.discrepancy.inference.verdict import Verdict
-from islands.discrepancy.simulators.extended import Extended
+from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.simulator_spec.factory import simulation
 from islands.io.simulator_spec.schema import PhysicalSpec
 from support.simulated_records import recorded
@@ -53,13 +53,13 @@ def overflowing(rim: float, beside: float, samples: int = 400, dt: float = 4.0) 
 def weighed(request):
     record = overflowing(RIM, BESIDE)
     core = simulation(PhysicalSpec(kind="cascaded-tanks"), record)
-    fitted = fitted_samples(record)
-    alone = Extended(core, (), scene_of(record, core, fitted))
+    fitted = count_fitted_samples(record)
+    alone = ExtendedSimulator(core, (), make_context(record, core, fitted))
     target = Target(record.y, np.arange(record.samples) < fitted, None, {})
     base = calibrate(alone, target, alone.nominal)
     effects = [*core.effects, *(CATALOGUE[name] for name in request.param)]
-    evidence = by_misfit(base, target, effects, silent, map)
-    return record, fitted, evidence, judged(evidence, fitted, np.random.default_rng(0))
+    evidence = search_with_model_error(base, target, effects, silent, map)
+    return record, fitted, evidence, assess_evidence(evidence, fitted, np.random.default_rng(0))
 
 
 def test_both_causes_are_found(weighed) -> None:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from islands.discrepancy.calibration.levenberg_marquardt import Calibrated, Target, held_against
-from islands.discrepancy.calibration.preparation import effects_for, fitted_samples, scene_of
+from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, evaluate_fit
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
 from islands.discrepancy.diagnosis import diagnose
-from islands.discrepancy.effects import CATALOGUE, in_order
+from islands.discrepancy.effects import CATALOGUE, catalogue_order
 from islands.discrepancy.interfaces.effect import Effect
-from islands.discrepancy.simulators.extended import Extended
-from islands.discrepancy.simulators.saved_extension import ExtensionCore
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, SettingsError
 from islands.io.export.extended import as_json
 from islands.io.simulator_spec.document import described, extended_document, extended_json
@@ -36,26 +36,26 @@ def asked(request: pytest.FixtureRequest) -> Made:
     return made()[request.param]
 
 
-def extended(asked: Made, effects: list[Effect]) -> Calibrated:
+def extended(asked: Made, effects: list[Effect]) -> CalibrationResult:
     """Put effects into a simulation, at points that a search would begin from."""
     core = asked.core
-    fitted = fitted_samples(asked.record)
-    scene = scene_of(asked.record, core, fitted)
-    simulation_ = Extended(core, in_order(effects), scene)
+    fitted = count_fitted_samples(asked.record)
+    scene = make_context(asked.record, core, fitted)
+    simulation_ = ExtendedSimulator(core, catalogue_order(effects), scene)
     values = simulation_.nominal
     residual = 0.01 * scene.output_peak * np.sin(2 * np.pi * 7.3 * scene.time)
     for effect in simulation_.effects:
         point = effect.grid(scene, residual)[0]
         values[simulation_.part(effect)] = point
     target = Target(asked.record.y, np.arange(asked.record.samples) < fitted, None, {})
-    return held_against(simulation_, target, values)
+    return evaluate_fit(simulation_, target, values)
 
 
 def known(asked: Made) -> list[Effect]:
     """Return the effects that the simulation may get."""
     core = asked.core
-    scene = scene_of(asked.record, core, fitted_samples(asked.record))
-    return effects_for(core, scene, {})
+    scene = make_context(asked.record, core, count_fitted_samples(asked.record))
+    return select_effects(core, scene, {})
 
 
 def chosen(asked: Made) -> list[Effect]:
@@ -66,11 +66,11 @@ def chosen(asked: Made) -> list[Effect]:
     return list(sites.values())
 
 
-def begins(simulation_: Extended) -> bool:
+def begins(simulation_: ExtendedSimulator) -> bool:
     return any(parameter.initial for parameter in simulation_.parameters)
 
 
-def simulates_the_same(asked: Made, fit: Calibrated) -> None:
+def simulates_the_same(asked: Made, fit: CalibrationResult) -> None:
     """Hold what a document simulates against what was written into it.
 
     To rounding; where states at the first sample are fitted anew, on the record that it would have made.
@@ -91,7 +91,7 @@ def fixed(asked: Made, effects: Iterable[Effect]) -> list[Effect]:
     Simulations that begin at the measured output begin elsewhere on another record.
     """
     core = asked.core
-    scene = scene_of(asked.record, core, fitted_samples(asked.record))
+    scene = make_context(asked.record, core, count_fitted_samples(asked.record))
     return [
         effect for effect in effects if not any(parameter.initial for parameter in effect.parameters(scene))
     ]
@@ -108,7 +108,7 @@ def test_what_is_written_simulates_the_same(asked: Made) -> None:
 )
 def test_each_effect_by_itself_simulates_the_same(asked: Made) -> None:
     found = fixed(asked, known(asked))
-    if begins(Extended(asked.core, (), extended(asked, []).simulation.scene)):
+    if begins(ExtendedSimulator(asked.core, (), extended(asked, []).simulation.scene)):
         found = found[::6]  # each is a fit
     for effect in found:
         simulates_the_same(asked, extended(asked, [effect]))
@@ -127,7 +127,7 @@ def test_what_is_read_is_written_as_it_was(asked: Made) -> None:
     spec = LocalExtendedSpec.model_validate(json.loads(text))
     assert as_json(spec) == text
     core = simulation(spec, asked.record, asked.columns)
-    assert isinstance(core, ExtensionCore)
+    assert isinstance(core, SavedExtension)
     values = np.array([parameter.nominal for parameter in core.parameters])
     assert as_json(described(core, values, spec.inputs, spec.output)) == text
 
