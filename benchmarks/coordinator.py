@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
@@ -54,7 +54,7 @@ def tiny(islands: int, topology: str, population: int) -> Problem:
 def epoch(engine, problem: Problem) -> tuple[float, float]:
     """Seconds of an epoch, and of the coordinator's CPU in it."""
     wall, cpu = [], []
-    for _ in engine.run(problem, founded(problem.settings.islands, 0), never):
+    for _ in engine.run(problem, empty_archipelago(problem.settings.islands, 0), never):
         wall.append(time.perf_counter())
         cpu.append(time.process_time())
     return (wall[-1] - wall[1]) / TIMED, (cpu[-1] - cpu[1]) / TIMED

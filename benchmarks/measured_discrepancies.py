@@ -27,7 +27,7 @@ import islands  # noqa: E402
 from islands.discrepancy.detectability import diagnose_surrogate  # noqa: E402
 from islands.discrepancy.surrogates import SurrogateCase, injection_strengths, make_surrogates  # noqa: E402
 from islands.io.simulator_spec.document import extended_document  # noqa: E402
-from islands.io.simulator_spec.factory import simulation  # noqa: E402
+from islands.io.simulator_spec.factory import make_simulator  # noqa: E402
 
 NAIVE = Path(__file__).parents[1] / "tests" / "support" / "naive_damper.py"
 DATA = Path(os.environ.get("ISLANDS_DATA_DIR", Path(__file__).parents[2] / "shared/data"))
@@ -189,7 +189,7 @@ def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> d
     Effects take turns, each with a misfit of one to three standard deviations of what the best simulation
     leaves, so that it is more than half of what is wrong.
     """
-    core = simulation(case.simulation, found.record)
+    core = make_simulator(case.simulation, found.record)
     source = make_surrogates(found, core, {})
     called = [diagnose_surrogate(source, SurrogateCase(None, seed)).called for seed in range(clean)]
     rng, told = np.random.default_rng(1), []

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.presets import PRESETS
 from islands.evolution.problem import problem
@@ -45,7 +45,7 @@ def error(preset: str, islands: int, samples: int, way: str, seed: int) -> tuple
     settings = replace(PRESETS[preset], generations=generations, **changes)
     settings = replace(settings, population=everybody // settings.islands)
     posed = problem(make_record("bouc-wen-piezo", "authors", "estimation")[:samples], settings)
-    *_, last = SerialEngine().run(posed, founded(settings.islands, seed), lambda: False)
+    *_, last = SerialEngine().run(posed, empty_archipelago(settings.islands, seed), lambda: False)
     best = last.archipelago.hall.best()
     found = [min(entry.fitness for size, entry in best.items() if size <= most) ** 0.5 for most in (6, 99)]
     return found[1], found[0]

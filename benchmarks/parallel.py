@@ -19,8 +19,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from islands.evolution.archipelago import founded
-from islands.evolution.epoch import advance
+from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.epoch import run_epoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import Island
 from islands.evolution.presets import PRESETS
@@ -55,13 +55,13 @@ def seconds(epochs) -> tuple[float, list[float]]:
 
 
 def alone(problem: Problem, index: int) -> float:
-    return seconds(_epochs(problem, founded(2, 0).islands[index]))[0]
+    return seconds(_epochs(problem, empty_archipelago(2, 0).islands[index]))[0]
 
 
 def _epochs(problem: Problem, island: Island):
     evaluator = Evaluator(problem.record, problem.settings)
     while island.generation < problem.settings.generations:
-        island = advance(island, [], evaluator, problem, never).island
+        island = run_epoch(island, [], evaluator, problem, never).island
         yield island
 
 
@@ -88,7 +88,7 @@ def killed(engine, problem: Problem) -> tuple[float, float]:
     took = []
     for disturbed in (False, True):
         began, lost = None, []
-        for count, _ in enumerate(engine.run(problem, founded(2, 0), never)):
+        for count, _ in enumerate(engine.run(problem, empty_archipelago(2, 0), never)):
             if count == 1:
                 began = time.perf_counter()
             # When there is one who stands in; the first two are those that the islands are on.
@@ -106,7 +106,7 @@ def cancelled(engine, problem: Problem, after: float) -> float:
     def stop() -> bool:
         return bool(wished) and wished[0] < time.perf_counter()
 
-    for count, _ in enumerate(engine.run(problem, founded(2, 0), stop)):
+    for count, _ in enumerate(engine.run(problem, empty_archipelago(2, 0), stop)):
         if count == 0:
             wished.append(time.perf_counter() + after)
     return time.perf_counter() - wished[0]
@@ -125,7 +125,7 @@ def main() -> None:
             evaluations = 500 * every * epochs
             single = statistics.fmean(evaluations / alone(problem, island) for island in (0, 1))
             pair = 2 * evaluations / apart(problem)
-            spent, each = seconds(engine.run(problem, founded(2, 0), never))
+            spent, each = seconds(engine.run(problem, empty_archipelago(2, 0), never))
             on_ray = 2 * evaluations / spent
             found[name] = {
                 "one alone, individuals/s": single,
@@ -136,7 +136,7 @@ def main() -> None:
                 "epoch, s": statistics.median(each),
             }
             print(name, json.dumps(found[name]), flush=True)
-        runs = engine.run(posed(22, 6), founded(2, 0), never)
+        runs = engine.run(posed(22, 6), empty_archipelago(2, 0), never)
         for count, _ in enumerate(runs):
             if count == 3:
                 found["memory of all processes, MB"] = memory(os.getpid())

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from service_table import Figure, percentile, run
 
-from islands_service.domain.jobs import Report, Submission
+from islands_service.domain.jobs import ProgressReport, Submission
 from islands_service.store import Store
 from support.service_processes import SPEC, Service, serving
 
@@ -265,7 +265,7 @@ def _tell(service: Service, job: str, sent: dict[int, float]) -> None:
             time.sleep(APART)
             # Known before it can be seen: the report returns when it is durable.
             sent[version + 1 + number] = time.perf_counter()
-            opened.leases.report(lease, Report(_progress(number)))
+            opened.leases.report(lease, ProgressReport(_progress(number)))
 
 
 def _progress(number: int) -> dict[str, Any]:

@@ -10,9 +10,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from islands_api.client import AsyncClient, Client, JobFailed, ServiceError, Unreachable
+    from islands_api.client import AsyncClient, Client, JobFailedError, ServiceError, ServiceUnreachableError
 
-__all__ = ["AsyncClient", "Client", "JobFailed", "ServiceError", "Unreachable"]
+__all__ = ["AsyncClient", "Client", "JobFailedError", "ServiceError", "ServiceUnreachableError"]
 
 
 def __getattr__(name: str) -> Any:

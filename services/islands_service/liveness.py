@@ -11,7 +11,7 @@ from threading import Event, Thread
 EVERY = 0.5
 
 
-def sign_of_life(descriptor: int | None) -> None:
+def send_heartbeat(descriptor: int | None) -> None:
     """Tell the supervisor that this process lives; without a descriptor there is none to tell."""
     if descriptor is not None:
         # A pipe that is full has been told often enough; a supervisor that is gone has taken us with it.
@@ -20,14 +20,14 @@ def sign_of_life(descriptor: int | None) -> None:
 
 
 @contextmanager
-def lifeline(descriptor: int | None) -> Iterator[None]:
+def watch_supervisor(descriptor: int | None) -> Iterator[None]:
     """Give signs of life from a thread of its own, as long as the block lasts."""
     over = Event()
 
     def beat() -> None:
-        sign_of_life(descriptor)
+        send_heartbeat(descriptor)
         while not over.wait(EVERY):
-            sign_of_life(descriptor)
+            send_heartbeat(descriptor)
 
     thread = Thread(target=beat, name="lifeline", daemon=True)
     thread.start()
@@ -38,7 +38,7 @@ def lifeline(descriptor: int | None) -> Iterator[None]:
         thread.join()
 
 
-class Wish:
+class StopRequest:
     """The wish to stop: signal handlers and threads make it, the main thread waits for it.
 
     Not an `Event`: what sets one in a signal handler waits for ever where the signal has interrupted `wait`,
@@ -67,7 +67,7 @@ class Wish:
         return self._made
 
 
-def stop_on_signals(stopping: Wish) -> None:
+def stop_on_signals(stopping: StopRequest) -> None:
     """Turn SIGTERM and Ctrl-C into a wish to stop. Ray takes SIGTERM for itself: call it again after Ray."""
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.make())

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.liveness import Wish, stop_on_signals
+from islands_service.liveness import StopRequest, stop_on_signals
 
 #: Seconds between two looks at the children.
 _LOOK = 0.05
@@ -45,7 +45,7 @@ MISCONFIGURED = 2
 _PR_SET_PDEATHSIG = 1
 
 
-class FolderTaken(IslandsError):
+class DataDirLockedError(IslandsError):
     """Another ``islands serve`` has the data folder."""
 
 
@@ -91,7 +91,7 @@ def folder_lock(folder: Path) -> Iterator[None]:
 
     Raises
     ------
-    FolderTaken
+    DataDirLockedError
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     with (folder / "lock").open("a+") as stream:
@@ -99,7 +99,7 @@ def folder_lock(folder: Path) -> Iterator[None]:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             stream.seek(0)
-            raise FolderTaken(
+            raise DataDirLockedError(
                 f"{folder} belongs to another 'islands serve' (process {stream.read().strip() or '?'}): end "
                 "that, or give another --data-dir"
             ) from None
@@ -124,7 +124,7 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     int
         0, or `MISCONFIGURED` where a child says that it cannot run so, and never has.
     """
-    stopping = Wish()
+    stopping = StopRequest()
     stop_on_signals(stopping)
     # Ray asks whoever talks to it for a token.
     environment = {"RAY_AUTH_TOKEN": secrets.token_hex(16), **environment}

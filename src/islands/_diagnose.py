@@ -8,9 +8,9 @@ from islands.discrepancy.diagnosis import diagnose as diagnosed
 from islands.discrepancy.inference.stepwise_search import Tell, ignore_progress
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.io.simulator_spec.factory import simulation as made
+from islands.io.simulator_spec.factory import make_simulator as made
 from islands.io.simulator_spec.schema import LocalSpec, SimulationSpec
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 
 def diagnose(
@@ -21,7 +21,7 @@ def diagnose(
     columns: Mapping[str, Signal] | None = None,
     seed: int = 0,
     progress: Tell = ignore_progress,
-    spread: Spread = map,
+    spread: ParallelMap = map,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record, why, and what mending it is worth.
 
@@ -40,7 +40,7 @@ def diagnose(
         The same record, simulation and seed give the same diagnosis, bit for bit.
     progress : callable
         Told what is being done.
-    spread : Spread
+    spread : ParallelMap
         Fits the effects, side by side perhaps; the result is the same.
 
     Raises

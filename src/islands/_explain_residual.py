@@ -27,7 +27,7 @@ WORTH = 0.1
 LEFT, SIMULATED = "residual", "simulated"
 
 
-def proposed(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> ResidualFormula | None:
+def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> ResidualFormula | None:
     """Look for a formula of what has no name; None where nothing is left, or none is worth it.
 
     The islands search on the samples that the analysis was fitted to. The locked ones say what it is worth.

@@ -12,8 +12,8 @@ from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import constraint
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import candidates, full_set, library_named
-from islands.search_result import Assessed, Findings, Search, ranked
-from islands.simulation.outcome import Outcome
+from islands.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
+from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 
 #: Samples of a shooting interval, the paper's case 1; a short record takes a tenth of its own.
@@ -87,17 +87,17 @@ def fit(
     warm_up = max(item.maximum_lag for item in pool)
     tell(f"inner products of {len(pool)} candidates", 0.0)
     structures = forward_selection(pool, parts.estimation, constraints, max_terms)
-    if isinstance(structures, Outcome):
+    if isinstance(structures, EvaluationOutcome):
         raise SettingsError(f"nothing can be fitted with these settings: {structures}")
     outcomes: Counter[str] = Counter()
     models = []
     for done, structure in enumerate(structures, start=1):
         estimated = estimate(structure, parts.estimation, constraints, warm_up)
-        if isinstance(estimated, Outcome):
+        if isinstance(estimated, EvaluationOutcome):
             outcomes[estimated.verdict.name.lower()] += 1
             continue
         outcomes["ok"] += 1
-        models.append(Assessed(estimated.model, assess(estimated.model, parts, shooting, warm_up)))
+        models.append(RankedModel(estimated.model, assess(estimated.model, parts, shooting, warm_up)))
         tell(f"model of {estimated.model.size} terms", done / len(structures))
     if not models:
         raise SettingsError(
@@ -105,7 +105,9 @@ def fit(
         )
     rows = sum(max(0, length - warm_up) for length in parts.estimation.segments)
     count = full_set(degree, lags, lags, record.inputs)
-    search = Search(sum(outcomes.values()), dict(outcomes), {"candidates": count, "bytes": 8 * count * rows})
+    search = SearchStatistics(
+        sum(outcomes.values()), dict(outcomes), {"candidates": count, "bytes": 8 * count * rows}
+    )
     settings = {
         "method": "fit",
         "library": library,
@@ -116,4 +118,4 @@ def fit(
         "shooting": shooting,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
-    return Result(Findings(record, parts, seed, settings, search, ranked(models)))
+    return Result(SearchResult(record, parts, seed, settings, search, rank_models(models)))

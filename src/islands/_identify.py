@@ -11,21 +11,21 @@ from islands.data.split import Split, split_data
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine, SerialEngine, Stop
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.individual import regressor_of
-from islands.evolution.presets import settings_of
+from islands.evolution.individual import make_regressor
+from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem, problem
-from islands.evolution.search_state import State, after, ended
+from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set
 from islands.model.model import Model, canonical_order
 from islands.model.regressor import Regressor
-from islands.search_result import Assessed, Findings, Search, ranked
-from islands.simulation.outcome import Outcome
+from islands.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
+from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.metrics import metrics
@@ -37,7 +37,7 @@ FEASIBLE = ("ok", "abandoned")
 _RESIDUALS = 3
 
 #: Called after every epoch.
-Watch = Callable[[State, Settings], None]
+Watch = Callable[[SearchState, Settings], None]
 
 
 def identify(
@@ -48,7 +48,7 @@ def identify(
     seed: int = 0,
     progress: Watch | None = None,
     stop: Stop | None = None,
-    start: State | None = None,
+    start: SearchState | None = None,
     engine: Engine | None = None,
     **changes: Any,
 ) -> Result:
@@ -65,10 +65,10 @@ def identify(
     seed : int
         The same seed gives the same result, bit for bit.
     progress : callable, optional
-        Called with the `State` and the `Settings` after every epoch.
+        Called with the `SearchState` and the `Settings` after every epoch.
     stop : callable, optional
         Asked all the time; once it answers with true the search ends, and the result is the best so far.
-    start : State, optional
+    start : SearchState, optional
         Go on from here, as if never stopped.
     engine : Engine, optional
         Carries out the epochs; the serial one by default.
@@ -82,7 +82,7 @@ def identify(
     RecordError
         The record is too short or incomplete, or the validation data does not fit it.
     """
-    settings = settings_of(
+    settings = resolve_settings(
         preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
     )
     if seed < 0:
@@ -91,15 +91,15 @@ def identify(
     _refuse_short(split.validation, settings)
     posed = problem(split.estimation, settings)
     stop = stop or (lambda: False)
-    state = start or State(founded(settings.islands, seed))
+    state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
         (index, seed) for index in range(settings.islands)
     ]:
         raise SettingsError("the start has other islands than the settings, or another seed: give its own")
     with closing((engine or SerialEngine()).run(posed, state.archipelago, stop)) as epochs:
         # What an engine has done beyond the epoch that ends a run is never asked for: it can't change it.
-        while not (stop() or ended(state, settings)) and (epoch := next(epochs, None)):
-            state = after(state, epoch)
+        while not (stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
+            state = advance(state, epoch)
             if progress is not None:
                 progress(state, settings)
     if state.archipelago.generation < 0:
@@ -112,7 +112,7 @@ def identify(
         )
     described = {"method": "identify", "preset": preset, **asdict(settings)}
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
-    return Result(Findings(record, split, seed, described, _search(state, posed), models))
+    return Result(SearchResult(record, split, seed, described, _search(state, posed), models))
 
 
 def _refuse_short(validation: Dataset, settings: Settings) -> None:
@@ -125,7 +125,7 @@ def _refuse_short(validation: Dataset, settings: Settings) -> None:
         )
 
 
-def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Assessed, ...]:
+def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[RankedModel, ...]:
     """Validate the hall of fame and return the best model of every size, best first.
 
     Candidates are the hall's models as they were estimated, the same refined, and the structures that seeded
@@ -145,9 +145,9 @@ def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Assess
         for _, model in entries:
             assessment = assess(model, split, settings.shooting, settings.maximum_lag)
             if settings.constraints == "none" or assessment.physics.property_1:
-                kept.append(Assessed(model, assessment))
+                kept.append(RankedModel(model, assessment))
                 break
-    return ranked(kept)
+    return rank_models(kept)
 
 
 def _candidates(hall: HallOfFame, posed: Problem) -> list[Model]:
@@ -155,27 +155,27 @@ def _candidates(hall: HallOfFame, posed: Problem) -> list[Model]:
     interval = FITNESSES[settings.fitness](settings.shooting)
     structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall.entries}
     for genes in posed.seeds:
-        found = (item for gene in genes if (item := regressor_of(gene)))
+        found = (item for gene in genes if (item := make_regressor(gene)))
         structures.setdefault(tuple(canonical_order(found)))
     models = []
     for structure in structures:
         estimated = estimate(structure, record, settings.constraints, settings.maximum_lag)
-        if isinstance(estimated, Outcome):
+        if isinstance(estimated, EvaluationOutcome):
             continue
         models.append(estimated.model)
         if settings.refine:
             refined = refine(estimated.model, record, interval, settings.constraints, settings.maximum_lag)
-            if not isinstance(refined, Outcome):
+            if not isinstance(refined, EvaluationOutcome):
                 models.append(refined.model)
     return models
 
 
-def _search(state: State, posed: Problem) -> Search:
+def _search(state: SearchState, posed: Problem) -> SearchStatistics:
     deepest, degree = _reach(state.archipelago.hall)
     inputs = posed.record.inputs
     count = full_set(degree, deepest, deepest, inputs)
     rows = sum(max(0, length - posed.settings.maximum_lag) for length in posed.record.segments)
-    return Search(
+    return SearchStatistics(
         state.evaluations,
         dict(state.outcomes),
         {"candidates": count, "bytes": 8 * count * rows, "degree": degree, "lags": deepest},
@@ -185,7 +185,7 @@ def _search(state: State, posed: Problem) -> Search:
         sum(state.outcomes.get(name, 0) for name in FEASIBLE) / max(1, state.evaluations),
         state.history,
         state.caches,
-        ended(state, posed.settings) or "stopped",
+        stop_reason(state, posed.settings) or "stopped",
     )
 
 

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from islands.data.dataset import Dataset
-from islands.errors import chosen
+from islands.errors import lookup
 from islands.io.export import export
 from islands.io.result_folder import summary, write_result
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
-from islands.search_result import Assessed, Findings
+from islands.search_result import RankedModel, SearchResult
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import Metrics
-from islands.validation.physics import Physics
+from islands.validation.physics import PhysicsChecks
 from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
@@ -32,15 +32,15 @@ class FittedModel:
     ----------
     rank : int
         1 is the best.
-    assessed : Assessed
+    assessed : RankedModel
         The model, and its errors, residual tests and physics.
-    findings : Findings
+    findings : SearchResult
         The result that it belongs to.
     """
 
     rank: int
-    assessed: Assessed
-    findings: Findings
+    assessed: RankedModel
+    findings: SearchResult
 
     @property
     def model(self) -> Model:
@@ -63,7 +63,7 @@ class FittedModel:
         return self.assessed.assessment.metrics
 
     @property
-    def physics(self) -> Physics:
+    def physics(self) -> PhysicsChecks:
         """Cluster sums, holds, minor loops, other amplitudes and rates."""
         return self.assessed.assessment.physics
 
@@ -81,7 +81,7 @@ class FittedModel:
         # Drawing takes half a second to import, and every process of a cluster would wait for it.
         from islands.figures.registry import FIGURES  # noqa: PLC0415
 
-        return chosen(FIGURES, kind, "figure")(self.assessed, self.findings.split)
+        return lookup(FIGURES, kind, "figure")(self.assessed, self.findings.split)
 
     def export(self, kind: str = "python") -> str:
         """Return the model as text: plain, latex, mathml, python, c, matlab or json."""
@@ -95,7 +95,7 @@ class FittedModel:
 class Result:
     """What a search found; models come best first."""
 
-    findings: Findings
+    findings: SearchResult
 
     @property
     def models(self) -> tuple[FittedModel, ...]:
@@ -147,4 +147,4 @@ def simulate(model: Model, record: Dataset, mode: str = "free-run", shooting: in
         The mode is unknown.
     """
     intervals = dict(zip(SIMULATIONS, (1, shooting, None), strict=True))
-    return multiple_shooting(model, record, chosen(intervals, mode, "mode"))
+    return multiple_shooting(model, record, lookup(intervals, mode, "mode"))

@@ -22,7 +22,7 @@ class SettingsError(IslandsError):
     """A setting is out of its range, unknown, or contradicts another one."""
 
 
-def chosen(table: Mapping[str, T], name: str, kind: str) -> T:
+def lookup(table: Mapping[str, T], name: str, kind: str) -> T:
     """Return an entry of a table by name.
 
     Raises

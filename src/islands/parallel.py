@@ -7,7 +7,7 @@ A = TypeVar("A")
 R = TypeVar("R")
 
 
-class Spread(Protocol):
+class ParallelMap(Protocol):
     """Calls a function with each of some arguments; yields what it returns in their order, as `map` does.
 
     `map` itself is one. Others do it on several cores: the result is the same.
@@ -17,7 +17,7 @@ class Spread(Protocol):
         """Call it."""
 
 
-def once(spread: Spread, same: Callable[[A], Hashable]) -> Spread:
+def memoised_map(spread: ParallelMap, same: Callable[[A], Hashable]) -> ParallelMap:
     """Return a spread that remembers what came of its arguments; what is the ``same`` is not done again.
 
     For calls of one function, or of some that return the same.

@@ -9,14 +9,14 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.evolution.history import Progress
+from islands.evolution.history import HistoryPoint
 from islands.model.equations import equation
 from islands.model.model import Model
 from islands.validation.assessment import Assessment
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Assessed:
+class RankedModel:
     """A model and what is known of it."""
 
     model: Model
@@ -24,7 +24,7 @@ class Assessed:
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class SearchStatistics:
     """What a search did.
 
     Attributes
@@ -41,7 +41,7 @@ class Search:
     generations, duplicates, feasible_share
         Of an evolution: generations done, individuals whose structure was that of a parent or a sibling, and
         the share of individuals that got parameters; None for other searches.
-    history : tuple of Progress
+    history : tuple of HistoryPoint
         The course of an evolution, oldest first.
     caches : mapping
         Bytes that every cache of an evolution takes at its end, and its limit.
@@ -56,7 +56,7 @@ class Search:
     generations: int | None = None
     duplicates: int | None = None
     feasible_share: float | None = None
-    history: tuple[Progress, ...] = ()
+    history: tuple[HistoryPoint, ...] = ()
     caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     ended_by: str | None = None
 
@@ -67,7 +67,7 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Findings:
+class SearchResult:
     """All that a result says.
 
     Attributes
@@ -79,20 +79,20 @@ class Findings:
     seed : int
     settings : mapping
         Everything that determines the result, besides the record and the seed.
-    search : Search
-    models : tuple of Assessed
-        Best first, as `ranked` orders them.
+    search : SearchStatistics
+    models : tuple of RankedModel
+        Best first, as `rank_models` orders them.
     """
 
     record: Dataset
     split: Split
     seed: int
     settings: Mapping[str, Any]
-    search: Search
-    models: tuple[Assessed, ...]
+    search: SearchStatistics
+    models: tuple[RankedModel, ...]
 
 
-def ranked(models: Sequence[Assessed]) -> tuple[Assessed, ...]:
+def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:
     """Order models by their free-run error on the validation data, the least first.
 
     Those that diverged there come last, by their one-step-ahead error, and behind them those that diverged
@@ -102,7 +102,7 @@ def ranked(models: Sequence[Assessed]) -> tuple[Assessed, ...]:
     return tuple(sorted(models, key=_key))
 
 
-def _key(entry: Assessed) -> tuple[bool, float, int, str]:
+def _key(entry: RankedModel) -> tuple[bool, float, int, str]:
     errors = entry.assessment.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))
     rmse = errors["one_step_ahead" if diverged else "free_run"].rmse

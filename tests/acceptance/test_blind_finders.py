@@ -15,28 +15,28 @@ from acceptance import test_hidden as checks
 from islands.discrepancy.calibration import preparation
 from islands.discrepancy.effects import CATALOGUE
 from islands.trials.injection.piezo import PIEZO
-from islands.trials.trial import Outcome, Trial
+from islands.trials.trial import Trial, TrialOutcome
 
-Finder = Callable[[Trial], Outcome]
+Finder = Callable[[Trial], TrialOutcome]
 
 
-def said(trial: Trial, *names: str, verdict: str | None = None) -> Outcome:
+def said(trial: Trial, *names: str, verdict: str | None = None) -> TrialOutcome:
     """Return an outcome with given names; of noise it says what there is."""
     noise = ("coloured-noise",) if trial.pole else ()
     found = verdict or ("named" if names or noise else "nothing")
-    return Outcome(
+    return TrialOutcome(
         trial, 1.0, found, names, noise, tuple(() for _ in names), names[:3], 1.0 if names else 0.0
     )
 
 
-def knowing(trial: Trial) -> Outcome:
+def knowing(trial: Trial) -> TrialOutcome:
     """Say what is hidden, and "unknown" where it has no name: no check may fail on that."""
     if any(name in PIEZO.unknown for name in trial.effects):
         return said(trial, verdict="unknown")
     return said(trial, *trial.effects)
 
 
-def silent(trial: Trial) -> Outcome:
+def silent(trial: Trial) -> TrialOutcome:
     return said(trial)
 
 
@@ -44,7 +44,7 @@ def always(name: str) -> Finder:
     return lambda trial: said(trial, name)
 
 
-def permuted(trial: Trial) -> Outcome:
+def permuted(trial: Trial) -> TrialOutcome:
     """Call everything by the next name of the list."""
     known = list(PIEZO.known)
     following = dict(zip(known, known[1:] + known[:1], strict=True))
@@ -52,13 +52,13 @@ def permuted(trial: Trial) -> Outcome:
     return replace(right, named=tuple(following.get(name, known[0]) for name in right.named))
 
 
-def vague(trial: Trial) -> Outcome:
+def vague(trial: Trial) -> TrialOutcome:
     """Name what is hidden, and say that it cannot be told from anything else."""
     right = knowing(trial)
     return replace(right, equivalents=tuple(tuple(PIEZO.known) for _ in right.named))
 
 
-def unsure(trial: Trial) -> Outcome:
+def unsure(trial: Trial) -> TrialOutcome:
     return said(trial, verdict="unknown")
 
 
@@ -98,7 +98,7 @@ CASES = dict(cases())
 
 def failures(finder: Finder, monkeypatch: pytest.MonkeyPatch) -> set[str]:
     """Return the checks that fail with a finder in the place of ours."""
-    monkeypatch.setattr(checks, "carried_out", finder)
+    monkeypatch.setattr(checks, "run_trial", finder)
     failed = set()
     for name, check in CASES.items():
         try:
@@ -113,7 +113,7 @@ def hidden() -> dict[str, tuple[str, ...]]:
     """Return what every check hides."""
     seen: list[Trial] = []
 
-    def watching(trial: Trial) -> Outcome:
+    def watching(trial: Trial) -> TrialOutcome:
         seen.append(trial)
         return knowing(trial)
 

@@ -15,8 +15,8 @@ from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.surrogates import SurrogateCase
 from islands.io.records import write_record
-from islands.parallel import Spread
-from islands.trials.injection.measurement import hide
+from islands.parallel import ParallelMap
+from islands.trials.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures
 
@@ -27,7 +27,7 @@ COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel"
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A record in which the sensor follows a temperature, and what is said of it; no figure is drawn."""
     base = tmp_path_factory.mktemp("diagnosis")
-    hidden = hide(["thermal-drift"], np.random.default_rng(4), seconds=6.0, band=(1.0, 4.0))
+    hidden = inject(["thermal-drift"], np.random.default_rng(4), seconds=6.0, band=(1.0, 4.0))
     write_record(hidden.record, base / "piezo.csv")
     with undrawn_figures():
         succeed(
@@ -103,7 +103,7 @@ def answered(_analyse: object, probes: Sequence[SurrogateCase]) -> Iterator[Surr
 
 
 def quick_self_test(
-    found: Diagnosis, core: Simulator, tolerance: dict, seed: int, _run: Spread, **asked: Any
+    found: Diagnosis, core: Simulator, tolerance: dict, seed: int, _run: ParallelMap, **asked: Any
 ) -> SelfTest:
     return self_test(found, core, tolerance, seed, answered, **asked)
 

@@ -8,7 +8,7 @@ from collections.abc import Container
 import pytest
 
 from islands.trials.injection.piezo import PIEZO
-from islands.trials.trial import Outcome, Trial, carried_out
+from islands.trials.trial import Trial, TrialOutcome, run_trial
 
 #: Seconds of a record at the levels ci and nightly, and of one that is diagnosed in less than a second.
 SECONDS, SHORT = 30.0, 5.0
@@ -34,15 +34,15 @@ def at_its_level(value: object, fast: Container[object] = FAST) -> object:
     return value if value in fast else pytest.param(value, marks=pytest.mark.ci)
 
 
-def outcome(*effects: str, seed: int = SEED, **asked: object) -> Outcome:
+def outcome(*effects: str, seed: int = SEED, **asked: object) -> TrialOutcome:
     """Carry out a trial; every name that is said leaves few others beside it."""
     trial = Trial(effects, seed, seconds=asked.pop("seconds", SECONDS), **asked)  # type: ignore[arg-type]
-    found = carried_out(trial)
+    found = run_trial(trial)
     assert all(len(others) <= ALIKE for others in found.equivalents), found
     return found
 
 
-def is_named(found: Outcome) -> bool:
+def is_named(found: TrialOutcome) -> bool:
     """Whether something was named, and the first name is right or cannot be told from a right one."""
     return found.verdict in ("named", "named with remainder") and found.within_set
 
@@ -108,7 +108,7 @@ def test_a_cause_without_a_name_is_not_passed_over_in_silence(name: str, seconds
     assert outcome(name, seconds=seconds).verdict in ("unknown", "named with remainder")
 
 
-def are_both_named(found: Outcome) -> bool:
+def are_both_named(found: TrialOutcome) -> bool:
     """Whether two names were said, each of which is right or cannot be told from a right one."""
     seen = [{name, *others} for name, others in zip(found.named, found.equivalents, strict=True)]
     return len(seen) == 2 and all(any(name in each for each in seen) for name in found.trial.effects)

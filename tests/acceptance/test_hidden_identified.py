@@ -5,7 +5,7 @@ The model is identified on the record that something is hidden in.
 
 import pytest
 
-from islands.trials.trial import Outcome, Trial, carried_out
+from islands.trials.trial import Trial, TrialOutcome, run_trial
 
 #: Seconds of a record at the nightly level, and of a short one.
 SECONDS, SHORT = 15.0, 6.0
@@ -13,8 +13,10 @@ SECONDS, SHORT = 15.0, 6.0
 ci, nightly = pytest.mark.ci, pytest.mark.nightly
 
 
-def outcome(*effects: str, seed: int, seconds: float, band: tuple[float, float] | None = None) -> Outcome:
-    return carried_out(Trial(effects, seed, band=band, seconds=seconds, core="narx"))
+def outcome(
+    *effects: str, seed: int, seconds: float, band: tuple[float, float] | None = None
+) -> TrialOutcome:
+    return run_trial(Trial(effects, seed, band=band, seconds=seconds, core="narx"))
 
 
 @pytest.mark.parametrize("seconds", [pytest.param(SHORT, marks=ci), pytest.param(SECONDS, marks=nightly)])

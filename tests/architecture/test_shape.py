@@ -10,8 +10,8 @@ import pytest
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import CHARACTERS
-from islands.evolution.migration import EMIGRANTS, REPLACED
+from islands.evolution.island_profiles import ISLAND_PROFILES
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.presets import PRESETS
 from islands.evolution.topology import TOPOLOGIES
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
@@ -80,9 +80,9 @@ def test_a_source_folder_is_not_importable_as_a_package(package: str) -> None:
         EXPORTS,
         READERS,
         TOPOLOGIES,
-        EMIGRANTS,
-        REPLACED,
-        CHARACTERS,
+        SELECTION_POLICIES,
+        REPLACEMENT_POLICIES,
+        ISLAND_PROFILES,
         ENGINES,
     ],
 )

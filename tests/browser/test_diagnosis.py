@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import EXTENDED, REPORT, JobState, Outcome, Report
+from islands_service.domain.jobs import EXTENDED, REPORT, JobOutcome, JobState, ProgressReport
 from islands_service.store.blobs import Blobs
 from support.played import stored
 from support.screen import Screen
@@ -22,11 +22,11 @@ SUMMARY = {"verdict": "named", "effects": ["thermal-drift"], "reduction_percent"
 PAGE = b"<!DOCTYPE html><title>piezo.csv: named</title><h1>piezo.csv against bouc-wen-piezo</h1>"
 
 
-def diagnosed(desk: Service, **summary: Any) -> Outcome:
+def diagnosed(desk: Service, **summary: Any) -> JobOutcome:
     """What a diagnosis brings; its report is on the disk."""
     blobs = Blobs(desk.folder / "blobs")
     artefacts = {REPORT: blobs.write(PAGE), EXTENDED: blobs.write(b"{}")}
-    return Outcome(JobState.SUCCEEDED, {}, summary={**SUMMARY, **summary}, artefacts=artefacts)
+    return JobOutcome(JobState.SUCCEEDED, {}, summary={**SUMMARY, **summary}, artefacts=artefacts)
 
 
 def submitted(desk: Service, **changes: Any) -> str:
@@ -44,7 +44,7 @@ def test_a_diagnosis_is_followed_and_says_what_it_found(
     page = quiet(desk.url).go(f"#/jobs/{job}")
     with stored(desk) as store:
         lease = taken(store, job)
-        store.leases.report(lease, Report({"phase": "looking for each of 32 effects"}))
+        store.leases.report(lease, ProgressReport({"phase": "looking for each of 32 effects"}))
         expect(page.locator(".stand .words")).to_have_text("looking for each of 32 effects")
         store.leases.finish(lease, diagnosed(desk))
     expect(page.locator(".stand .words")).to_have_text("named: thermal-drift")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobOutcome, JobState
 from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen
@@ -56,7 +56,7 @@ def test_a_failure_is_told_in_the_services_words(
 ) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
-        store.leases.finish(taken(store, job), Outcome(JobState.FAILED, problem=PROBLEM))
+        store.leases.finish(taken(store, job), JobOutcome(JobState.FAILED, problem=PROBLEM))
     page = quiet(desk.url).go(f"#/jobs/{job}")
     expect(page.locator(".failure")).to_have_text("The job failed" + PROBLEM["detail"])
     assert page.locator(".failure b").count() == 0
@@ -107,7 +107,7 @@ def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
         page.get_by_role("button", name="Cancel").click()
         expect(page.locator(".title .state")).to_have_text("cancelling")
         expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
-        store.leases.finish(lease, Outcome(JobState.CANCELLED))
+        store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
     expect(page.locator(".title .state")).to_have_text("cancelled")
     expect(page.locator(".stand .words")).to_have_text("10 / 500")
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobOutcome, JobState
 from support.played import advance, stored
 from support.screen import Screen
 from support.service_processes import Service
@@ -36,7 +36,7 @@ def test_a_job_shows_up_and_passes_through_its_states(
         assert bar.evaluate("bar => bar.value") == pytest.approx(0.25)
         best = desk.job(job)["progress"]["best_error"]
         assert row(page, job).locator("td").nth(2).text_content() == f"{best:#.3g}"
-        store.leases.finish(lease, Outcome(JobState.FAILED, problem={"title": "t", "detail": "d"}))
+        store.leases.finish(lease, JobOutcome(JobState.FAILED, problem={"title": "t", "detail": "d"}))
     expect(state).to_have_text("failed")
     expect(page.get_by_role("status")).to_have_text("tank, level 3: failed")
     assert row(page, job).locator("td").last.text_content() == "1"

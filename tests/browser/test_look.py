@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobOutcome, JobState
 from support.played import advance, stored
 from support.reading import unreadable
 from support.screen import Screen
@@ -27,8 +27,8 @@ def places(desk: Service) -> dict[str, str]:
     with stored(desk) as store:
         lease = taken(store, failed)
         advance(store, lease, 0, 100)
-        store.leases.finish(lease, Outcome(JobState.FAILED, problem=problem))
-        store.leases.finish(taken(store, cancelled), Outcome(JobState.CANCELLED))
+        store.leases.finish(lease, JobOutcome(JobState.FAILED, problem=problem))
+        store.leases.finish(taken(store, cancelled), JobOutcome(JobState.CANCELLED))
         advance(store, taken(store, running), 0, 212, islands=8)
     desk.submit(500, name="queued")
     return {"list": "#/jobs", "nothing": "#/jobs?state=succeeded", "failed": failed, "running": running}

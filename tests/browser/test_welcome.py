@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobOutcome, JobState
 from support.command_line import ISLANDS, write_hysteresis
 from support.played import stored
 from support.processes import eventually
@@ -73,7 +73,7 @@ def carried_out(desk: Service) -> Iterator[Any]:
             new = eventually(lambda: set(jobs(desk)) - before or done.done())
             assert new is not True, done.result()
             lease = taken(store, new.pop())
-            store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {}, summary={"equation": "y(k) = 42"}))
+            store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}, summary={"equation": "y(k) = 42"}))
             return done.result()
 
         yield carry_out

@@ -12,8 +12,8 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.epoch import advance, emigrants
+from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.epoch import run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import problem
@@ -86,7 +86,7 @@ def courses():
 def course(name, engine, posed, courses):
     """Every epoch of three islands, never stopped: every engine's is held against every other engine's."""
     if name not in courses:
-        courses[name] = list(engine.run(posed, founded(3, 7), never))
+        courses[name] = list(engine.run(posed, empty_archipelago(3, 7), never))
     return courses[name]
 
 
@@ -106,10 +106,10 @@ def test_epochs_end_where_islands_migrate_and_at_the_last_generation(course):
 def test_an_engine_does_what_the_islands_do_one_by_one(course, posed):
     """The definition: every island by itself, and every island's emigrants handed to the next one."""
     evaluators = [Evaluator(posed.record, posed.settings) for _ in range(3)]
-    islands, leaving = founded(3, 7).islands, [(), (), ()]
+    islands, leaving = empty_archipelago(3, 7).islands, [(), (), ()]
     for epoch in course:
         epochs = [
-            advance(island, [leaving[index - 1]], evaluators[index], posed, never)
+            run_epoch(island, [leaving[index - 1]], evaluators[index], posed, never)
             for index, island in enumerate(islands)
         ]
         islands, leaving = [each.island for each in epochs], [each.emigrants for each in epochs]
@@ -120,11 +120,11 @@ def test_an_engine_does_what_the_islands_do_one_by_one(course, posed):
 @elsewhere(pytest.mark.nightly)
 def test_migration_makes_a_difference(course, engine, posed):
     alone = replace(posed, settings=replace(SETTINGS, topology="isolated"))
-    isolated = archipelagos(engine.run(alone, founded(3, 7), never))
+    isolated = archipelagos(engine.run(alone, empty_archipelago(3, 7), never))
     # Whoever leaves at generation 2 arrives at the beginning of the epoch behind it.
     assert isolated[:2] == archipelagos(course)[:2]
     assert isolated[-1] != course[-1].archipelago
-    assert all(emigrants(island, SETTINGS) for island in course[1].archipelago.islands)
+    assert all(select_migrants(island, SETTINGS) for island in course[1].archipelago.islands)
 
 
 @pytest.mark.parametrize(
@@ -158,10 +158,10 @@ def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, cour
 
 @elsewhere(pytest.mark.nightly)
 def test_an_engine_may_run_twice_and_be_left_between(engine, course, posed):
-    first = engine.run(posed, founded(3, 7), never)
+    first = engine.run(posed, empty_archipelago(3, 7), never)
     assert next(first).archipelago == course[0].archipelago
     first.close()
-    assert archipelagos(engine.run(posed, founded(3, 7), never)) == archipelagos(course)
+    assert archipelagos(engine.run(posed, empty_archipelago(3, 7), never)) == archipelagos(course)
 
 
 def test_from_the_last_epoch_there_is_nothing_to_do(engine, course, posed):
@@ -171,14 +171,14 @@ def test_from_the_last_epoch_there_is_nothing_to_do(engine, course, posed):
 @elsewhere(pytest.mark.nightly)
 def test_more_generations_go_on_where_fewer_ended(engine, course, posed):
     shorter = replace(posed, settings=replace(SETTINGS, generations=4))
-    *_, stopped = engine.run(shorter, founded(3, 7), never)
+    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never)
     assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
 
 
 @elsewhere(pytest.mark.nightly)
 def test_a_run_that_ended_between_two_stops_goes_on_to_the_same_stops(engine, course, posed):
     shorter = replace(posed, settings=replace(SETTINGS, generations=5))
-    *_, stopped = engine.run(shorter, founded(3, 7), never)
+    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never)
     assert stopped.archipelago.generation == 5
     assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
 
@@ -186,15 +186,15 @@ def test_a_run_that_ended_between_two_stops_goes_on_to_the_same_stops(engine, co
 @elsewhere(pytest.mark.ci)
 def test_told_to_stop_an_engine_ends_and_what_it_yielded_stands(engine, course, posed):
     seen = []
-    for epoch in engine.run(posed, founded(3, 7), lambda: len(seen) == 2):
+    for epoch in engine.run(posed, empty_archipelago(3, 7), lambda: len(seen) == 2):
         seen.append(epoch.archipelago)  # noqa: PERF401 - the engine asks while the list grows
     assert seen == archipelagos(course)[:2]
-    assert list(engine.run(posed, founded(3, 7), lambda: True)) == []
+    assert list(engine.run(posed, empty_archipelago(3, 7), lambda: True)) == []
 
 
 @elsewhere(pytest.mark.nightly)
 def test_another_seed_is_another_run(engine, course, posed):
-    other = next(iter(engine.run(posed, founded(3, 8), never))).archipelago
+    other = next(iter(engine.run(posed, empty_archipelago(3, 8), never))).archipelago
     assert [island.population for island in other.islands] != [
         island.population for island in course[0].archipelago.islands
     ]
@@ -239,15 +239,15 @@ def test_what_is_wrong_with_a_problem_comes_out_as_it_is(engine, posed):
         replace(posed, record=Dataset(posed.record.u[:3], posed.record.y[:3], posed.record.dt)),
     ):
         with pytest.raises(RecordError) as raised:
-            list(engine.run(wrong, founded(3, 7), never))
+            list(engine.run(wrong, empty_archipelago(3, 7), never))
         assert type(raised.value) is RecordError
 
 
 @elsewhere(pytest.mark.ci)
 def test_more_islands_than_processors_share_them(engine, posed):
     many = replace(posed, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2))
-    *_, last = engine.run(many, founded(9, 1), never)
+    *_, last = engine.run(many, empty_archipelago(9, 1), never)
     apart = replace(many, settings=replace(many.settings, generations=0))
-    *_, first = engine.run(apart, founded(9, 1), never)
+    *_, first = engine.run(apart, empty_archipelago(9, 1), never)
     assert last.archipelago.generation == 2
     assert len({island.population for island in first.archipelago.islands}) == 9

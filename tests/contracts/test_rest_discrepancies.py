@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from islands_service.domain.jobs import DISCREPANCY, JobState, Outcome, Report
+from islands_service.domain.jobs import DISCREPANCY, JobOutcome, JobState, ProgressReport
 from support.service import HIDDEN, diagnosed, held, hidden, identified, kept, parsed, problem_of, served
 from support.stores import LONG, claimed
 
@@ -267,7 +267,7 @@ def test_a_search_has_no_simulation_to_extend(service):
 
 def test_where_nothing_was_named_there_is_nothing_to_extend(service, order):
     job = submitted(service, **order).json()["id"]
-    found = Outcome(JobState.SUCCEEDED, {"verdict": "nothing"}, summary={"verdict": "nothing"})
+    found = JobOutcome(JobState.SUCCEEDED, {"verdict": "nothing"}, summary={"verdict": "nothing"})
     service.store.leases.finish(claimed(service.store), found)
     detail = problem_of(service.client.get(f"/v1/jobs/{job}/extended"), 404, "not-found")
     assert "found nothing" in detail
@@ -276,7 +276,7 @@ def test_where_nothing_was_named_there_is_nothing_to_extend(service, order):
 def test_before_it_has_ended_it_says_so(service, order):
     job = submitted(service, **order).json()["id"]
     lease = service.store.leases.claim("test", LONG)
-    service.store.leases.report(lease, Report({"phase": "what is left over"}))
+    service.store.leases.report(lease, ProgressReport({"phase": "what is left over"}))
     for of in ("/result", "/report", "/extended"):
         detail = problem_of(service.client.get(f"/v1/jobs/{job}{of}"), 409, "not-finished")
         assert "wait until it has succeeded" in detail

@@ -5,7 +5,7 @@ import json
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from islands_service.domain.jobs import JobState, Report
+from islands_service.domain.jobs import JobState, ProgressReport
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, claimed
 
@@ -113,7 +113,7 @@ def test_metrics_count_jobs_as_they_stand(service):
         queued(service.store)
     lease = claimed(service.store)
     service.store.leases.report(
-        lease, Report({"evaluations_per_second": 120.5, "best_error": 0.25, "generation": 7})
+        lease, ProgressReport({"evaluations_per_second": 120.5, "best_error": 0.25, "generation": 7})
     )
     found = measured(service)
     label = (("job", lease.job.id),)

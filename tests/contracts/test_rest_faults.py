@@ -223,14 +223,14 @@ def test_a_drawing_that_takes_too_long_is_not_begun_again_at_once(drawing, monke
 
 
 def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
-    failures, error = figures.Failures(), figures.DrawingFailed("no")
+    failures, error = figures.FigureFailures(), figures.FigureError("no")
     monkeypatch.setattr(figures, "_REMEMBERED", 2)
     for job in ("a", "b", "a", "c"):
         failures.remember(job, 1, error)
     for job, rank in (("b", 1), ("a", 2), ("a", None)):
         failures.refuse(job, rank)  # forgotten, or never tried
     for job in ("a", "c"):
-        with pytest.raises(figures.DrawingFailed, match="no"):
+        with pytest.raises(figures.FigureError, match="no"):
             failures.refuse(job, 1)
     monkeypatch.setattr(figures, "_REST", 0.0)
     failures.remember("a", 1, error)
@@ -242,9 +242,9 @@ def test_a_process_that_draws_may_take_only_so_much(tmp_path):
     """It reads the files of strangers, too."""
     script = (
         "import resource, sys\n"
-        "from islands_service import drawing\n"
-        "sys.argv = ['drawing', 'job', '--owner', 'local']\n"
-        "assert drawing.main() == 22\n"
+        "from islands_service.reports import figure_worker\n"
+        "sys.argv = ['figure_worker', 'job', '--owner', 'local']\n"
+        "assert figure_worker.main() == 22\n"
         "print(resource.getrlimit(resource.RLIMIT_AS)[0], resource.getrlimit(resource.RLIMIT_CPU)[0])\n"
     )
     environment = {

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from islands_api.web.auth import LOCAL
-from islands_service.domain.jobs import JobState, Report, Submission
+from islands_service.domain.jobs import JobState, ProgressReport, Submission
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
 
@@ -269,7 +269,7 @@ def test_the_course_of_many_islands_comes_in_pages_that_can_be_sent(service):
     asked = {**spec("0-csv"), "settings": {"islands": 256}}
     job, _ = service.store.jobs.submit(Submission(LOCAL, asked))
     points = tuple((at, 60 * at, {"3": 0.5}, (1.0 / 3.0,) * 256) for at in range(400))
-    service.store.leases.report(claimed(service.store), Report({"generation": 399}, points))
+    service.store.leases.report(claimed(service.store), ProgressReport({"generation": 399}, points))
     path, sizes, seen = f"/v1/jobs/{job.id}/history", [], [-1]
     while not sizes or sizes[-1]:
         answer = service.client.get(path, params={"after": seen[-1]})

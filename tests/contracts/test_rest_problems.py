@@ -7,8 +7,8 @@ import pytest
 from fastapi.responses import StreamingResponse
 
 from islands_api.web.problems import PROBLEMS
-from islands_service.store.blobs import NoSuchBlob
-from islands_service.store.database import StoreInDoubt
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.database import CommitUnknownError
 from support.repository import DOCS
 from support.service import PROBLEM, problem_of, queued
 
@@ -36,11 +36,11 @@ def late():
 
 
 async def doubt():
-    raise StoreInDoubt("connection to server at 10.0.0.7 failed: nobody knows whether it was written")
+    raise CommitUnknownError("connection to server at 10.0.0.7 failed: nobody knows whether it was written")
 
 
 async def lost():
-    raise NoSuchBlob("the blob 0 is not in /srv/islands/blobs: restore the data folder from a backup")
+    raise BlobNotFoundError("the blob 0 is not in /srv/islands/blobs: restore the data folder from a backup")
 
 
 async def half():

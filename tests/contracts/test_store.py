@@ -12,9 +12,9 @@ import pytest
 from islands_service.domain.jobs import (
     ACTIVE,
     TERMINAL,
-    IdempotencyConflict,
+    IdempotencyError,
     JobState,
-    QuotaExceeded,
+    QuotaError,
 )
 from islands_service.store import Store
 from support.stores import (
@@ -110,7 +110,7 @@ def test_the_same_key_with_the_same_request_is_the_same_job(store):
 def test_the_same_key_with_another_request_is_refused_and_leaves_the_job(store, change):
     job = submitted(store, idempotency_key="k")
     before = contents(store)
-    with pytest.raises(IdempotencyConflict, match=job.id):
+    with pytest.raises(IdempotencyError, match=job.id):
         submitted(store, idempotency_key="k", **change)
     assert contents(store) == before
 
@@ -154,7 +154,7 @@ def test_many_submitters_with_the_same_key_and_two_requests_get_one_job_and_conf
                 for i in range(MANY)
             ]
         )
-        refused = [answer for answer in answers if isinstance(answer, IdempotencyConflict)]
+        refused = [answer for answer in answers if isinstance(answer, IdempotencyError)]
         taken = [answer for answer in answers if isinstance(answer, tuple)]
         assert (len(refused), len(taken)) == (MANY // 2, MANY // 2)
         assert len({job.id for job, _ in taken}) == 1
@@ -164,7 +164,7 @@ def test_jobs_that_wait_or_run_take_up_the_quota(store):
     job_in(store, JobState.RUNNING)
     submitted(store)
     before = contents(store)
-    with pytest.raises(QuotaExceeded, match="2 jobs are waiting or running, and 2 is the most"):
+    with pytest.raises(QuotaError, match="2 jobs are waiting or running, and 2 is the most"):
         store.jobs.submit(asked(), 2)
     assert contents(store) == before
     assert store.jobs.submit(asked(), 3)[1]
@@ -179,7 +179,7 @@ def test_finished_jobs_take_up_no_quota(store, state):
 
 def test_a_job_that_was_cancelled_or_failed_makes_room_at_once(store):
     waiting = submitted(store)
-    with pytest.raises(QuotaExceeded):
+    with pytest.raises(QuotaError):
         store.jobs.submit(asked(), 1)
     store.jobs.cancel(ALICE, waiting.id)
     assert store.jobs.submit(asked(), 1)[1]
@@ -193,7 +193,7 @@ def test_the_jobs_of_others_take_up_no_quota(store):
 
 
 def test_a_quota_of_nothing_lets_nothing_in(store):
-    with pytest.raises(QuotaExceeded):
+    with pytest.raises(QuotaError):
         store.jobs.submit(asked(), 0)
 
 
@@ -201,7 +201,7 @@ def test_what_is_resumed_takes_up_the_quota_too(store):
     job = submitted(store)
     store.jobs.cancel(ALICE, job.id)
     other = submitted(store)
-    with pytest.raises(QuotaExceeded, match="1 jobs are waiting or running"):
+    with pytest.raises(QuotaError, match="1 jobs are waiting or running"):
         store.jobs.resume(ALICE, job.id, 1)
     assert store.jobs.get(ALICE, job.id).state == JobState.CANCELLED
     store.jobs.cancel(ALICE, other.id)
@@ -219,6 +219,6 @@ def test_many_submitters_at_once_get_exactly_their_quota(database, quota):
         answers = at_once(
             [lambda store=stores[i % 4]: store.jobs.submit(asked(), quota) for i in range(MANY)]
         )
-        refused = [answer for answer in answers if isinstance(answer, QuotaExceeded)]
+        refused = [answer for answer in answers if isinstance(answer, QuotaError)]
         assert len(refused) == MANY - quota
         assert len(stores[0].jobs.page(ALICE).jobs) == quota

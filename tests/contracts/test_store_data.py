@@ -8,9 +8,9 @@ import pytest
 from sqlalchemy import update
 
 from islands.errors import SettingsError
-from islands_service.domain.jobs import TERMINAL, JobState, QuotaExceeded
-from islands_service.store.datasets import DatasetInUse, NoSuchDataset, dataset_id
-from islands_service.store.keys import PREFIX, SCOPES, NoSuchKey
+from islands_service.domain.jobs import TERMINAL, JobState, QuotaError
+from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, dataset_id
+from islands_service.store.keys import PREFIX, SCOPES, KeyNotFoundError
 from islands_service.store.tables import datasets, jobs
 from support.stores import (
     ALICE,
@@ -78,7 +78,7 @@ def test_data_sets_may_have_so_many_bytes_and_no_more(store):
     added(store, ALICE, 1, 600, most_bytes=1000)
     added(store, BOB, 1, 600, most_bytes=1000)
     before = contents(store)
-    with pytest.raises(QuotaExceeded, match=r"0\.0 MB is the most"):
+    with pytest.raises(QuotaError, match=r"0\.0 MB is the most"):
         added(store, ALICE, 2, 401, most_bytes=1000)
     assert contents(store) == before
     assert added(store, ALICE, 3, 400, most_bytes=1000)[1]
@@ -91,7 +91,7 @@ def test_bytes_are_counted_exactly_however_many(store):
     added(store, ALICE, 1, huge)
     added(store, ALICE, 2, huge)
     assert added(store, ALICE, 3, 1, most_bytes=2 * huge + 1)[1]
-    with pytest.raises(QuotaExceeded):
+    with pytest.raises(QuotaError):
         added(store, ALICE, 4, 1, most_bytes=2 * huge + 1)
 
 
@@ -105,7 +105,7 @@ def test_many_uploads_of_the_same_bytes_make_one_data_set(database):
 def test_many_uploads_at_once_get_exactly_the_bytes_that_there_are(database):
     with several(database) as stores:
         answers = at_once([partial(added, stores[i % 4], ALICE, i, 100, most_bytes=550) for i in range(MANY)])
-        assert sum(isinstance(answer, QuotaExceeded) for answer in answers) == MANY - 5
+        assert sum(isinstance(answer, QuotaError) for answer in answers) == MANY - 5
         assert len(stores[0].datasets.page(ALICE)[0]) == 5
 
 
@@ -136,10 +136,10 @@ def test_a_data_set_can_be_deleted_unless_a_job_needs_it(store, state):
     before = contents(store)
     if state in TERMINAL:
         store.datasets.delete(ALICE, dataset.id)
-        with pytest.raises(NoSuchDataset, match=dataset.id):
+        with pytest.raises(DatasetNotFoundError, match=dataset.id):
             store.datasets.get(ALICE, dataset.id)
     else:
-        with pytest.raises(DatasetInUse, match=dataset.id):
+        with pytest.raises(DatasetInUseError, match=dataset.id):
             store.datasets.delete(ALICE, dataset.id)
         assert contents(store) == before
     store.datasets.delete(ALICE, other.id)
@@ -154,7 +154,7 @@ def test_the_job_of_another_does_not_hold_ones_data_set(store):
 
 
 def test_a_data_set_that_is_not_there_cannot_be_deleted(store):
-    with pytest.raises(NoSuchDataset):
+    with pytest.raises(DatasetNotFoundError):
         store.datasets.delete(ALICE, dataset_id(BLOB, ".csv"))
 
 
@@ -205,7 +205,7 @@ def test_a_revoked_key_stays_revoked_since_the_first_time(store):
     assert revoked.revoked >= key.created
     assert store.keys.find(secret) == revoked
     assert store.keys.revoke(key.id) == revoked
-    with pytest.raises(NoSuchKey, match="0000"):
+    with pytest.raises(KeyNotFoundError, match="0000"):
         store.keys.revoke("0000")
 
 

@@ -5,7 +5,7 @@ import threading
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.jobs import JobState, WrongState
+from islands_service.domain.jobs import JobState, JobStateError
 from islands_service.store.leases import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.stores import (
@@ -90,7 +90,7 @@ def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
                 ask = (owner.jobs.cancel, owner.jobs.resume)[turn % 2]
                 try:
                     ask(ALICE, job.id)
-                except WrongState:
+                except JobStateError:
                     continue
 
         def read():

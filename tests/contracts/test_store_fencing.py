@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from islands_service.domain.jobs import JobState, LeaseLost, Report
+from islands_service.domain.jobs import JobState, LeaseLostError, ProgressReport
 from support.stores import (
     ALICE,
     CANCELLED,
@@ -25,7 +25,7 @@ from support.stores import (
 WRITES = {
     "beat": lambda leases, lease: leases.beat(lease, LONG),
     "report": lambda leases, lease: leases.report(lease, brought_on(9)),
-    "progress alone": lambda leases, lease: leases.report(lease, Report({"phase": "search"})),
+    "progress alone": lambda leases, lease: leases.report(lease, ProgressReport({"phase": "search"})),
     "release": lambda leases, lease: leases.release(lease),
     "release of an attempt": lambda leases, lease: leases.release(lease, attempted=True),
     "finish": lambda leases, lease: leases.finish(lease, FOUND),
@@ -95,7 +95,7 @@ def test_who_has_lost_a_job_changes_nothing(store, loss):
     loss(store, lease)
     before = contents(store)
     for write in WRITES.values():
-        with pytest.raises(LeaseLost, match=job.id):
+        with pytest.raises(LeaseLostError, match=job.id):
             write(store.leases, lease)
         assert contents(store) == before
 
@@ -156,7 +156,7 @@ def test_of_two_who_finish_a_job_the_owner_of_the_lease_does(database):
             zombie, successor = at_once([partial(one.leases.finish, old, FOUND), succeed])
             found = one.jobs.get(ALICE, job.id)
             models = one.results.models(job.id)
-            if isinstance(zombie, LeaseLost):
+            if isinstance(zombie, LeaseLostError):
                 assert (found.state, models) == (JobState.FAILED, [])
                 assert kinds(one, job.id) == ["queued", "running", "running", "failed"]
             else:

@@ -6,11 +6,11 @@ from contextlib import suppress
 import pytest
 from sqlalchemy import insert, select, text
 
-from islands_service.domain.jobs import NoSuchJob
+from islands_service.domain.jobs import JobNotFoundError
 from islands_service.store import Store
 from islands_service.store import database as database_module
 from islands_service.store.database import GROUP, StoreError
-from islands_service.store.job_events import change, record
+from islands_service.store.job_events import append_event, update_job
 from islands_service.store.tables import keys
 from support.stores import (
     ALICE,
@@ -27,7 +27,7 @@ from support.stores import (
 )
 
 
-class OwnFault(Exception):
+class OwnFault(Exception):  # noqa: N818
     """What an operation may raise."""
 
 
@@ -46,7 +46,7 @@ def in_one_group(store, actions, reads=0):
 
 
 def touched(connection, job):
-    record(connection, change(connection, job), "touched")
+    append_event(connection, update_job(connection, job), "touched")
 
 
 def test_who_comes_while_others_are_written_shares_their_commit(store):
@@ -108,7 +108,7 @@ def test_what_fails_in_a_group_fails_alone_and_the_others_are_written(store):
     assert len(times) == 2
     assert isinstance(answers[4], OwnFault)
     assert all(isinstance(answer, Exception) for answer in answers[5:7])
-    assert isinstance(answers[7], NoSuchJob)
+    assert isinstance(answers[7], JobNotFoundError)
     assert {each.id for each in store.jobs.page(ALICE).jobs} == {job.id, *new}
     after = contents(store)
     assert after["keys"] == before["keys"]

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from islands_service.domain.jobs import TERMINAL, JobState, Report
+from islands_service.domain.jobs import TERMINAL, JobState, ProgressReport
 from islands_service.store.leases import ATTEMPTS
 from support.stores import (
     ALICE,
@@ -249,7 +249,7 @@ def test_a_checkpoint_is_progress_and_attempts_are_counted_anew(store):
 def test_a_report_without_a_checkpoint_is_no_progress(store):
     submitted(store)
     for _ in range(ATTEMPTS):
-        store.leases.report(claimed(store, EXPIRED), Report({"phase": "starting"}))
+        store.leases.report(claimed(store, EXPIRED), ProgressReport({"phase": "starting"}))
     assert store.leases.claim("another", LONG) is None
 
 

@@ -5,8 +5,8 @@ import time
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.jobs import JobState, NoSuchJob, WrongState
-from islands_service.store.datasets import NoSuchDataset
+from islands_service.domain.jobs import JobNotFoundError, JobState, JobStateError
+from islands_service.store.datasets import DatasetNotFoundError
 from islands_service.store.jobs import PAGE
 from islands_service.store.tables import jobs as jobs_table
 from support.stores import (
@@ -53,7 +53,7 @@ def test_a_state_allows_what_it_allows(store, ask, state):
     job = job_in(store, state)
     before = contents(store)
     if state not in ALLOWED[ask]:
-        with pytest.raises(WrongState, match=f"job {job.id} is {state}: "):
+        with pytest.raises(JobStateError, match=f"job {job.id} is {state}: "):
             getattr(store.jobs, ask)(ALICE, job.id)
         assert contents(store) == before
         return
@@ -150,7 +150,7 @@ def test_a_deleted_job_leaves_nothing_and_no_other_job_loses_anything(store):
     tables = ("jobs", "events", "points", "results", "models", "artefacts")
     assert all(2 * len(after[table]) == len(before[table]) for table in tables)
     assert lease.job.id not in repr(after)
-    with pytest.raises(NoSuchJob, match=lease.job.id):
+    with pytest.raises(JobNotFoundError, match=lease.job.id):
         store.jobs.get(ALICE, lease.job.id)
 
 
@@ -161,7 +161,7 @@ def test_anothers_job_is_no_job_and_stays_as_it_is(store, ask, state):
     before = contents(store)
     messages = []
     for name in (job.id, NOBODYS):
-        with pytest.raises(NoSuchJob) as raised:
+        with pytest.raises(JobNotFoundError) as raised:
             getattr(store.jobs, ask)(ALICE, name)
         messages.append(str(raised.value).replace(name, "?"))
     # It does not even say that there is one.
@@ -176,7 +176,7 @@ def test_nobody_sees_anything_of_another(store):
     assert store.jobs.page(ALICE, QUEUED, (theirs.created + 1, "f" * 32)).jobs == ()
     assert store.datasets.page(ALICE) == ((), None)
     for ask in ("get", "delete"):
-        with pytest.raises(NoSuchDataset, match=dataset.id):
+        with pytest.raises(DatasetNotFoundError, match=dataset.id):
             getattr(store.datasets, ask)(ALICE, dataset.id)
     assert store.datasets.get(BOB, dataset.id) == dataset
 

@@ -5,7 +5,7 @@ import threading
 import pytest
 from sqlalchemy import event
 
-from islands_service.domain.jobs import JobState, LeaseLost, NoSuchJob, Outcome, Report
+from islands_service.domain.jobs import JobNotFoundError, JobOutcome, JobState, LeaseLostError, ProgressReport
 from islands_service.store import leases as leases_module
 from support.stores import (
     ALICE,
@@ -92,10 +92,10 @@ def test_a_reader_never_sees_a_part_of_a_report(database):
 
 
 BROKEN = {
-    "progress": Report({"generation": Unwritable()}, (point(2),), BLOB),
-    "a point's values": Report({"generation": 2}, (point(2), (3, 30, {3: Unwritable()}, ())), BLOB),
-    "the same point twice": Report({"generation": 2}, (point(2), point(2)), BLOB),
-    "a point without a number": Report({"generation": 2}, (point(2), (None, 1, {}, ())), BLOB),
+    "progress": ProgressReport({"generation": Unwritable()}, (point(2),), BLOB),
+    "a point's values": ProgressReport({"generation": 2}, (point(2), (3, 30, {3: Unwritable()}, ())), BLOB),
+    "the same point twice": ProgressReport({"generation": 2}, (point(2), point(2)), BLOB),
+    "a point without a number": ProgressReport({"generation": 2}, (point(2), (None, 1, {}, ())), BLOB),
 }
 
 
@@ -111,31 +111,31 @@ def test_a_report_that_fails_midway_leaves_nothing(store, lease, report):
 
 def test_a_report_without_a_checkpoint_leaves_the_one_that_is_there(store, lease):
     store.leases.report(lease, brought_on(4))
-    told = store.leases.report(lease, Report({"generation": 5}, (point(5),), after=4))
+    told = store.leases.report(lease, ProgressReport({"generation": 5}, (point(5),), after=4))
     assert (told.checkpoint, told.progress) == (brought_on(4).checkpoint, {"generation": 5})
     assert generations(store, lease) == [4, 5]
 
 
 def test_points_take_the_place_of_those_behind_the_generation_that_is_said(store, lease):
     """After a crash the same generations come once more, from the checkpoint on."""
-    store.leases.report(lease, Report({}, tuple(map(point, range(8)))))
-    store.leases.report(lease, Report({}, ((5, 99, {2: 0.25}, (0.25,)), point(6)), after=4))
+    store.leases.report(lease, ProgressReport({}, tuple(map(point, range(8)))))
+    store.leases.report(lease, ProgressReport({}, ((5, 99, {2: 0.25}, (0.25,)), point(6)), after=4))
     assert generations(store, lease) == [0, 1, 2, 3, 4, 5, 6]
     assert store.results.history(lease.job.id, after=4, limit=1) == [[5, 99, {"2": 0.25}, [0.25]]]
-    store.leases.report(lease, Report({}, (point(6),), after=2))
+    store.leases.report(lease, ProgressReport({}, (point(6),), after=2))
     assert generations(store, lease) == [0, 1, 2, 6]
-    store.leases.report(lease, Report({}, (point(3),)))
+    store.leases.report(lease, ProgressReport({}, (point(3),)))
     assert generations(store, lease) == [3]
 
 
 def test_a_report_without_points_leaves_the_history(store, lease):
-    store.leases.report(lease, Report({}, tuple(map(point, range(4)))))
-    store.leases.report(lease, Report({"phase": "refining"}))
+    store.leases.report(lease, ProgressReport({}, tuple(map(point, range(4)))))
+    store.leases.report(lease, ProgressReport({"phase": "refining"}))
     assert generations(store, lease) == [0, 1, 2, 3]
 
 
 def test_history_is_read_from_a_generation_on_and_not_more_than_is_asked_for(store, lease):
-    store.leases.report(lease, Report({}, tuple(map(point, range(0, 20, 2)))))
+    store.leases.report(lease, ProgressReport({}, tuple(map(point, range(0, 20, 2)))))
     assert generations(store, lease) == list(range(0, 20, 2))
     assert generations(store, lease, after=4) == [6, 8, 10, 12, 14, 16, 18]
     assert generations(store, lease, after=5, limit=2) == [6, 8]
@@ -144,7 +144,7 @@ def test_history_is_read_from_a_generation_on_and_not_more_than_is_asked_for(sto
 
 
 def test_what_is_infinite_in_a_history_stays_infinite(store, lease):
-    store.leases.report(lease, Report({}, ((0, 1, {1: float("inf")}, (float("-inf"),)),)))
+    store.leases.report(lease, ProgressReport({}, ((0, 1, {1: float("inf")}, (float("-inf"),)),)))
     assert store.results.history(lease.job.id) == [[0, 1, {"1": float("inf")}, [float("-inf")]]]
 
 
@@ -197,17 +197,17 @@ def test_a_failure_says_why(store, lease):
 
 
 def test_a_cancelled_job_may_have_a_result(store, lease):
-    store.leases.finish(lease, Outcome(JobState.CANCELLED, FOUND.document, FOUND.models))
+    store.leases.finish(lease, JobOutcome(JobState.CANCELLED, FOUND.document, FOUND.models))
     assert store.jobs.get(ALICE, lease.job.id).state == JobState.CANCELLED
     assert len(store.results.models(lease.job.id)) == 2
 
 
 HALVES = {
-    "document": Outcome(JobState.SUCCEEDED, {"a": Unwritable()}, FOUND.models),
-    "a model": Outcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({"a": Unwritable()}, ""))),
-    "a model's file": Outcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({}, None))),
-    "summary": Outcome(JobState.SUCCEEDED, {}, FOUND.models, {"a": Unwritable()}),
-    "an artefact": Outcome(JobState.SUCCEEDED, {}, FOUND.models, artefacts={"a": None}),
+    "document": JobOutcome(JobState.SUCCEEDED, {"a": Unwritable()}, FOUND.models),
+    "a model": JobOutcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({"a": Unwritable()}, ""))),
+    "a model's file": JobOutcome(JobState.SUCCEEDED, {}, (*FOUND.models, ({}, None))),
+    "summary": JobOutcome(JobState.SUCCEEDED, {}, FOUND.models, {"a": Unwritable()}),
+    "an artefact": JobOutcome(JobState.SUCCEEDED, {}, FOUND.models, artefacts={"a": None}),
 }
 
 
@@ -223,7 +223,7 @@ def test_an_end_that_fails_midway_leaves_the_job_running(store, lease, outcome):
 
 def test_what_belongs_to_a_result_comes_with_it_and_is_not_swept_away(store, lease):
     job = lease.job.id
-    whole = Outcome(JobState.SUCCEEDED, {"found": 1}, artefacts={"a": BLOB, "b": "c" * 64})
+    whole = JobOutcome(JobState.SUCCEEDED, {"found": 1}, artefacts={"a": BLOB, "b": "c" * 64})
     store.leases.finish(lease, whole)
     assert [store.results.artefact(job, name) for name in "abc"] == [BLOB, "c" * 64, None]
     assert {BLOB, "c" * 64} <= store.retention.named_blobs()
@@ -231,18 +231,18 @@ def test_what_belongs_to_a_result_comes_with_it_and_is_not_swept_away(store, lea
 
 def test_what_belongs_to_a_result_takes_the_place_of_what_was_there(store, lease):
     job = lease.job.id
-    lease = again(store, lease, Outcome(JobState.CANCELLED, {"old": 1}, artefacts={"a": BLOB, "b": BLOB}))
-    store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {"new": 1}, artefacts={"a": "c" * 64}))
+    lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, artefacts={"a": BLOB, "b": BLOB}))
+    store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"new": 1}, artefacts={"a": "c" * 64}))
     assert [store.results.artefact(job, name) for name in "ab"] == ["c" * 64, None]
 
 
 def test_a_new_result_replaces_all_of_the_old_one(store, lease):
     job = lease.job.id
-    lease = again(store, lease, Outcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
+    lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
     store.results.keep(job, {"pareto.svg": BLOB})
     # What was found before is there to be looked at until something else has been found.
     assert store.results.document(job) == {"old": 1}
-    store.leases.finish(lease, Outcome(JobState.SUCCEEDED, {"new": 1}, (({"fitness": 0.1}, "only"),)))
+    store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"new": 1}, (({"fitness": 0.1}, "only"),)))
     assert store.results.document(job) == {"new": 1}
     assert [each.file for each in store.results.models(job)] == ["only"]
     assert store.results.artefact(job, "pareto.svg") is None
@@ -250,7 +250,7 @@ def test_a_new_result_replaces_all_of_the_old_one(store, lease):
 
 def test_an_end_without_a_result_leaves_the_one_that_is_there(store, lease):
     job = lease.job.id
-    lease = again(store, lease, Outcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
+    lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
     store.results.keep(job, {"pareto.svg": BLOB})
     store.leases.finish(lease, FAILED)
     assert store.results.document(job) == {"old": 1}
@@ -271,9 +271,9 @@ def test_nothing_is_kept_of_a_job_that_is_gone(store, lease):
     store.leases.finish(lease, FOUND)
     store.jobs.delete(ALICE, lease.job.id)
     # Whoever draws a figure may find that the job was deleted meanwhile.
-    with pytest.raises(NoSuchJob, match=lease.job.id):
+    with pytest.raises(JobNotFoundError, match=lease.job.id):
         store.results.keep(lease.job.id, {"a": BLOB})
-    with pytest.raises(LeaseLost):
+    with pytest.raises(LeaseLostError):
         store.leases.report(lease, brought_on(1))
     assert not any(contents(store).values())
 
@@ -282,8 +282,8 @@ def test_what_jobs_bring_does_not_get_mixed_up(store):
     for priority in (2, 1):
         submitted(store, priority=priority)
     first, second = claimed(store), claimed(store)
-    store.leases.report(first, Report({"of": 1}, (point(1),)))
-    store.leases.report(second, Report({"of": 2}, (point(1), point(2))))
+    store.leases.report(first, ProgressReport({"of": 1}, (point(1),)))
+    store.leases.report(second, ProgressReport({"of": 2}, (point(1), point(2))))
     store.results.keep(first.job.id, {"a": "1" * 64})
     store.results.keep(second.job.id, {"a": "2" * 64})
     store.leases.finish(second, FOUND)

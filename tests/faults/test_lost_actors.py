@@ -7,7 +7,7 @@ from threading import Event, Thread
 
 import pytest
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
@@ -33,7 +33,9 @@ def posed():
 
 @pytest.fixture(scope="module")
 def undisturbed(posed):
-    return [exactly(epoch.archipelago) for epoch in SerialEngine().run(posed, founded(3, SEED), never)]
+    return [
+        exactly(epoch.archipelago) for epoch in SerialEngine().run(posed, empty_archipelago(3, SEED), never)
+    ]
 
 
 @pytest.fixture
@@ -52,7 +54,7 @@ def engine(ray_address, told):
 @pytest.mark.ci
 def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine, told):
     found = []
-    for epoch in engine.run(posed, founded(3, SEED), never):
+    for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
         found.append(exactly(epoch.archipelago))
         if len(found) in (2, 4, 6):
             victim = min(actors())
@@ -66,7 +68,7 @@ def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine
 @pytest.mark.nightly
 def test_losing_all_actors_at_once_changes_nothing(posed, undisturbed, engine, told):
     found = []
-    for epoch in engine.run(posed, founded(3, SEED), never):
+    for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
         found.append(exactly(epoch.archipelago))
         if len(found) == 3:
             for pid in actors():
@@ -82,7 +84,7 @@ def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_repla
     import ray
 
     monkeypatch.setattr(actor_pool, "STAND_IN_AFTER", 0.0)
-    found = actor_pool.Crew(posed, 3, told.append)
+    found = actor_pool.IslandActorPool(posed, 3, told.append)
     try:
         everybody = min(3, len(os.sched_getaffinity(0))) + 1
         eventually(lambda: found.tend(at_once=True) and len(found.places) == everybody)
@@ -118,7 +120,7 @@ def test_actors_that_die_again_and_again_end_the_search_with_advice(posed, engin
     murderer.start()
     try:
         with pytest.raises(ClusterError, match="actors were lost and no epoch got done"):
-            list(engine.run(posed, founded(3, SEED), never))
+            list(engine.run(posed, empty_archipelago(3, SEED), never))
     finally:
         over.set()
         murderer.join()
@@ -126,7 +128,7 @@ def test_actors_that_die_again_and_again_end_the_search_with_advice(posed, engin
 
 @pytest.mark.ci
 def test_a_search_that_ends_leaves_no_actor_behind(posed, engine):
-    epochs = engine.run(posed, founded(3, SEED), never)
+    epochs = engine.run(posed, empty_archipelago(3, SEED), never)
     next(epochs)
     assert actors()
     epochs.close()

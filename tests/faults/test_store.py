@@ -6,10 +6,10 @@ from contextlib import closing
 
 import pytest
 
-from islands_service.domain.jobs import Report
+from islands_service.domain.jobs import ProgressReport
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import StoreFull
+from islands_service.store.database import StorageFullError
 from support.disks import filled
 from support.processes import eventually, kill
 from support.stores import (
@@ -45,14 +45,14 @@ with ThreadPoolExecutor(4) as pool:
 
 REPORT = """
 import sys
-from islands_service.domain.jobs import Report
+from islands_service.domain.jobs import ProgressReport
 from islands_service.store import Store
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", 3600.0)
 generation = 0
 while True:
     point = (generation, 10 * generation, {3: 0.5}, (0.5,))
-    report = Report({"generation": generation}, (point,), f"{generation:064x}", generation - 1)
+    report = ProgressReport({"generation": generation}, (point,), f"{generation:064x}", generation - 1)
     store.leases.report(lease, report)
     print(generation, flush=True)
     generation += 1
@@ -164,7 +164,7 @@ def until_full(store, jobs):
     while True:
         try:
             jobs.append(submitted(store, spec={"text": "x" * 20_000}))
-        except StoreFull as error:
+        except StorageFullError as error:
             return error
 
 
@@ -178,9 +178,9 @@ def test_on_a_full_disk_what_was_accepted_is_there_and_the_store_goes_on_when_th
         assert "make room" in str(until_full(store, jobs))
         # All are told, also those who come at once, and nothing half is seen.
         answered = at_once([lambda: submitted(store, spec={"text": "x" * 20_000})] * 8)
-        assert all(isinstance(each, StoreFull) for each in answered)
-        with pytest.raises(StoreFull):
-            store.leases.report(lease, Report({"text": "x" * 50_000}, (), BLOB))
+        assert all(isinstance(each, StorageFullError) for each in answered)
+        with pytest.raises(StorageFullError):
+            store.leases.report(lease, ProgressReport({"text": "x" * 50_000}, (), BLOB))
         assert store.jobs.get(ALICE, job.id) == lease.job
         assert {each.id for each in store.jobs.page(ALICE, limit=200).jobs} == {
             job.id,
@@ -204,7 +204,7 @@ def test_on_a_disk_without_a_single_byte_left_what_was_accepted_can_be_read(disk
     with Store(url) as store:
         job = submitted(store)
         filler = filled(disk)
-        with pytest.raises(StoreFull):
+        with pytest.raises(StorageFullError):
             submitted(store, spec={"text": "x" * 100_000})
         assert store.jobs.get(ALICE, job.id) == job
         filler.unlink()
@@ -217,7 +217,7 @@ def test_on_a_full_disk_a_store_opens_again_when_there_is_room(disk):
         job = submitted(store)
     filler = filled(disk)
     # Its log and the memory that its readers share are files, too.
-    with pytest.raises(StoreFull, match="make room"):
+    with pytest.raises(StorageFullError, match="make room"):
         Store(url)
     filler.unlink()
     with Store(url) as store:
@@ -229,7 +229,7 @@ def test_where_files_may_not_grow_any_more_the_disk_is_called_full(prepared_sqli
     path = shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
     with child(NARROW, f"sqlite:///{path}", "500000") as process:
         *accepted, fault, after = process.communicate(timeout=60)[0].split()
-    assert fault == "StoreFull"
+    assert fault == "StorageFullError"
     assert len(accepted) > 5
     intact(f"sqlite:///{path}")
     with Store(f"sqlite:///{path}") as store:
@@ -241,7 +241,7 @@ def test_on_a_full_disk_blobs_are_refused_and_those_that_are_there_stay(disk):
     kept = blobs.write(b"kept" * 1000)
     filler = filled(disk, leave=100_000)
     for size in (150_000, 10_000_000):
-        with pytest.raises(StoreFull, match="make room"):
+        with pytest.raises(StorageFullError, match="make room"):
             blobs.write(bytes(size))
 
     def receive():
@@ -249,7 +249,7 @@ def test_on_a_full_disk_blobs_are_refused_and_those_that_are_there_stay(disk):
             while True:
                 stream.write(bytes(5000))
 
-    with pytest.raises(StoreFull):
+    with pytest.raises(StorageFullError):
         receive()
     assert [blob for blob, _ in blobs.all()] == [kept]
     small = blobs.write(b"small")

@@ -10,10 +10,10 @@ import time
 
 import pytest
 
-from islands_service.domain.jobs import JobState, LeaseLost
+from islands_service.domain.jobs import JobState, LeaseLostError
 from islands_service.store import Store
-from islands_service.store.database import StoreUnavailable
-from islands_service.store.job_events import change, record
+from islands_service.store.database import StoreUnavailableError
+from islands_service.store.job_events import append_event, update_job
 from support.databases import answers, emptied, server
 from support.processes import eventually
 from support.repository import ROOT
@@ -39,7 +39,7 @@ def test_on_postgresql_a_process_that_stands_still_in_the_middle_of_a_write_lets
             assert eventually(lambda: store.leases.claim("second", LONG)).job.id == job.id
             os.kill(process.pid, signal.SIGCONT)
             # The connection is found dead before the commit, or in it.
-            assert process.stdout.readline().startswith("StoreUnavailable")
+            assert process.stdout.readline().startswith("StoreUnavailableError")
             assert store.jobs.get(ALICE, job.id).progress is None
 
 
@@ -50,14 +50,14 @@ sys.path.insert(0, sys.argv[1])
 from support.databases import server
 from support.stores import ALICE, submitted
 from islands_service.store import Store
-from islands_service.store.database import StoreUnavailable
+from islands_service.store.database import StoreUnavailableError
 def network(state):
     subprocess.run(["ip", "link", "set", "lo", state], check=True)
 def told(ask):
     began = time.monotonic()
     try:
         ask()
-    except StoreUnavailable:
+    except StoreUnavailableError:
         print(time.monotonic() - began, flush=True)
 network("up")
 with server(listen_addresses="127.0.0.1") as far:
@@ -110,10 +110,10 @@ def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mort
         ):
             for _ in range(2):
                 began = time.monotonic()
-                with pytest.raises(StoreUnavailable, match="try again"):
+                with pytest.raises(StoreUnavailableError, match="try again"):
                     ask()
                 assert time.monotonic() - began < 20
-        with pytest.raises(StoreUnavailable):
+        with pytest.raises(StoreUnavailableError):
             Store(mortal.url)
         assert not answers(mortal.url)
         mortal.start()
@@ -131,7 +131,7 @@ def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
             while not over.is_set():
                 try:
                     acknowledged.append(submitted(store).id)
-                except StoreUnavailable:
+                except StoreUnavailableError:
                     failed.append(1)
                     over.wait(0.01)
 
@@ -160,9 +160,9 @@ def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(prepared
 
         def only_read(connection):
             connection.exec_driver_sql("SET TRANSACTION READ ONLY")
-            record(connection, change(connection, job.id), "touched")
+            append_event(connection, update_job(connection, job.id), "touched")
 
-        with pytest.raises(StoreUnavailable):
+        with pytest.raises(StoreUnavailableError):
             store.database.write(only_read)
         assert store.jobs.get(ALICE, job.id).state == JobState.QUEUED
 
@@ -177,7 +177,7 @@ def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebo
         assert store.leases.beat(lease, EXPIRED) is False
         taken = claimed(other)
         assert taken.job.id == lease.job.id
-        with pytest.raises(LeaseLost):
+        with pytest.raises(LeaseLostError):
             store.leases.beat(lease, LONG)
 
 

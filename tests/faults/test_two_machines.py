@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.runtime.cluster import cluster
@@ -29,7 +29,7 @@ def posed():
 
 @pytest.fixture(scope="module")
 def undisturbed(posed):
-    return [exactly(epoch.archipelago) for epoch in SerialEngine().run(posed, founded(4, 5), never)]
+    return [exactly(epoch.archipelago) for epoch in SerialEngine().run(posed, empty_archipelago(4, 5), never)]
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_two_nodes_find_what_one_process_finds_even_if_one_is_lost(head, posed, 
     told, seen = [], []
     with cluster(head.address):
         eventually(lambda: ray.cluster_resources().get("CPU") == 2)
-        for epoch in RayEngine(told.append).run(posed, founded(4, 5), never):
+        for epoch in RayEngine(told.append).run(posed, empty_archipelago(4, 5), never):
             seen.append(exactly(epoch.archipelago))
             if lost and len(seen) == 3:
                 # The machine goes, and all of its processes with it.
@@ -76,6 +76,8 @@ def test_without_a_cpu_it_says_so_and_begins_when_a_machine_joins(head, posed, u
         add(head)
 
     with cluster(head.address):
-        seen = [exactly(epoch.archipelago) for epoch in RayEngine(tell).run(posed, founded(4, 5), never)]
+        seen = [
+            exactly(epoch.archipelago) for epoch in RayEngine(tell).run(posed, empty_archipelago(4, 5), never)
+        ]
     assert told[0].startswith("waiting for capacity: 0 of 1 island actors are ready")
     assert seen == undisturbed

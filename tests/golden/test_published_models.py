@@ -7,12 +7,12 @@ Its parameters are rounded to three digits; with those the record gives 0.3310 /
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.estimation.estimate import Estimated, estimate
+from islands.estimation.estimate import FittedStructure, estimate
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED, published
 from islands.validation.metrics import Metrics, metrics
-from islands.validation.physics import cluster_sums, physics
+from islands.validation.physics import check_physics, cluster_sums
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_the_printed_parameters_reproduce_table_1(records, number, mape, r2):
 def test_estimated_again_under_the_constraints_model_13_is_the_paper_s(records):
     """With all digits the estimation error is Table 1's 0.31189: structure and record are the paper's."""
     estimated = estimate(published("13").model.regressors, records[0], "hysteresis")
-    assert isinstance(estimated, Estimated)
+    assert isinstance(estimated, FittedStructure)
     estimation, validation = errors(estimated.model, records)
     assert estimation.mape == pytest.approx(0.31189, rel=0.002)
     assert validation.mape < 0.2525
@@ -57,7 +57,7 @@ def test_every_published_cluster_sum_meets_its_target(number):
 
 @pytest.mark.parametrize("number", ["12", "13"])
 def test_property_1_holds_for_the_published_models(records, number):
-    checked = physics(published(number).model, records[0])
+    checked = check_physics(published(number).model, records[0])
     assert checked.property_1
     assert len(checked.holds) == 10
     assert checked.hold_drift_percent < 1e-9

@@ -12,7 +12,7 @@ from islands.evolution.hall_of_fame import DEPTH
 from islands.evolution.individual import Individual
 from islands.evolution.island import _bar, _bars, first_generation, step
 from islands.evolution.problem import problem
-from islands.simulation.outcome import Verdict
+from islands.simulation.outcome import Status
 from support.searches import SMALL, exactly, islands_of, record
 
 GENERATIONS = 9
@@ -45,7 +45,7 @@ FAST = (
 
 
 def abandoned(island):
-    return [each for each in island.population if each.outcome.verdict is Verdict.ABANDONED]
+    return [each for each in island.population if each.outcome.verdict is Status.ABANDONED]
 
 
 @cache
@@ -76,7 +76,7 @@ def test_halls_elites_and_genes_are_those_of_a_search_that_abandons_nobody(setti
         assert not abandoned(other)
         # Everybody else is known exactly, and who was abandoned is known to be a model.
         for each, known in zip(one.population, other.population, strict=True):
-            if each.outcome.verdict is Verdict.ABANDONED:
+            if each.outcome.verdict is Status.ABANDONED:
                 assert each == replace(known, theta=(), fitness=inf, outcome=each.outcome)
                 assert known.fitness > one.bar
             else:
@@ -98,7 +98,7 @@ def test_whoever_is_abandoned_is_less_fit_than_the_island_s_bar_and_settles_to_t
         assert all(each.fitness > island.bar for each in settled)
         assert all(each.outcome or "interval" in each.outcome.reason for each in settled)
         # Nobody is in an elite or a hall by less than its fitness.
-        assert all(each.outcome.verdict is not Verdict.ABANDONED for each in island.elite)
+        assert all(each.outcome.verdict is not Status.ABANDONED for each in island.elite)
         assert all(each.fitness < inf for each in island.hall.entries)
 
 

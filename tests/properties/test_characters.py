@@ -9,7 +9,7 @@ from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.individual import Individual
 from islands.evolution.island import Island
-from islands.evolution.island_profiles import CHARACTERS
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
 from support.migrations import (
@@ -21,7 +21,7 @@ from support.migrations import (
 )
 from support.searches import exactly, islands_of
 
-every_character = pytest.mark.parametrize("character", CHARACTERS)
+every_character = pytest.mark.parametrize("character", ISLAND_PROFILES)
 
 #: All that a character may change: not one of these says what an individual means, or what it is worth.
 BREEDING = {"crossover", "mutation", "prune", "tournament", "high_level", "outer", "from_library"}
@@ -29,14 +29,14 @@ BREEDING = {"crossover", "mutation", "prune", "tournament", "high_level", "outer
 
 @every_character
 def test_a_character_changes_only_how_an_island_breeds(character):
-    assert CHARACTERS[character].keys() <= BREEDING
+    assert ISLAND_PROFILES[character].keys() <= BREEDING
 
 
 def test_characters_are_given_out_in_turn():
-    given_out = tuple(CHARACTERS)
+    given_out = tuple(ISLAND_PROFILES)
     posed = Problem(recorded(), replace(SETTINGS, characters=given_out))
     for island in range(3 * len(given_out)):
-        character = CHARACTERS[given_out[island % len(given_out)]]
+        character = ISLAND_PROFILES[given_out[island % len(given_out)]]
         for field in fields(Settings):
             value = getattr(posed.settings_of(island), field.name)
             assert value == character.get(field.name, getattr(posed.settings, field.name)), field.name

@@ -15,7 +15,7 @@ from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.model.rendering import plain
 from islands.program.regressor_matrix import regressor_matrix
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run
 
 
@@ -82,7 +82,7 @@ def test_a_lone_y_keeps_its_parameter_of_one():
 @pytest.mark.parametrize("texts", [["u(k-1)", "u(k-2)"], ["y(k-1)^2", "y(k-2)^2"], ["phi1(u(k-1), u(k-2))"]])
 def test_a_structure_without_y_is_infeasible(texts):
     found = hysteresis(*texts)
-    assert found == Outcome(Verdict.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
+    assert found == EvaluationOutcome(Status.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
     assert "change either as the reason says" in str(found)
 
 
@@ -168,7 +168,9 @@ def test_a_group_that_no_sum_is_wanted_of_sums_to_zero_and_one_alone_in_it_is_le
 
 @pytest.mark.parametrize("sums", [{"c1": 1.0}, {"c0": 1.0, "c2": 0.5}])
 def test_a_structure_that_lacks_a_group_with_a_sum_is_infeasible(sums):
-    assert of_ones_own(**sums).constrain(made("y(k-1)", "y(k-2)")) == Outcome(Verdict.INFEASIBLE, "none")
+    assert of_ones_own(**sums).constrain(made("y(k-1)", "y(k-2)")) == EvaluationOutcome(
+        Status.INFEASIBLE, "none"
+    )
 
 
 def test_the_table_holds_group_and_sums():
@@ -222,7 +224,7 @@ def test_estimating_in_the_null_space_is_constrained_least_squares():
 
 def test_a_library_without_y_cannot_meet_the_constraint():
     found = CONSTRAINTS["hysteresis"].directions(made("u(k-1)", "u(k-2)"))
-    assert found.verdict is Verdict.INFEASIBLE
+    assert found.verdict is Status.INFEASIBLE
     assert "add y(k-1) to the library" in found.reason
 
 

@@ -8,25 +8,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.epoch import emigrants
+from islands.evolution.epoch import select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.island import Island, elite_of
-from islands.evolution.migration import EMIGRANTS
+from islands.evolution.island import Island, select_elite
+from islands.evolution.migration import SELECTION_POLICIES
 from islands.evolution.problem import Problem
 from islands.evolution.rng import Purpose, Stream
 from islands.model.expression import Apply, Lagged, height, walk
-from islands.simulation.outcome import Verdict
+from islands.simulation.outcome import Status
 from support.migrations import SETTINGS, every_emigrants, folk, islands, keys, models, never, recorded
 from support.searches import SMALL, islands_of
 
 
 def test_the_folk_of_these_tests_are_of_all_sorts():
     verdicts = [each.outcome.verdict for each in folk()]
-    assert verdicts.count(Verdict.OK) > 30
-    assert verdicts.count(Verdict.ABANDONED) > 10
+    assert verdicts.count(Status.OK) > 30
+    assert verdicts.count(Status.ABANDONED) > 10
     assert len(set(verdicts)) > 2
 
 
@@ -34,7 +34,7 @@ def test_the_folk_of_these_tests_are_of_all_sorts():
 @given(islands(), st.integers(0, 5))
 def test_emigrants_are_members_with_a_known_fitness_each_structure_once(leave, island, count):
     setting = replace(SETTINGS, emigrants=leave, migrants=count, migrate_every=1)
-    leaving = emigrants(replace(island, generation=4), setting)
+    leaving = select_migrants(replace(island, generation=4), setting)
     assert len(leaving) <= count
     assert all(isfinite(each.fitness) for each in leaving)
     assert len(set(keys(leaving))) == len(leaving)
@@ -47,7 +47,7 @@ def test_nobody_leaves_but_at_a_stop(leave, island):
     setting = replace(SETTINGS, emigrants=leave, migrate_every="3,8:2", elite=1.0)
     island = replace(island, elite=(models()[0],), hall=with_entries(HallOfFame(), models()[:1]))
     leaving = [
-        len(emigrants(replace(island, generation=generation), setting)) for generation in range(-1, 13)
+        len(select_migrants(replace(island, generation=generation), setting)) for generation in range(-1, 13)
     ]
     assert leaving == [int(generation in (3, 6, 8, 10, 12)) for generation in range(-1, 13)]
 
@@ -60,15 +60,15 @@ def test_as_many_leave_as_the_schedule_says(leave):
     assert len(people) > 3
     island = Island(0, 3, 0, people, people, with_entries(HallOfFame(), people))
     setting = replace(SETTINGS, emigrants=leave, migrants="2,9:0,12:3", migrate_every=1)
-    counted = [len(emigrants(replace(island, generation=each), setting)) for each in (8, 9, 11, 12, 99)]
+    counted = [len(select_migrants(replace(island, generation=each), setting)) for each in (8, 9, 11, 12, 99)]
     assert counted == [2, 0, 0, 3, 3]
     many = replace(setting, population=1000, migrants=1000)
-    assert len(emigrants(replace(island, generation=8), many)) == len(people)
+    assert len(select_migrants(replace(island, generation=8), many)) == len(people)
 
 
 @given(islands(), st.integers(1, 5))
 def test_the_best_leave_first(island, count):
-    leaving = EMIGRANTS["best"](island.elite, count, Stream(0, 0, 0, Purpose.EMIGRATION))
+    leaving = SELECTION_POLICIES["best"](island.elite, count, Stream(0, 0, 0, Purpose.EMIGRATION))
     fitness = {each.key: each.fitness for each in island.elite if isfinite(each.fitness)}
     assert [each.fitness for each in leaving] == sorted(fitness.values())[:count]
 
@@ -78,7 +78,7 @@ def test_of_two_that_are_one_model_the_first_leaves(leave):
     one = next(each for each in models() if each.size > 1)
     copy = replace(one, genes=one.genes[::-1])
     assert copy != one
-    leaving = EMIGRANTS[leave]((one, copy), 2, Stream(0, 0, 0, Purpose.EMIGRATION))
+    leaving = SELECTION_POLICIES[leave]((one, copy), 2, Stream(0, 0, 0, Purpose.EMIGRATION))
     assert leaving == (one,)
 
 
@@ -102,8 +102,8 @@ def test_the_front_is_who_nobody_of_the_elite_beats_in_error_and_size(data):
         each.key: replace(each, fitness=error) if error and isfinite(each.fitness) else each
         for each, error in drawn
     }
-    elite = elite_of(people.values(), 20, False)
-    leaving = EMIGRANTS["front"](elite, len(elite), Stream(0, 0, 0, Purpose.EMIGRATION))
+    elite = select_elite(people.values(), 20, False)
+    leaving = SELECTION_POLICIES["front"](elite, len(elite), Stream(0, 0, 0, Purpose.EMIGRATION))
     assert sorted(map(id, leaving)) == sorted(map(id, front_of(elite)))
 
 
@@ -113,18 +113,18 @@ def test_whoever_is_in_the_hall_of_fame_alone_does_not_leave(leave):
     small, *others = sorted(models(), key=lambda each: each.size)
     island = Island(0, 3, 4, (), tuple(others[-3:]), with_entries(HallOfFame(), [small, *others]))
     setting = replace(SETTINGS, emigrants=leave, migrants=3, migrate_every=1)
-    assert set(keys(emigrants(island, setting))) <= set(keys(others[-3:]))
+    assert set(keys(select_migrants(island, setting))) <= set(keys(others[-3:]))
 
 
 @pytest.mark.parametrize("leave", ["random", "front"])
 def test_anyone_may_leave_and_every_place_of_a_run_draws_others(leave):
-    elite = elite_of(models(), len(models()), True)
+    elite = select_elite(models(), len(models()), True)
     elite = (*front_of(elite), *elite[:10])
     pool = {"random": elite, "front": front_of(elite)}[leave]
     assert len(pool) > 3
     setting = replace(SETTINGS, emigrants=leave, migrants=1, migrate_every=1)
     everywhere = [
-        emigrants(Island(index, seed, generation, (), elite, HallOfFame()), setting)[0]
+        select_migrants(Island(index, seed, generation, (), elite, HallOfFame()), setting)[0]
         for index in range(6)
         for seed in range(6)
         for generation in range(1, 7)
@@ -133,15 +133,15 @@ def test_anyone_may_leave_and_every_place_of_a_run_draws_others(leave):
 
 
 def test_the_draws_of_those_who_leave_know_island_generation_and_seed_and_are_their_own():
-    elite = elite_of(models(), 20, True)
+    elite = select_elite(models(), 20, True)
     setting = replace(SETTINGS, emigrants="random", migrants=6, migrate_every=1)
     island = Island(0, 3, 1, (), elite, HallOfFame())
     others = (replace(island, index=1), replace(island, generation=2), replace(island, seed=4))
     # 20 * 19 * .. * 15 orders: no two are the same by chance.
-    assert len({emigrants(each, setting) for each in (island, *others, island)}) == 4
+    assert len({select_migrants(each, setting) for each in (island, *others, island)}) == 4
     for purpose in Purpose:
-        drawn = EMIGRANTS["random"](elite, 6, Stream(3, 0, 1, purpose))
-        assert (drawn == emigrants(island, setting)) == (purpose is Purpose.EMIGRATION)
+        drawn = SELECTION_POLICIES["random"](elite, 6, Stream(3, 0, 1, purpose))
+        assert (drawn == select_migrants(island, setting)) == (purpose is Purpose.EMIGRATION)
 
 
 @pytest.mark.parametrize("structure", ["free", "phi"])
@@ -150,7 +150,7 @@ def test_whoever_leaves_is_made_of_what_the_settings_allow(leave, structure):
     """Variation relies on it: a leaf that reads farther than any of its own may be put under back-shifts."""
     setting = replace(SMALL, emigrants=leave, migrants=9, migrate_every=1, structure=structure)
     for island in islands_of(Evaluator(recorded(), setting), 4)[1:]:
-        leaving = emigrants(island, setting)
+        leaving = select_migrants(island, setting)
         assert leaving
         for gene in chain(*(each.genes for each in leaving)):
             assert height(gene) <= setting.max_height
@@ -170,6 +170,6 @@ def test_a_long_search_breeds_from_the_front_without_a_gene_that_the_settings_fo
         migrants=3,
         generations=40,
     )
-    for epoch in SerialEngine().run(Problem(recorded(), setting), founded(4, 2), never):
+    for epoch in SerialEngine().run(Problem(recorded(), setting), empty_archipelago(4, 2), never):
         last = epoch.archipelago
     assert last.generation == 40

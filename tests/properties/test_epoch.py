@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.epoch import advance, emigrants, immigrated, next_stop
+from islands.evolution.epoch import next_stop, receive_migrants, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island, first_generation, step
@@ -52,7 +52,7 @@ def test_an_epoch_is_its_steps_one_by_one(posed, index):
             infos.append(info)
         assert exactly(epoch.island) == exactly(island)
         assert epoch.steps == tuple(infos)
-        assert epoch.emigrants == emigrants(island, setting)
+        assert epoch.emigrants == select_migrants(island, setting)
         assert len(epoch.emigrants) == 1
 
 
@@ -61,7 +61,7 @@ def test_an_epoch_begins_with_those_who_arrive(posed, replaced):
     posed = replace(posed, settings=replace(posed.settings, replaced=replaced, migrants=6))
     here, there = begun(posed, 0)[1], begun(posed, 1)[1]
     judge = Evaluator(posed.record, posed.settings)
-    arrived = immigrated(here.island, [there.emigrants], judge, posed.settings_of(0))
+    arrived = receive_migrants(here.island, [there.emigrants], judge, posed.settings_of(0))
     assert arrived != here.island
     after = advanced(here.island, posed, [there.emigrants])
     infos = []
@@ -113,7 +113,7 @@ def test_an_epoch_ends_at_the_next_stop_or_with_the_run():
 def test_who_is_told_to_stop_brings_nothing_back(posed, asked):
     founding, first, _ = begun(posed)
     judge, answers = Evaluator(posed.record, posed.settings), iter([False] * (asked - 1) + [True])
-    assert advance(founding.island, [], judge, posed, lambda: next(answers)) is None
+    assert run_epoch(founding.island, [], judge, posed, lambda: next(answers)) is None
     assert list(answers) == []
     # What has been done of the epoch is lost, and harms nobody.
     assert exactly(advanced(founding.island, posed, judge=judge).island) == exactly(first.island)
@@ -122,10 +122,10 @@ def test_who_is_told_to_stop_brings_nothing_back(posed, asked):
 def test_it_is_asked_before_every_generation_and_not_after_the_last(posed):
     founding, first, _ = begun(posed)
     answers = iter([False] * 3)
-    epoch = advance(
+    epoch = run_epoch(
         founding.island, [], Evaluator(posed.record, posed.settings), posed, lambda: next(answers)
     )
     assert list(answers) == []
     assert exactly(epoch.island) == exactly(first.island)
     before_the_first = Island(0, 7, -1, (), (), HallOfFame())
-    assert advance(before_the_first, [], evaluator(), Problem(recorded(), SETTINGS), lambda: True) is None
+    assert run_epoch(before_the_first, [], evaluator(), Problem(recorded(), SETTINGS), lambda: True) is None

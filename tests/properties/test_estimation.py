@@ -21,7 +21,7 @@ from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.program.regressor_matrix import regressor_matrix
-from islands.simulation.outcome import OK, Outcome, Verdict
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from support.regressions import problem, seeds, squares
 
 
@@ -114,7 +114,7 @@ def test_standard_errors_are_the_spread_of_the_estimates(constrained):
 def test_as_many_rows_as_parameters_are_too_few():
     psi, y = problem(5, 4, 4)
     found = least_squares(psi, y)
-    assert found.outcome == Outcome(Verdict.TOO_FEW_ROWS, "4 rows for 4 parameters")
+    assert found.outcome == EvaluationOutcome(Status.TOO_FEW_ROWS, "4 rows for 4 parameters")
     assert np.isnan(found.theta).all()
     assert np.isnan(found.standard_errors).all()
     assert math.isnan(found.residual_variance)
@@ -126,7 +126,7 @@ def test_a_regressor_that_depends_on_others_is_named(estimate):
     psi, y = problem(6, 4)
     psi[2] = psi[0] - 2.0 * psi[1]
     found = estimate(psi, y)
-    assert found.outcome == Outcome(Verdict.SINGULAR, "regressor 3 depends on those before it")
+    assert found.outcome == EvaluationOutcome(Status.SINGULAR, "regressor 3 depends on those before it")
     assert np.isnan(found.theta).tolist() == [True] * 4
 
 
@@ -234,7 +234,7 @@ def test_constraints_that_cannot_be_met_are_outcomes_with_a_reason(S, c, reason,
     # Whatever the regressors' unit.
     psi, y = problem(8, 4)
     found = constrained_least_squares(size * psi, y, np.array(S, float), np.array(c, float))
-    assert found.outcome == Outcome(Verdict.INFEASIBLE, reason)
+    assert found.outcome == EvaluationOutcome(Status.INFEASIBLE, reason)
     assert np.isnan(found.theta).all()
 
 
@@ -245,14 +245,14 @@ def test_a_combination_of_constraints_is_told_from_a_contradiction(seed, contrad
     weights = np.random.default_rng(seed + 2).normal(size=3)
     S, c = np.vstack([S, weights @ S]), np.append(c, weights @ c + 0.01 * contradicts)
     outcome = constrained_least_squares(psi, y, S, c).outcome
-    assert outcome.verdict is Verdict.INFEASIBLE
+    assert outcome.verdict is Status.INFEASIBLE
     assert outcome.reason.endswith("contradicts the others" if contradicts else "others: leave it out")
 
 
 def test_more_constraints_than_terms_are_infeasible():
     psi, y = problem(9, 2)
     found = constrained_least_squares(psi, y, *restriction(9, 3, 2))
-    assert found.outcome.verdict is Verdict.INFEASIBLE
+    assert found.outcome.verdict is Status.INFEASIBLE
     assert found.outcome.reason.endswith("contradicts the others")
 
 

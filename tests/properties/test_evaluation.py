@@ -18,7 +18,7 @@ from islands.evolution.settings import Settings
 from islands.evolution.variation import random_genes
 from islands.model.expression import Constant, Lagged
 from islands.model.parsing import parse
-from islands.simulation.outcome import Verdict
+from islands.simulation.outcome import Status
 from support.searches import SMALL, evolved, record
 
 FREE = Settings(
@@ -139,7 +139,7 @@ def test_who_is_abandoned_has_an_exact_fitness_above_its_bar_and_can_be_settled(
     abandoned = [
         (each, key)
         for each, key in zip(found, population, strict=True)
-        if each.outcome.verdict is Verdict.ABANDONED
+        if each.outcome.verdict is Status.ABANDONED
     ]
     assert bars is not None or not abandoned
     settled = evaluator.settled([each for each, _ in abandoned])

@@ -10,7 +10,7 @@ import pytest
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator, Limits
-from islands.evolution.gene_index import Vocabulary
+from islands.evolution.gene_index import GeneIndex
 from islands.evolution.individual import Individual
 from islands.evolution.island import first_generation, step
 from islands.evolution.rng import Purpose, Stream
@@ -65,7 +65,7 @@ def test_with_its_own_limits_an_evaluator_takes_no_more_memory_however_long_it_i
 def traced():
     """The growth of memory from here on."""
     # A function that no kernel has called yet is compiled, and that is not a gene's.
-    Vocabulary(CONSTRAINTS["none"], [parse("tanh(exp(y(k-1)))")])
+    GeneIndex(CONSTRAINTS["none"], [parse("tanh(exp(y(k-1)))")])
     gc.collect()
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
@@ -90,7 +90,7 @@ FREE = replace(HIGH, constraints="none", structure="free", primitives=("mul", "t
     [pytest.param(HIGH, id="paper", marks=pytest.mark.nightly), pytest.param(FREE, id="free")],
 )
 def test_genes_take_what_a_vocabulary_says(traced, setting):
-    vocabulary = Vocabulary(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
+    vocabulary = GeneIndex(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
     draw = Stream(7, 0, 0, Purpose.INITIAL)
     for _ in range(400):
         vocabulary.number(random_gene(setting, 2, draw))

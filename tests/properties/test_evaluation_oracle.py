@@ -19,7 +19,7 @@ from islands.model.expression import Lagged
 from islands.model.model import Model, canonical_order
 from islands.model.parsing import parse
 from islands.program.regressor_matrix import regressor_matrix
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import multiple_shooting
 from support.searches import distinct_genes, record
 
@@ -75,7 +75,7 @@ def least_pivot(psi, S, c):
     """Of the free directions; those of equilibrated columns, squared."""
     scaled = psi / np.linalg.norm(psi, axis=1, keepdims=True)
     found = null_space(S / np.linalg.norm(psi, axis=1), c)
-    assert not isinstance(found, Outcome)
+    assert not isinstance(found, EvaluationOutcome)
     return np.linalg.svd(scaled.T @ found[1], compute_uv=False).min(initial=1.0) ** 2
 
 
@@ -84,15 +84,15 @@ def expected(genes, pruned, data, setting):
     warm_up = setting.maximum_lag
     regressors = canonical_order(distinct_genes(genes))
     if not regressors:
-        return (), Verdict.INFEASIBLE
+        return (), Status.INFEASIBLE
     *psi, y = regressor_matrix([*regressors, Lagged(0, 0)], data, warm_up)
     psi = np.array(psi)
     if pruned:
         regressors = [regressors[j] for j in pruned_by_columns(psi, y, setting.tolerance)]
         if not regressors:
-            return (), Verdict.INFEASIBLE
+            return (), Status.INFEASIBLE
     constrained = CONSTRAINTS[setting.constraints].constrain(regressors)
-    if isinstance(constrained, Outcome):
+    if isinstance(constrained, EvaluationOutcome):
         return None, constrained.verdict
     regressors = constrained.regressors
     psi = regressor_matrix(regressors, data, warm_up)
@@ -121,7 +121,7 @@ def held_against_the_oracle(individuals, data, setting):
         except DoubtError as doubt:
             seen[doubt.where] += 1
             continue
-        if isinstance(rest, Verdict):
+        if isinstance(rest, Status):
             assert found.outcome.verdict is rest
             assert (found.fitness, found.theta) == (np.inf, ())
             seen[rest.name] += 1
@@ -134,7 +134,7 @@ def held_against_the_oracle(individuals, data, setting):
         # Of the parameters as many digits are known as their squares have left; a simulation may lose two.
         close = min(max(1e-14 / pivot, 1e-12), 2e-5)
         if not simulated.outcome:
-            assert found.outcome.verdict is Verdict.DIVERGED
+            assert found.outcome.verdict is Status.DIVERGED
             seen["DIVERGED"] += 1
             continue
         assert found.outcome
@@ -243,7 +243,7 @@ def test_a_regressor_that_is_zero_on_the_record_is_singular_and_pruning_removes_
     texts = ("y(k-1)", "u(k-1)", "u(k-9)")
     assert not regressor_matrix([Lagged(1, 9)], late, SETTINGS.maximum_lag).any()
     whole = evaluated(*texts, data=late, constraints=constraints)
-    assert whole.outcome.verdict is Verdict.SINGULAR
+    assert whole.outcome.verdict is Status.SINGULAR
     pruned = evaluated(*texts, data=late, constraints=constraints, pruned=True, tolerance=0.0)
     assert pruned.outcome
     assert pruned.key == (("y(k-1)", "u1(k-1)") if constraints == "none" else ("y(k-1)",))
@@ -252,7 +252,7 @@ def test_a_regressor_that_is_zero_on_the_record_is_singular_and_pruning_removes_
 def test_without_y_at_rest_the_constraint_cannot_be_met():
     for texts in (("u(k-1)",), ("u(k-1)", "u(k-2)"), ("y(k-1)*y(k-2)", "y(k-3)*y(k-1)")):
         found = evaluated(*texts)
-        assert found.outcome.verdict is Verdict.INFEASIBLE
+        assert found.outcome.verdict is Status.INFEASIBLE
         assert found.outcome.reason == "no regressor is y at rest: add y(k-1)" or found.size == 0
         assert evaluated(*texts, constraints="none").outcome
 
@@ -264,7 +264,7 @@ def test_regressors_that_depend_on_each_other_are_singular_and_pruning_may_help(
     texts = ["y(k-1)", *(f"u(k-{lag})" for lag in range(1, 8))]
     assert evaluated(*texts[: 1 + most], **setting).outcome
     found = evaluated(*texts[: 2 + most], **setting)
-    assert found.outcome.verdict is Verdict.SINGULAR
+    assert found.outcome.verdict is Status.SINGULAR
     assert found.outcome.reason == "the free directions depend on each other"
     assert (found.size, found.fitness, found.theta) == (2 + most, np.inf, ())
     pruned = evaluated(*texts, pruned=True, **setting)
@@ -277,7 +277,7 @@ def test_no_more_rows_than_parameters_are_too_few():
     for rows in (1, 2, 3, 4, 5):
         for constraints in ("none", "hysteresis"):
             found = evaluated(*texts, constraints=constraints, data=record(16 + rows))
-            assert found.outcome.verdict is Verdict.TOO_FEW_ROWS
+            assert found.outcome.verdict is Status.TOO_FEW_ROWS
             assert (found.fitness, found.theta) == (np.inf, ())
     assert evaluated(*texts, constraints="none", data=record(16 + 30)).outcome
 
@@ -287,7 +287,7 @@ def test_what_overflows_on_the_record_has_diverged():
     huge = Dataset(1e160 * data.u, data.y, data.dt)
     for pruned in (False, True):
         found = evaluated("y(k-1)", "u(k-1)*u(k-2)", data=huge, constraints="none", pruned=pruned)
-        assert found.outcome.verdict is Verdict.DIVERGED
+        assert found.outcome.verdict is Status.DIVERGED
         assert found.outcome.reason == "a regressor overflows on the record"
         assert found.size == 2
 
@@ -299,7 +299,7 @@ def test_no_genes_at_all_are_infeasible_pruned_or_not():
                 evaluator = Evaluator(record(), replace(SETTINGS, constraints=constraints))
                 (found,), _ = evaluator.evaluate([(Individual(genes), pruned)])
                 assert (found.outcome.verdict, found.outcome.reason) == (
-                    Verdict.INFEASIBLE,
+                    Status.INFEASIBLE,
                     "no gene is left",
                 )
                 assert (found.genes, found.regressors) == (genes, ())

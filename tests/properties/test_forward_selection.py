@@ -11,12 +11,12 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset, join
-from islands.estimation.estimate import Estimated, estimate
+from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.model.candidate_library import candidates
 from islands.model.rendering import plain
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.physics import cluster_sums
 
 LAGS = 3
@@ -162,7 +162,7 @@ def test_under_the_hysteresis_constraint_every_estimated_structure_meets_it(name
     assert len(found) >= 4
     for structure in found:
         estimated = estimate(structure, data, "hysteresis", LAGS)
-        assert isinstance(estimated, Estimated)
+        assert isinstance(estimated, FittedStructure)
         # Nothing that was selected is dropped again.
         assert estimated.model.regressors == structure
         sums = {entry.cluster: entry.sum for entry in cluster_sums(estimated.model)}
@@ -185,8 +185,8 @@ def test_selecting_under_the_constraint_beats_repairing_a_free_selection():
 def test_a_library_that_cannot_meet_the_constraint_is_an_outcome():
     without = [item for item in library("phi-polynomial", 2) if plain(item.expression) != "y(k-1)"]
     found = forward_selection(without, measured(), "hysteresis")
-    assert isinstance(found, Outcome)
-    assert found.verdict is Verdict.INFEASIBLE
+    assert isinstance(found, EvaluationOutcome)
+    assert found.verdict is Status.INFEASIBLE
     assert found.reason == "no candidate is y at rest: add y(k-1) to the library"
 
 
@@ -251,16 +251,16 @@ def test_a_warm_up_leaves_the_rows_before_it_out():
 
 @pytest.mark.parametrize(
     ("samples", "constraints", "verdict"),
-    [(10, "none", Verdict.TOO_FEW_ROWS), (400, "none", Verdict.SINGULAR), (400, "hysteresis", Verdict.OK)],
+    [(10, "none", Status.TOO_FEW_ROWS), (400, "none", Status.SINGULAR), (400, "hysteresis", Status.OK)],
 )
 def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
     # u(k-1), u(k-2) and their difference depend on each other; the constraint drops the lone u(k-1)*y(k-1).
     names = ["y(k-1)", "u(k-1) - u(k-2)", "u(k-1)", "u(k-2)", "1", "u(k-3)", "u(k-3)^2", "y(k-1)*u(k-1)"]
-    if verdict is Verdict.OK:
+    if verdict is Status.OK:
         names = ["y(k-1)", "u(k-1) - u(k-2)", "y(k-1)*u(k-1)"]
     terms = islands.model_of([(islands.parse(text), 1.0) for text in names]).regressors
     found = estimate(terms, measured(samples=samples), constraints)
-    if verdict is Verdict.OK:
+    if verdict is Status.OK:
         assert texts(found.model.regressors) == ["y(k-1)", "u(k-1) - u(k-2)"]
     else:
         assert found.verdict is verdict
@@ -269,4 +269,4 @@ def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
 
 def test_a_structure_without_y_cannot_be_estimated_under_the_constraint():
     terms = islands.model_of([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
-    assert estimate(terms, measured(), "hysteresis").verdict is Verdict.INFEASIBLE
+    assert estimate(terms, measured(), "hysteresis").verdict is Status.INFEASIBLE

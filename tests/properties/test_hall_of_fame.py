@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.hall_of_fame import DEPTH, HallOfFame, front, merge, with_entries
-from islands.evolution.individual import Individual, regressor_of
+from islands.evolution.hall_of_fame import DEPTH, HallOfFame, merge, pareto_front, with_entries
+from islands.evolution.individual import Individual, make_regressor
 from islands.model.expression import Lagged, Shift
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
@@ -30,7 +30,7 @@ def individuals(draw):
         # u(k-3) is also q2(u(k-1)): one structure, written in two ways.
         shift = draw(st.integers(0, leaf.lag - 1))
         genes.append(Shift(shift, Lagged(leaf.channel, leaf.lag - shift)) if shift else leaf)
-    regressors = tuple(canonical_order(regressor_of(gene) for gene in genes))
+    regressors = tuple(canonical_order(make_regressor(gene) for gene in genes))
     theta = tuple(draw(st.sampled_from([-1.0, 0.5, 1.0])) for _ in regressors)
     return Individual(tuple(genes), regressors, theta, draw(st.sampled_from(FITNESSES)))
 
@@ -101,7 +101,7 @@ def test_it_keeps_the_best_of_every_size_each_structure_once(found):
 
 
 single = st.tuples(st.sampled_from(LEAVES), st.sampled_from(FITNESSES)).map(
-    lambda drawn: Individual((drawn[0],), (regressor_of(drawn[0]),), (1.0,), drawn[1])
+    lambda drawn: Individual((drawn[0],), (make_regressor(drawn[0]),), (1.0,), drawn[1])
 )
 
 
@@ -138,7 +138,7 @@ def test_the_places_are_counted_within_a_size(hall):
 
 @given(halls)
 def test_the_front_gets_better_with_every_term(hall):
-    best = front(hall.entries)
+    best = pareto_front(hall.entries)
     assert all(one.size < other.size and one.fitness > other.fitness for one, other in pairwise(best))
     for entry in hall.entries:
         assert min(each.fitness for each in best if each.size <= entry.size) <= entry.fitness
@@ -150,7 +150,7 @@ def test_the_front_gets_better_with_every_term(hall):
 
 def entry(fitness, *texts, theta=None):
     genes = tuple(parse(text) for text in texts)
-    regressors = tuple(canonical_order(regressor_of(gene) for gene in genes))
+    regressors = tuple(canonical_order(make_regressor(gene) for gene in genes))
     return Individual(genes, regressors, theta or (1.0,) * len(genes), fitness)
 
 
@@ -189,6 +189,6 @@ def test_a_larger_model_that_is_no_better_is_off_the_front():
         HallOfFame(),
         [entry(1.0, "y(k-1)"), entry(1.0, "y(k-1)", "u(k-1)"), entry(0.5, "y(k-1)", "y(k-2)", "u(k-1)")],
     )
-    assert [each.size for each in front(hall.entries)] == [1, 3]
+    assert [each.size for each in pareto_front(hall.entries)] == [1, 3]
     assert sorted(hall.best()) == [1, 2, 3]
-    assert front(()) == ()
+    assert pareto_front(()) == ()

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, regressor_of
-from islands.evolution.island import elite_of, first_generation, step
+from islands.evolution.individual import Individual, make_regressor
+from islands.evolution.island import first_generation, select_elite, step
 from islands.evolution.problem import problem
 from islands.io.checkpoints import write_checkpoint
 from islands.model.expression import Lagged
@@ -32,7 +32,7 @@ def digest():
     setting = replace(
         SMALL, structure="increment", characters=("plain", "recombiner"), **library, **migration
     )
-    for epoch in SerialEngine().run(problem(record(), setting), founded(2, 11), lambda: False):
+    for epoch in SerialEngine().run(problem(record(), setting), empty_archipelago(2, 11), lambda: False):
         last = epoch.archipelago
     assert last.generation == 10
     with tempfile.TemporaryDirectory() as folder:
@@ -255,17 +255,17 @@ def test_the_elite_is_the_best_of_old_elite_and_offspring(distinct):
 
 def test_ties_for_the_elite_go_to_the_smaller_then_to_the_structure_s_text():
     def each(*texts):
-        regressors = tuple(regressor_of(parse(text)) for text in texts)
+        regressors = tuple(make_regressor(parse(text)) for text in texts)
         return Individual(tuple(map(parse, texts)), regressors, (1.0,) * len(texts), 0.5)
 
     large, late, early = each("y(k-1)", "u(k-1)"), each("y(k-3)"), each("y(k-2)")
-    assert elite_of((large, late, early), 3, False) == (early, late, large)
-    assert elite_of((large, late, early, early), 2, False) == (early, early)
-    assert elite_of((large, late, early, early), 2, True) == (early, late)
+    assert select_elite((large, late, early), 3, False) == (early, late, large)
+    assert select_elite((large, late, early, early), 2, False) == (early, early)
+    assert select_elite((large, late, early, early), 2, True) == (early, late)
 
 
 def finite(fitness, text="y(k-1)"):
-    return Individual((parse(text),), (regressor_of(parse(text)),), (1.0,), fitness)
+    return Individual((parse(text),), (make_regressor(parse(text)),), (1.0,), fitness)
 
 
 def test_a_failure_never_enters_the_hall_of_fame_and_is_last_in_anelite_of():

@@ -24,12 +24,12 @@ from islands_service.domain.jobs import (
     ACTIVE,
     RESUMABLE,
     TERMINAL,
-    IdempotencyConflict,
+    IdempotencyError,
+    JobNotFoundError,
     JobState,
-    LeaseLost,
-    NoSuchJob,
-    QuotaExceeded,
-    WrongState,
+    JobStateError,
+    LeaseLostError,
+    QuotaError,
 )
 from islands_service.store import Store
 from islands_service.store import leases as leases_module
@@ -102,9 +102,9 @@ class Machine(RuleBasedStateMachine):
         submission = asked(owner, priority=priority, idempotency_key=key)
         before = [name for name, each in self.jobs.items() if key and (each.owner, each.key) == (owner, key)]
         refused = (
-            IdempotencyConflict
+            IdempotencyError
             if before and self.jobs[before[0]].priority != priority
-            else QuotaExceeded
+            else QuotaError
             if not before and quota is not None and len(self.of(owner, *ACTIVE)) >= quota
             else None
         )
@@ -145,7 +145,7 @@ class Machine(RuleBasedStateMachine):
         known = self.jobs.get(lease.job.id)
         if known is not None and known.state == JobState.RUNNING and known.epoch == lease.epoch:
             return write(), known
-        with pytest.raises(LeaseLost):
+        with pytest.raises(LeaseLostError):
             write()
         return None, None
 
@@ -191,9 +191,9 @@ class Machine(RuleBasedStateMachine):
         """Ask as an owner; return what is known of the job if it is theirs and its state allows that."""
         known = self.jobs.get(job)
         wrong = (
-            NoSuchJob
+            JobNotFoundError
             if known is None or known.owner != owner
-            else WrongState
+            else JobStateError
             if known.state not in states
             else None
         )

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.gene_structure import phi
-from islands.evolution.individual import Individual, regressor_of
+from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.island import first_generation, step
 from islands.evolution.problem import problem
 from islands.evolution.rng import Purpose, Stream
@@ -284,4 +284,4 @@ def test_a_phi_function_is_mended_as_in_figure_3(broken, mended):
 def test_the_figure_s_term_is_the_paper_s():
     """Figure 3: "to form the model term phi(u(k-2), u(k-5))"."""
     mended = phi(parse("phi1(q1(u(k-1)*y(k-1)), q4(y(k-1)))"))
-    assert regressor_of(mended).text == "u1(k-2) - u1(k-5)"
+    assert make_regressor(mended).text == "u1(k-2) - u1(k-5)"

@@ -4,7 +4,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.engine import SerialEngine
-from islands.evolution.presets import settings_of
+from islands.evolution.presets import resolve_settings
 
 SMALL = (
     "--population",
@@ -22,7 +22,7 @@ SMALL = (
 STEPWISE = (*SMALL, "--migrate-every", "1")
 TWO = (*STEPWISE, "--islands", "2", "--engine", "serial")
 COLUMNS = ("--input", "u_V", "--output", "y_um")
-DEEPEST = settings_of("hysteresis", {"max_height": 12}).maximum_lag
+DEEPEST = resolve_settings("hysteresis", {"max_height": 12}).maximum_lag
 
 
 def record(samples=700, seed=0, dt=0.01):

@@ -5,13 +5,13 @@ from itertools import pairwise
 
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.individual import Individual
 from islands.evolution.problem import Problem
 from islands.evolution.schedule import Schedule
 from islands.evolution.topology import topology
-from islands_service.runtime.epoch_scheduler import AHEAD, Itinerary, Leg
+from islands_service.runtime.epoch_scheduler import AHEAD, EpochScheduler, EpochTask
 from support.searches import SMALL, record
 from support.strategies import layouts, schedule_text, schedules
 
@@ -38,7 +38,7 @@ def posed(text="ring", islands=3, pieces=((0, 4),), generations=10):
 
 def itinerary(ahead=AHEAD, **changes):
     made = posed(**changes)
-    return Itinerary(made, founded(made.settings.islands, SEED), as_it_is, ahead)
+    return EpochScheduler(made, empty_archipelago(made.settings.islands, SEED), as_it_is, ahead)
 
 
 @st.composite
@@ -67,11 +67,14 @@ def in_lock_step(problem_, ends, first=-1):
     """Every epoch of all islands, one after the other: what must come out."""
     islands = problem_.settings.islands
     sources = topology(problem_.settings.topology, islands, SEED).sources
-    epochs = [IslandEpoch(replace(each, generation=first), (), ()) for each in founded(islands, SEED).islands]
+    epochs = [
+        IslandEpoch(replace(each, generation=first), (), ())
+        for each in empty_archipelago(islands, SEED).islands
+    ]
     for begin, end in pairwise(ends):
         epochs = [
             carried(
-                Leg(island, begin, end),
+                EpochTask(island, begin, end),
                 epochs[island].island,
                 [bred(epochs[source]) for source in sources[island]],
             )
@@ -88,7 +91,9 @@ class Voyage:
 
     def __init__(self, problem_, ends, ahead, start=None):
         self.ends, self.ahead = ends, ahead
-        self.plan = Itinerary(problem_, start or founded(problem_.settings.islands, SEED), as_it_is, ahead)
+        self.plan = EpochScheduler(
+            problem_, start or empty_archipelago(problem_.settings.islands, SEED), as_it_is, ahead
+        )
         self.sources = topology(problem_.settings.topology, problem_.settings.islands, SEED).sources
         self.out, self.held, self.done = [], {}, []
         self.sent = []
@@ -167,4 +172,6 @@ orders = st.randoms(use_true_random=False)
 
 
 def epoch_of(leg):
-    return IslandEpoch(replace(founded(leg.island + 1, SEED).islands[-1], generation=leg.end), (), ())
+    return IslandEpoch(
+        replace(empty_archipelago(leg.island + 1, SEED).islands[-1], generation=leg.end), (), ()
+    )

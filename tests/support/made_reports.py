@@ -5,7 +5,7 @@ from dataclasses import replace
 from islands.benchmark.comparison import Comparison
 from islands.benchmark.full_runs import Run
 from islands.benchmark.machine import Machine
-from islands.benchmark.report import Report
+from islands.benchmark.report import BenchmarkReport
 from islands.benchmark.scaling import Scaling, against_islands
 
 KINDS = ("poly", "general", "gp")
@@ -34,7 +34,7 @@ def report(**changes):
         for name in ("samples", "terms", "tree_size")
     )
     islands = against_islands({1: (run,), 2: (run, run)})
-    made = Report(
+    made = BenchmarkReport(
         quick=False,
         workload="ab" * 32,
         samples=100_000,

@@ -8,12 +8,12 @@ from math import isfinite
 import pytest
 from hypothesis import strategies as st
 
-from islands.evolution.epoch import advance
+from islands.evolution.epoch import run_epoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.individual import Individual
-from islands.evolution.island import Island, elite_of
-from islands.evolution.migration import EMIGRANTS, REPLACED
+from islands.evolution.island import Island, select_elite
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from support.searches import SMALL, islands_of, record
 
 #: Individuals fail now and then, and copies get into the elite.
@@ -28,8 +28,8 @@ SETTINGS = replace(
     primitives=("mul", "phi1", "phi2", "tanh", "cube"),
 )
 
-every_emigrants = pytest.mark.parametrize("leave", EMIGRANTS)
-every_replaced = pytest.mark.parametrize("replaced", REPLACED)
+every_emigrants = pytest.mark.parametrize("leave", SELECTION_POLICIES)
+every_replaced = pytest.mark.parametrize("replaced", REPLACEMENT_POLICIES)
 
 
 def never():
@@ -73,7 +73,7 @@ def islands(draw, distinct=False):
     """An island in the middle of a run, in whose elite and population are models and failures, and copies."""
     several = st.lists(st.sampled_from(folk()), min_size=SETTINGS.population, max_size=SETTINGS.population)
     population, others = draw(several), draw(several)
-    elite = elite_of(others[: draw(st.integers(1, 6))], SETTINGS.elites, distinct)
+    elite = select_elite(others[: draw(st.integers(1, 6))], SETTINGS.elites, distinct)
     index, generation = draw(st.integers(0, 9)), draw(st.integers(0, 12))
     return Island(index, 3, generation, tuple(population), elite, with_entries(HallOfFame(), others), 1.0)
 
@@ -86,4 +86,4 @@ def arrivals(draw):
 
 
 def advanced(island, posed, arriving=(), judge=None):
-    return advance(island, arriving, judge or Evaluator(posed.record, posed.settings), posed, never)
+    return run_epoch(island, arriving, judge or Evaluator(posed.record, posed.settings), posed, never)

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from math import sqrt
 from typing import Any
 
-from islands_service.domain.jobs import Lease, Report
+from islands_service.domain.jobs import Lease, ProgressReport
 from islands_service.store import Store
 from support.service_processes import Service
 
@@ -46,4 +46,4 @@ def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2)
         "best_by_size": {"5": sqrt(squared_error(last, 0))},
         "islands": [sqrt(squared_error(last, island)) for island in range(islands)],
     }
-    store.leases.report(lease, Report(progress, points, after=first - 1))
+    store.leases.report(lease, ProgressReport(progress, points, after=first - 1))

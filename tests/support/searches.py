@@ -4,7 +4,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import regressor_of
+from islands.evolution.individual import make_regressor
 from islands.evolution.island import first_generation, step
 from islands.evolution.settings import Settings
 
@@ -56,7 +56,7 @@ def distinct_genes(genes):
     """Return the first gene of every regressor; genes that are zero are left out."""
     found = {}
     for gene in genes:
-        item = regressor_of(gene)
+        item = make_regressor(gene)
         if item is not None:
             found.setdefault(item, gene)
     return found

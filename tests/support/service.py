@@ -213,9 +213,9 @@ HIDDEN, KNOWN = "thermal-drift", {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 
 
 def hidden(folder: Path, seconds: float = 4.0) -> bytes:
     """A record of a piezo actuator whose sensor follows a temperature, which its simulation does not know."""
-    from islands.trials.injection.measurement import hide
+    from islands.trials.injection.measurement import inject
 
-    found = hide([HIDDEN], np.random.default_rng(4), seconds=seconds, band=(1.0, 4.0))
+    found = inject([HIDDEN], np.random.default_rng(4), seconds=seconds, band=(1.0, 4.0))
     write_record(found.record, folder / "hidden.csv")
     return (folder / "hidden.csv").read_bytes()
 

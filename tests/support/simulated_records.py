@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.io.simulator_spec.factory import simulation
+from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.schema import (
     ColumnSpec,
     LinearSpec,
@@ -50,7 +50,7 @@ class Made:
 
     @cached_property
     def core(self) -> Simulator:
-        return simulation(self.spec, self.record, self.columns)
+        return make_simulator(self.spec, self.record, self.columns)
 
 
 def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from sqlalchemy import event, select
 
-from islands_service.domain.jobs import Job, JobState, Lease, Outcome, Report, Submission
+from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, ProgressReport, Submission
 from islands_service.store import Store
 from islands_service.store.tables import metadata
 from support.processes import eventually
@@ -26,14 +26,14 @@ MANY = 16
 
 BLOB = "b" * 64
 
-FOUND = Outcome(
+FOUND = JobOutcome(
     JobState.SUCCEEDED,
     {"search": {"seed": 7}},
     (({"fitness": 0.5}, "first"), ({"fitness": 0.7}, "second")),
     {"best": 0.5},
 )
-FAILED = Outcome(JobState.FAILED, problem={"type": "broken", "detail": "it broke"})
-CANCELLED = Outcome(JobState.CANCELLED)
+FAILED = JobOutcome(JobState.FAILED, problem={"type": "broken", "detail": "it broke"})
+CANCELLED = JobOutcome(JobState.CANCELLED)
 
 
 def asked(owner: str = ALICE, /, **changes: Any) -> Submission:
@@ -63,9 +63,11 @@ def point(generation: int) -> tuple[int, int, dict[int, float], tuple[float | No
     return generation, 10 * generation, {3: 1 / (1 + generation)}, (0.5, None)
 
 
-def brought_on(generation: int) -> Report:
+def brought_on(generation: int) -> ProgressReport:
     """A report in which every part says the same generation."""
-    return Report({"generation": generation}, (point(generation),), f"{generation:064x}", generation - 1)
+    return ProgressReport(
+        {"generation": generation}, (point(generation),), f"{generation:064x}", generation - 1
+    )
 
 
 #: How a job gets to a state, from the queue.
@@ -129,12 +131,12 @@ def at_once(actions: list[Callable[[], Any]]) -> list[Any]:
 _STANDING = """
 import signal, sys, threading
 from islands_service.store import Store, connections
-from islands_service.store.job_events import change
+from islands_service.store.job_events import update_job
 connections.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", -1.0)
 def stand(connection):
-    change(connection, lease.job.id, progress='{"half": true}')
+    update_job(connection, lease.job.id, progress='{"half": true}')
     print("standing", flush=True)
     signal.pthread_kill(threading.get_ident(), signal.SIGSTOP)
 try:

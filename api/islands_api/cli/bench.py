@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from islands.benchmark.report import Report, document, goals
+from islands.benchmark.report import BenchmarkReport, check_goals, to_document
 from islands.benchmark.run import measure
 from islands.benchmark.scaling import save_scalings
 from islands.errors import IslandsError
@@ -38,13 +38,13 @@ def bench(
         figures = save_scalings(report.scalings, out)
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
-        json_file.write_text(json.dumps(document(report), indent=2) + "\n", encoding="utf-8")
+        json_file.write_text(json.dumps(to_document(report), indent=2) + "\n", encoding="utf-8")
     _show(report)
     for path in (*figures, *([json_file] if json_file else [])):
         output.print(str(path), markup=False)
 
 
-def _measured(quick: bool, tell: Callable[[str, float], None]) -> Report:
+def _measured(quick: bool, tell: Callable[[str, float], None]) -> BenchmarkReport:
     """Measure in a process of its own: a linear algebra library reads its threads when it is loaded.
 
     They wait in a loop, and their waiting would be counted as CPU time of plain numpy.
@@ -62,7 +62,7 @@ def _measured(quick: bool, tell: Callable[[str, float], None]) -> Report:
         process.join()
 
 
-def _followed(receiving: Connection, tell: Callable[[str, float], None]) -> Report:
+def _followed(receiving: Connection, tell: Callable[[str, float], None]) -> BenchmarkReport:
     """Pass on what the measuring process tells, until it sends the report or its error."""
     while True:
         try:
@@ -75,7 +75,7 @@ def _followed(receiving: Connection, tell: Callable[[str, float], None]) -> Repo
         match message:
             case str(text), float(share):
                 tell(text, share)
-            case Report():
+            case BenchmarkReport():
                 return message
             case _:
                 raise message
@@ -90,7 +90,7 @@ def _measure(quick: bool, sending: Connection) -> None:
         pass  # whoever pressed the key stopped the command as well, which says so
 
 
-def _show(report: Report) -> None:
+def _show(report: BenchmarkReport) -> None:
     table = Table("ms of CPU per individual", *report.kinds, title=f"{report.samples} samples, medians")
     kinds = report.kinds
     rows: dict[str, Sequence[float | None]] = {
@@ -116,7 +116,7 @@ def _show(report: Report) -> None:
         table.add_row(name.replace("_", " "), *(str(run.caches[name]) for run in runs))
     output.print(table)
     table = Table("goal", "wanted", "measured", "met")
-    for goal in goals(report):
+    for goal in check_goals(report):
         met = {True: "[green]yes[/]", False: "[red]no[/]", None: "-"}[goal.met]
         table.add_row(goal.text, goal.wanted, goal.measured, met)
     output.print(table)

@@ -18,7 +18,7 @@ from islands.systems.published_models import PUBLISHED
 from islands.validation.metrics import Metrics, metrics
 from islands_api.cli.console import compile_kernels, errors, output, progress
 from islands_api.cli.output_folder import check_folder, show_result
-from islands_api.cli.search_progress import course
+from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
 
 #: As many as the smallest machine has cores.
@@ -50,7 +50,7 @@ def demo(
             *(estimation, validation),
             preset="paper-case1",
             islands=ISLANDS,
-            progress=course(tell),
+            progress=search_progress(tell),
             engine=engine,
         )
         result = result.with_wall_time(perf_counter() - began)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from islands._explain_residual import proposed
+from islands._explain_residual import explain_residual
 from islands.data.dataset import Dataset
 from islands.discrepancy.detectability import SelfTest, self_test
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
@@ -16,15 +16,15 @@ from islands.discrepancy.diagnosis import diagnose as diagnosed
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.io.records import read_record
-from islands.io.records.row_range import rows_of
+from islands.io.records.row_range import parse_rows
 from islands.io.simulator_spec.document import extended_json
-from islands.io.simulator_spec.factory import simulation
-from islands.io.simulator_spec.schema import ColumnSpec, innermost, spec_of
-from islands.parallel import Spread
+from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.schema import ColumnSpec, innermost, parse_spec
+from islands.parallel import ParallelMap
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
-from islands_service.reports.diagnosis_report import in_words, report, self_test_in_words
+from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
 #: Files of a result.
 RESULT, EXTENDED, REPORT = "discrepancy.json", "extended.json", "report.html"
@@ -56,26 +56,26 @@ def diagnose(
     compile_kernels()
     with progress("diagnose") as tell:
         tell("reading", 0.0)
-        asked = spec_of(simulated)
+        asked = parse_spec(simulated)
         inner = innermost(asked)
         column = inner.column if isinstance(inner, ColumnSpec) else None
         data, columns = _read(
             record, options.columns(inputs), channels or [], column, output_column, dt, rows
         )
-        core = simulation(asked, data, columns)
+        core = make_simulator(asked, data, columns)
         known = options.tolerances(tolerance or [])
         with _cores(workers, tested) as spread:
             began = perf_counter()
             found = diagnosed(data, core, known, seed, lambda line: tell(line, 0.5), spread)
             tell("a formula for what has no name", 0.8)
-            proposal = proposed(found, seed)
+            proposal = explain_residual(found, seed)
             wall = perf_counter() - began
             shown = _self_tested(found, core, known, seed, spread, tell) if tested else None
         tell("figures", 0.9)
         write(found, out, record.name, wall, shown, proposal)
-    output.print(in_words(found, proposal), markup=False)
+    output.print(summarise(found, proposal), markup=False)
     if shown is not None:
-        output.print(self_test_in_words(shown), markup=False)
+        output.print(summarise_self_test(shown), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
 
 
@@ -91,7 +91,7 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     for path in (folder / EXTENDED, folder / RESULT):
         path.unlink(missing_ok=True)
-    (folder / REPORT).write_bytes(report(name, found, tested, proposal))
+    (folder / REPORT).write_bytes(diagnosis_report(name, found, tested, proposal))
     if found.gain is not None:
         (folder / EXTENDED).write_text(extended_json(found.best, found.record))
     document = diagnosis_document(found, wall_s, tested, proposal)
@@ -103,7 +103,7 @@ def _self_tested(
     core: Simulator,
     tolerance: Mapping[str, float],
     seed: int,
-    spread: Spread,
+    spread: ParallelMap,
     tell: Tell,
 ) -> SelfTest:
     """Carry out the self-test, and show how long it will take."""
@@ -117,13 +117,13 @@ def _self_tested(
     return self_test(found, core, tolerance, seed, spread, tell=ended)
 
 
-def _cores(workers: int | None, tested: bool) -> AbstractContextManager[Spread]:
+def _cores(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:
     if workers == 1 or (workers is None and not tested):
         return nullcontext(map)
     # An analysis of some seconds need not wait for Ray.
-    from islands_service.runtime.parallel_map import pool  # noqa: PLC0415
+    from islands_service.runtime.parallel_map import ray_pool  # noqa: PLC0415
 
-    return pool(workers)
+    return ray_pool(workers)
 
 
 def _duration(seconds: float) -> str:
@@ -142,7 +142,7 @@ def _read(
     """Read the record, and beside it the column that is the simulation, if one is."""
     beside = [] if column is None else [column]
     whole = read_record(
-        record, [options.driving(inputs), *channels, *beside], output_column, dt, rows_of(rows)
+        record, [options.single_input(inputs), *channels, *beside], output_column, dt, parse_rows(rows)
     )
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

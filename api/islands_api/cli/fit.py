@@ -9,7 +9,7 @@ import typer
 import islands
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.io.records import read_record
-from islands.io.records.row_range import rows_of
+from islands.io.records.row_range import parse_rows
 from islands.model.candidate_library import LIBRARIES
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, progress
@@ -49,7 +49,7 @@ def fit(
     compile_kernels()
     with progress("fit") as tell:
         tell("reading", 0.0)
-        data = read_record(record, names, output_column, dt, rows_of(rows))
+        data = read_record(record, names, output_column, dt, parse_rows(rows))
         held_out = options.validation(validation, record, names, output_column, dt, rows)
         began = perf_counter()
         result = islands.fit(

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from islands.errors import SettingsError, chosen
+from islands.errors import SettingsError, lookup
 from islands.io.records import fingerprint
 from islands_api.cli import options
 from islands_api.cli import search_options as search
-from islands_api.cli.identify_run import Manner, run, stored
+from islands_api.cli.identify_run import RunOptions, run, stored
 from islands_api.cli.output_folder import check_folder
 from islands_service.engines import ENGINES
 
@@ -71,12 +71,12 @@ def identify(
     """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR goes on."""
     given = locals()
     if engine is not None:
-        chosen(ENGINES, engine, "engine")
+        lookup(ENGINES, engine, "engine")
     if wall_time is not None and not wall_time > 0.0:
         raise SettingsError(f"--wall-time is a number of seconds above 0, got {wall_time}")
     if ray_address is not None and engine == "serial":
         raise SettingsError("--ray-address goes with --engine ray: the serial engine runs in this process")
-    manner = Manner(engine, ray_address, wall_time, verbose)
+    manner = RunOptions(engine, ray_address, wall_time, verbose)
     if resume is not None:
         _refuse_others(context)
         run(manner, resume, *stored(resume))

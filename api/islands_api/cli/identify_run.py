@@ -13,17 +13,23 @@ from typing import Any
 import islands
 from islands.data.dataset import SAME_DT
 from islands.errors import ModelError, RecordError, SettingsError
-from islands.evolution.presets import settings_of
-from islands.evolution.search_state import State
+from islands.evolution.presets import resolve_settings
+from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.io.checkpoints import read_checkpoint, state_document, state_of, write_checkpoint, write_hall
+from islands.io.checkpoints import (
+    read_checkpoint,
+    state_document,
+    state_from_document,
+    write_checkpoint,
+    write_hall,
+)
 from islands.io.records import fingerprint, read_record
-from islands.io.records.row_range import rows_of
+from islands.io.records.row_range import parse_rows
 from islands.validation.metrics import metrics
 from islands_api.cli import options
 from islands_api.cli.console import Tell, compile_kernels, errors, output, progress
 from islands_api.cli.output_folder import show_result
-from islands_api.cli.search_progress import course
+from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
 
 CHECKPOINT = "checkpoint.json"
@@ -38,7 +44,7 @@ CHECKPOINT_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class RunOptions:
     """How to run: nothing of it changes what is found, but for an end by the clock."""
 
     engine: str | None
@@ -52,14 +58,14 @@ class Manner:
 
 
 def run(
-    manner: Manner,
+    manner: RunOptions,
     folder: Path,
     job: dict[str, Any],
-    state: State | None = None,
+    state: SearchState | None = None,
     spent: float = 0.0,
 ) -> None:
     """Run a job in a folder, or go on with it from a state that took some seconds; print what was found."""
-    settings = settings_of(job["preset"], job["changes"])
+    settings = resolve_settings(job["preset"], job["changes"])
     data, held_out, tested = _data(job, settings)
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
@@ -119,7 +125,7 @@ def _data(
             raise RecordError(f"{name} has changed since the run began: bring back the file, or start anew")
     path = Path(job["record"])
     columns = (job["inputs"], job["output"], job["dt"])
-    data = read_record(path, *columns, rows_of(job["rows"]))
+    data = read_record(path, *columns, parse_rows(job["rows"]))
     held_out = options.validation(job["validation"], path, *columns, job["rows"])
     if job["test"] is None:
         return data, held_out, None
@@ -154,15 +160,15 @@ class _Watch:
     """Shows where the search stands and writes checkpoints."""
 
     def __init__(
-        self, folder: Path, job: dict[str, Any], tell: Tell, state: State | None, spent: float
+        self, folder: Path, job: dict[str, Any], tell: Tell, state: SearchState | None, spent: float
     ) -> None:
         self._folder, self._job = folder, job
-        self._show = course(tell)
+        self._show = search_progress(tell)
         self._next = -inf  # the first populations are kept at once
         self._began = monotonic() - spent
         self._state = state
 
-    def __call__(self, state: State, settings: Settings) -> None:
+    def __call__(self, state: SearchState, settings: Settings) -> None:
         self._state = state
         self._show(state, settings)
         if monotonic() > self._next:
@@ -198,7 +204,7 @@ def _stop_requests(wall_time: float | None) -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-def stored(folder: Path) -> tuple[dict[str, Any], State, float]:
+def stored(folder: Path) -> tuple[dict[str, Any], SearchState, float]:
     """Read a folder's checkpoint: its job, where the search stands, and the seconds that it has taken.
 
     Raises
@@ -209,6 +215,6 @@ def stored(folder: Path) -> tuple[dict[str, Any], State, float]:
     path = folder / CHECKPOINT
     archipelago, about = read_checkpoint(path)
     try:
-        return dict(about["job"]), state_of(archipelago, about), float(about["wall_s"])
+        return dict(about["job"]), state_from_document(archipelago, about), float(about["wall_s"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"{path} is no checkpoint of islands identify: {error!r}") from error

@@ -91,7 +91,7 @@ def show_models(models: Sequence[ModelView]) -> None:
 
 
 @contextmanager
-def bar_of_job() -> Iterator[Callable[[JobView], None]]:
+def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
     """Show how far a job is, in a moving bar."""
     with progress("job") as show_bar:
 
@@ -148,7 +148,7 @@ def models_of(document: dict[str, Any]) -> tuple[ModelView, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class DownloadFolder:
     """How a result is kept and shown: its document's file, what the folder holds, and how it gets there."""
 
     file: str
@@ -158,15 +158,15 @@ class Kept:
 
 
 #: By what a result holds.
-RESULTS: Mapping[str, Kept] = MappingProxyType(
+RESULTS: Mapping[str, DownloadFolder] = MappingProxyType(
     {
-        "models": Kept(
+        "models": DownloadFolder(
             "result.json",
             "result.json, models/, figures/",
             download,
             lambda _client, _job, document: show_models(models_of(document)),
         ),
-        "verdict": Kept(
+        "verdict": DownloadFolder(
             "discrepancy.json",
             "discrepancy.json, report.html, extended.json where something was named",
             download_diagnosis,

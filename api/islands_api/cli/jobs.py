@@ -11,7 +11,7 @@ from islands_api.cli import options
 from islands_api.cli import search_options as search
 from islands_api.cli.console import errors, output
 from islands_api.cli.output_folder import check_folder
-from islands_api.client import Client, JobFailed
+from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import simulation_of
 from islands_api.schemas import JobView
 from islands_service.domain.jobs import DISCREPANCY, JobState
@@ -136,7 +136,7 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """Upload a record and submit a job that finds out what a simulation gets wrong about it."""
-    driving, known = options.driving(options.columns(inputs)), options.tolerances(tolerance or [])
+    driving, known = options.single_input(options.columns(inputs)), options.tolerances(tolerance or [])
     beside = options.columns(channels or [])
     asked = simulation_of(simulated)
     read = [driving, *beside, *([asked["column"]] if "column" in asked else [])]
@@ -276,12 +276,12 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
 
     Raises
     ------
-    JobFailed
+    JobFailedError
     """
     errors.print(f"job {job.id}", markup=False)
     with Client(url, key) as client:
         try:
-            with views.bar_of_job() as tell:
+            with views.job_progress_bar() as tell:
                 for job in client.progress(job):  # noqa: B020, PLR1704 - as it is now
                     tell(job)
         except KeyboardInterrupt:
@@ -295,4 +295,4 @@ def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
             views.show_models(client.models(job))
     if job.state != JobState.SUCCEEDED:
         detail = (job.problem or {}).get("detail", "resume it to go on")
-        raise JobFailed(f"job {job.id} {job.state}: {detail}")
+        raise JobFailedError(f"job {job.id} {job.state}: {detail}")

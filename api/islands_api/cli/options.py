@@ -9,8 +9,8 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.records import read_record
-from islands.io.records.row_range import overlap, rows_of
-from islands.io.simulator_spec.schema import KINDS, LocalExtendedSpec, is_extended, spec_of
+from islands.io.records.row_range import overlap, parse_rows
+from islands.io.simulator_spec.schema import KINDS, LocalExtendedSpec, is_extended, parse_spec
 from islands.model.model import Model
 from islands.systems.published_models import published
 
@@ -52,7 +52,7 @@ def columns(texts: list[str]) -> list[str]:
     return [name for text in texts for name in text.split(",") if name]
 
 
-def driving(inputs: list[str]) -> str:
+def single_input(inputs: list[str]) -> str:
     """Return the one input that drives a simulation.
 
     Raises
@@ -109,9 +109,9 @@ def validation(
     if Path(text).exists():
         return read_record(text, inputs, output, dt)
     if ":" in text:
-        if used is None or overlap(rows_of(used), rows_of(text)):
+        if used is None or overlap(parse_rows(used), parse_rows(text)):
             raise SettingsError(f"{option} {text}: say with --rows START:STOP which other samples estimate")
-        return read_record(record, inputs, output, dt, rows_of(text))
+        return read_record(record, inputs, output, dt, parse_rows(text))
     try:
         return float(text)
     except ValueError:
@@ -124,7 +124,7 @@ def extended(text: str) -> LocalExtendedSpec | None:
     """Read an extended simulation; None where the file is none."""
     if text.startswith(PUBLISHED) or not is_extended(text):
         return None
-    found = spec_of(f"model:{text}")
+    found = parse_spec(f"model:{text}")
     assert isinstance(found, LocalExtendedSpec)
     return found
 

@@ -5,8 +5,8 @@ from typing import Annotated
 import typer
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.island_profiles import CHARACTERS
-from islands.evolution.migration import EMIGRANTS, REPLACED
+from islands.evolution.island_profiles import ISLAND_PROFILES
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.presets import PRESETS
 from islands.evolution.topology import TOPOLOGIES
 from islands.model.primitives import PRIMITIVES
@@ -37,13 +37,15 @@ MigrateEvery = Annotated[
     str | None, typer.Option("--migrate-every", help="Generations; 5,100:20 is 20 from generation 100 on.")
 ]
 Migrants = Annotated[str | None, typer.Option("--migrants", help="For each neighbour; may change likewise.")]
-Emigrants = Annotated[str | None, typer.Option("--emigrants", help=f"Who leaves: {', '.join(EMIGRANTS)}.")]
+Emigrants = Annotated[
+    str | None, typer.Option("--emigrants", help=f"Who leaves: {', '.join(SELECTION_POLICIES)}.")
+]
 Replaced = Annotated[
-    str | None, typer.Option("--replaced", help=f"Whose place they take: {', '.join(REPLACED)}.")
+    str | None, typer.Option("--replaced", help=f"Whose place they take: {', '.join(REPLACEMENT_POLICIES)}.")
 ]
 Characters = Annotated[
     list[str] | None,
-    typer.Option("--character", help=f"Repeat it, islands take turns: {', '.join(CHARACTERS)}."),
+    typer.Option("--character", help=f"Repeat it, islands take turns: {', '.join(ISLAND_PROFILES)}."),
 ]
 MaxEvaluations = Annotated[
     int | None, typer.Option("--max-evaluations", help="End with the epoch that reaches it.")

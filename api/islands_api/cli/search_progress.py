@@ -5,8 +5,8 @@ from itertools import takewhile
 from math import inf
 from time import monotonic
 
-from islands.evolution.history import Progress
-from islands.evolution.search_state import State
+from islands.evolution.history import HistoryPoint
+from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands_api.cli.console import Tell
 
@@ -14,11 +14,11 @@ from islands_api.cli.console import Tell
 SHOWN = 16
 
 
-def course(tell: Tell) -> Callable[[State, Settings], None]:
+def search_progress(tell: Tell) -> Callable[[SearchState, Settings], None]:
     """Return a watcher that shows generation, speed, time left, the best of every size and every island."""
     began: list[tuple[float, int]] = []
 
-    def watch(state: State, settings: Settings) -> None:
+    def watch(state: SearchState, settings: Settings) -> None:
         now = monotonic()
         began[:] = began or [(now, state.evaluations)]
         rate = (state.evaluations - began[0][1]) / max(now - began[0][0], 1e-9)
@@ -35,11 +35,11 @@ def course(tell: Tell) -> Callable[[State, Settings], None]:
     return watch
 
 
-def _has(island: int, best: float) -> Callable[[Progress], bool]:
+def _has(island: int, best: float) -> Callable[[HistoryPoint], bool]:
     return lambda point: point.islands[island] == best
 
 
-def _islands(history: Sequence[Progress]) -> list[str]:
+def _islands(history: Sequence[HistoryPoint]) -> list[str]:
     """Return a line for every island: its best, and for how long; of many for the best ones."""
     least = history[-1].islands
     if len(least) == 1:

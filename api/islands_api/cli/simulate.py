@@ -12,7 +12,7 @@ from islands._result import simulate as run
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, SettingsError
 from islands.io.records import read_record, write_simulation
-from islands.io.records.row_range import rows_of
+from islands.io.records.row_range import parse_rows
 from islands.io.simulator_spec.factory import simulated
 from islands.io.simulator_spec.schema import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
@@ -45,7 +45,7 @@ def simulate(
         options.columns(inputs or list(chosen.input_names)),
         output_column or chosen.output_name,
         dt,
-        rows_of(rows),
+        parse_rows(rows),
         missing_output=True,
     )
     if chosen.dt is not None and abs(data.dt - chosen.dt) > 0.01 * chosen.dt:
@@ -73,7 +73,7 @@ def _extended(
     core = innermost(asked)
     beside = (core.column,) if isinstance(core, ColumnSpec) else ()
     driving = options.columns(inputs or list(asked.inputs))
-    whole = read_record(record, [*driving, *beside], output_column or asked.output, dt, rows_of(rows))
+    whole = read_record(record, [*driving, *beside], output_column or asked.output, dt, parse_rows(rows))
     data = whole.first_inputs(len(driving))
     compile_kernels()
     y = simulated(asked, data, dict.fromkeys(beside, whole.u[:, -1]))

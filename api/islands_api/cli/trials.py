@@ -11,14 +11,14 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from islands.errors import SettingsError, chosen
+from islands.errors import SettingsError, lookup
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
-from islands.trials.cases import CORES, Simulated
-from islands.trials.scoring import Bin, Measure, Share, confusion, reliability, tally
-from islands.trials.trial import Outcome, Trial, carried_out
+from islands.trials.cases import CORES, SimulatedCase
+from islands.trials.scoring import Proportion, ReliabilityBin, Statistic, confusion, reliability, score
+from islands.trials.trial import Trial, TrialOutcome, run_trial
 from islands_api.cli.console import compile_kernels, output, progress
-from islands_service.runtime.parallel_map import pool
+from islands_service.runtime.parallel_map import ray_pool
 
 #: Bands of the misfit of each effect in standard deviations of the noise: they are taken in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
@@ -71,7 +71,7 @@ def trials(
     out: Annotated[Path | None, typer.Option("--json", help="A file for the outcomes.")] = None,
 ) -> None:
     """Hide effects in simulated records, look for them, and count how often they are found and named."""
-    asked_cores = {name: chosen(CORES, name, "core") for name in cores or [next(iter(CORES))]}
+    asked_cores = {name: lookup(CORES, name, "core") for name in cores or [next(iter(CORES))]}
     if noise not in ("white", "ar"):
         raise SettingsError(f"--noise {noise}: take white or ar")
     pole = POLE if noise == "ar" else 0.0
@@ -97,8 +97,8 @@ def trials(
             ]
     compile_kernels()
     found = []
-    with progress("trials") as tell, pool(workers, address) as side_by_side:
-        for outcome in side_by_side(carried_out, asked):
+    with progress("trials") as tell, ray_pool(workers, address) as side_by_side:
+        for outcome in side_by_side(run_trial, asked):
             found.append(outcome)
             tell(f"{len(found)} of {len(asked)}", len(found) / len(asked))
     document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
@@ -113,9 +113,9 @@ def trials(
         out.write_text(json.dumps(document, indent=1))
 
 
-def _told(core: str, simulated: Simulated, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _told(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:
     """Say how one kind of simulation did; return the same as a document."""
-    rows = tally(outcomes, simulated.nameless, simulated.goals)
+    rows = score(outcomes, simulated.nameless, simulated.goals)
     bins = reliability([each for each in outcomes if not set(each.trial.effects) & set(simulated.nameless)])
     output.print(_table(core, rows))
     for each in bins:
@@ -123,12 +123,12 @@ def _told(core: str, simulated: Simulated, outcomes: Sequence[Outcome]) -> dict[
     wrong = {key: times for key, times in sorted(confusion(outcomes).items()) if key[0] != key[1]}
     for (hidden, named), times in islice(wrong.items(), 40):
         output.print(f"{hidden or 'nothing'} was called {named or 'nothing'}: {times}", markup=False)
-    shares = [{**asdict(each), "bounds": each.bounds} for each in rows if isinstance(each, Share)]
-    measures = [asdict(each) for each in rows if isinstance(each, Measure) and each.of]
+    shares = [{**asdict(each), "bounds": each.bounds} for each in rows if isinstance(each, Proportion)]
+    measures = [asdict(each) for each in rows if isinstance(each, Statistic) and each.of]
     return {"shares": shares, "measures": measures, "reliability": [asdict(each) for each in bins]}
 
 
-def _names(effects: list[str] | None, simulated: Simulated) -> list[str]:
+def _names(effects: list[str] | None, simulated: SimulatedCase) -> list[str]:
     if not effects or effects == ["all"]:
         return list(simulated.nameable)
     unknown = set(effects) - set(simulated.system.known)
@@ -140,7 +140,7 @@ def _names(effects: list[str] | None, simulated: Simulated) -> list[str]:
     return effects
 
 
-def _table(title: str, rows: Sequence[Share | Measure]) -> Table:
+def _table(title: str, rows: Sequence[Proportion | Statistic]) -> Table:
     table = Table("", "trials", "", "95 %", "goal", "", title=title, title_justify="left")
     for row in rows:
         if row.of:
@@ -150,14 +150,14 @@ def _table(title: str, rows: Sequence[Share | Measure]) -> Table:
     return table
 
 
-def _value(row: Share | Measure) -> tuple[str, str]:
-    if isinstance(row, Measure):
+def _value(row: Proportion | Statistic) -> tuple[str, str]:
+    if isinstance(row, Statistic):
         return f"{row.value:.3f}", ""
     low, high = row.bounds
     return f"{row.percent:.1f} %", f"{low:.1f} to {high:.1f}"
 
 
-def _reliable(each: Bin) -> str:
+def _reliable(each: ReliabilityBin) -> str:
     return (
         f"confidence {each.low:g} to {each.high:g}: {each.count} names, said {100 * each.said:.0f} %, "
         f"right {100 * each.right:.0f} %"

@@ -2,8 +2,16 @@
 
 from islands_api.client.asynchronous import AsyncClient
 from islands_api.client.calls import JobRef
-from islands_api.client.errors import JobFailed, ServiceError, Unreachable
+from islands_api.client.errors import JobFailedError, ServiceError, ServiceUnreachableError
 from islands_api.client.response_parsing import Event
 from islands_api.client.synchronous import Client
 
-__all__ = ["AsyncClient", "Client", "Event", "JobFailed", "JobRef", "ServiceError", "Unreachable"]
+__all__ = [
+    "AsyncClient",
+    "Client",
+    "Event",
+    "JobFailedError",
+    "JobRef",
+    "ServiceError",
+    "ServiceUnreachableError",
+]

@@ -34,7 +34,7 @@ DatasetRef = DatasetView | str
 
 
 @dataclass(frozen=True, slots=True)
-class Call(Generic[T]):
+class RequestSpec(Generic[T]):
     """One request, and what its answer means.
 
     Attributes
@@ -59,11 +59,11 @@ def upload(
     inputs: str | Sequence[str] = (),
     output: str | None = None,
     dt: float | None = None,
-) -> Call[DatasetView]:
+) -> RequestSpec[DatasetView]:
     """Upload a record; with columns it is checked as a job would."""
     given: dict[str, Any] = {"inputs": names_of(inputs) or None, "output": output, "dt": dt}
     form = {name: value for name, value in given.items() if value is not None}
-    return Call("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
+    return RequestSpec("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
 
 
 def submit(
@@ -80,7 +80,7 @@ def submit(
     priority: int = 0,
     idempotency_key: str | None = None,
     **settings: Any,
-) -> Call[JobView]:
+) -> RequestSpec[JobView]:
     """Submit a job; it has an idempotency key in any case, so that a lost answer makes no second job.
 
     Parameters
@@ -115,99 +115,101 @@ def submit(
     return submission("/v1/jobs", given, idempotency_key)
 
 
-def job(which: JobRef) -> Call[JobView]:
+def job(which: JobRef) -> RequestSpec[JobView]:
     """Look at a job."""
-    return Call("GET", f"/v1/jobs/{_part(which)}", read_as(JobView))
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}", read_as(JobView))
 
 
-def changed(which: JobView, seconds: float) -> Call[JobView]:
+def changed(which: JobView, seconds: float) -> RequestSpec[JobView]:
     """Wait until a job is not as it was."""
 
     def read(response: httpx.Response) -> JobView:
         return which if response.status_code == HTTPStatus.NOT_MODIFIED else read_as(JobView)(response)
 
     headers = {"If-None-Match": f'"{which.version}"'}
-    return Call("GET", f"/v1/jobs/{_part(which)}", read, params={"wait": seconds}, headers=headers)
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}", read, params={"wait": seconds}, headers=headers)
 
 
-def jobs(state: str | None = None, cursor: str | None = None, limit: int = 50) -> Call[JobPage]:
+def jobs(state: str | None = None, cursor: str | None = None, limit: int = 50) -> RequestSpec[JobPage]:
     """List jobs."""
     given = {"state": state, "cursor": cursor, "limit": limit}
     params = {key: value for key, value in given.items() if value is not None}
-    return Call("GET", "/v1/jobs", read_as(JobPage), params=params)
+    return RequestSpec("GET", "/v1/jobs", read_as(JobPage), params=params)
 
 
-def datasets(cursor: str | None = None, limit: int = 50) -> Call[DatasetPage]:
+def datasets(cursor: str | None = None, limit: int = 50) -> RequestSpec[DatasetPage]:
     """List data sets."""
     params = {"limit": limit, **({} if cursor is None else {"cursor": cursor})}
-    return Call("GET", "/v1/datasets", read_as(DatasetPage), params=params)
+    return RequestSpec("GET", "/v1/datasets", read_as(DatasetPage), params=params)
 
 
-def cancel(which: JobRef) -> Call[JobView]:
+def cancel(which: JobRef) -> RequestSpec[JobView]:
     """Cancel a job."""
-    return Call("POST", f"/v1/jobs/{_part(which)}/cancel", read_as(JobView))
+    return RequestSpec("POST", f"/v1/jobs/{_part(which)}/cancel", read_as(JobView))
 
 
-def resume(which: JobRef) -> Call[JobView]:
+def resume(which: JobRef) -> RequestSpec[JobView]:
     """Have a job go on that failed or was cancelled."""
-    return Call("POST", f"/v1/jobs/{_part(which)}/resume", read_as(JobView), repeatable=False)
+    return RequestSpec("POST", f"/v1/jobs/{_part(which)}/resume", read_as(JobView), repeatable=False)
 
 
-def delete(which: JobRef) -> Call[None]:
+def delete(which: JobRef) -> RequestSpec[None]:
     """Delete a finished job."""
-    return Call("DELETE", f"/v1/jobs/{_part(which)}", lambda _: None, repeatable=False)
+    return RequestSpec("DELETE", f"/v1/jobs/{_part(which)}", lambda _: None, repeatable=False)
 
 
-def delete_dataset(which: DatasetRef) -> Call[None]:
+def delete_dataset(which: DatasetRef) -> RequestSpec[None]:
     """Delete a data set."""
-    return Call("DELETE", f"/v1/datasets/{_part(which)}", lambda _: None, repeatable=False)
+    return RequestSpec("DELETE", f"/v1/datasets/{_part(which)}", lambda _: None, repeatable=False)
 
 
-def models(which: JobRef) -> Call[tuple[ModelView, ...]]:
+def models(which: JobRef) -> RequestSpec[tuple[ModelView, ...]]:
     """Take the models of a job."""
     page = read_as(ModelPage)
-    return Call("GET", f"/v1/jobs/{_part(which)}/models", lambda response: page(response).items)
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/models", lambda response: page(response).items)
 
 
-def result(which: JobRef) -> Call[dict[str, Any]]:
+def result(which: JobRef) -> RequestSpec[dict[str, Any]]:
     """Take the whole result."""
-    return Call("GET", f"/v1/jobs/{_part(which)}/result", document_of)
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/result", document_of)
 
 
-def report(which: JobRef) -> Call[bytes]:
+def report(which: JobRef) -> RequestSpec[bytes]:
     """Take the report of a job."""
-    return Call("GET", f"/v1/jobs/{_part(which)}/report", lambda response: response.content)
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/report", lambda response: response.content)
 
 
-def extended(which: JobRef) -> Call[bytes]:
+def extended(which: JobRef) -> RequestSpec[bytes]:
     """Take the simulation with what it lacked."""
-    return Call("GET", f"/v1/jobs/{_part(which)}/extended", lambda response: response.content)
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/extended", lambda response: response.content)
 
 
-def history(which: JobRef, after: int = -1) -> Call[HistoryPage]:
+def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:
     """Take the course of the search."""
-    return Call("GET", f"/v1/jobs/{_part(which)}/history", read_as(HistoryPage), params={"after": after})
+    return RequestSpec(
+        "GET", f"/v1/jobs/{_part(which)}/history", read_as(HistoryPage), params={"after": after}
+    )
 
 
-def exported(which: JobRef, rank: int = 1, form: str = "python") -> Call[str]:
+def exported(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[str]:
     """Take a model as text of a kind."""
     path = f"/v1/jobs/{_part(which)}/models/{rank}/export"
-    return Call("GET", path, lambda response: response.text, params={"format": form})
+    return RequestSpec("GET", path, lambda response: response.text, params={"format": form})
 
 
-def figure(which: JobRef, name: str, rank: int | None = 1) -> Call[bytes]:
+def figure(which: JobRef, name: str, rank: int | None = 1) -> RequestSpec[bytes]:
     """Take a figure of a model, or without a rank of the search, as SVG."""
     of = "" if rank is None else f"/models/{rank}"
-    return Call(
+    return RequestSpec(
         "GET", f"/v1/jobs/{_part(which)}{of}/figures/{_part(name)}.svg", lambda response: response.content
     )
 
 
-def figure_names(which: JobRef, rank: int | None) -> Call[tuple[str, ...]]:
+def figure_names(which: JobRef, rank: int | None) -> RequestSpec[tuple[str, ...]]:
     """Ask which figures there are, of a model or of the search."""
     of = "" if rank is None else f"/models/{rank}"
     names = read_as(Names)
-    return Call("GET", f"/v1/jobs/{_part(which)}{of}/figures", lambda response: names(response).items)
+    return RequestSpec("GET", f"/v1/jobs/{_part(which)}{of}/figures", lambda response: names(response).items)
 
 
 def events_path(which: JobRef) -> str:
@@ -225,7 +227,7 @@ def _part(which: JobView | DatasetView | str) -> str:
     return quote(id_of(which), safe="")
 
 
-def submission(path: str, given: Mapping[str, Any], idempotency_key: str | None) -> Call[JobView]:
+def submission(path: str, given: Mapping[str, Any], idempotency_key: str | None) -> RequestSpec[JobView]:
     """Submit a job of any kind, once; what is None is left to the service.
 
     Raises
@@ -238,7 +240,7 @@ def submission(path: str, given: Mapping[str, Any], idempotency_key: str | None)
     key = uuid4().hex if idempotency_key is None else idempotency_key
     if not (key.isascii() and key.isprintable()):
         raise SettingsError(f"an idempotency key is a line of ASCII, got {key!r}")
-    return Call("POST", path, read_as(JobView), headers={"Idempotency-Key": key}, json=body)
+    return RequestSpec("POST", path, read_as(JobView), headers={"Idempotency-Key": key}, json=body)
 
 
 def _refuse_no_numbers(body: Mapping[str, Any]) -> None:

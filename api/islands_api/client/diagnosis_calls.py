@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.schema import spec_of
-from islands_api.client.calls import Call, DatasetRef, id_of, names_of, submission
+from islands.io.simulator_spec.schema import parse_spec
+from islands_api.client.calls import DatasetRef, RequestSpec, id_of, names_of, submission
 from islands_api.schemas import JobView
 
 
@@ -23,7 +23,7 @@ def diagnose(
     name: str = "",
     priority: int = 0,
     idempotency_key: str | None = None,
-) -> Call[JobView]:
+) -> RequestSpec[JobView]:
     """Submit a job that finds out what a simulation gets wrong about a record.
 
     Parameters
@@ -69,7 +69,7 @@ def simulation_of(text: str) -> dict[str, Any]:
     ModelError
         It names a model file that cannot be read.
     """
-    asked = spec_of(text).model_dump(mode="json", exclude_unset=True)
+    asked = parse_spec(text).model_dump(mode="json", exclude_unset=True)
     if asked["kind"] == "python":
         raise SettingsError(
             f"{text}: a service runs no code of others: run 'islands diagnose' where it is, or send what it "

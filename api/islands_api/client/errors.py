@@ -28,9 +28,9 @@ class ServiceError(IslandsError):
         self.type = str(document.get("type", "about:blank"))
 
 
-class Unreachable(IslandsError):
+class ServiceUnreachableError(IslandsError):
     """The service does not answer."""
 
 
-class JobFailed(IslandsError):
+class JobFailedError(IslandsError):
     """A job that was waited for has failed, or was cancelled."""

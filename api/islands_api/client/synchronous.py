@@ -11,18 +11,18 @@ from typing import Any, TypeVar
 import httpx
 
 from islands_api.client import calls, diagnosis_calls
-from islands_api.client.calls import Call, JobRef
-from islands_api.client.errors import JobFailed, ServiceError
+from islands_api.client.calls import JobRef, RequestSpec
+from islands_api.client.errors import JobFailedError, ServiceError
 from islands_api.client.response_parsing import Event, EventLines, refuse_problem
 from islands_api.client.transport import (
     PATIENCE,
-    Tries,
-    address_of,
-    headers_of,
-    held_back,
+    RetryPolicy,
     in_time,
-    timeout_of,
-    trust_of,
+    make_headers,
+    parse_address,
+    parse_timeout,
+    retry_after,
+    ssl_context,
 )
 from islands_api.schemas import DatasetPage, DatasetView, HistoryPage, JobPage, JobView, ModelView
 from islands_service.domain.jobs import TERMINAL, JobState
@@ -63,10 +63,10 @@ class Client:
         verify: Any = True,
     ) -> None:
         self._http = httpx.Client(
-            base_url=address_of(url),
-            headers=headers_of(key),
-            timeout=timeout_of(timeout),
-            verify=trust_of(verify),
+            base_url=parse_address(url),
+            headers=make_headers(key),
+            timeout=parse_timeout(timeout),
+            verify=ssl_context(verify),
         )
         self._url, self._timeout, self._retry = url, timeout, retry
 
@@ -85,7 +85,7 @@ class Client:
     ) -> None:
         self.close()
 
-    def call(self, call: Call[T], until: float = inf) -> T:
+    def call(self, call: RequestSpec[T], until: float = inf) -> T:
         """Carry out a call of `islands_api.client.calls`.
 
         Parameters
@@ -97,10 +97,10 @@ class Client:
         ------
         ServiceError
             The service answered with a problem.
-        Unreachable
+        ServiceUnreachableError
             It did not answer.
         """
-        tries = Tries(self._url, self._retry, until)
+        tries = RetryPolicy(self._url, self._retry, until)
         while True:
             try:
                 response = self._send(call, until)
@@ -114,7 +114,7 @@ class Client:
                 pause = again
             sleep(pause)
 
-    def _send(self, call: Call[T], until: float) -> httpx.Response:
+    def _send(self, call: RequestSpec[T], until: float) -> httpx.Response:
         with ExitStack() as stack:
             files = None
             if call.file is not None:
@@ -127,7 +127,7 @@ class Client:
                 json=call.json,
                 data=call.data,
                 files=files,
-                timeout=timeout_of(self._timeout, until),
+                timeout=parse_timeout(self._timeout, until),
             )
 
     def upload(self, *arguments: Any, **named: Any) -> DatasetView:
@@ -229,7 +229,7 @@ class Client:
         yield job
         while job.state not in TERMINAL:
             with in_time(job.id, seconds, until):
-                after = self.call(calls.changed(job, held_back(self._timeout, until)), until)
+                after = self.call(calls.changed(job, retry_after(self._timeout, until)), until)
             if after.version != job.version:
                 yield after
             elif monotonic() > until:
@@ -241,7 +241,7 @@ class Client:
 
         Raises
         ------
-        JobFailed
+        JobFailedError
             It failed, or was cancelled.
         TimeoutError
         """
@@ -249,12 +249,12 @@ class Client:
             pass
         if job.state != JobState.SUCCEEDED:
             detail = (job.problem or {}).get("detail", "it was cancelled")
-            raise JobFailed(f"job {job.id} {job.state}: {detail}")
+            raise JobFailedError(f"job {job.id} {job.state}: {detail}")
         return job
 
     def events(self, which: JobRef, after: int = 0) -> Iterator[Event]:
         """Yield the events of a job behind a number, until it has ended, over cut connections as well."""
-        tries = Tries(self._url, self._retry)
+        tries = RetryPolicy(self._url, self._retry)
         while True:
             lines = EventLines()
             try:

@@ -15,7 +15,7 @@ from typing import Any
 import httpx
 
 from islands.errors import SettingsError
-from islands_api.client.errors import Unreachable
+from islands_api.client.errors import ServiceUnreachableError
 
 #: Seconds for an answer: the service itself takes up to two minutes to read an upload.
 PATIENCE = 150.0
@@ -32,7 +32,7 @@ PASSING = (HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE)
 DOUBTFUL = (HTTPStatus.BAD_GATEWAY, HTTPStatus.GATEWAY_TIMEOUT)
 
 
-def headers_of(key: str | None) -> dict[str, str]:
+def make_headers(key: str | None) -> dict[str, str]:
     """Return what every request says.
 
     Raises
@@ -52,7 +52,7 @@ def headers_of(key: str | None) -> dict[str, str]:
     return {**headers, "Authorization": f"Bearer {key}"}
 
 
-def address_of(url: str) -> str:
+def parse_address(url: str) -> str:
     """Return a service's address as it is.
 
     Raises
@@ -69,23 +69,23 @@ def address_of(url: str) -> str:
     return url
 
 
-def trust_of(verify: Any) -> Any:
+def ssl_context(verify: Any) -> Any:
     """Return whom to trust, as httpx takes it: a file of certificates is read."""
     return ssl.create_default_context(cafile=verify) if isinstance(verify, str | os.PathLike) else verify
 
 
-def timeout_of(patience: float, until: float = inf) -> httpx.Timeout:
+def parse_timeout(patience: float, until: float = inf) -> httpx.Timeout:
     """Return how long a request may take that is of no use any more a little after a time of the clock."""
     patience = min(patience, max(0.0, until - monotonic()) + GRACE)
     return httpx.Timeout(patience, connect=min(patience, CONNECT))
 
 
-def held_back(patience: float, until: float) -> float:
+def retry_after(patience: float, until: float) -> float:
     """Return for how many seconds the service may hold an answer back, so that it still comes in time."""
     return max(0.0, min(WAIT, patience / 2, until - monotonic()))
 
 
-class Tries:
+class RetryPolicy:
     """Decides after each try of a call whether there is another one, and when.
 
     Parameters
@@ -116,24 +116,24 @@ class Tries:
 
         Raises
         ------
-        Unreachable
+        ServiceUnreachableError
             There is no next try.
         """
         if untrusted(error):
-            raise Unreachable(
+            raise ServiceUnreachableError(
                 f"the certificate of the service at {self._url} is not trusted ({error}): give the file of "
                 "its authority as `verify`, to the command line in SSL_CERT_FILE"
             ) from error
         reason = reason_of(error)
         # A connection that never came about has carried nothing.
         if not (repeatable or isinstance(error, httpx.ConnectError | httpx.ConnectTimeout)):
-            raise Unreachable(
+            raise ServiceUnreachableError(
                 f"the service at {self._url} broke off before it answered ({reason}): it may have done what "
                 "was asked, look whether it has"
             ) from error
         pause = self._pause(0.0)
         if pause is None:
-            raise Unreachable(
+            raise ServiceUnreachableError(
                 f"the service at {self._url} does not answer ({reason}): is it running, and is this its "
                 "address?"
             ) from error
@@ -195,7 +195,7 @@ def in_time(job: str, seconds: float, until: float) -> Iterator[None]:
     """
     try:
         yield
-    except Unreachable as error:
+    except ServiceUnreachableError as error:
         if monotonic() + LAST_DELAY < until:
             raise
         raise TimeoutError(f"job {job} is not known to have ended after {seconds:g} s: {error}") from error

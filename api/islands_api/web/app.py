@@ -10,16 +10,16 @@ from fastapi.openapi.utils import get_openapi
 from starlette.middleware.gzip import GZipMiddleware
 
 from islands_api.web import exception_handlers
-from islands_api.web.auth import KeyRing
-from islands_api.web.concurrency import Threads
-from islands_api.web.dependencies import DRAWINGS, INSPECTIONS, Doors
-from islands_api.web.event_hub import Hub
-from islands_api.web.metrics import Measures
-from islands_api.web.middleware import Limited, SameOrigin, Watched
+from islands_api.web.auth import KeyCache
+from islands_api.web.concurrency import BlockingExecutor
+from islands_api.web.dependencies import DRAWINGS, INSPECTIONS, AppState
+from islands_api.web.event_hub import JobEventHub
+from islands_api.web.metrics import Metrics
+from islands_api.web.middleware import BodyLimit, RequestLogging, SameOrigin
 from islands_api.web.problems import ProblemDocument
-from islands_api.web.rate_limit import Rate
+from islands_api.web.rate_limit import RateLimiter
 from islands_api.web.routes import ROUTERS
-from islands_service.liveness import EVERY, sign_of_life
+from islands_service.liveness import EVERY, send_heartbeat
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -50,20 +50,20 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         opened = store or Store(settings.url)
-        threads = Threads()
-        hub = Hub(opened, threads)
-        app.state.doors = doors = Doors(
+        threads = BlockingExecutor()
+        hub = JobEventHub(opened, threads)
+        app.state.doors = doors = AppState(
             settings,
             opened,
             Blobs(settings.blobs),
             hub,
-            Rate(settings.rate, settings.burst),
-            Measures(opened),
+            RateLimiter(settings.rate, settings.burst),
+            Metrics(opened),
             asyncio.Semaphore(INSPECTIONS),
             asyncio.Semaphore(DRAWINGS),
             threads,
         )
-        app.state.keys = KeyRing(doors)
+        app.state.keys = KeyCache(doors)
         tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_live(settings.lifeline))]
         try:
             yield
@@ -88,12 +88,12 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     )
     for router in ROUTERS:
         app.include_router(router)
-    exception_handlers.install(app)
+    exception_handlers.install_handlers(app)
     # Figures and the page take a third; a job on its own is too small to gain, and events are not held back.
     app.add_middleware(GZipMiddleware, minimum_size=_PACKED, compresslevel=5)
-    app.add_middleware(Limited, settings=settings)
+    app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(SameOrigin, settings=settings)
-    app.add_middleware(Watched)
+    app.add_middleware(RequestLogging)
     _trace(app, traces)
     _describe(app)
     return app
@@ -111,7 +111,7 @@ def _trace(app: FastAPI, traces: Traces) -> None:
 async def _live(descriptor: int | None) -> None:
     """Give signs of life from the event loop: if that hangs, nobody is answered."""
     while True:
-        sign_of_life(descriptor)
+        send_heartbeat(descriptor)
         await asyncio.sleep(EVERY)
 
 

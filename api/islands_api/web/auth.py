@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
-from islands_api.web.dependencies import Doors
-from islands_api.web.problems import NoKey, ScopeMissing
+from islands_api.web.dependencies import AppState
+from islands_api.web.problems import AuthenticationError, InsufficientScopeError
 from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
 
@@ -26,7 +26,7 @@ _bearer = HTTPBearer(auto_error=False, description="A key of `islands keys creat
 
 
 @dataclass(frozen=True, slots=True)
-class Caller:
+class Principal:
     """Who asks.
 
     Attributes
@@ -44,15 +44,15 @@ class Caller:
     secret: str | None = field(default=None, repr=False)
 
 
-class KeyRing:
+class KeyCache:
     """Keys that were looked up a moment ago.
 
     Parameters
     ----------
-    doors : Doors
+    doors : AppState
     """
 
-    def __init__(self, doors: Doors) -> None:
+    def __init__(self, doors: AppState) -> None:
         self._doors = doors
         self._found: dict[str, tuple[float, Key | None]] = {}
 
@@ -69,7 +69,7 @@ class KeyRing:
                 self._found[secret] = now, key
         return key
 
-    async def still_open(self, caller: Caller) -> bool:
+    async def still_open(self, caller: Principal) -> bool:
         """Tell whether a caller who was let in a while ago would be let in now, as far as can be known."""
         if caller.secret is None:
             return True
@@ -80,51 +80,51 @@ class KeyRing:
         return key is not None and key.valid
 
 
-async def caller_of(request: Request) -> Caller:
+async def authenticate(request: Request) -> Principal:
     """Return who asks.
 
     Raises
     ------
-    NoKey
-    TooManyRequests
+    AuthenticationError
+    RateLimitError
     """
     if not hasattr(request.state, "caller"):
         # Once for each request: it takes a token of the rate.
         request.state.caller = await _let_in(request, request.app.state.doors, await _bearer(request))
-    caller: Caller = request.state.caller
+    caller: Principal = request.state.caller
     return caller
 
 
-async def _let_in(request: Request, doors: Doors, given: HTTPAuthorizationCredentials | None) -> Caller:
+async def _let_in(request: Request, doors: AppState, given: HTTPAuthorizationCredentials | None) -> Principal:
     address = request.client.host if request.client is not None else "?"
     if given is None:
         if doors.settings.keys_needed:
             doors.rate.take(f"address {address}")
-            raise NoKey(
+            raise AuthenticationError(
                 "this service needs a key: send 'Authorization: Bearer islands_...'; whoever runs it makes "
                 "one with 'islands keys create'"
             )
-        return Caller(LOCAL, frozenset(SCOPES))
+        return Principal(LOCAL, frozenset(SCOPES))
     key = await request.app.state.keys.find(given.credentials)
     if key is None or not key.valid:
         doors.rate.take(f"address {address}", min(_WRONG, doors.settings.burst))
         what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
-        raise NoKey(f"the key {what}: ask whoever runs this service for another one")
+        raise AuthenticationError(f"the key {what}: ask whoever runs this service for another one")
     doors.rate.take(f"key {key.id}")
-    return Caller(key.owner, key.scopes, given.credentials)
+    return Principal(key.owner, key.scopes, given.credentials)
 
 
 async def _caller(
     request: Request,
     _described: Annotated[HTTPAuthorizationCredentials | None, Security(_bearer)] = None,
-) -> Caller:
-    return await caller_of(request)
+) -> Principal:
+    return await authenticate(request)
 
 
-def _allowed(scope: str) -> Callable[[Caller], Awaitable[Caller]]:
-    async def allowed(caller: Annotated[Caller, Depends(_caller)]) -> Caller:
+def _allowed(scope: str) -> Callable[[Principal], Awaitable[Principal]]:
+    async def allowed(caller: Annotated[Principal, Depends(_caller)]) -> Principal:
         if scope not in caller.scopes:
-            raise ScopeMissing(
+            raise InsufficientScopeError(
                 f"the key has the scopes {', '.join(sorted(caller.scopes))}, this needs "
                 f"{scope}: ask for another key"
             )
@@ -134,6 +134,6 @@ def _allowed(scope: str) -> Callable[[Caller], Awaitable[Caller]]:
 
 
 #: What a route asks for: a caller who may look, who may change, who may see the service's metrics.
-Reader = Annotated[Caller, Depends(_allowed("read"))]
-Writer = Annotated[Caller, Depends(_allowed("write"))]
+Reader = Annotated[Principal, Depends(_allowed("read"))]
+Writer = Annotated[Principal, Depends(_allowed("write"))]
 Operator = Annotated[Any, Depends(_allowed("metrics"))]

@@ -16,7 +16,7 @@ T = TypeVar("T")
 COUNT = 40
 
 
-class Threads:
+class BlockingExecutor:
     """Carries out operations in threads. The framework's own way takes a third of a look at a job."""
 
     def __init__(self) -> None:

@@ -7,10 +7,10 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
 
-from islands_api.web.concurrency import Threads
-from islands_api.web.event_hub import Hub
-from islands_api.web.metrics import Measures
-from islands_api.web.rate_limit import Rate
+from islands_api.web.concurrency import BlockingExecutor
+from islands_api.web.event_hub import JobEventHub
+from islands_api.web.metrics import Metrics
+from islands_api.web.rate_limit import RateLimiter
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -23,18 +23,18 @@ INSPECTIONS, DRAWINGS = 2, 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Doors:
+class AppState:
     """Made when the application starts, and closed when it ends."""
 
     settings: ServiceSettings
     store: Store
     blobs: Blobs
-    hub: Hub
-    rate: Rate
-    measures: Measures
+    hub: JobEventHub
+    rate: RateLimiter
+    measures: Metrics
     inspections: asyncio.Semaphore
     drawings: asyncio.Semaphore
-    threads: Threads
+    threads: BlockingExecutor
 
     async def do(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
         """Carry out what waits for the database or the disk, without holding up other requests."""
@@ -47,4 +47,4 @@ async def _doors(request: Request) -> Any:
 
 
 #: What a route asks for to get at them.
-AtDoors = Annotated[Doors, Depends(_doors)]
+AppStateDep = Annotated[AppState, Depends(_doors)]

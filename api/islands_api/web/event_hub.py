@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import structlog
 
-from islands_api.web.concurrency import Threads
+from islands_api.web.concurrency import BlockingExecutor
 from islands_service.domain.jobs import TERMINAL, Event
 from islands_service.store import Store
 from islands_service.store.database import StoreError
@@ -23,7 +23,7 @@ _KEPT = 256
 
 
 @dataclass(slots=True, eq=False)
-class Feed:
+class JobFeed:
     """What is known of a watched job."""
 
     version: int
@@ -38,18 +38,18 @@ class Feed:
         self.changed = asyncio.Event()
 
 
-class Hub:
+class JobEventHub:
     """Feeds of all jobs that somebody watches.
 
     Parameters
     ----------
     store : Store
-    threads : Threads
+    threads : BlockingExecutor
     """
 
-    def __init__(self, store: Store, threads: Threads) -> None:
+    def __init__(self, store: Store, threads: BlockingExecutor) -> None:
         self._store, self._threads = store, threads
-        self._feeds: dict[str, Feed] = {}
+        self._feeds: dict[str, JobFeed] = {}
         self._somebody = asyncio.Event()
         self.closed = False
 
@@ -75,9 +75,9 @@ class Hub:
             feed.tell()
 
     @contextmanager
-    def watching(self, job: str, version: int) -> Iterator[Feed]:
+    def watching(self, job: str, version: int) -> Iterator[JobFeed]:
         """Have a job's feed kept up to date in the block, from a version on that is known."""
-        feed = self._feeds.setdefault(job, Feed(version))
+        feed = self._feeds.setdefault(job, JobFeed(version))
         feed.watchers += 1
         self._somebody.set()
         try:
@@ -89,7 +89,7 @@ class Hub:
                 if not self._feeds:
                     self._somebody.clear()
 
-    async def wait(self, feed: Feed, version: int, seconds: float) -> bool:
+    async def wait(self, feed: JobFeed, version: int, seconds: float) -> bool:
         """Wait until a job is past a version; return whether it is."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds):
@@ -112,7 +112,7 @@ class Hub:
                 if last >= feed.version and not await self.wait(feed, last, alive):
                     yield None
 
-    async def _after(self, job: str, feed: Feed, last: int) -> list[Event]:
+    async def _after(self, job: str, feed: JobFeed, last: int) -> list[Event]:
         if last >= feed.version:
             return []
         if feed.recent and feed.recent[0].number <= last + 1:

@@ -16,26 +16,32 @@ from islands.errors import IslandsError
 from islands_api.web.problems import (
     MEDIA_TYPE,
     PROBLEMS,
-    NoKey,
-    NoSuchThing,
+    AuthenticationError,
+    MalformedBodyError,
+    MethodNotAllowedError,
+    PayloadTooLargeError,
     Problem,
-    TooLarge,
-    TooManyRequests,
-    Unreadable,
-    WrongMedia,
-    WrongMethod,
+    RateLimitError,
+    ResourceNotFoundError,
+    UnsupportedMediaTypeError,
     problem_of,
 )
-from islands_service.domain.jobs import QuotaExceeded
-from islands_service.store.blobs import NoSuchBlob
-from islands_service.store.database import StoreError, StoreFull, StoreInDoubt
+from islands_service.domain.jobs import QuotaError
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.database import CommitUnknownError, StorageFullError, StoreError
 
 log = structlog.get_logger()
 
 #: What the framework itself raises, by status: it has no classes for it.
 _FRAMEWORK = {
     PROBLEMS[kind].status: PROBLEMS[kind]
-    for kind in (Unreadable, NoSuchThing, WrongMethod, WrongMedia, TooLarge)
+    for kind in (
+        MalformedBodyError,
+        ResourceNotFoundError,
+        MethodNotAllowedError,
+        UnsupportedMediaTypeError,
+        PayloadTooLargeError,
+    )
 }
 
 #: What may be asked of a path.
@@ -48,7 +54,7 @@ _RETRY_AFTER = {HTTPStatus.SERVICE_UNAVAILABLE: 1, HTTPStatus.INSUFFICIENT_STORA
 _ERRORS = 20
 
 
-def answer(
+def problem_response(
     request: Request,
     problem: Problem,
     detail: str,
@@ -71,7 +77,7 @@ def answer(
     return JSONResponse(document, int(problem.status), headers, MEDIA_TYPE)
 
 
-def install(app: FastAPI) -> None:
+def install_handlers(app: FastAPI) -> None:
     """Have an application answer every error as a problem."""
     app.add_exception_handler(IslandsError, _deliberate)
     app.add_exception_handler(RequestValidationError, _invalid)
@@ -80,22 +86,22 @@ def install(app: FastAPI) -> None:
 
 async def _deliberate(request: Request, error: Exception) -> JSONResponse:
     problem, headers = problem_of(error), {}
-    if isinstance(error, TooManyRequests):
+    if isinstance(error, RateLimitError):
         headers["Retry-After"] = str(ceil(error.seconds))
-    if isinstance(error, QuotaExceeded):
+    if isinstance(error, QuotaError):
         headers["Retry-After"] = "60"
-    if isinstance(error, NoKey):
+    if isinstance(error, AuthenticationError):
         headers["WWW-Authenticate"] = 'Bearer realm="islands"'
     if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         log.error("request failed", type=problem.type, reason=str(error))
-    return answer(request, problem, _detail(error), headers=headers)
+    return problem_response(request, problem, _detail(error), headers=headers)
 
 
 def _detail(error: Exception) -> str:
     """Return what a stranger is told: where data lies, what a driver says, is for the log."""
-    if isinstance(error, StoreInDoubt):
+    if isinstance(error, CommitUnknownError):
         return f"{error.__doc__} Look whether it was, or ask again under the same idempotency key."
-    return str(error.__doc__) if isinstance(error, StoreError | NoSuchBlob) else str(error)
+    return str(error.__doc__) if isinstance(error, StoreError | BlobNotFoundError) else str(error)
 
 
 async def _invalid(request: Request, error: Exception) -> JSONResponse:
@@ -107,7 +113,7 @@ async def _invalid(request: Request, error: Exception) -> JSONResponse:
     detail = "; ".join(f"{entry['pointer']}: {entry['detail']}" for entry in errors)
     if len(found) > _ERRORS:
         detail += f"; and {len(found) - _ERRORS} more"
-    return answer(request, problem_of(error), detail, errors)
+    return problem_response(request, problem_of(error), detail, errors)
 
 
 def _words(message: str) -> str:
@@ -129,7 +135,9 @@ async def _http(request: Request, error: Exception) -> JSONResponse:
     status = HTTPStatus(error.status_code)
     detail, headers = str(error.detail), dict(error.headers or {})
     if isinstance(error.__cause__, OSError) and error.__cause__.errno in (ENOSPC, EDQUOT):
-        return await _deliberate(request, StoreFull("there is no room to receive the request: make room"))
+        return await _deliberate(
+            request, StorageFullError("there is no room to receive the request: make room")
+        )
     if status == HTTPStatus.NOT_FOUND:
         detail = f"there is nothing at {request.url.path}: /openapi.json says what there is"
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
@@ -138,7 +146,7 @@ async def _http(request: Request, error: Exception) -> JSONResponse:
     problem = _FRAMEWORK.get(status) or Problem(
         status, status.phrase.lower().replace(" ", "-"), status.phrase
     )
-    return answer(request, problem, detail, headers=headers)
+    return problem_response(request, problem, detail, headers=headers)
 
 
 def _allowed(request: Request) -> list[str]:
@@ -151,8 +159,8 @@ def _allowed(request: Request) -> list[str]:
     ]
 
 
-def defect(request: Request, error: Exception) -> JSONResponse:
+def internal_error(request: Request, error: Exception) -> JSONResponse:
     """Say that something went wrong that nobody has thought of; what it was stands in the log alone."""
     log.error("defect", exc_info=error)
     detail = "This is a defect of the service. Please report it with the request's id."
-    return answer(request, problem_of(error), detail)
+    return problem_response(request, problem_of(error), detail)

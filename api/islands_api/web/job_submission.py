@@ -6,14 +6,14 @@ from fastapi import Header
 
 from islands.errors import IslandsError
 from islands_api.schemas import DiscrepancyRequest, JobRequest
-from islands_api.web.auth import Caller
-from islands_api.web.dependencies import Doors
-from islands_api.web.problems import NoSuchThing, NotFinished
-from islands_api.web.responses import Document, job_document
+from islands_api.web.auth import Principal
+from islands_api.web.dependencies import AppState
+from islands_api.web.problems import ResourceNotFoundError, ResultNotReadyError
+from islands_api.web.responses import JSONDocument, job_document
 from islands_service.domain.jobs import Job, JobState, Submission
-from islands_service.intake.file_inspection import inspected
-from islands_service.intake.job_inputs import named
-from islands_service.intake.job_validation import Doubt, admit
+from islands_service.intake.file_inspection import inspect_file
+from islands_service.intake.job_inputs import link_blob
+from islands_service.intake.job_validation import PendingInspection, validate_job
 
 #: Where jobs of every kind are.
 JOBS = "/v1/jobs"
@@ -43,7 +43,9 @@ IdempotencyKey = Annotated[
 Request = JobRequest | DiscrepancyRequest
 
 
-async def accept(doors: Doors, caller: Caller, request: Request, kind: str, key: str | None) -> Document:
+async def submit_job(
+    doors: AppState, caller: Principal, request: Request, kind: str, key: str | None
+) -> JSONDocument:
     """Accept a job, and say where it is.
 
     Raises
@@ -58,7 +60,7 @@ async def accept(doors: Doors, caller: Caller, request: Request, kind: str, key:
     headers = {"Location": f"{JOBS}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
     if not new:
         headers["Idempotent-Replayed"] = "true"
-    return Document(job_document(job), 202, headers)
+    return JSONDocument(job_document(job), 202, headers)
 
 
 def etag(job: Job) -> str:
@@ -66,27 +68,29 @@ def etag(job: Job) -> str:
     return f'"{job.version}"'
 
 
-async def _submitted(doors: Doors, request: Request, submission: Submission) -> tuple[Job, bool]:
+async def _submitted(doors: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
     before, doubts = await doors.do(_admitted, doors, request, submission)
     if before is not None:
         return before, False
     for doubt in doubts:
-        with named(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
+        with link_blob(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
             async with doors.inspections:
-                await inspected(
+                await inspect_file(
                     path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
                 )
     return await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
 
 
-def _admitted(doors: Doors, request: Request, submission: Submission) -> tuple[Job | None, tuple[Doubt, ...]]:
+def _admitted(
+    doors: AppState, request: Request, submission: Submission
+) -> tuple[Job | None, tuple[PendingInspection, ...]]:
     """Return what is in doubt about a submission, or the job that it is already.
 
     That is looked for only where it spares an inspection or a refusal: what was accepted once stays so, even
     if its data set was deleted since. All others are told by `Jobs.submit`, in the transaction that accepts.
     """
     try:
-        doubts = admit(request, submission.owner, doors.store, doors.settings)
+        doubts = validate_job(request, submission.owner, doors.store, doors.settings)
     except IslandsError:
         if (before := doors.store.jobs.accepted(submission)) is not None:
             return before, ()
@@ -94,30 +98,30 @@ def _admitted(doors: Doors, request: Request, submission: Submission) -> tuple[J
     return doors.store.jobs.accepted(submission) if doubts else None, doubts
 
 
-async def of_kind(doors: Doors, caller: Caller, job: str, kind: str) -> Job:
+async def get_job_of_kind(doors: AppState, caller: Principal, job: str, kind: str) -> Job:
     """Return a job that is of a kind.
 
     Raises
     ------
-    NoSuchJob
-    NoSuchThing
+    JobNotFoundError
+    ResourceNotFoundError
         It is of another kind, and has nothing of what is asked for.
     """
     found = await doors.do(doors.store.jobs.get, caller.owner, job)
     if found.kind != kind:
-        raise NoSuchThing(
+        raise ResourceNotFoundError(
             f"job {job} is of the kind {found.kind}, and only those of the kind {kind} have this: its "
             "/result and /report say what it found"
         )
     return found
 
 
-async def finished(doors: Doors, job: Job) -> dict[str, Any]:
+async def get_result(doors: AppState, job: Job) -> dict[str, Any]:
     """Return a job's result without its models.
 
     Raises
     ------
-    NotFinished
+    ResultNotReadyError
     """
     document = await doors.do(doors.store.results.document, job.id)
     if document is None:
@@ -126,5 +130,5 @@ async def finished(doors: Doors, job: Job) -> dict[str, Any]:
             if job.state in (JobState.QUEUED, JobState.RUNNING)
             else "resume it, or submit it again"
         )
-        raise NotFinished(f"job {job.id} is {job.state} and has no result: {hint}")
+        raise ResultNotReadyError(f"job {job.id} is {job.state} and has no result: {hint}")
     return document

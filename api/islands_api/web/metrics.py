@@ -9,7 +9,7 @@ from prometheus_client.registry import Collector
 from islands_service.store import Store
 
 
-class Measures:
+class Metrics:
     """The metrics of one application.
 
     Parameters
@@ -38,7 +38,7 @@ class Measures:
 
         Raises
         ------
-        StoreUnavailable
+        StoreUnavailableError
         """
         return generate_latest(self.registry)
 

@@ -10,8 +10,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from islands_api.web.exception_handlers import METHODS, answer, defect
-from islands_api.web.problems import CrossOrigin, TooLarge, problem_of
+from islands_api.web.exception_handlers import METHODS, internal_error, problem_response
+from islands_api.web.problems import CrossOriginError, PayloadTooLargeError, problem_of
 from islands_service.settings import LOOPBACK, ServiceSettings
 
 log = structlog.get_logger()
@@ -35,7 +35,7 @@ SECURITY = {
 _TLS = {"Strict-Transport-Security": "max-age=31536000"}
 
 
-class Watched:
+class RequestLogging:
     """Gives a request an id, binds it to the log, and takes the time until the answer begins.
 
     An id that the client sends is kept, so that one line of work can be followed through several services.
@@ -71,7 +71,7 @@ class Watched:
                 await self._app(scope, receive, sending)
             except Exception as error:
                 # Here, so that this answer has its headers too, and the connection lives on.
-                response = defect(Request(scope), error)
+                response = internal_error(Request(scope), error)
                 if started:
                     raise
                 await response(scope, receive, sending)
@@ -93,7 +93,7 @@ class Watched:
             )
 
 
-class Limited:
+class BodyLimit:
     """Refuses a body that is too large, whatever it says of its length."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
@@ -105,9 +105,11 @@ class Limited:
             return await self._app(scope, receive, send)
         most = self._upload if scope["path"] == UPLOADS else BODY
         claimed = Headers(scope=scope).get("content-length", "0")
-        error = TooLarge(f"the request has more than {most} bytes, the most that is taken here")
+        error = PayloadTooLargeError(f"the request has more than {most} bytes, the most that is taken here")
         if claimed.isdecimal() and int(claimed) > most:
-            return await answer(Request(scope), problem_of(error), error.detail)(scope, receive, send)
+            return await problem_response(Request(scope), problem_of(error), error.detail)(
+                scope, receive, send
+            )
         received = 0
 
         async def receiving() -> Message:
@@ -134,8 +136,8 @@ class SameOrigin:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle a request."""
         if scope["type"] == "http" and (refusal := self._refusal(Headers(scope=scope))):
-            error = CrossOrigin(refusal)
-            return await answer(Request(scope), problem_of(error), str(error))(scope, receive, send)
+            error = CrossOriginError(refusal)
+            return await problem_response(Request(scope), problem_of(error), str(error))(scope, receive, send)
         return await self._app(scope, receive, send)
 
     def _refusal(self, headers: Headers) -> str:

@@ -16,14 +16,14 @@ Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the 
 Limit = Annotated[int, Query(ge=1, le=200, description="The most entries of a page.")]
 
 
-def cursor_of(place: tuple[float, str] | None) -> str | None:
+def encode_cursor(place: tuple[float, str] | None) -> str | None:
     """Write the place behind which the next page begins."""
     if place is None:
         return None
     return base64.urlsafe_b64encode(json.dumps(place).encode()).decode().rstrip("=")
 
 
-def place_of(cursor: str | None) -> tuple[float, str] | None:
+def decode_cursor(cursor: str | None) -> tuple[float, str] | None:
     """Read a cursor.
 
     Raises

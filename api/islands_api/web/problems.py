@@ -14,23 +14,23 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-from islands_service.domain.jobs import IdempotencyConflict, NoSuchJob, QuotaExceeded, WrongState
-from islands_service.store.blobs import NoSuchBlob
-from islands_service.store.database import StoreFull, StoreInDoubt, StoreUnavailable
-from islands_service.store.datasets import DatasetInUse, NoSuchDataset
+from islands_service.domain.jobs import IdempotencyError, JobNotFoundError, JobStateError, QuotaError
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
+from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError
 
 MEDIA_TYPE = "application/problem+json"
 
 
-class NoKey(IslandsError):
+class AuthenticationError(IslandsError):
     """The request has no key, or one that opens nothing."""
 
 
-class ScopeMissing(IslandsError):
+class InsufficientScopeError(IslandsError):
     """The key does not allow this."""
 
 
-class TooManyRequests(IslandsError):
+class RateLimitError(IslandsError):
     """The key has asked too much in too short a time."""
 
     def __init__(self, message: str, seconds: float) -> None:
@@ -38,7 +38,7 @@ class TooManyRequests(IslandsError):
         self.seconds = seconds
 
 
-class TooLarge(HTTPException):
+class PayloadTooLargeError(HTTPException):
     """The request has more bytes than this service takes.
 
     One of the framework's own errors: others, raised while it reads a body, become a plain 400 to it.
@@ -48,33 +48,33 @@ class TooLarge(HTTPException):
         super().__init__(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, message)
 
 
-class Unreadable(HTTPException):
+class MalformedBodyError(HTTPException):
     """The body of the request cannot be read: it is damaged, or not what it says it is."""
 
     def __init__(self, message: str) -> None:
         super().__init__(HTTPStatus.BAD_REQUEST, message)
 
 
-class WrongMedia(HTTPException):
+class UnsupportedMediaTypeError(HTTPException):
     """The body of the request is of another type than this path takes."""
 
     def __init__(self, message: str) -> None:
         super().__init__(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, message)
 
 
-class WrongMethod(HTTPException):
+class MethodNotAllowedError(HTTPException):
     """The path does not take this method; the header Allow names those that it takes."""
 
 
-class CrossOrigin(IslandsError):
+class CrossOriginError(IslandsError):
     """Another site's page wants something of this service."""
 
 
-class NoSuchThing(IslandsError):
+class ResourceNotFoundError(IslandsError):
     """There is no such model, figure or result."""
 
 
-class NotFinished(IslandsError):
+class ResultNotReadyError(IslandsError):
     """The job has no result yet."""
 
 
@@ -98,36 +98,40 @@ PROBLEMS: Mapping[type[Exception], Problem] = MappingProxyType(
         RequestValidationError: Problem(
             HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "The request is not valid"
         ),
-        IdempotencyConflict: Problem(
+        IdempotencyError: Problem(
             HTTPStatus.UNPROCESSABLE_ENTITY, "idempotency-conflict", "The idempotency key was used before"
         ),
-        NoKey: Problem(HTTPStatus.UNAUTHORIZED, "no-key", "A valid key is needed"),
-        ScopeMissing: Problem(HTTPStatus.FORBIDDEN, "scope-missing", "The key does not allow this"),
-        CrossOrigin: Problem(HTTPStatus.FORBIDDEN, "cross-origin", "Requests of other sites are refused"),
-        NoSuchJob: Problem(HTTPStatus.NOT_FOUND, "no-such-job", "There is no such job"),
-        NoSuchDataset: Problem(HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"),
-        NoSuchThing: Problem(HTTPStatus.NOT_FOUND, "not-found", "There is no such thing"),
-        Unreadable: Problem(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
-        WrongMethod: Problem(
+        AuthenticationError: Problem(HTTPStatus.UNAUTHORIZED, "no-key", "A valid key is needed"),
+        InsufficientScopeError: Problem(HTTPStatus.FORBIDDEN, "scope-missing", "The key does not allow this"),
+        CrossOriginError: Problem(
+            HTTPStatus.FORBIDDEN, "cross-origin", "Requests of other sites are refused"
+        ),
+        JobNotFoundError: Problem(HTTPStatus.NOT_FOUND, "no-such-job", "There is no such job"),
+        DatasetNotFoundError: Problem(HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"),
+        ResourceNotFoundError: Problem(HTTPStatus.NOT_FOUND, "not-found", "There is no such thing"),
+        MalformedBodyError: Problem(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
+        MethodNotAllowedError: Problem(
             HTTPStatus.METHOD_NOT_ALLOWED, "method-not-allowed", "The method is not allowed here"
         ),
-        WrongMedia: Problem(
+        UnsupportedMediaTypeError: Problem(
             HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "The body has another type"
         ),
-        NotFinished: Problem(HTTPStatus.CONFLICT, "not-finished", "The job has no result"),
-        WrongState: Problem(HTTPStatus.CONFLICT, "wrong-state", "The job's state does not allow this"),
-        DatasetInUse: Problem(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
-        TooLarge: Problem(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large"),
-        QuotaExceeded: Problem(HTTPStatus.TOO_MANY_REQUESTS, "quota-exceeded", "The quota is used up"),
-        TooManyRequests: Problem(HTTPStatus.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests"),
-        NoSuchBlob: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "no-such-blob", "Stored data is lost"),
-        StoreUnavailable: Problem(
+        ResultNotReadyError: Problem(HTTPStatus.CONFLICT, "not-finished", "The job has no result"),
+        JobStateError: Problem(HTTPStatus.CONFLICT, "wrong-state", "The job's state does not allow this"),
+        DatasetInUseError: Problem(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
+        PayloadTooLargeError: Problem(
+            HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large"
+        ),
+        QuotaError: Problem(HTTPStatus.TOO_MANY_REQUESTS, "quota-exceeded", "The quota is used up"),
+        RateLimitError: Problem(HTTPStatus.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests"),
+        BlobNotFoundError: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "no-such-blob", "Stored data is lost"),
+        StoreUnavailableError: Problem(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
         ),
-        StoreInDoubt: Problem(
+        CommitUnknownError: Problem(
             HTTPStatus.GATEWAY_TIMEOUT, "store-in-doubt", "Nobody knows whether it was done"
         ),
-        StoreFull: Problem(HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "There is no room left"),
+        StorageFullError: Problem(HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "There is no room left"),
         IslandsError: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "failed", "The service failed"),
         Exception: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "The service met a defect"),
     }

@@ -3,13 +3,13 @@
 from collections import OrderedDict
 from time import monotonic
 
-from islands_api.web.problems import TooManyRequests
+from islands_api.web.problems import RateLimitError
 
 #: Buckets that are remembered: who has not asked for longest is forgotten, and is full by then.
 _REMEMBERED = 10_000
 
 
-class Rate:
+class RateLimiter:
     """Lets everybody ask so often, and no more.
 
     Parameters
@@ -29,7 +29,7 @@ class Rate:
 
         Raises
         ------
-        TooManyRequests
+        RateLimitError
         """
         if not self._rate:
             return
@@ -38,7 +38,7 @@ class Rate:
         left = min(self._burst, left + (now - at) * self._rate)
         if left < tokens:
             wait = (tokens - left) / self._rate
-            raise TooManyRequests(
+            raise RateLimitError(
                 f"more than {self._rate:g} requests a second: wait {wait:.1f} s; to follow a job, watch its "
                 "events or ask with ?wait=30",
                 wait,

@@ -14,8 +14,8 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
-from islands_api.web.auth import caller_of
-from islands_api.web.problems import Unreadable, WrongMedia
+from islands_api.web.auth import authenticate
+from islands_api.web.problems import MalformedBodyError, UnsupportedMediaTypeError
 
 #: The most digits of a whole number: reading one takes the square of their count.
 _DIGITS = 400
@@ -38,18 +38,22 @@ class BodyRoute(APIRoute):
 
         async def handle(request: Request) -> Response:
             # Before the body is received: a stranger would have us keep what nobody will look at.
-            await caller_of(request)
+            await authenticate(request)
             given = request.headers.get("content-type", "")
             if given.partition(";")[0].strip().lower() != self.media:
-                raise WrongMedia(f"the body is {given or 'of no type'}: send it as {self.media}")
+                raise UnsupportedMediaTypeError(
+                    f"the body is {given or 'of no type'}: send it as {self.media}"
+                )
             try:
                 return await handler(_Strict(request.scope, request.receive))
             except HTTPException as error:
-                if error.status_code != HTTPStatus.BAD_REQUEST or isinstance(error, Unreadable):
+                if error.status_code != HTTPStatus.BAD_REQUEST or isinstance(error, MalformedBodyError):
                     raise
                 if isinstance(error.__cause__, OSError):  # a full disk, say
                     raise
-                raise Unreadable(f"the body cannot be read ({error.detail}): {self.advice}") from error
+                raise MalformedBodyError(
+                    f"the body cannot be read ({error.detail}): {self.advice}"
+                ) from error
 
         return handle
 
@@ -79,19 +83,19 @@ def read_json(body: bytes) -> Any:
 
     Raises
     ------
-    Unreadable
+    MalformedBodyError
         It is none, holds what is no number, names a thing twice, or is nested too deeply.
     """
     try:
         return json.loads(body, object_pairs_hook=_once, parse_int=_whole, parse_constant=_no_number)
     except RecursionError:
-        raise Unreadable("the body is nested too deeply: a job needs a few levels") from None
+        raise MalformedBodyError("the body is nested too deeply: a job needs a few levels") from None
     except json.JSONDecodeError as error:
-        raise Unreadable(
+        raise MalformedBodyError(
             f"the body is no JSON: {error.msg} in line {error.lineno}, column {error.colno}"
         ) from error
     except ValueError as error:
-        raise Unreadable(f"the body is no JSON: {error}") from error
+        raise MalformedBodyError(f"the body is no JSON: {error}") from error
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

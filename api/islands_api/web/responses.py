@@ -45,7 +45,7 @@ def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
     }
 
 
-class Document(JSONResponse):
+class JSONDocument(JSONResponse):
     """An answer that is made by hand."""
 
     def render(self, content: Any) -> bytes:
@@ -53,7 +53,7 @@ class Document(JSONResponse):
         return json_text(content).encode()
 
 
-class Items(Document):
+class JSONItems(JSONDocument):
     """A list of things, perhaps long: made in a thread, it lets others go on between two of them."""
 
     def render(self, content: Any) -> bytes:

@@ -8,7 +8,7 @@ from typing import IO
 
 from islands.errors import RecordError
 from islands.io.records import READERS
-from islands_api.web.problems import TooLarge
+from islands_api.web.problems import PayloadTooLargeError
 
 #: Bytes that are handled at once.
 CHUNK = 1 << 20
@@ -51,7 +51,7 @@ def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, m
     ------
     RecordError
         It is empty, or no gzip though its name says so.
-    TooLarge
+    PayloadTooLargeError
         It unpacks to more than ``most`` bytes: a small file may unpack to any size.
     """
     size, digest = 0, hashlib.sha256()
@@ -60,7 +60,7 @@ def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, m
         while piece := stream.read(CHUNK):
             size += len(piece)
             if size > most:
-                raise TooLarge(
+                raise PayloadTooLargeError(
                     f"{name} has more than {most / 1e6:.0f} MB unpacked, the most that is taken here"
                 )
             target.write(piece)

@@ -8,7 +8,7 @@ import sys
 
 from islands.errors import IslandsError
 from islands_service.coordinator.coordinator import Coordinator
-from islands_service.liveness import Wish, lifeline, stop_on_signals
+from islands_service.liveness import StopRequest, stop_on_signals, watch_supervisor
 from islands_service.logging_config import configure_logs
 from islands_service.settings import service_settings
 
@@ -22,12 +22,12 @@ def main() -> int:
         "--name", default=f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(3)}", help="unique"
     )
     name = parser.parse_args().name
-    stopping = Wish()
+    stopping = StopRequest()
     try:
         settings = service_settings()
         configure_logs(settings.log_format, "coordinator")
         stop_on_signals(stopping)
-        with lifeline(settings.lifeline):
+        with watch_supervisor(settings.lifeline):
             Coordinator(settings, name, stopping).run()
     except IslandsError as error:
         print(f"coordinator: {error}", file=sys.stderr)

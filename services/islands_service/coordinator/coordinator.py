@@ -15,13 +15,13 @@ from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat
 from islands_service.domain.jobs import (
     DISCREPANCY,
     IDENTIFICATION,
+    JobOutcome,
     JobState,
     Lease,
-    LeaseLost,
-    Outcome,
-    Report,
+    LeaseLostError,
+    ProgressReport,
 )
-from islands_service.liveness import Wish, stop_on_signals
+from islands_service.liveness import StopRequest, stop_on_signals
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -31,7 +31,7 @@ from islands_service.tracing import Traces
 
 if TYPE_CHECKING:
     from islands.evolution.archipelago import Archipelago
-    from islands.evolution.engine import Engine, Epoch, Stop
+    from islands.evolution.engine import ArchipelagoEpoch, Engine, Stop
     from islands.evolution.problem import Problem
 
 log = structlog.get_logger()
@@ -46,17 +46,17 @@ PATIENCE = 60.0
 SWEEP_EVERY, ORPHAN = 600.0, 3600.0
 
 #: Carries out a job: lease, store, blobs, engine, a check that ends it, seconds between checkpoints.
-Work = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], Outcome]
+Work = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], JobOutcome]
 
 
-def _identification(*arguments: object) -> Outcome:
+def _identification(*arguments: object) -> JobOutcome:
     # The search's own imports take half a second: a job is claimed before that.
     from islands_service.coordinator.identification_job import identification  # noqa: PLC0415
 
     return identification(*arguments)  # type: ignore[arg-type]
 
 
-def _discrepancy(*arguments: object) -> Outcome:
+def _discrepancy(*arguments: object) -> JobOutcome:
     from islands_service.coordinator.diagnosis_job import discrepancy  # noqa: PLC0415
 
     return discrepancy(*arguments)  # type: ignore[arg-type]
@@ -74,11 +74,11 @@ class Coordinator:
     settings : ServiceSettings
     name : str
         No two living coordinators have the same.
-    stopping : Wish
+    stopping : StopRequest
         Set to have it stop: its job goes back to the queue, with its last checkpoint.
     """
 
-    def __init__(self, settings: ServiceSettings, name: str, stopping: Wish) -> None:
+    def __init__(self, settings: ServiceSettings, name: str, stopping: StopRequest) -> None:
         self._settings, self._name, self._stopping = settings, name, stopping
         self._store = Store(settings.url)
         self._blobs = Blobs(settings.blobs)
@@ -147,7 +147,7 @@ class Coordinator:
                     outcome = self._outcome(lease, heartbeat)
                     self._finish(lease, outcome, heartbeat)
                 log.info("job finished", state=outcome.state, seconds=round(monotonic() - began, 3))
-            except LeaseLost as error:
+            except LeaseLostError as error:
                 log.warning("lease lost", reason=str(error))
             except CoordinatorStopping:
                 self._release(lease)
@@ -160,7 +160,7 @@ class Coordinator:
                 self._release(lease, attempted=self._connected)
                 raise
 
-    def _outcome(self, lease: Lease, heartbeat: Heartbeat) -> Outcome:
+    def _outcome(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
         try:
             heartbeat.check()
             self._wait_for_ray(lease, heartbeat)
@@ -173,14 +173,14 @@ class Coordinator:
                 self._settings.checkpoint_every,
             )
         except JobCancelled:
-            return Outcome(JobState.CANCELLED)
-        except (LeaseLost, CoordinatorStopping, ClusterError, StoreError):
+            return JobOutcome(JobState.CANCELLED)
+        except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError):
             raise
         except IslandsError as error:
-            return Outcome(JobState.FAILED, problem=problem_of(error))
+            return JobOutcome(JobState.FAILED, problem=problem_of(error))
         except Exception as error:
             log.error("job failed", trace=traceback.format_exc())
-            return Outcome(
+            return JobOutcome(
                 JobState.FAILED,
                 problem={
                     "type": "defect",
@@ -198,7 +198,7 @@ class Coordinator:
         except (StoreError, OSError) as error:
             log.warning("sweep failed", reason=str(error))
 
-    def _finish(self, lease: Lease, outcome: Outcome, heartbeat: Heartbeat) -> None:
+    def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
         """Write down how a job ended; a store that is away or full is waited for: the work is done."""
         while True:
             try:
@@ -214,14 +214,14 @@ class Coordinator:
         try:
             self._store.leases.release(lease, attempted)
             log.info("job released")
-        except (LeaseLost, StoreError) as error:
+        except (LeaseLostError, StoreError) as error:
             # It is taken over when its lease has run out.
             log.warning("job not released", reason=str(error))
 
     def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
         if self._connected:
             return
-        self._store.leases.report(lease, Report({"phase": "starting", "note": "waiting for Ray"}))
+        self._store.leases.report(lease, ProgressReport({"phase": "starting", "note": "waiting for Ray"}))
         until = monotonic() + PATIENCE
         while self._address() is None:
             heartbeat.check()
@@ -249,10 +249,10 @@ class Coordinator:
         warm_up(lambda line: log.info("kernels", note=line))
 
     def _engine(self, lease: Lease) -> "Engine":
-        from islands_service.runtime.actor_pool import end_leftovers  # noqa: PLC0415
+        from islands_service.runtime.actor_pool import kill_stale_actors  # noqa: PLC0415
         from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
 
-        if ended := end_leftovers(lease.job.id, lease.epoch):
+        if ended := kill_stale_actors(lease.job.id, lease.epoch):
             log.warning("actors of a lost lease ended", actors=ended)
         return RayEngine(lambda line: log.warning("islands", note=line), f"{lease.job.id}.{lease.epoch}")
 
@@ -276,7 +276,7 @@ class _Watched:
     def __init__(self, engine: "Engine", heartbeat: Heartbeat) -> None:
         self._engine, self._heartbeat = engine, heartbeat
 
-    def run(self, problem: "Problem", start: "Archipelago", stop: "Stop") -> Generator["Epoch"]:
+    def run(self, problem: "Problem", start: "Archipelago", stop: "Stop") -> Generator["ArchipelagoEpoch"]:
         """See `islands.evolution.engine.Engine`."""
         with self._heartbeat.search():
             yield from self._engine.run(problem, start, stop)
@@ -294,7 +294,7 @@ PROBLEMS: Mapping[str, str] = MappingProxyType(
         "RecordError": "invalid-record",
         "SettingsError": "invalid-settings",
         "ModelError": "invalid-model",
-        "NoSuchDataset": "no-such-dataset",
-        "NoSuchBlob": "no-such-blob",
+        "DatasetNotFoundError": "no-such-dataset",
+        "BlobNotFoundError": "no-such-blob",
     }
 )

@@ -5,18 +5,18 @@ from time import monotonic
 
 import structlog
 
-from islands._explain_residual import proposed
+from islands._explain_residual import explain_residual
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula, diagnose
 from islands.evolution.engine import Engine
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
-from islands.io.simulator_spec.factory import simulation
-from islands.parallel import Spread
+from islands.io.simulator_spec.factory import make_simulator
+from islands.parallel import ParallelMap
 from islands_service.domain.job_spec import discrepancy_of
-from islands_service.domain.jobs import EXTENDED, REPORT, JobState, Lease, Outcome, Report
+from islands_service.domain.jobs import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.intake.job_inputs import record_and_columns
-from islands_service.reports.diagnosis_report import in_words, report
-from islands_service.runtime.parallel_map import on_ray
+from islands_service.reports.diagnosis_report import diagnosis_report, summarise
+from islands_service.runtime.parallel_map import ray_map
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
@@ -31,15 +31,15 @@ def discrepancy(
     _engine: Engine,
     check: Callable[[], None],
     _every: float,
-    spread: Spread | None = None,
-) -> Outcome:
+    spread: ParallelMap | None = None,
+) -> JobOutcome:
     """Carry out a discrepancy job. It takes seconds to minutes: interrupted, it begins anew.
 
     Parameters
     ----------
     check : callable
         Raises what ends the job before its time.
-    spread : Spread, optional
+    spread : ParallelMap, optional
         Fits the effects; by default on the Ray that this process is connected to.
 
     Raises
@@ -52,7 +52,7 @@ def discrepancy(
     def tell(line: str) -> None:
         check()
         try:
-            store.leases.report(lease, Report({"phase": line}))
+            store.leases.report(lease, ProgressReport({"phase": line}))
         except StoreError as error:
             # The analysis goes on: the next line tells where it is.
             log.warning("report failed", job=lease.job.id, reason=str(error))
@@ -61,17 +61,17 @@ def discrepancy(
     stored = store.datasets.get(lease.job.owner, spec.dataset)
     tell("reading the record")
     record, columns = record_and_columns(spec, stored, blobs)
-    core = simulation(spec.simulation, record, columns)
-    found = diagnose(record, core, spec.tolerance, spec.seed, tell, spread or on_ray())
+    core = make_simulator(spec.simulation, record, columns)
+    found = diagnose(record, core, spec.tolerance, spec.seed, tell, spread or ray_map())
     tell("a formula for what has no name")
-    proposal = proposed(found, spec.seed)
+    proposal = explain_residual(found, spec.seed)
     wall_s = monotonic() - began
     tell("writing the report")
-    artefacts = {REPORT: blobs.write(report(stored.name, found, proposal=proposal))}
+    artefacts = {REPORT: blobs.write(diagnosis_report(stored.name, found, proposal=proposal))}
     if found.gain is not None:
         artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())
     document = diagnosis_document(found, wall_s, proposal=proposal)
-    return Outcome(
+    return JobOutcome(
         JobState.SUCCEEDED,
         document,
         summary=_summary(found, proposal, core.name, wall_s),
@@ -87,6 +87,6 @@ def _summary(
         "verdict": str(found.verdict),
         "effects": [finding.name for finding in found.effects],
         "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
-        "words": in_words(found, proposal),
+        "words": summarise(found, proposal),
         "wall_s": wall_s,
     }

@@ -10,8 +10,8 @@ from types import TracebackType
 import structlog
 
 from islands.errors import IslandsError
-from islands_service.domain.jobs import JobState, Lease, LeaseLost, Outcome
-from islands_service.liveness import Wish
+from islands_service.domain.jobs import JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.liveness import StopRequest
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 
@@ -28,11 +28,11 @@ GRACE = 1.0
 HANGS = 600.0
 
 
-class JobCancelled(IslandsError):
+class JobCancelled(IslandsError):  # noqa: N818 - ends a job, and is no error
     """The owner has cancelled the job."""
 
 
-class CoordinatorStopping(IslandsError):
+class CoordinatorStopping(IslandsError):  # noqa: N818 - ends a process, and is no error
     """The coordinator is to stop: its job goes on elsewhere."""
 
 
@@ -45,11 +45,11 @@ class Heartbeat:
     lease : Lease
     seconds : float
         Of the lease.
-    stopping : Wish
+    stopping : StopRequest
         Set when the coordinator is to stop.
     """
 
-    def __init__(self, store: Store, lease: Lease, seconds: float, stopping: Wish) -> None:
+    def __init__(self, store: Store, lease: Lease, seconds: float, stopping: StopRequest) -> None:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
         self._over = Event()
         self._lost = self._cancelled = False
@@ -75,12 +75,12 @@ class Heartbeat:
 
         Raises
         ------
-        LeaseLost, JobCancelled, CoordinatorStopping
+        LeaseLostError, JobCancelled, CoordinatorStopping
         """
         if self._asked is not None:
             self._asked = monotonic()
         if self._lost:
-            raise LeaseLost(f"job {self._lease.job.id} is not ours any more")
+            raise LeaseLostError(f"job {self._lease.job.id} is not ours any more")
         if self._cancelled:
             raise JobCancelled(f"job {self._lease.job.id} is cancelled")
         if self._stopping.made:
@@ -109,9 +109,9 @@ class Heartbeat:
                 waited += self._seconds / BEATS if self._cancelled else 0.0
                 if waited > GRACE:
                     # Something long that asks nobody, a refinement perhaps: its result comes too late.
-                    self._store.leases.finish(self._lease, Outcome(JobState.CANCELLED))
+                    self._store.leases.finish(self._lease, JobOutcome(JobState.CANCELLED))
                     self._lost = True
-            except LeaseLost:
+            except LeaseLostError:
                 self._lost = True
             except StoreError as error:
                 # The lease may run out meanwhile: then the next beat is told so.

@@ -11,15 +11,21 @@ import structlog
 
 from islands._identify import identify
 from islands.evolution.engine import Engine
-from islands.evolution.search_state import State
+from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands.io.checkpoints import archipelago_of, checkpoint_text, history_document, state_document, state_of
+from islands.io.checkpoints import (
+    archipelago_from_document,
+    checkpoint_text,
+    history_document,
+    state_document,
+    state_from_document,
+)
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.model.equations import equation
-from islands.search_result import Findings
+from islands.search_result import SearchResult
 from islands_service.domain.job_spec import identification_of
-from islands_service.domain.jobs import Job, JobState, Lease, Outcome, Report
+from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.intake.job_inputs import record_and_validation
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -36,7 +42,7 @@ CHECKPOINT_SHARE = 0.05
 
 def identification(
     lease: Lease, store: Store, blobs: Blobs, engine: Engine, check: Callable[[], None], every: float
-) -> Outcome:
+) -> JobOutcome:
     """Carry out an identification, from its last checkpoint on.
 
     Parameters
@@ -77,7 +83,7 @@ def identification(
     return outcome_of(result.with_wall_time(watch.spent).findings)
 
 
-def outcome_of(findings: Findings) -> Outcome:
+def outcome_of(findings: SearchResult) -> JobOutcome:
     """Return what is stored of findings."""
     document = result_document(findings)
     models = document.pop("models")
@@ -93,16 +99,16 @@ def outcome_of(findings: Findings) -> Outcome:
         "ended_by": document["search"]["ended_by"],
     }
     files = [model_json(entry.model) for entry in findings.models]
-    return Outcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
+    return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 
-def _stored(job: Job, blobs: Blobs) -> tuple[State | None, float]:
+def _stored(job: Job, blobs: Blobs) -> tuple[SearchState | None, float]:
     """Return where a job stood at its last checkpoint, and the seconds that it had taken."""
     if job.checkpoint is None:
         return None, 0.0
     text = gzip.decompress(blobs.read(job.checkpoint)).decode()
-    archipelago, about = archipelago_of(text, f"the checkpoint of job {job.id}")
-    return state_of(archipelago, about), float(about["wall_s"])
+    archipelago, about = archipelago_from_document(text, f"the checkpoint of job {job.id}")
+    return state_from_document(archipelago, about), float(about["wall_s"])
 
 
 class _Watch:
@@ -115,7 +121,7 @@ class _Watch:
         blobs: Blobs,
         check: Callable[[], None],
         every: float,
-        start: State | None,
+        start: SearchState | None,
         spent: float,
     ) -> None:
         self._lease, self._store, self._blobs = lease, store, blobs
@@ -125,14 +131,14 @@ class _Watch:
         # Points that are told for good: the last one of a history is replaced while nothing gets better.
         self._told = 0 if start is None else len(start.history) - 1
         self._report_at = self._checkpoint_at = monotonic()  # the first populations are kept at once
-        self._last: tuple[State, Settings] | None = None
+        self._last: tuple[SearchState, Settings] | None = None
 
     @property
     def spent(self) -> float:
         """Seconds that the job has taken, in all attempts."""
         return monotonic() - self._began
 
-    def __call__(self, state: State, settings: Settings) -> None:
+    def __call__(self, state: SearchState, settings: Settings) -> None:
         self._check()
         self._last = state, settings
         if monotonic() >= min(self._report_at, self._checkpoint_at):
@@ -144,11 +150,11 @@ class _Watch:
             self._check()
             sleep(REPORT_EVERY)
 
-    def _tell(self, state: State, settings: Settings) -> bool:
+    def _tell(self, state: SearchState, settings: Settings) -> bool:
         """Tell how far the search is; return whether that could be told."""
         began = monotonic()
         points, after = self._points(state)
-        report = Report(self._progress(state, settings), points, after=after)
+        report = ProgressReport(self._progress(state, settings), points, after=after)
         try:
             if began >= self._checkpoint_at:
                 report = replace(report, checkpoint=self._blobs.write(self._checkpoint(state)))
@@ -168,7 +174,7 @@ class _Watch:
             self._checkpoint_at = now + max(self._every, (now - began) / CHECKPOINT_SHARE)
         return True
 
-    def _progress(self, state: State, settings: Settings) -> dict[str, Any]:
+    def _progress(self, state: SearchState, settings: Settings) -> dict[str, Any]:
         last = state.history[-1]
         since, before = self._first
         rate = (state.evaluations - before) / max(monotonic() - since, 1e-9)
@@ -186,11 +192,11 @@ class _Watch:
             "islands": [least**0.5 if isfinite(least) else None for least in last.islands],
         }
 
-    def _points(self, state: State) -> tuple[tuple[Any, ...], int]:
+    def _points(self, state: SearchState) -> tuple[tuple[Any, ...], int]:
         new = history_document(state.history[self._told :])
         after = state.history[self._told - 1].generation if self._told else -1
         return tuple((*point[:3], tuple(point[3])) for point in new), after
 
-    def _checkpoint(self, state: State) -> bytes:
+    def _checkpoint(self, state: SearchState) -> bytes:
         about = {"job": self._lease.job.id, "wall_s": self.spent, **state_document(state)}
         return gzip.compress(checkpoint_text(state.archipelago, about).encode(), compresslevel=1, mtime=0)

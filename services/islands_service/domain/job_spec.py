@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from islands.errors import SettingsError
-from islands.evolution.presets import PRESETS, settings_of
+from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.settings import Settings
 from islands.io.simulator_spec.schema import ColumnSpec, SimulationSpec, innermost
 from islands.model.candidate_library import candidates
@@ -215,7 +215,7 @@ def _read(form: type[S], document: Mapping[str, Any]) -> S:
         ) from error
 
 
-def checked(spec: Identification, max_islands: int, max_evaluations: int) -> Settings:
+def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations: int) -> Settings:
     """Return the settings of a job that a stranger may ask for.
 
     Raises
@@ -235,7 +235,7 @@ def checked(spec: Identification, max_islands: int, max_evaluations: int) -> Set
             raise SettingsError(f"{name} has {len(value)} entries, and {_ENTRIES} is the most")
     if any(shift > SHIFT for shift in changes.get("shifts", ())):
         raise SettingsError(f"back-shifts are at most {SHIFT} on this service, got {changes['shifts']}")
-    settings = settings_of(spec.preset, changes)
+    settings = resolve_settings(spec.preset, changes)
     asked = settings.population * (settings.generations + 1) * settings.islands
     if asked > max_evaluations:
         raise SettingsError(

@@ -54,23 +54,23 @@ REPORT, EXTENDED = "report.html", "extended.json"
 PRIORITIES = range(-100, 101)
 
 
-class NoSuchJob(IslandsError):
+class JobNotFoundError(IslandsError):
     """There is no such job for this owner."""
 
 
-class WrongState(IslandsError):
+class JobStateError(IslandsError):
     """A job's state does not allow what is asked: the message says which state it is in."""
 
 
-class IdempotencyConflict(IslandsError):
+class IdempotencyError(IslandsError):
     """An idempotency key was used before, with another request."""
 
 
-class QuotaExceeded(IslandsError):
+class QuotaError(IslandsError):
     """An owner has as many jobs, or as much data, as it may have."""
 
 
-class LeaseLost(IslandsError):
+class LeaseLostError(IslandsError):
     """The job is another coordinator's by now, or finished: whoever gets this writes nothing more."""
 
 
@@ -178,7 +178,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class JobOutcome:
     """How a job ended, and what it brought.
 
     Attributes
@@ -204,7 +204,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class ProgressReport:
     """What a coordinator tells of a running job.
 
     Attributes

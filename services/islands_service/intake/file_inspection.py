@@ -38,7 +38,7 @@ _REFUSED = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class InspectionRequest:
     """What is asked about a file.
 
     Attributes
@@ -55,7 +55,9 @@ class Asked:
     rows: str | None = None
 
 
-async def inspected(path: Path, asked: Asked, memory: int, seconds: float) -> Mapping[str, Any]:
+async def inspect_file(
+    path: Path, asked: InspectionRequest, memory: int, seconds: float
+) -> Mapping[str, Any]:
     """Describe a file, and read from it what is asked.
 
     Parameters
@@ -113,15 +115,15 @@ def main() -> None:
     # After the limits: whatever these do, they do it within them.
     from islands.io.records import read_record  # noqa: PLC0415
     from islands.io.records.preview import preview  # noqa: PLC0415
-    from islands.io.records.row_range import rows_of  # noqa: PLC0415
+    from islands.io.records.row_range import parse_rows  # noqa: PLC0415
 
-    asked = Asked(**request["asked"])
+    asked = InspectionRequest(**request["asked"])
     try:
         found = preview(request["path"])
         # First: what is said of the columns asked for lists those that there are.
         _refuse_unreadable(found, request["path"])
         if asked.inputs and asked.output is not None:
-            read_record(request["path"], asked.inputs, asked.output, asked.dt, rows_of(asked.rows))
+            read_record(request["path"], asked.inputs, asked.output, asked.dt, parse_rows(asked.rows))
         else:
             _refuse_unusable({column.name: column.problem for column in found.columns}, asked)
     except RecordError as error:
@@ -148,12 +150,12 @@ def _refuse_unreadable(found: "Preview", path: str) -> None:
         raise RecordError(problems[0] if problems else f"{Path(path).name} holds no column: export it anew")
 
 
-def _refuse_unusable(problems: Mapping[str, str], asked: Asked) -> None:
+def _refuse_unusable(problems: Mapping[str, str], asked: InspectionRequest) -> None:
     """Refuse columns by what a preview says of each: a job that would read them is not known yet."""
-    from islands.io.records.column_names import column_of  # noqa: PLC0415
+    from islands.io.records.column_names import find_column  # noqa: PLC0415
 
     for name in (*asked.inputs, *([] if asked.output is None else [asked.output])):
-        source = column_of(name, problems)
+        source = find_column(name, problems)
         if source not in problems:
             raise RecordError(f"the record has no column {name}; it has {', '.join(problems)}")
         if problems[source]:

@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.io.records import read_record
-from islands.io.records.row_range import rows_of
+from islands.io.records.row_range import parse_rows
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
-from islands_service.store.blobs import Blobs, full_disk_told
+from islands_service.store.blobs import Blobs, translate_disk_full
 from islands_service.store.datasets import StoredDataset
 
 
 @contextmanager
-def named(blob: Path, name: str) -> Iterator[Path]:
+def link_blob(blob: Path, name: str) -> Iterator[Path]:
     """Give a blob its owner's name for it: messages speak of that, and its suffix chooses the reader.
 
     Raises
     ------
-    StoreFull
+    StorageFullError
     """
-    with full_disk_told(), tempfile.TemporaryDirectory(prefix="islands-record-") as folder:
+    with translate_disk_full(), tempfile.TemporaryDirectory(prefix="islands-record-") as folder:
         link = Path(folder) / name
         link.symlink_to(blob.absolute())
         yield link
@@ -39,14 +39,14 @@ def record_and_validation(
     ------
     RecordError
         A record cannot be used as the job says.
-    NoSuchBlob
+    BlobNotFoundError
         The data folder has lost a file.
     """
 
     def read(dataset: str, rows: str | None) -> Dataset:
         stored = datasets[dataset]
-        with named(blobs.path(stored.blob), stored.name) as path:
-            return read_record(path, spec.inputs, spec.output, spec.dt, rows_of(rows))
+        with link_blob(blobs.path(stored.blob), stored.name) as path:
+            return read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(rows))
 
     record = read(spec.dataset, spec.rows)
     if isinstance(spec.validation, Part):
@@ -63,10 +63,10 @@ def record_and_columns(
     ------
     RecordError
         The record cannot be used as the job says.
-    NoSuchBlob
+    BlobNotFoundError
         The data folder has lost a file.
     """
-    with named(blobs.path(stored.blob), stored.name) as path:
-        whole = read_record(path, spec.inputs, spec.output, spec.dt, rows_of(spec.rows))
+    with link_blob(blobs.path(stored.blob), stored.name) as path:
+        whole = read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(spec.rows))
     kept = 1 + len(spec.channels)
     return whole.first_inputs(kept), dict(zip(spec.beside, whole.u[:, kept:].T, strict=True))

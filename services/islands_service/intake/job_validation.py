@@ -9,12 +9,19 @@ from typing import Any
 
 from islands.errors import RecordError, SettingsError
 from islands.io.models import model_from_json
-from islands.io.records.column_names import column_of
-from islands.io.records.row_range import overlap, rows_of
+from islands.io.records.column_names import find_column
+from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
 from islands.io.simulator_spec.schema import PARAMETERS, ModelSpec, PhysicalSpec, innermost
-from islands_service.domain.job_spec import LIMITS, SHIFT, Discrepancy, Identification, Part, checked
-from islands_service.intake.file_inspection import Asked
+from islands_service.domain.job_spec import (
+    LIMITS,
+    SHIFT,
+    Discrepancy,
+    Identification,
+    Part,
+    resolve_job_settings,
+)
+from islands_service.intake.file_inspection import InspectionRequest
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.datasets import StoredDataset
@@ -25,23 +32,23 @@ _SIMULATION, _WRITTEN_OUT = 50_000, 200_000
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class PendingInspection:
     """A data set that has to be read once more, as the job would, to know whether that works."""
 
     dataset: StoredDataset
-    asked: Asked
+    asked: InspectionRequest
 
 
-def admit(
+def validate_job(
     spec: Identification | Discrepancy, owner: str, store: Store, settings: ServiceSettings
-) -> tuple[Doubt, ...]:
+) -> tuple[PendingInspection, ...]:
     """Refuse a job that could only fail; return what the previews of its data sets leave open.
 
     Raises
     ------
     SettingsError
         A setting is unknown, out of range, or asks for more than this service gives.
-    NoSuchDataset
+    DatasetNotFoundError
         A data set is not there, or belongs to somebody else.
     RecordError
         A column is not there, or cannot be used.
@@ -52,7 +59,9 @@ def admit(
     for part in _parts(spec, settings):
         dataset = store.datasets.get(owner, part.dataset)
         if not _plain(spec, part, dataset.preview, dataset.name):
-            doubts.append(Doubt(dataset, Asked(spec.inputs, spec.output, spec.dt, part.rows)))
+            doubts.append(
+                PendingInspection(dataset, InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows))
+            )
     return tuple(doubts)
 
 
@@ -62,11 +71,11 @@ def _parts(spec: Identification | Discrepancy, settings: ServiceSettings) -> lis
 
 def _of_identification(spec: Identification, settings: ServiceSettings) -> list[Part]:
     """Check what an identification asks for; return what it reads."""
-    checked(spec, settings.max_islands, settings.max_evaluations)
+    resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
     parts = [Part(dataset=spec.dataset, rows=spec.rows)]
     if isinstance(spec.validation, Part):
         parts.append(spec.validation)
-        if len(set(spec.datasets)) == 1 and overlap(*(rows_of(part.rows) for part in parts)):
+        if len(set(spec.datasets)) == 1 and overlap(*(parse_rows(part.rows) for part in parts)):
             raise SettingsError(
                 "the validation shares samples with those that estimate: say with rows START:STOP which "
                 "samples do either, or take another data set"
@@ -142,7 +151,7 @@ def _plain(spec: Identification | Discrepancy, part: Part, preview: Mapping[str,
     A preview looks at each column by itself: what speaks against using them together leaves a doubt.
     """
     columns = {column["name"]: column for column in preview["columns"]}
-    sources = [column_of(given, tuple(columns)) for given in spec.inputs]
+    sources = [find_column(given, tuple(columns)) for given in spec.inputs]
     check_choice(tuple(columns), sources, spec.output, name)
     chosen = (*sources, spec.output)
     clean = not any(columns[name]["problem"] for name in chosen)

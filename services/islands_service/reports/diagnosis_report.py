@@ -33,7 +33,7 @@ _CAPTIONS = {
 _NOISE = "Nothing significant: within this record's noise, which has a name, the simulation is right."
 
 
-def in_words(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
+def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     """Say a diagnosis in a few plain lines."""
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
@@ -84,7 +84,7 @@ def _finding(finding: Finding) -> str:
     return f"{finding.name}: {values}; confidence {finding.confidence:.2f}{share}{or_else}"
 
 
-def self_test_in_words(tested: SelfTest) -> str:
+def summarise_self_test(tested: SelfTest) -> str:
     """Say in a few plain lines what the analysis can do on a record."""
     alarms, limits = tested.false_alarm_rate, tested.detection_limits
     low, high = (100 * each for each in alarms.ci95)
@@ -124,7 +124,7 @@ def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
     ]
 
 
-def report(
+def diagnosis_report(
     name: str, found: Diagnosis, tested: SelfTest | None = None, proposal: ResidualFormula | None = None
 ) -> bytes:
     """Write the report of a diagnosis.
@@ -147,7 +147,7 @@ def report(
         proposal=proposal,
         floor=_floor(found),
         figures=figures,
-        tested=None if tested is None else self_test_in_words(tested),
+        tested=None if tested is None else summarise_self_test(tested),
         strengths=STRENGTHS,
         limits=[] if tested is None else _limits(tested),
         mistaken=[] if tested is None else _mistaken(tested),

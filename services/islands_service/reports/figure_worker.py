@@ -17,22 +17,22 @@ import numpy as np
 
 from islands.data.split import split_data
 from islands.errors import IslandsError, SettingsError
-from islands.evolution.presets import settings_of
+from islands.evolution.presets import resolve_settings
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, search_figures
 from islands.figures.style import save
-from islands.io.checkpoints import history_of
+from islands.io.checkpoints import history_from_document
 from islands.io.models import model_from_json
-from islands.search_result import Assessed, Findings, Search
+from islands.search_result import RankedModel, SearchResult, SearchStatistics
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands_service.domain.job_spec import identification_of
 from islands_service.domain.jobs import REPORT, Job
 from islands_service.intake.job_inputs import record_and_validation
-from islands_service.reports.identification_report import report
+from islands_service.reports.identification_report import identification_report
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
-from islands_service.store.blobs import Blobs, NoSuchBlob
-from islands_service.store.database import StoreError, StoreFull
+from islands_service.store.blobs import BlobNotFoundError, Blobs
+from islands_service.store.database import StorageFullError, StoreError
 
 #: Samples of a simulation that are handed out as numbers: a screen shows no more.
 POINTS = 4000
@@ -56,14 +56,18 @@ def main() -> int:
     try:
         with Store(settings.url) as store:
             job = store.jobs.get(asked.owner, asked.job)
-            findings = findings_of(job, store, blobs, asked.rank)
-            made = drawn(job, findings) if asked.rank is None else drawn_model(findings, asked.rank)
+            findings = read_search_result(job, store, blobs, asked.rank)
+            made = (
+                render_figures(job, findings)
+                if asked.rank is None
+                else render_model_figures(findings, asked.rank)
+            )
             store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
-    except StoreFull as error:
+    except StorageFullError as error:
         return _failed(error, ENOSPC)
     except StoreError as error:
         return _failed(error, EAGAIN)
-    except NoSuchBlob as error:
+    except BlobNotFoundError as error:
         return _failed(error, ENODATA)
     except IslandsError as error:
         print(error)
@@ -86,7 +90,7 @@ def _failed(error: IslandsError, status: int) -> int:
     return status
 
 
-def findings_of(job: Job, store: Store, blobs: Blobs, rank: int | None) -> Findings:
+def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -> SearchResult:
     """Put a finished job's findings together again, with the model of a rank or with all.
 
     Raises
@@ -98,21 +102,21 @@ def findings_of(job: Job, store: Store, blobs: Blobs, rank: int | None) -> Findi
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = record_and_validation(spec, datasets, blobs)
     split = split_data(record, validation)
-    settings = settings_of(spec.preset, spec.changes)
+    settings = resolve_settings(spec.preset, spec.changes)
     document = store.results.document(job.id)
     stored = store.results.models(job.id, rank)
     if document is None or not stored:
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
     assessed = tuple(
-        Assessed(model, assess(model, split, settings.shooting, settings.maximum_lag)) for model in models
+        RankedModel(model, assess(model, split, settings.shooting, settings.maximum_lag)) for model in models
     )
     search = _search(document["search"], store.results.history(job.id))
-    return Findings(record, split, spec.seed, document["settings"], search, assessed)
+    return SearchResult(record, split, spec.seed, document["settings"], search, assessed)
 
 
-def _search(document: Mapping[str, Any], history: list[list[Any]]) -> Search:
-    return Search(
+def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:
+    return SearchStatistics(
         document["evaluations"],
         document["outcomes"],
         document["full_set"],
@@ -120,20 +124,20 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> Search:
         document["generations"],
         document["duplicates"],
         document["feasible_share"],
-        history_of(history),
+        history_from_document(history),
         {},
         document["ended_by"],
     )
 
 
-def drawn(job: Job, findings: Findings) -> dict[str, bytes]:
+def render_figures(job: Job, findings: SearchResult) -> dict[str, bytes]:
     """Draw the figures of a search and write its report, by the names of their artefacts."""
     made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](findings)) for name in search_figures(findings)}
     best = {f"{name}.svg": _svg(draw(findings.models[0], findings.split)) for name, draw in FIGURES.items()}
-    return {**made, REPORT: report(job.name or job.id, findings, {**best, **made})}
+    return {**made, REPORT: identification_report(job.name or job.id, findings, {**best, **made})}
 
 
-def drawn_model(findings: Findings, rank: int) -> dict[str, bytes]:
+def render_model_figures(findings: SearchResult, rank: int) -> dict[str, bytes]:
     """Draw a model's figures, and simulate it, by the names of their artefacts."""
     entry = findings.models[0]
     made = {f"{rank}/{name}.svg": _svg(draw(entry, findings.split)) for name, draw in FIGURES.items()}
@@ -147,7 +151,7 @@ def _svg(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _simulated(entry: Assessed, findings: Findings) -> bytes:
+def _simulated(entry: RankedModel, findings: SearchResult) -> bytes:
     """Return the validation data and the model's free run over it, thinned for a screen."""
     data = findings.split.validation
     simulated = free_run(entry.model, data, entry.assessment.warm_up)

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from islands.io.result_folder import COLUMNS, row
 from islands.model.equations import mathml_equation
-from islands.search_result import Findings
+from islands.search_result import SearchResult
 
 #: Pages that are files of their own.
 TEMPLATES = Environment(
@@ -29,14 +29,14 @@ CAPTIONS = {
 }
 
 
-def report(name: str, findings: Findings, figures: Mapping[str, bytes]) -> bytes:
+def identification_report(name: str, findings: SearchResult, figures: Mapping[str, bytes]) -> bytes:
     """Write the report of a result.
 
     Parameters
     ----------
     name : str
         Of the job.
-    findings : Findings
+    findings : SearchResult
     figures : mapping
         SVG by name; those that `CAPTIONS` knows are shown.
     """
@@ -58,7 +58,7 @@ def report(name: str, findings: Findings, figures: Mapping[str, bytes]) -> bytes
     return text.encode()
 
 
-def _settings(findings: Findings) -> list[tuple[str, Any]]:
+def _settings(findings: SearchResult) -> list[tuple[str, Any]]:
     return [(name, value) for name, value in findings.settings.items() if not isinstance(value, Mapping)]
 
 

@@ -35,7 +35,7 @@ _LOSSES = 5
 _ACTOR = ray.remote(max_restarts=0, max_task_retries=0, concurrency_groups={"watch": 1})(IslandActor)
 
 
-class Crew:
+class IslandActorPool:
     """Actors, one for every island as long as there are CPUs for them; further islands share them.
 
     An actor that finds no place stays in the cluster's queue, and the others do its work meanwhile. One more
@@ -182,7 +182,7 @@ def _ended(actors: dict[int, tuple[ActorHandle, ray.ObjectRef]]) -> list[int]:
     return [places[reference] for reference in ended]
 
 
-def end_leftovers(job: str, epoch: int) -> int:
+def kill_stale_actors(job: str, epoch: int) -> int:
     """End the actors of a job's leases before this one; return how many.
 
     Parameters

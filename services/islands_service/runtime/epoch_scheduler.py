@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import topology_of
-from islands.evolution.epoch import IslandEpoch, emigrants, next_stop
+from islands.evolution.engine import make_topology
+from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
 from islands.evolution.problem import Problem
 
 #: What is kept of an island's epoch.
@@ -21,7 +21,7 @@ AHEAD = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
+class EpochTask:
     """One epoch of one island, between two generations."""
 
     island: int
@@ -29,7 +29,7 @@ class Leg:
     end: int
 
 
-class Itinerary(Generic[T]):
+class EpochScheduler(Generic[T]):
     """Keeps what has been sent and what has come back of a search.
 
     Whatever is sent may stand on what has not come back yet: Ray hands it over when it is there.
@@ -48,13 +48,13 @@ class Itinerary(Generic[T]):
         self, problem: Problem, start: Archipelago, keep: Callable[[IslandEpoch], T], ahead: int = AHEAD
     ) -> None:
         self._settings, self._ahead = problem.settings, ahead
-        self.sources = topology_of(problem, start).sources
+        self.sources = make_topology(problem, start).sources
         self.complete = start.generation
         self._sent = [start.generation] * len(start.islands)
         #: What is known of every island by generation, from the last complete archipelago on.
         self.known: list[dict[int, T]] = []
         for island in start.islands:
-            leaving = emigrants(island, problem.settings_of(island.index))
+            leaving = select_migrants(island, problem.settings_of(island.index))
             self.known.append({start.generation: keep(IslandEpoch(island, leaving, ()))})
 
     @property
@@ -62,23 +62,23 @@ class Itinerary(Generic[T]):
         """Whether the last generation is complete."""
         return self.complete >= self._settings.generations
 
-    def due(self) -> Iterator[Leg]:
+    def due(self) -> Iterator[EpochTask]:
         """Yield the legs that may be sent off, and take each for sent; those of earlier epochs come first."""
         begin, end = self.complete, self._after(self.complete)
         for _ in range(self._ahead):
             for island, sent in enumerate(self._sent):
                 if sent == begin:
                     self._sent[island] = end
-                    yield Leg(island, begin, end)
+                    yield EpochTask(island, begin, end)
             if end >= self._settings.generations:
                 return
             begin, end = end, self._after(end)
 
-    def lost(self, leg: Leg) -> None:
+    def lost(self, leg: EpochTask) -> None:
         """Take a leg, and what was sent of its island after it, for not sent."""
         self._sent[leg.island] = max(self.complete, min(self._sent[leg.island], leg.begin))
 
-    def back(self, leg: Leg, epoch: T) -> None:
+    def back(self, leg: EpochTask, epoch: T) -> None:
         """Take note of what a leg brought."""
         if leg.end > self.complete:
             self.known[leg.island][leg.end] = epoch

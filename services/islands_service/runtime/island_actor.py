@@ -9,12 +9,12 @@ from threading import Event
 import ray
 
 from islands._warm_up import warm_up
-from islands.evolution.epoch import advance
+from islands.evolution.epoch import run_epoch
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Population
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
-from islands_service.runtime.packed_epoch import Report, report_of, unpacked
+from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_island
 
 
 class IslandActor:
@@ -43,16 +43,16 @@ class IslandActor:
         Event().wait()
 
     @ray.method(num_returns=2)
-    def advance(self, before: Report, *arriving: Population) -> tuple[Report, Population]:
+    def advance(self, before: PackedEpoch, *arriving: Population) -> tuple[PackedEpoch, Population]:
         """Carry an island from where it stood to its next stop; return that, and who emigrates."""
         # Nobody tells it to stop: a search that ends kills its actors, and misses nothing.
-        epoch = advance(self._island(before), arriving, self._evaluator, self._problem, lambda: False)
+        epoch = run_epoch(self._island(before), arriving, self._evaluator, self._problem, lambda: False)
         assert epoch is not None
-        report = report_of(epoch, self._name, self._evaluator.memory)
+        report = pack_epoch(epoch, self._name, self._evaluator.memory)
         self._islands[report.index] = report.packed, epoch.island
         return report, epoch.emigrants
 
-    def _island(self, before: Report) -> Island:
+    def _island(self, before: PackedEpoch) -> Island:
         """Unpack an island, unless it is the one that was packed here last."""
         packed, island = self._islands.pop(before.index, (b"", None))
-        return island if island is not None and packed == before.packed else unpacked(before)
+        return island if island is not None and packed == before.packed else unpack_island(before)

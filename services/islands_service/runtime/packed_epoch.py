@@ -16,7 +16,7 @@ from islands.evolution.island import Island, StepInfo
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class PackedEpoch:
     """What is known of an island at the end of an epoch.
 
     Attributes
@@ -42,13 +42,13 @@ class Report:
     caches: Caches = field(default_factory=dict)
 
 
-def report_of(epoch: IslandEpoch, actor: str = "", caches: Caches | None = None) -> Report:
+def pack_epoch(epoch: IslandEpoch, actor: str = "", caches: Caches | None = None) -> PackedEpoch:
     """Pack what an epoch brought."""
     packed = pickle.dumps(epoch.island, pickle.HIGHEST_PROTOCOL)
-    return Report(epoch.island.index, packed, epoch.emigrants, epoch.steps, actor, caches or {})
+    return PackedEpoch(epoch.island.index, packed, epoch.emigrants, epoch.steps, actor, caches or {})
 
 
-def unpacked(report: Report) -> Island:
+def unpack_island(report: PackedEpoch) -> Island:
     """Return a report's island. It comes from an actor of our own, never from a stranger."""
     island: Island = pickle.loads(report.packed)
     return island
@@ -57,7 +57,7 @@ def unpacked(report: Report) -> Island:
 class PackedIslands(Sequence[Island]):
     """The islands of reports, each unpacked when it is first looked at; equal to the tuple of them."""
 
-    def __init__(self, reports: Sequence[Report]) -> None:
+    def __init__(self, reports: Sequence[PackedEpoch]) -> None:
         self._reports = tuple(reports)
         self._islands: dict[int, Island] = {}
 
@@ -75,7 +75,7 @@ class PackedIslands(Sequence[Island]):
             raise IndexError(place)
         place %= len(self)
         if place not in self._islands:
-            self._islands[place] = unpacked(self._reports[place])
+            self._islands[place] = unpack_island(self._reports[place])
         return self._islands[place]
 
     def __eq__(self, other: object) -> bool:

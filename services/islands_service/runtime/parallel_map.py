@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import ray
 from ray.exceptions import RayError, RayTaskError
 
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 from islands_service.runtime.cluster import cluster
 from islands_service.runtime.errors import ClusterError
 
@@ -17,7 +17,7 @@ R = TypeVar("R")
 
 
 @contextmanager
-def pool(workers: int | None = None, address: str | None = None) -> Iterator[Spread]:
+def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator[ParallelMap]:
     """Hold a pool open.
 
     Parameters
@@ -33,10 +33,10 @@ def pool(workers: int | None = None, address: str | None = None) -> Iterator[Spr
         There is no Ray, or it failed. What the function itself raises is raised as it is.
     """
     with cluster(address):
-        yield on_ray(workers)
+        yield ray_map(workers)
 
 
-def on_ray(workers: int | None = None) -> Spread:
+def ray_map(workers: int | None = None) -> ParallelMap:
     """Return a pool on the Ray that this process is connected to when it is called.
 
     It raises a `ClusterError` where that is none.

@@ -7,19 +7,19 @@ import ray
 from ray.exceptions import RayError, RayTaskError
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import Caches, Epoch, Stop, Tell
+from islands.evolution.engine import ArchipelagoEpoch, Caches, Stop, Tell
 from islands.evolution.problem import Problem
-from islands_service.runtime.actor_pool import Crew
+from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOST
-from islands_service.runtime.epoch_scheduler import Itinerary, Leg
+from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 from islands_service.runtime.errors import ClusterError
-from islands_service.runtime.packed_epoch import PackedIslands, Report, report_of
+from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
 
 #: Seconds between two looks at whether the search is to stop.
 _LOOK = 0.1
 
 #: The report of an epoch, and its emigrants, wherever they are.
-References = tuple["ray.ObjectRef[Report]", "ray.ObjectRef"]
+References = tuple["ray.ObjectRef[PackedEpoch]", "ray.ObjectRef"]
 
 
 class RayEngine:
@@ -36,12 +36,12 @@ class RayEngine:
     def __init__(self, tell: Tell = lambda _line: None, title: str = "") -> None:
         self._tell, self._title = tell, title
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """See `islands.evolution.engine.Engine`."""
-        itinerary = Itinerary(problem, start, report_of)
+        itinerary = EpochScheduler(problem, start, pack_epoch)
         if itinerary.finished:
             return
-        crew = Crew(problem, len(start.islands), self._tell, self._title)
+        crew = IslandActorPool(problem, len(start.islands), self._tell, self._title)
         try:
             yield from _carried_out(itinerary, crew, stop)
         except RayError as error:
@@ -50,7 +50,9 @@ class RayEngine:
             crew.dismiss()
 
 
-def _carried_out(itinerary: Itinerary[Report], crew: Crew, stop: Stop) -> Generator[Epoch]:
+def _carried_out(
+    itinerary: EpochScheduler[PackedEpoch], crew: IslandActorPool, stop: Stop
+) -> Generator[ArchipelagoEpoch]:
     voyage = _Voyage(itinerary, crew)
     while not (itinerary.finished or stop()):
         if crew.tend():
@@ -61,7 +63,7 @@ def _carried_out(itinerary: Itinerary[Report], crew: Crew, stop: Stop) -> Genera
                 return
             crew.progressed()
             voyage.forget()
-            yield Epoch(
+            yield ArchipelagoEpoch(
                 Archipelago(PackedIslands(reports)),
                 tuple(report.steps for report in reports),
                 voyage.memory,
@@ -71,10 +73,10 @@ def _carried_out(itinerary: Itinerary[Report], crew: Crew, stop: Stop) -> Genera
 class _Voyage:
     """What is on its way: references to values that actors hold, or are about to make."""
 
-    def __init__(self, itinerary: Itinerary[Report], crew: Crew) -> None:
+    def __init__(self, itinerary: EpochScheduler[PackedEpoch], crew: IslandActorPool) -> None:
         self._itinerary, self._crew = itinerary, crew
         self._references: dict[tuple[int, int], References] = {}
-        self._out: dict[ray.ObjectRef[Report], Leg] = {}
+        self._out: dict[ray.ObjectRef[PackedEpoch], EpochTask] = {}
         self._caches: dict[str, Caches] = {}
 
     @property
@@ -121,7 +123,7 @@ class _Voyage:
         complete = self._itinerary.complete
         self._references = {key: kept for key, kept in self._references.items() if key[1] >= complete}
 
-    def _taken(self, leg: Leg, reference: "ray.ObjectRef[Report]") -> bool:
+    def _taken(self, leg: EpochTask, reference: "ray.ObjectRef[PackedEpoch]") -> bool:
         """Take in what a leg brought; return False where it was lost."""
         try:
             report = ray.get(reference)
@@ -133,7 +135,7 @@ class _Voyage:
         self._itinerary.back(leg, report)
         return True
 
-    def _lose(self, legs: list[Leg]) -> None:
+    def _lose(self, legs: list[EpochTask]) -> None:
         """Forget legs that were lost, and what was sent of their islands after them."""
         first: dict[int, int] = {}
         for leg in legs:

@@ -13,7 +13,7 @@ from pathlib import Path
 import ray
 
 from islands.errors import IslandsError
-from islands_service.liveness import Wish, sign_of_life, stop_on_signals
+from islands_service.liveness import StopRequest, send_heartbeat, stop_on_signals
 from islands_service.runtime.cluster import cluster
 from islands_service.settings import service_settings
 
@@ -27,7 +27,7 @@ _VITAL = ("gcs_server", "raylet")
 def main() -> int:
     """Start Ray, say where it is, and stay until SIGTERM, or until Ray is lost."""
     settings = service_settings()
-    stopping = Wish()
+    stopping = StopRequest()
     stop_on_signals(stopping)
     try:
         with cluster(None):
@@ -35,7 +35,7 @@ def main() -> int:
             with _found_at(settings.ray_address_file):
                 while not (lost := _lost()) and not stopping.wait(_LOOK):
                     # Here and not from a thread: where Ray hangs we do, too, and are started again.
-                    sign_of_life(settings.lifeline)
+                    send_heartbeat(settings.lifeline)
             if lost:
                 print(f"Ray: {lost}", file=sys.stderr, flush=True)
                 # Ray's own end would wait for who is lost; the supervisor ends whom we leave behind.

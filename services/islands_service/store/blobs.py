@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import IO
 
 from islands.errors import IslandsError
-from islands_service.store.database import StoreFull
+from islands_service.store.database import StorageFullError
 
 #: Of a file that is being written.
 _PART = ".part"
 
 
-class NoSuchBlob(IslandsError):
+class BlobNotFoundError(IslandsError):
     """A blob is not there, though something names it: the data folder has lost a file."""
 
 
@@ -38,11 +38,11 @@ class Blobs:
 
         Raises
         ------
-        NoSuchBlob
+        BlobNotFoundError
         """
         path = self._at(blob)
         if not path.is_file():
-            raise NoSuchBlob(
+            raise BlobNotFoundError(
                 f"the blob {blob} is not in {self._folder}: restore the data folder from a backup"
             )
         return path
@@ -52,7 +52,7 @@ class Blobs:
 
         Raises
         ------
-        NoSuchBlob
+        BlobNotFoundError
         """
         return self.path(blob).read_bytes()
 
@@ -61,7 +61,7 @@ class Blobs:
 
         Raises
         ------
-        StoreFull
+        StorageFullError
         """
         with self.receiving() as stream:
             stream.write(data)
@@ -73,10 +73,10 @@ class Blobs:
 
         Raises
         ------
-        StoreFull
+        StorageFullError
         """
         with (
-            full_disk_told(),
+            translate_disk_full(),
             tempfile.NamedTemporaryFile(dir=self._folder, suffix=_PART, delete=False) as stream,
         ):
             try:
@@ -90,9 +90,9 @@ class Blobs:
 
         Raises
         ------
-        StoreFull
+        StorageFullError
         """
-        with full_disk_told():
+        with translate_disk_full():
             stream.flush()
             os.fsync(stream.fileno())
             with Path(stream.name).open("rb") as written:
@@ -129,19 +129,21 @@ class Blobs:
 
 
 @contextmanager
-def full_disk_told() -> Iterator[None]:
+def translate_disk_full() -> Iterator[None]:
     """Turn a full disk into our own error.
 
     Raises
     ------
-    StoreFull
+    StorageFullError
     """
     try:
         yield
     except OSError as error:
         if error.errno not in (ENOSPC, EDQUOT):
             raise
-        raise StoreFull(f"the disk of the data folder is full ({error.strerror}): make room") from error
+        raise StorageFullError(
+            f"the disk of the data folder is full ({error.strerror}): make room"
+        ) from error
 
 
 def _sync(folder: Path) -> None:

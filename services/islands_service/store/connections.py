@@ -28,7 +28,7 @@ CONNECTING = {
 SETTINGS = ("idle_in_transaction_session_timeout = '10s'",)
 
 
-def engine_of(url: str) -> Engine:
+def make_engine(url: str) -> Engine:
     """Return what connects to a database. Whoever will write says so by the execution option ``writes``."""
     return (_sqlite if url.startswith("sqlite") else _postgresql)(url)
 

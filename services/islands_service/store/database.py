@@ -18,7 +18,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from islands.errors import IslandsError
-from islands_service.store.connections import engine_of
+from islands_service.store.connections import make_engine
 
 T = TypeVar("T")
 
@@ -42,19 +42,19 @@ class StoreError(IslandsError):
     """The store cannot do what is asked."""
 
 
-class StoreUnavailable(StoreError):
+class StoreUnavailableError(StoreError):
     """The database does not answer. Nothing was written; try again."""
 
 
-class StoreCollision(StoreUnavailable):
+class StoreCollisionError(StoreUnavailableError):
     """Two transactions waited for each other, and this one gave way. Nothing was written; try again."""
 
 
-class StoreInDoubt(StoreUnavailable):
+class CommitUnknownError(StoreUnavailableError):
     """The database went away while it committed: nobody knows whether it was written."""
 
 
-class StoreFull(StoreError):
+class StorageFullError(StoreError):
     """The disk is full. Nothing was written, and nothing that was accepted is lost; make room."""
 
 
@@ -68,7 +68,7 @@ class Database:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.engine = engine_of(url)
+        self.engine = make_engine(url)
         self._writing = self.engine.execution_options(writes=True)
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._writer: Thread | None = None
@@ -91,12 +91,12 @@ class Database:
 
         Raises
         ------
-        StoreUnavailable, StoreFull
+        StoreUnavailableError, StorageFullError
         StoreError
             It is closed.
         """
         self._refuse_closed()
-        with told(), self.engine.begin() as connection:
+        with translate_db_errors(), self.engine.begin() as connection:
             yield connection
 
     def write(self, operation: Callable[[Connection], T]) -> T:
@@ -106,9 +106,9 @@ class Database:
 
         Raises
         ------
-        StoreUnavailable, StoreFull
+        StoreUnavailableError, StorageFullError
             Nothing was written.
-        StoreInDoubt
+        CommitUnknownError
             Nobody knows whether it was written.
         StoreError
             It is closed.
@@ -127,7 +127,7 @@ class Database:
     @contextmanager
     def alone(self) -> Iterator[Connection]:
         """Open a transaction that writes, outside of any group: for migrations."""
-        with told(), self._writing.begin() as connection:
+        with translate_db_errors(), self._writing.begin() as connection:
             yield connection
 
     def _refuse_closed(self) -> None:
@@ -153,7 +153,7 @@ class Database:
     def _write_group(self, group: list[_Waiting], tries: int = TRIES) -> None:
         try:
             answers = self._transaction([operation for operation, _ in group])
-        except StoreCollision as error:
+        except StoreCollisionError as error:
             if tries > 1:
                 # One by one they hold less at a time that others wait for.
                 for each in group:
@@ -172,15 +172,15 @@ class Database:
         """Carry out a group; return what each came to, once all is durable."""
         committing = False
         try:
-            with told(), self._writing.begin() as connection:
+            with translate_db_errors(), self._writing.begin() as connection:
                 answers = [_carried_out(operation, connection) for operation in operations]
                 committing = True
-        except StoreCollision:
+        except StoreCollisionError:
             raise
-        except StoreUnavailable as error:
+        except StoreUnavailableError as error:
             if not committing:
                 raise
-            raise StoreInDoubt(
+            raise CommitUnknownError(
                 "the database went away while it committed, and nobody knows whether it was written: look, "
                 "or ask again under the same idempotency key"
             ) from error
@@ -202,12 +202,12 @@ def _carried_out(operation: Callable[[Connection], Any], connection: Connection)
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def translate_db_errors() -> Iterator[None]:
     """Turn what a database raises when it is full or gone into our own errors."""
     try:
         yield
     except PoolTimeout as error:
-        raise StoreUnavailable("all connections to the database are taken: try again") from error
+        raise StoreUnavailableError("all connections to the database are taken: try again") from error
     except DBAPIError as error:
         trouble = _trouble(error)
         if trouble is None:
@@ -221,14 +221,16 @@ def _trouble(error: DBAPIError) -> StoreError | None:
     state = str(getattr(cause, "sqlstate", None) or "")
     text = str(cause)
     if state in _FULL_STATES or (isinstance(cause, sqlite3.Error) and _is_full(cause)):
-        return StoreFull(f"the disk of the database is full ({text}): nothing was written; make room")
+        return StorageFullError(f"the disk of the database is full ({text}): nothing was written; make room")
     if state in _COLLISION_STATES:
-        return StoreCollision(f"the database is used by others ({text}): nothing was written; try again")
+        return StoreCollisionError(f"the database is used by others ({text}): nothing was written; try again")
     if error.connection_invalidated or state.startswith(_GONE_STATES):
-        return StoreUnavailable(f"the database does not answer ({text}): nothing was written; try again")
+        return StoreUnavailableError(f"the database does not answer ({text}): nothing was written; try again")
     # SQLite calls a statement that is wrong in itself operational, too: that one alone fails.
     if isinstance(error, OperationalError) and getattr(cause, "sqlite_errorname", "") != "SQLITE_ERROR":
-        return StoreUnavailable(f"the database cannot be used now ({text}): nothing was written; try again")
+        return StoreUnavailableError(
+            f"the database cannot be used now ({text}): nothing was written; try again"
+        )
     return None
 
 

@@ -8,18 +8,18 @@ from typing import Any
 from sqlalchemy import Connection, Row, delete, func, insert, select, tuple_
 
 from islands.errors import IslandsError
-from islands_service.domain.jobs import ACTIVE, QuotaExceeded
+from islands_service.domain.jobs import ACTIVE, QuotaError
 from islands_service.store import dialect
 from islands_service.store.database import Database
 from islands_service.store.dialect import now
 from islands_service.store.tables import datasets, jobs
 
 
-class NoSuchDataset(IslandsError):
+class DatasetNotFoundError(IslandsError):
     """There is no such data set for this owner."""
 
 
-class DatasetInUse(IslandsError):
+class DatasetInUseError(IslandsError):
     """A job that is not finished needs the data set."""
 
 
@@ -74,13 +74,13 @@ class Datasets:
 
         Raises
         ------
-        QuotaExceeded
+        QuotaError
             The owner would have more than ``most_bytes``.
         """
         identity = dataset_id(blob, suffix)
 
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
-            dialect.counting(connection, owner)
+            dialect.lock_owner(connection, owner)
             before = connection.execute(_one(owner, identity)).one_or_none()
             if before is not None:
                 return _dataset_of(before), False
@@ -106,7 +106,7 @@ class Datasets:
 
         Raises
         ------
-        QuotaExceeded
+        QuotaError
         """
         with self._database.read() as connection:
             if connection.execute(_one(owner, dataset_id(blob, suffix))).one_or_none() is None:
@@ -117,12 +117,14 @@ class Datasets:
 
         Raises
         ------
-        NoSuchDataset
+        DatasetNotFoundError
         """
         with self._database.read() as connection:
             row = connection.execute(_one(owner, dataset)).one_or_none()
         if row is None:
-            raise NoSuchDataset(f"there is no data set {dataset!r}: upload it first, or list those there are")
+            raise DatasetNotFoundError(
+                f"there is no data set {dataset!r}: upload it first, or list those there are"
+            )
         return _dataset_of(row)
 
     def page(
@@ -143,19 +145,19 @@ class Datasets:
 
         Raises
         ------
-        NoSuchDataset, DatasetInUse
+        DatasetNotFoundError, DatasetInUseError
         """
 
         def operation(connection: Connection) -> None:
             if connection.execute(_one(owner, dataset)).one_or_none() is None:
-                raise NoSuchDataset(f"there is no data set {dataset!r}")
+                raise DatasetNotFoundError(f"there is no data set {dataset!r}")
             user = connection.execute(
                 select(jobs.c.id)
                 .where(jobs.c.owner == owner, jobs.c.state.in_(ACTIVE), jobs.c.spec.contains(f'"{dataset}"'))
                 .limit(1)
             ).scalar()
             if user is not None:
-                raise DatasetInUse(f"job {user} needs data set {dataset!r}: wait for it, or cancel it")
+                raise DatasetInUseError(f"job {user} needs data set {dataset!r}: wait for it, or cancel it")
             connection.execute(delete(datasets).where(datasets.c.owner == owner, datasets.c.id == dataset))
 
         self._database.write(operation)
@@ -172,7 +174,7 @@ def _refuse_above(connection: Connection, owner: str, size: int, most: int) -> N
     ).scalar_one()
     used = int(used)  # PostgreSQL adds integers up to a decimal number
     if used + size > most:
-        raise QuotaExceeded(
+        raise QuotaError(
             f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
             f"{most / 1e6:.1f} MB is the most: delete some"
         )

@@ -30,12 +30,12 @@ _MIGRATING = 7_241_563
 _COUNTING = 7_241_564
 
 
-def migrating(connection: Connection) -> None:
+def lock_migration(connection: Connection) -> None:
     """Wait until nobody else migrates the database; keep others waiting until the transaction ends."""
     _lock(connection, _MIGRATING, "")
 
 
-def counting(connection: Connection, owner: str) -> None:
+def lock_owner(connection: Connection, owner: str) -> None:
     """Wait until nobody else adds to what an owner has; keep others waiting until the transaction ends.
 
     Who counts before it adds would else count without what another transaction is adding just now: quotas

@@ -10,7 +10,7 @@ from islands_service.store.dialect import now
 from islands_service.store.tables import events, jobs
 
 
-def change(connection: Connection, job: str, **values: Any) -> Row[Any]:
+def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
     """Change a job in a way that watchers see, and return it as it is then."""
     return connection.execute(
         update(jobs)
@@ -20,13 +20,13 @@ def change(connection: Connection, job: str, **values: Any) -> Row[Any]:
     ).one()
 
 
-def record(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
+def append_event(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
     """Write down what happened to a job as its version's event."""
     values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}
     connection.execute(insert(events), values)
 
 
-def job_of(row: Row[Any]) -> Job:
+def job_from_row(row: Row[Any]) -> Job:
     """Make a job of its row."""
     return Job(
         row.id,

@@ -13,16 +13,16 @@ from islands_service.domain.jobs import (
     TERMINAL,
     Event,
     Job,
+    JobNotFoundError,
     JobState,
-    NoSuchJob,
+    JobStateError,
     Submission,
-    WrongState,
 )
 from islands_service.store import dialect
 from islands_service.store.database import Database
 from islands_service.store.dialect import now
-from islands_service.store.job_events import change, job_of, read_document, record
-from islands_service.store.submission_checks import accepted, digest, refuse_above
+from islands_service.store.job_events import append_event, job_from_row, read_document, update_job
+from islands_service.store.submission_checks import check_quota, find_accepted_job, request_digest
 from islands_service.store.tables import events, jobs
 
 #: The most jobs of a page.
@@ -33,7 +33,7 @@ _QUEUE = insert(jobs).values(state=JobState.QUEUED, created=now(), updated=now()
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
+class JobRows:
     """Jobs, newest first, and where the next page begins; None where there is none."""
 
     jobs: tuple[Job, ...]
@@ -41,7 +41,7 @@ class Page:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class QueueStatistics:
     """How all jobs stand.
 
     Attributes
@@ -80,34 +80,34 @@ class Jobs:
 
         Raises
         ------
-        IdempotencyConflict
+        IdempotencyError
             The key was used with another request.
-        QuotaExceeded
+        QuotaError
             The owner has ``most_active`` jobs that are not finished.
-        StoreUnavailable, StoreFull
+        StoreUnavailableError, StorageFullError
             Nothing was accepted.
         """
         spec = json.dumps(submission.spec)
 
         def operation(connection: Connection) -> tuple[Job, bool]:
-            dialect.counting(connection, submission.owner)
-            if (before := accepted(connection, submission)) is not None:
+            dialect.lock_owner(connection, submission.owner)
+            if (before := find_accepted_job(connection, submission)) is not None:
                 return before, False
             if most_active is not None:
-                refuse_above(connection, submission.owner, most_active)
+                check_quota(connection, submission.owner, most_active)
             values = {
                 "id": uuid4().hex,
                 "owner": submission.owner,
                 "kind": submission.kind,
                 "name": submission.name,
                 "spec": spec,
-                "request_sha256": digest(submission),
+                "request_sha256": request_digest(submission),
                 "idempotency_key": submission.idempotency_key,
                 "priority": submission.priority,
             }
             row = connection.execute(_QUEUE, values).one()
-            record(connection, row, "queued")
-            return job_of(row), True
+            append_event(connection, row, "queued")
+            return job_from_row(row), True
 
         return self._database.write(operation)
 
@@ -116,21 +116,21 @@ class Jobs:
 
         Raises
         ------
-        IdempotencyConflict
+        IdempotencyError
             The key was used with another request.
         """
         with self._database.read() as connection:
-            return accepted(connection, submission)
+            return find_accepted_job(connection, submission)
 
     def get(self, owner: str, job: str) -> Job:
         """Return a job.
 
         Raises
         ------
-        NoSuchJob
+        JobNotFoundError
         """
         with self._database.read() as connection:
-            return job_of(_own(connection, owner, job))
+            return job_from_row(_own(connection, owner, job))
 
     def page(
         self,
@@ -138,7 +138,7 @@ class Jobs:
         state: JobState | None = None,
         after: tuple[float, str] | None = None,
         limit: int = 50,
-    ) -> Page:
+    ) -> JobRows:
         """Return the jobs of an owner, newest first, from behind a place on."""
         query = select(jobs).where(jobs.c.owner == owner)
         if state is not None:
@@ -147,37 +147,37 @@ class Jobs:
             query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
         query = query.order_by(jobs.c.created.desc(), jobs.c.id.desc()).limit(min(limit, PAGE) + 1)
         with self._database.read() as connection:
-            found = [job_of(row) for row in connection.execute(query)]
+            found = [job_from_row(row) for row in connection.execute(query)]
         more = len(found) > min(limit, PAGE)
         found = found[: min(limit, PAGE)]
-        return Page(tuple(found), (found[-1].created, found[-1].id) if more else None)
+        return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
     def cancel(self, owner: str, job: str) -> Job:
         """Cancel a job that is waiting, or ask whoever runs it to let go of it.
 
         Raises
         ------
-        NoSuchJob
-        WrongState
+        JobNotFoundError
+        JobStateError
             It is finished.
         """
 
         def operation(connection: Connection) -> Job:
             before = _own(connection, owner, job, locked=True)
             if before.state in TERMINAL:
-                raise WrongState(f"job {job} is {before.state}: there is nothing to cancel")
+                raise JobStateError(f"job {job} is {before.state}: there is nothing to cancel")
             if before.cancel_requested:
-                return job_of(before)
+                return job_from_row(before)
             waiting = before.state == JobState.QUEUED
-            row = change(
+            row = update_job(
                 connection,
                 job,
                 cancel_requested=True,
                 state=JobState.CANCELLED if waiting else before.state,
                 finished=now() if waiting else None,
             )
-            record(connection, row, "cancelled" if waiting else "cancelling")
-            return job_of(row)
+            append_event(connection, row, "cancelled" if waiting else "cancelling")
+            return job_from_row(row)
 
         return self._database.write(operation)
 
@@ -186,23 +186,23 @@ class Jobs:
 
         Raises
         ------
-        NoSuchJob
-        WrongState
+        JobNotFoundError
+        JobStateError
             It is waiting, running, or has succeeded.
-        QuotaExceeded
+        QuotaError
             The owner has ``most_active`` jobs that are not finished.
         """
 
         def operation(connection: Connection) -> Job:
-            dialect.counting(connection, owner)
+            dialect.lock_owner(connection, owner)
             before = _own(connection, owner, job, locked=True)
             if before.state not in RESUMABLE:
-                raise WrongState(
+                raise JobStateError(
                     f"job {job} is {before.state}: only one that failed or was cancelled resumes"
                 )
             if most_active is not None:
-                refuse_above(connection, owner, most_active)
-            row = change(
+                check_quota(connection, owner, most_active)
+            row = update_job(
                 connection,
                 job,
                 state=JobState.QUEUED,
@@ -211,8 +211,8 @@ class Jobs:
                 problem=None,
                 finished=None,
             )
-            record(connection, row, "queued")
-            return job_of(row)
+            append_event(connection, row, "queued")
+            return job_from_row(row)
 
         return self._database.write(operation)
 
@@ -221,15 +221,15 @@ class Jobs:
 
         Raises
         ------
-        NoSuchJob
-        WrongState
+        JobNotFoundError
+        JobStateError
             It is not finished.
         """
 
         def operation(connection: Connection) -> None:
             before = _own(connection, owner, job, locked=True)
             if before.state not in TERMINAL:
-                raise WrongState(f"job {job} is {before.state}: cancel it first")
+                raise JobStateError(f"job {job} is {before.state}: cancel it first")
             connection.execute(delete(jobs).where(jobs.c.id == job))
 
         self._database.write(operation)
@@ -252,7 +252,7 @@ class Jobs:
                 Event(row.job_id, row.number, row.kind, json.loads(row.data), row.at) for row in rows
             )
 
-    def standing(self) -> Standing:
+    def standing(self) -> QueueStatistics:
         """Return how all owners' jobs stand."""
         counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
         waits = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
@@ -263,7 +263,7 @@ class Jobs:
         )
         with self._database.read() as connection:
             counts = {row[0]: row[1] for row in connection.execute(counted)}
-            return Standing(
+            return QueueStatistics(
                 {state: counts.get(state, 0) for state in JobState},
                 connection.execute(waits).scalar_one(),
                 {row.id: read_document(row.progress) or {} for row in connection.execute(running)},
@@ -274,5 +274,5 @@ def _own(connection: Connection, owner: str, job: str, locked: bool = False) -> 
     query: Select[Any] = select(jobs).where(jobs.c.id == job, jobs.c.owner == owner)
     row = connection.execute(query.with_for_update() if locked else query).one_or_none()
     if row is None:
-        raise NoSuchJob(f"there is no job {job!r}")
+        raise JobNotFoundError(f"there is no job {job!r}")
     return row

@@ -24,7 +24,7 @@ SCOPES = {
 PREFIX = "islands_"
 
 
-class NoSuchKey(IslandsError):
+class KeyNotFoundError(IslandsError):
     """There is no such key."""
 
 
@@ -121,7 +121,7 @@ class Keys:
 
         Raises
         ------
-        NoSuchKey
+        KeyNotFoundError
         """
 
         def operation(connection: Connection) -> Key:
@@ -130,7 +130,7 @@ class Keys:
             )
             row = connection.execute(_query().where(keys.c.id == key)).one_or_none()
             if row is None:
-                raise NoSuchKey(f"there is no key {key!r}: list them with 'islands keys list'")
+                raise KeyNotFoundError(f"there is no key {key!r}: list them with 'islands keys list'")
             return _key_of(row)
 
         return self._database.write(operation)

@@ -1,8 +1,8 @@
 """What coordinators do with jobs: claim one, keep it, tell of it, finish it.
 
-A coordinator owns a job as long as its lease's epoch is the job's: every write says which epoch it stands on,
-and one that stands on an older epoch changes nothing (`LeaseLost`). So a coordinator that was thought dead,
-and wakes up, does no harm.
+A coordinator owns a job as long as its lease's epoch is the job's. Every write names its epoch, and a write
+under an older epoch changes nothing (`LeaseLostError`): a coordinator that was taken for dead and goes on
+does no harm.
 """
 
 import json
@@ -10,10 +10,10 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, and_, case, delete, func, insert, or_, select, update
 
-from islands_service.domain.jobs import Job, JobState, Lease, LeaseLost, Outcome, Report
+from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.store.database import Database
 from islands_service.store.dialect import now
-from islands_service.store.job_events import change, job_of, record
+from islands_service.store.job_events import append_event, job_from_row, update_job
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
 #: Attempts that may fail to bring a job on, one after the other, before it is given up.
@@ -62,7 +62,7 @@ class Leases:
 
         Raises
         ------
-        LeaseLost
+        LeaseLostError
         """
 
         def operation(connection: Connection) -> bool:
@@ -74,12 +74,12 @@ class Leases:
 
         return self._database.write(operation)
 
-    def report(self, lease: Lease, report: Report) -> Job:
+    def report(self, lease: Lease, report: ProgressReport) -> Job:
         """Tell how far a job is; with a checkpoint, all of it counts or nothing.
 
         Raises
         ------
-        LeaseLost
+        LeaseLostError
         """
         return self._database.write(lambda connection: _report(connection, lease, report))
 
@@ -95,7 +95,7 @@ class Leases:
 
         Raises
         ------
-        LeaseLost
+        LeaseLostError
         """
 
         def operation(connection: Connection) -> None:
@@ -108,16 +108,16 @@ class Leases:
                 attempt=jobs.c.attempt - int(not attempted),
                 stalled=case((jobs.c.stalled > 0, jobs.c.stalled - int(not attempted)), else_=0),
             )
-            record(connection, row, row.state)
+            append_event(connection, row, row.state)
 
         self._database.write(operation)
 
-    def finish(self, lease: Lease, outcome: Outcome) -> None:
+    def finish(self, lease: Lease, outcome: JobOutcome) -> None:
         """Write down how a job ended, with all that belongs to its result.
 
         Raises
         ------
-        LeaseLost
+        LeaseLostError
         """
 
         def operation(connection: Connection) -> None:
@@ -142,7 +142,7 @@ class Leases:
                     connection.execute(insert(models).values(values))
                 for name, blob in outcome.artefacts.items():
                     connection.execute(insert(artefacts).values(job_id=row.id, name=name, blob=blob))
-            record(connection, row, outcome.state, _text(outcome.problem or outcome.summary) or "{}")
+            append_event(connection, row, outcome.state, _text(outcome.problem or outcome.summary) or "{}")
 
         self._database.write(operation)
 
@@ -163,7 +163,7 @@ def _claim(connection: Connection, owner: str, seconds: float) -> Lease | None:
         if found.stalled >= ATTEMPTS:
             _give_up(connection, found.id, found.cancel_requested)
             continue
-        row = change(
+        row = update_job(
             connection,
             found.id,
             state=JobState.RUNNING,
@@ -174,14 +174,14 @@ def _claim(connection: Connection, owner: str, seconds: float) -> Lease | None:
             stalled=jobs.c.stalled + 1,
             started=func.coalesce(jobs.c.started, now()),
         )
-        record(connection, row, "running", json.dumps({"attempt": row.attempt}))
-        return Lease(job_of(row), row.lease_epoch)
+        append_event(connection, row, "running", json.dumps({"attempt": row.attempt}))
+        return Lease(job_from_row(row), row.lease_epoch)
     return None
 
 
 def _give_up(connection: Connection, job: str, cancelled: bool) -> None:
     """End a job that nobody could bring on; one that was to be cancelled is cancelled."""
-    row = change(
+    row = update_job(
         connection,
         job,
         state=JobState.CANCELLED if cancelled else JobState.FAILED,
@@ -189,10 +189,10 @@ def _give_up(connection: Connection, job: str, cancelled: bool) -> None:
         finished=now(),
         problem=None if cancelled else _text(GIVEN_UP),
     )
-    record(connection, row, row.state, row.problem or "{}")
+    append_event(connection, row, row.state, row.problem or "{}")
 
 
-def _report(connection: Connection, lease: Lease, report: Report) -> Job:
+def _report(connection: Connection, lease: Lease, report: ProgressReport) -> Job:
     values: dict[str, Any] = {"progress": _text(report.progress)}
     if report.checkpoint is not None:
         values |= {"checkpoint": report.checkpoint, "stalled": 0}
@@ -219,8 +219,8 @@ def _report(connection: Connection, lease: Lease, report: Report) -> Job:
             events.c.job_id == row.id, events.c.kind == "progress", events.c.number <= row.version - KEPT
         )
     )
-    record(connection, row, "progress", row.progress)
-    return job_of(row)
+    append_event(connection, row, "progress", row.progress)
+    return job_from_row(row)
 
 
 def _held(lease: Lease) -> tuple[Any, ...]:
@@ -244,8 +244,8 @@ def _fenced(connection: Connection, lease: Lease, **values: Any) -> Row[Any]:
     return row
 
 
-def _lost(lease: Lease) -> LeaseLost:
-    return LeaseLost(f"job {lease.job.id} is not ours any more (lease {lease.epoch})")
+def _lost(lease: Lease) -> LeaseLostError:
+    return LeaseLostError(f"job {lease.job.id} is not ours any more (lease {lease.epoch})")
 
 
 def _text(document: Any) -> str | None:

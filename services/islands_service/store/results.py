@@ -7,7 +7,7 @@ from typing import Any
 
 from sqlalchemy import Connection, delete, insert, select
 
-from islands_service.domain.jobs import NoSuchJob
+from islands_service.domain.jobs import JobNotFoundError
 from islands_service.store.database import Database
 from islands_service.store.tables import artefacts, jobs, models, points, results
 
@@ -73,7 +73,7 @@ class Results:
 
         Raises
         ------
-        NoSuchJob
+        JobNotFoundError
             It was deleted meanwhile.
         """
 
@@ -81,7 +81,7 @@ class Results:
             # Locked: others may have drawn the same, and one has to see what the other has kept.
             there = connection.execute(select(jobs.c.id).where(jobs.c.id == job).with_for_update())
             if there.one_or_none() is None:
-                raise NoSuchJob(f"there is no job {job!r} any more")
+                raise JobNotFoundError(f"there is no job {job!r} any more")
             connection.execute(
                 delete(artefacts).where(artefacts.c.job_id == job, artefacts.c.name.in_(blobs))
             )

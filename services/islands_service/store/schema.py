@@ -29,7 +29,7 @@ def prepare(database: Database) -> None:
         if revision(connection) == HEAD:
             return
     with database.alone() as connection:
-        dialect.migrating(connection)
+        dialect.lock_migration(connection)
         upgrade(connection)
 
 

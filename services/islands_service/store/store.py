@@ -16,10 +16,10 @@ class Store:
     """All that the service remembers, but for blobs.
 
     Laws, for every database (`tests/contracts/test_store.py`): what a write has returned from is durable; a
-    job belongs to one lease at a time, and a write under an older one changes nothing and raises `LeaseLost`;
-    a checkpoint, its progress and its event appear together or not at all; an idempotency key names one job;
-    events of a job are numbered without gaps in the order in which they became visible; an owner never meets
-    what belongs to another.
+    job belongs to one lease at a time, and a write under an older one changes nothing and raises
+    `LeaseLostError`; a checkpoint, its progress and its event appear together or not at all; an idempotency
+    key names one job; events of a job are numbered without gaps in the order in which they became visible; an
+    owner never meets what belongs to another.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Store:
 
     Raises
     ------
-    StoreUnavailable
+    StoreUnavailableError
         The database does not answer.
     StoreError
         It was made by a newer version of islands.

@@ -8,7 +8,7 @@ from statistics import median
 
 from islands.benchmark import compiled_c, kernel_evaluator, plain_numpy
 from islands.benchmark.clock import milliseconds
-from islands.benchmark.compiled_c import compiler
+from islands.benchmark.compiled_c import find_compiler
 from islands.benchmark.workload import CASE1, INTERVAL, WARM_UP, Candidate
 from islands.errors import ModelError
 
@@ -74,10 +74,10 @@ def compare(
     ModelError
         Two sides come to different errors, or the compiler fails.
     """
-    rows = compiled_c.rows_of(state.record, WARM_UP, INTERVAL)
+    rows = compiled_c.row_pointers(state.record, WARM_UP, INTERVAL)
     measured: list[_Times] = []
     for place, candidate in enumerate(candidates):
-        compiled = _compiled(candidate, rows, folder) if compiler() else []
+        compiled = _compiled(candidate, rows, folder) if find_compiler() else []
         _check(candidate, state, compiled)
         drawn = [_times(candidate, state, compiled) for _ in range(rounds)]
         times = {name: median(each[name] for each in drawn) for name in drawn[0]}
@@ -129,7 +129,7 @@ def _evaluation(time: Callable[[bool], float]) -> float:
     return CASE1.prune * time(True) + (1.0 - CASE1.prune) * time(False)
 
 
-def _compiled(candidate: Candidate, rows: compiled_c.Rows, folder: Path) -> list[Callable[[], float]]:
+def _compiled(candidate: Candidate, rows: compiled_c.RowsPointer, folder: Path) -> list[Callable[[], float]]:
     return [
         compiled_c.simulation(candidate.regressors, candidate.theta, rows, flags, folder)
         for flags in compiled_c.FLAGS

@@ -24,12 +24,12 @@ from islands.model.primitives import SIGN
 from islands.model.regressor import Regressor
 
 
-def compiler() -> str | None:
+def find_compiler() -> str | None:
     """Return the C compiler's path, None where there is none."""
     return shutil.which("cc")
 
 
-def compiled(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDLL:
+def compile_model(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDLL:
     """Compile C and load it.
 
     Parameters
@@ -42,7 +42,7 @@ def compiled(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDLL:
     ModelError
         There is no compiler, or it refuses the source or a flag: the message is the compiler's.
     """
-    command = compiler()
+    command = find_compiler()
     if command is None:
         raise ModelError("no C compiler is called cc: install one, or leave C out of the comparison")
     name = hashlib.sha256("\n".join((source, *flags)).encode()).hexdigest()
@@ -101,7 +101,7 @@ void simulate(const double *restrict input, const double *restrict measured, lon
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class RowsPointer:
     """A record of one input in rows, shape (blocks, warm_up + interval, `LANES`).
 
     Lanes that the last block has too many repeat the first interval; whole intervals alone are simulated.
@@ -114,7 +114,7 @@ class Rows:
     interval: int
 
 
-def rows_of(record: Dataset, warm_up: int, interval: int) -> Rows:
+def row_pointers(record: Dataset, warm_up: int, interval: int) -> RowsPointer:
     """Lay out the whole intervals of a record."""
     lanes = (record.samples - warm_up) // interval
     blocks = -(-lanes // LANES)
@@ -122,10 +122,10 @@ def rows_of(record: Dataset, warm_up: int, interval: int) -> Rows:
     start[:lanes] = interval * np.arange(lanes)
     samples = start.reshape(blocks, 1, LANES) + np.arange(warm_up + interval)[:, None]
     u, y = (_aligned(signal[samples]) for signal in (record.u[:, 0], record.y))
-    return Rows(u, y, lanes, warm_up, interval)
+    return RowsPointer(u, y, lanes, warm_up, interval)
 
 
-def source_of(regressors: Sequence[Regressor], warm_up: int, interval: int) -> str:
+def c_source_of_model(regressors: Sequence[Regressor], warm_up: int, interval: int) -> str:
     """Write the C of an individual's simulation."""
 
     def sample(channel: int, lag: int) -> str:
@@ -148,7 +148,7 @@ def source_of(regressors: Sequence[Regressor], warm_up: int, interval: int) -> s
 def simulation(
     regressors: Sequence[Regressor],
     theta: Sequence[float],
-    rows: Rows,
+    rows: RowsPointer,
     flags: Sequence[str],
     folder: Path,
 ) -> Callable[[], float]:
@@ -159,7 +159,7 @@ def simulation(
     ModelError
         There is no compiler, or it refuses.
     """
-    library = compiled(source_of(regressors, rows.warm_up, rows.interval), flags, folder)
+    library = compile_model(c_source_of_model(regressors, rows.warm_up, rows.interval), flags, folder)
     squared = _aligned(np.zeros((len(rows.u), LANES)))
     arrays = (np.array(theta), _aligned(np.zeros(rows.u.shape[1:])), squared)
     weights, y, error = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)

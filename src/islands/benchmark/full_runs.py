@@ -76,7 +76,7 @@ def run_island(
     )
 
 
-def run_apart(
+def run_in_processes(
     record: Dataset, settings: Settings, indices: Sequence[int], warm: bool = False
 ) -> tuple[float, tuple[Run, ...]]:
     """Run islands at the same time, each in a new process; return the seconds on the wall, and every run.

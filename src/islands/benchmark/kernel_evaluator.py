@@ -17,7 +17,7 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.gene_index import Vocabulary
+from islands.evolution.gene_index import GeneIndex
 from islands.kernels.gram import gram
 from islands.kernels.interpreter import Program
 from islands.kernels.pair_table import clear, pair_table
@@ -25,10 +25,10 @@ from islands.kernels.population import evaluate
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
-from islands.program.regressor_matrix import rows_of
+from islands.program.regressor_matrix import evaluate_terms
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
-from islands.simulation.predictors import bound_of
+from islands.simulation.predictors import divergence_bound
 
 #: Bytes of a table of inner products for one individual: emptied as often as nothing shall be known.
 _TABLE = 1 << 14
@@ -60,8 +60,8 @@ def prepared(record: Dataset) -> Prepared:
         record,
         layout(record, WARM_UP, INTERVAL),
         layout(record[: WARM_UP + 1], WARM_UP, INTERVAL),
-        rows_of(record, WARM_UP),
-        bound_of(record),
+        evaluate_terms(record, WARM_UP),
+        divergence_bound(record),
     )
 
 
@@ -113,7 +113,7 @@ def _evaluation(state: Prepared, candidate: Candidate, pruned: bool, cached: boo
         The simulation ends early.
     """
     size = len(candidate.regressors)
-    vocabulary = Vocabulary(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
+    vocabulary = GeneIndex(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
     terms = np.array([[vocabulary.number(item.expression) for item in candidate.regressors]], np.int64)
     sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
     kept, estimated = np.empty((1, size), np.int64), np.empty((1, size))

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from islands.benchmark.clock import cpu
-from islands.benchmark.compiled_c import compiled, compiler
+from islands.benchmark.compiled_c import compile_model, find_compiler
 
 #: Packages whose version a time depends on.
 _PACKAGES = ("islands", "numpy", "numba", "llvmlite", "scipy")
@@ -63,7 +63,7 @@ def _processor() -> str:
 
 
 def _compiler() -> str | None:
-    command = compiler()
+    command = find_compiler()
     if command is None:
         return None
     done = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
@@ -110,9 +110,9 @@ def peak(folder: Path) -> float | None:
 
     Fused multiply-add is left out, as in the kernels: it would make bits depend on the processor.
     """
-    if compiler() is None:
+    if find_compiler() is None:
         return None
-    library = compiled(_SOURCE, _FLAGS, folder)
+    library = compile_model(_SOURCE, _FLAGS, folder)
     multiply_add = library.multiply_add
     multiply_add.restype = ctypes.c_double
     result = ctypes.c_double()

@@ -18,7 +18,7 @@ LINEAR = 0.98
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class BenchmarkReport:
     """Everything that a benchmark measured.
 
     Attributes
@@ -93,7 +93,7 @@ class Goal:
     met: bool | None
 
 
-def document(report: Report) -> dict[str, Any]:
+def to_document(report: BenchmarkReport) -> dict[str, Any]:
     """Return a report as JSON has it.
 
     A ratio or fraction that is one number is that of ``gp``, the individuals of a real search; ``kinds`` has
@@ -145,7 +145,7 @@ def document(report: Report) -> dict[str, Any]:
     }
 
 
-def goals(report: Report) -> tuple[Goal, ...]:
+def check_goals(report: BenchmarkReport) -> tuple[Goal, ...]:
     """Return every goal of the design with what was measured."""
     kinds = report.kinds
     rows = [

@@ -8,9 +8,9 @@ from tempfile import TemporaryDirectory
 from islands.benchmark import kernel_evaluator
 from islands.benchmark.clock import refuse_threads
 from islands.benchmark.comparison import Comparison, compare
-from islands.benchmark.full_runs import Run, run_apart, run_island
+from islands.benchmark.full_runs import Run, run_in_processes, run_island
 from islands.benchmark.machine import peak, this_machine
-from islands.benchmark.report import Report
+from islands.benchmark.report import BenchmarkReport
 from islands.benchmark.scaling import against_islands, against_samples, against_terms, against_tree_size
 from islands.benchmark.workload import ISLAND, ISLANDS, SAMPLES, benchmark_record, fingerprint, workload
 from islands.data.dataset import Dataset
@@ -19,7 +19,7 @@ Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class BenchmarkSize:
     """How much is measured.
 
     Attributes
@@ -44,11 +44,11 @@ class Effort:
     case1: bool
 
 
-FULL = Effort(30, 3, 7, ISLAND.generations, 100, True)
-QUICK = Effort(4, 1, 2, 10, 10, False)
+FULL = BenchmarkSize(30, 3, 7, ISLAND.generations, 100, True)
+QUICK = BenchmarkSize(4, 1, 2, 10, 10, False)
 
 
-def measure(quick: bool, tell: Tell) -> Report:
+def measure(quick: bool, tell: Tell) -> BenchmarkReport:
     """Carry out the benchmark.
 
     Parameters
@@ -92,8 +92,8 @@ def measure(quick: bool, tell: Tell) -> Report:
     case1 = None
     if effort.case1:
         tell("the whole case 1, two islands in two processes", 0.85)
-        case1, _ = run_apart(record, ISLAND, range(ISLANDS))
-    return Report(
+        case1, _ = run_in_processes(record, ISLAND, range(ISLANDS))
+    return BenchmarkReport(
         quick=quick,
         workload=fingerprint(individuals),
         samples=record.samples,
@@ -111,7 +111,7 @@ def measure(quick: bool, tell: Tell) -> Report:
 def _processes(record: Dataset, generations: int) -> dict[int, tuple[Run, ...]]:
     """Run the same island in one process, and in two at the same time: each has the same work."""
     settings = replace(ISLAND, generations=generations)
-    return {count: run_apart(record, settings, [0] * count, warm=True)[1] for count in (1, 2)}
+    return {count: run_in_processes(record, settings, [0] * count, warm=True)[1] for count in (1, 2)}
 
 
 def _part(tell: Tell, text: str, begin: float, share: float) -> Callable[[float], None]:

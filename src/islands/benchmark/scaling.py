@@ -13,9 +13,9 @@ from matplotlib.ticker import MaxNLocator
 
 from islands.benchmark import kernel_evaluator
 from islands.benchmark.full_runs import Run
-from islands.benchmark.workload import Candidate, drawn, full_tree, monomial
+from islands.benchmark.workload import Candidate, full_tree, monomial, random_workload
 from islands.data.dataset import Dataset
-from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, house_style, save, settled
+from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, save
 from islands.model.expression import walk
 
 #: Where the cost is measured.
@@ -72,7 +72,7 @@ def line_through(points: Points) -> Line:
 
 def against_samples(record: Dataset, individuals: int, tell: Callable[[float], None]) -> Scaling:
     """Measure products of lagged signals on the first samples of a record."""
-    candidates = drawn(monomial, individuals)
+    candidates = random_workload(monomial, individuals)
     sizes = [size for size in SAMPLES if size <= record.samples]
     costs = []
     for place, size in enumerate(sizes):
@@ -87,7 +87,7 @@ def against_terms(
     """Measure individuals of more and more products of lagged signals."""
     costs = []
     for place, terms in enumerate(TERMS):
-        costs.append((float(terms), _cost(state, drawn(monomial, individuals, terms))))
+        costs.append((float(terms), _cost(state, random_workload(monomial, individuals, terms))))
         tell((place + 1) / len(TERMS))
     return _evaluation("terms", "terms of an individual", costs)
 
@@ -98,7 +98,7 @@ def against_tree_size(
     """Measure individuals of ten full trees, higher and higher; their size is counted in nodes."""
     costs = []
     for place, height in enumerate(HEIGHTS):
-        candidates = drawn(partial(full_tree, height=height), individuals)
+        candidates = random_workload(partial(full_tree, height=height), individuals)
         costs.append((_nodes(candidates), _cost(state, candidates)))
         tell((place + 1) / len(HEIGHTS))
     return _evaluation("tree_size", "nodes of an individual, ten full trees of height 1 to 5", costs)
@@ -157,7 +157,7 @@ def draw_scaling(scaling: Scaling) -> Figure:
     axes.set_xlabel(scaling.x_label)
     axes.set_ylabel(scaling.y_label)
     axes.legend()
-    return settled(figure)
+    return finish(figure)
 
 
 def save_scalings(scalings: Iterable[Scaling], folder: Path) -> tuple[Path, ...]:

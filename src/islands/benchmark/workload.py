@@ -72,13 +72,13 @@ def benchmark_record(samples: int = SAMPLES) -> Dataset:
 def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple[Candidate, ...]]:
     """Return so many individuals of every kind: ``poly``, ``general``, and ``gp`` of a run with settings."""
     return {
-        "poly": drawn(monomial, count),
-        "general": drawn(tree, count),
-        "gp": evolved(record, count, settings),
+        "poly": random_workload(monomial, count),
+        "general": random_workload(tree, count),
+        "gp": evolved_workload(record, count, settings),
     }
 
 
-def text_of(individuals: Mapping[str, Sequence[Candidate]]) -> str:
+def candidate_text(individuals: Mapping[str, Sequence[Candidate]]) -> str:
     """Return a workload as text: a line for the record's length, a kind, an individual, or a term."""
     lines = [f"{SAMPLES} samples"]
     for kind, candidates in individuals.items():
@@ -90,7 +90,7 @@ def text_of(individuals: Mapping[str, Sequence[Candidate]]) -> str:
 
 def fingerprint(individuals: Mapping[str, Sequence[Candidate]]) -> str:
     """Return the SHA-256 of a workload's text, in hexadecimal."""
-    return hashlib.sha256(text_of(individuals).encode()).hexdigest()
+    return hashlib.sha256(candidate_text(individuals).encode()).hexdigest()
 
 
 def monomial(draw: random.Random) -> Expression:
@@ -125,7 +125,7 @@ def _leaf(draw: random.Random) -> Lagged:
     return Lagged(draw.choice((0, 1)), 1 + min(int(draw.expovariate(0.25)), DEEPEST - 1))
 
 
-def drawn(
+def random_workload(
     make: Callable[[random.Random], Expression], count: int, terms: int = TERMS
 ) -> tuple[Candidate, ...]:
     """Draw individuals: y(k-1) and others, so many different regressors each, with small parameters."""
@@ -144,7 +144,7 @@ def drawn(
     return tuple(candidates)
 
 
-def evolved(record: Dataset, count: int, settings: Settings) -> tuple[Candidate, ...]:
+def evolved_workload(record: Dataset, count: int, settings: Settings) -> tuple[Candidate, ...]:
     """Return individuals whose structure is new to a run, evenly spread over its course: island 0, seed 0.
 
     They have every gene that they were bred with: pruning is a part of their evaluation.

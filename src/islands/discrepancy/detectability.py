@@ -23,7 +23,7 @@ from islands.discrepancy.surrogates import (
     injection_strengths,
     make_surrogates,
 )
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 #: Clean surrogates.
 CLEAN = 40
@@ -109,7 +109,7 @@ def self_test(
     core: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
-    run: Spread = map,
+    run: ParallelMap = map,
     effects: Sequence[str] | None = None,
     clean: int = CLEAN,
     tell: Callable[[int, int], None] = _quiet,

@@ -37,7 +37,7 @@ from islands.discrepancy.inference.verdict import (
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 #: Times that causes are looked for anew because with them the record asks for another hold or step.
 ROUNDS = 3
@@ -108,7 +108,7 @@ def diagnose(
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
     tell: Tell = ignore_progress,
-    spread: Spread = map,
+    spread: ParallelMap = map,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record.
 
@@ -125,7 +125,7 @@ def diagnose(
         Of all that is drawn by lot.
     tell : callable
         Told what is being done.
-    spread : Spread
+    spread : ParallelMap
         Fits the effects of a ladder, side by side perhaps; the result is the same.
 
     Raises
@@ -178,7 +178,7 @@ def _told(
     fitted: int,
     rng: np.random.Generator,
     tell: Tell,
-    spread: Spread,
+    spread: ParallelMap,
 ) -> Diagnosis:
     """Say what the evidence comes to, and measure the gain: once, on the locked part."""
     base, found, rungs, verdict = evidence.base, evidence.found, evidence.rungs, evidence.verdict

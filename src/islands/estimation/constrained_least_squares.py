@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from islands.estimation.least_squares import Estimate, factor, failed, solve
-from islands.simulation.outcome import Outcome, Verdict
+from islands.estimation.least_squares import Estimate, factor, failed_estimate, solve
+from islands.simulation.outcome import EvaluationOutcome, Status
 
 #: Rows of S that keep less than this share of their norm are combinations of the others.
 _REDUNDANT = 1e-10
@@ -37,17 +37,17 @@ def constrained_least_squares(
         INFEASIBLE where a constraint is redundant or contradicts the others, or there are more than terms.
     """
     made = factor(psi, y)
-    if isinstance(made, Outcome):
-        return failed(len(psi), made)
+    if isinstance(made, EvaluationOutcome):
+        return failed_estimate(len(psi), made)
     found = null_space(S / made.scale, c)
-    if isinstance(found, Outcome):
-        return failed(len(psi), found)
+    if isinstance(found, EvaluationOutcome):
+        return failed_estimate(len(psi), found)
     return solve(made, *found)
 
 
 def null_space(
     S: NDArray[np.float64], c: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | Outcome:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | EvaluationOutcome:
     """Return a particular solution of ``S theta = c`` and an orthonormal basis of the null space of S."""
     constraints, terms = S.shape
     if not constraints:
@@ -55,7 +55,7 @@ def null_space(
     norms = np.sqrt(np.sum(S**2, axis=1))
     if not norms.all():
         row = int(np.flatnonzero(norms == 0.0)[0])
-        return Outcome(Verdict.INFEASIBLE, f"constraint {row + 1} names no regressor")
+        return EvaluationOutcome(Status.INFEASIBLE, f"constraint {row + 1} names no regressor")
     scaled, targets = S / norms[:, None], c / norms
     q, r, order = qr(scaled.T, pivoting=True)
     diagonal = np.abs(np.diag(r))
@@ -66,5 +66,5 @@ def null_space(
         missed = abs(scaled[row] @ particular - targets[row])
         contradicts = missed > _REDUNDANT * (np.linalg.norm(particular) + abs(targets[row]))
         kind = "contradicts the others" if contradicts else "is a combination of the others: leave it out"
-        return Outcome(Verdict.INFEASIBLE, f"constraint {row + 1} {kind}")
+        return EvaluationOutcome(Status.INFEASIBLE, f"constraint {row + 1} {kind}")
     return particular, q[:, rank:]

@@ -12,11 +12,11 @@ from islands.model.expression import Lagged
 from islands.model.model import Model, canonical_order
 from islands.model.regressor import Regressor
 from islands.program.regressor_matrix import regressor_matrix
-from islands.simulation.outcome import Outcome
+from islands.simulation.outcome import EvaluationOutcome
 
 
 @dataclass(frozen=True, slots=True)
-class Estimated:
+class FittedStructure:
     """A model with parameters, and the variance of its equation error (the residual one step ahead)."""
 
     model: Model
@@ -25,7 +25,7 @@ class Estimated:
 
 def estimate(
     regressors: Sequence[Regressor], record: Dataset, constraints: str = "none", warm_up: int | None = None
-) -> Estimated | Outcome:
+) -> FittedStructure | EvaluationOutcome:
     """Estimate the parameters of a structure on a record.
 
     Parameters
@@ -37,11 +37,11 @@ def estimate(
 
     Returns
     -------
-    Estimated or Outcome
+    FittedStructure or EvaluationOutcome
         The failure's outcome: INFEASIBLE, SINGULAR or TOO_FEW_ROWS.
     """
     constrained = constraint(constraints).constrain(canonical_order(regressors))
-    if isinstance(constrained, Outcome):
+    if isinstance(constrained, EvaluationOutcome):
         return constrained
     structure = Model(constrained.regressors, None, record.input_names, record.output_name, record.dt)
     first = structure.maximum_lag if warm_up is None else warm_up
@@ -49,7 +49,7 @@ def estimate(
     found = constrained_least_squares(np.array(psi), y, constrained.S, constrained.c)
     if not found.outcome:
         return found.outcome
-    return Estimated(
+    return FittedStructure(
         structure.with_parameters(found.theta.tolist(), found.standard_errors.tolist()),
         found.residual_variance,
     )

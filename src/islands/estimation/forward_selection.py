@@ -14,14 +14,14 @@ from islands.estimation.parameter_constraints import constraint
 from islands.model.model import canonical_order
 from islands.model.regressor import Regressor
 from islands.program.regressor_matrix import gram_matrix
-from islands.simulation.outcome import Outcome
+from islands.simulation.outcome import EvaluationOutcome
 
 Structure = tuple[Regressor, ...]
 
 
 def forward_selection(
     library: Sequence[Regressor], record: Dataset, constraints: str = "none", max_terms: int = 10
-) -> tuple[Structure, ...] | Outcome:
+) -> tuple[Structure, ...] | EvaluationOutcome:
     """Return nested structures, each the one before it and the candidate with the largest ERR.
 
     Parameters
@@ -35,11 +35,11 @@ def forward_selection(
 
     Returns
     -------
-    tuple of structures, or Outcome
+    tuple of structures, or EvaluationOutcome
         Regressors in the order of their content. INFEASIBLE where the library cannot meet the constraint.
     """
     found = constraint(constraints).directions(library)
-    if isinstance(found, Outcome):
+    if isinstance(found, EvaluationOutcome):
         return found
     warm_up = max(item.maximum_lag for item in library)
     gram = gram_matrix([*(direction.expression for direction in found.free), found.target], record, warm_up)

@@ -9,7 +9,7 @@ from scipy.linalg import qr, solve_triangular
 from islands.errors import RecordError
 from islands.kernels.qr import orthogonalise
 from islands.kernels.summation import total
-from islands.simulation.outcome import OK, Outcome, Verdict
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
 #: A regressor that keeps less than this share of its norm depends on those before it.
 DEPENDENT = 1e-11
@@ -27,18 +27,18 @@ class Estimate:
         Square roots of the diagonal of the parameters' covariance, as if the equation error were white.
     residual_variance : float
         Residual sum of squares over rows less free parameters.
-    outcome : Outcome
+    outcome : EvaluationOutcome
         OK, SINGULAR, INFEASIBLE or TOO_FEW_ROWS.
     """
 
     theta: NDArray[np.float64]
     standard_errors: NDArray[np.float64]
     residual_variance: float
-    outcome: Outcome
+    outcome: EvaluationOutcome
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Factor:
+class QRFactor:
     """``Psi = Q R`` with the columns of R scaled to norm 1: all that estimation needs of a record.
 
     Attributes
@@ -62,7 +62,7 @@ class Factor:
     rows: int
 
 
-def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Factor | Outcome:
+def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | EvaluationOutcome:
     """Factor a regressor matrix.
 
     Parameters
@@ -74,7 +74,7 @@ def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Factor | Outcome
 
     Returns
     -------
-    Factor or Outcome
+    QRFactor or EvaluationOutcome
         TOO_FEW_ROWS, or SINGULAR with the position of the first regressor that depends on those before it.
 
     Raises
@@ -86,15 +86,15 @@ def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Factor | Outcome
     if y.shape != (rows,):
         raise RecordError(f"the regressor matrix has {rows} rows, the target has shape {y.shape}")
     if rows <= terms:
-        return Outcome(Verdict.TOO_FEW_ROWS, f"{rows} rows for {terms} parameters")
+        return EvaluationOutcome(Status.TOO_FEW_ROWS, f"{rows} rows for {terms} parameters")
     triangle, projection = np.empty((terms, terms)), np.empty(terms)
     # The kernel works in place on contiguous rows of float64; the caller's may be a transposed view.
     q, residual = np.array(psi, dtype=np.float64, order="C"), np.array(y, dtype=np.float64)
     dependent = orthogonalise(q, residual, triangle, projection, DEPENDENT)
     if dependent >= 0:
-        return Outcome(Verdict.SINGULAR, f"regressor {dependent + 1} depends on those before it")
+        return EvaluationOutcome(Status.SINGULAR, f"regressor {dependent + 1} depends on those before it")
     scale = np.sqrt(np.sum(triangle**2, axis=0))
-    return Factor(triangle / scale, scale, projection, float(total(residual**2)), rows)
+    return QRFactor(triangle / scale, scale, projection, float(total(residual**2)), rows)
 
 
 def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
@@ -108,12 +108,12 @@ def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
         The target.
     """
     made = factor(psi, y)
-    if isinstance(made, Outcome):
-        return failed(len(psi), made)
+    if isinstance(made, EvaluationOutcome):
+        return failed_estimate(len(psi), made)
     return solve(made, np.zeros(len(psi)), np.eye(len(psi)))
 
 
-def solve(made: Factor, particular: NDArray[np.float64], basis: NDArray[np.float64]) -> Estimate:
+def solve(made: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.float64]) -> Estimate:
     """Minimise over ``scaled theta = particular + basis eta``.
 
     Parameters
@@ -129,7 +129,9 @@ def solve(made: Factor, particular: NDArray[np.float64], basis: NDArray[np.float
         return _estimate(made, particular, np.zeros((terms, terms)), float(remainder @ remainder), 0)
     q, r = qr(made.triangle @ basis, mode="economic")
     if np.abs(np.diag(r)).min() <= DEPENDENT:
-        return failed(terms, Outcome(Verdict.SINGULAR, "the free directions depend on each other"))
+        return failed_estimate(
+            terms, EvaluationOutcome(Status.SINGULAR, "the free directions depend on each other")
+        )
     right = q.T @ remainder
     scaled = particular + basis @ solve_triangular(r, right)
     spread = solve_triangular(r, basis.T, trans="T")
@@ -138,14 +140,14 @@ def solve(made: Factor, particular: NDArray[np.float64], basis: NDArray[np.float
 
 
 def _estimate(
-    made: Factor, scaled: NDArray[np.float64], covariance: NDArray[np.float64], missed: float, free: int
+    made: QRFactor, scaled: NDArray[np.float64], covariance: NDArray[np.float64], missed: float, free: int
 ) -> Estimate:
     variance = (made.residual + missed) / (made.rows - free)
     errors = np.sqrt(variance * np.maximum(np.diag(covariance), 0.0)) / made.scale
     return Estimate(scaled / made.scale, errors, variance, OK)
 
 
-def failed(terms: int, outcome: Outcome) -> Estimate:
+def failed_estimate(terms: int, outcome: EvaluationOutcome) -> Estimate:
     """Return the estimate of a failure."""
     nothing = np.full(terms, np.nan)
     return Estimate(nothing, nothing, np.nan, outcome)

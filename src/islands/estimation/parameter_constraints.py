@@ -11,12 +11,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.errors import chosen
+from islands.errors import lookup
 from islands.model.clusters import OUTPUT_AT_REST, Cluster, clusters, steady_state
 from islands.model.expression import Apply, Constant, Expression, Lagged
 from islands.model.primitives import ADD, MUL
 from islands.model.regressor import Regressor, canonical
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,10 +91,10 @@ class Constraint:
     group: Callable[[Regressor], tuple[float, Expression]]
     sums: Mapping[Expression, float]
     lacking: str
-    directions: Callable[[Sequence[Regressor]], Directions | Outcome]
+    directions: Callable[[Sequence[Regressor]], Directions | EvaluationOutcome]
     description: str
 
-    def constrain(self, regressors: Sequence[Regressor]) -> Constrained | Outcome:
+    def constrain(self, regressors: Sequence[Regressor]) -> Constrained | EvaluationOutcome:
         """Return the constraint on given regressors.
 
         A regressor alone in a group that sums to zero has the parameter zero and is left out.
@@ -108,7 +108,7 @@ class Constraint:
         kept = tuple(item for position, item in enumerate(regressors) if position not in alone)
         groups = clusters(kept, self.group)
         if not self.sums.keys() <= {group.steady_state for group in groups}:
-            return Outcome(Verdict.INFEASIBLE, self.lacking)
+            return EvaluationOutcome(Status.INFEASIBLE, self.lacking)
         S = np.zeros((len(groups), len(kept)))
         for row, group in enumerate(groups):
             S[row, group.members] = group.weights
@@ -131,7 +131,7 @@ def every_regressor(library: Sequence[Regressor]) -> Directions:
     return Directions(_PRESENT, (), tuple(Direction(item.expression, (item,)) for item in library))
 
 
-def increments(library: Sequence[Regressor]) -> Directions | Outcome:
+def increments(library: Sequence[Regressor]) -> Directions | EvaluationOutcome:
     """Let a model grow by what vanishes at rest: y(k) - y(k-1) is explained by increments alone.
 
     Within a cluster that is the difference of a regressor and the cluster's first; a regressor with a phi
@@ -140,7 +140,7 @@ def increments(library: Sequence[Regressor]) -> Directions | Outcome:
     groups = clusters(library)
     output = next((group for group in groups if is_output(group)), None)
     if output is None:
-        return Outcome(Verdict.INFEASIBLE, "no candidate is y at rest: add y(k-1) to the library")
+        return EvaluationOutcome(Status.INFEASIBLE, "no candidate is y at rest: add y(k-1) to the library")
     clustered = {member for group in groups for member in group.members}
     vanishing = [item for position, item in enumerate(library) if position not in clustered]
     free = [Direction(item.expression, (item,)) for item in vanishing]
@@ -195,4 +195,4 @@ def constraint(name: str) -> Constraint:
     SettingsError
         There is none of that name.
     """
-    return chosen(CONSTRAINTS, name, "constraints")
+    return lookup(CONSTRAINTS, name, "constraints")

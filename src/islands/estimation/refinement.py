@@ -19,8 +19,8 @@ from islands.kernels.summation import dot
 from islands.model.model import Model
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
-from islands.simulation.outcome import Outcome, Verdict
-from islands.simulation.predictors import bound_of, multiple_shooting
+from islands.simulation.outcome import EvaluationOutcome, Status
+from islands.simulation.predictors import divergence_bound, multiple_shooting
 
 #: Step of a central difference, in units of a parameter's size: between truncation and rounding.
 _DIFFERENCE = 1e-5
@@ -33,7 +33,7 @@ _GAIN = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
-class Refined:
+class RefinedModel:
     """A model with polished parameters, the mean squared error before and after, and the steps taken."""
 
     model: Model
@@ -49,7 +49,7 @@ def refine(
     constraints: str = "none",
     warm_up: int | None = None,
     max_steps: int = 30,
-) -> Refined | Outcome:
+) -> RefinedModel | EvaluationOutcome:
     """Polish a model's parameters on the error of multiple shooting.
 
     Parameters
@@ -67,7 +67,7 @@ def refine(
 
     Returns
     -------
-    Refined or Outcome
+    RefinedModel or EvaluationOutcome
         With standard errors from the Jacobian at the end. INFEASIBLE where the constraint refuses the model
         or one of its regressors, DIVERGED where the model diverges as it is.
 
@@ -81,10 +81,12 @@ def refine(
         The warm-up is shorter than the model's deepest lag, or the interval is under 1.
     """
     constrained = constraint(constraints).constrain(model.regressors)
-    if isinstance(constrained, Outcome):
+    if isinstance(constrained, EvaluationOutcome):
         return constrained
     if constrained.regressors != model.regressors:
-        return Outcome(Verdict.INFEASIBLE, "the constraint forces a parameter to zero: leave its term out")
+        return EvaluationOutcome(
+            Status.INFEASIBLE, "the constraint forces a parameter to zero: leave its term out"
+        )
     # It checks what the kernel does not: inputs, lags, the record's length.
     started = multiple_shooting(model, record, interval, warm_up)
     if not started.outcome:
@@ -95,7 +97,7 @@ def refine(
     # Each parameter in units of its own size: their sizes differ by many orders.
     unit = np.where(theta == 0.0, 1.0, np.abs(theta))
     found = null_space(constrained.S * unit, constrained.c)
-    if isinstance(found, Outcome):
+    if isinstance(found, EvaluationOutcome):
         return found
     directions = unit[:, None] * found[1]
     residual = _Residual(model, record, interval, warm_up)
@@ -120,7 +122,7 @@ def refine(
     variance = after * error.size / max(1, error.size - directions.shape[1])
     covariance = directions @ np.linalg.pinv(normal) @ directions.T
     errors = np.sqrt(variance) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return Refined(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)
+    return RefinedModel(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)
 
 
 class _Residual:
@@ -130,7 +132,7 @@ class _Residual:
         first = model.maximum_lag if warm_up is None else warm_up
         self._program = link(model.regressors)
         self._cut: Layout = layout(record, first, interval)
-        self._y, self._bound = record.y, bound_of(record)
+        self._y, self._bound = record.y, divergence_bound(record)
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True

@@ -30,6 +30,6 @@ class Archipelago:
         return merge(*(island.hall for island in self.islands))
 
 
-def founded(islands: int, seed: int) -> Archipelago:
+def empty_archipelago(islands: int, seed: int) -> Archipelago:
     """Return islands that nobody lives on yet."""
     return Archipelago(tuple(Island(index, seed, -1, (), (), HallOfFame()) for index in range(islands)))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.epoch import IslandEpoch, advance, emigrants
+from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import StepInfo
 from islands.evolution.problem import Problem
@@ -22,7 +22,7 @@ Caches = Mapping[str, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
-class Epoch:
+class ArchipelagoEpoch:
     """An archipelago, and what its islands did to get there.
 
     Attributes
@@ -46,7 +46,7 @@ class Engine(Protocol):
     any archipelago that it yielded goes on as if it had never stopped.
     """
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """Yield every epoch after ``start``, up to the settings' last generation.
 
         Parameters
@@ -62,26 +62,26 @@ class Engine(Protocol):
 class SerialEngine:
     """Runs the islands one after the other in this process, on one evaluator."""
 
-    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[Epoch]:
+    def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """See `Engine`."""
         evaluator = Evaluator(problem.record, problem.settings)
-        sources = topology_of(problem, start).sources
+        sources = make_topology(problem, start).sources
         archipelago = start
-        leaving = [emigrants(island, problem.settings_of(island.index)) for island in start.islands]
+        leaving = [select_migrants(island, problem.settings_of(island.index)) for island in start.islands]
         while archipelago.generation < problem.settings.generations:
             epochs: list[IslandEpoch] = []
             for island in archipelago.islands:
                 arriving = [leaving[source] for source in sources[island.index]]
-                epoch = advance(island, arriving, evaluator, problem, stop)
+                epoch = run_epoch(island, arriving, evaluator, problem, stop)
                 if epoch is None:
                     return
                 epochs.append(epoch)
             archipelago = Archipelago(tuple(epoch.island for epoch in epochs))
             leaving = [epoch.emigrants for epoch in epochs]
-            yield Epoch(archipelago, tuple(epoch.steps for epoch in epochs), evaluator.memory)
+            yield ArchipelagoEpoch(archipelago, tuple(epoch.steps for epoch in epochs), evaluator.memory)
 
 
-def topology_of(problem: Problem, archipelago: Archipelago) -> Topology:
+def make_topology(problem: Problem, archipelago: Archipelago) -> Topology:
     """Return the topology of an archipelago; it follows from its islands' number and seed."""
     islands = archipelago.islands
     return topology(problem.settings.topology, len(islands), islands[0].seed)

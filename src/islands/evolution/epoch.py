@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Population, distinct
-from islands.evolution.island import Island, StepInfo, elite_of, first_generation, step
-from islands.evolution.migration import EMIGRANTS, REPLACED
+from islands.evolution.individual import Population, unique_structures
+from islands.evolution.island import Island, StepInfo, first_generation, select_elite, step
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.problem import Problem
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.settings import Settings
-from islands.simulation.outcome import Verdict
+from islands.simulation.outcome import Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class IslandEpoch:
     steps: tuple[StepInfo, ...]
 
 
-def advance(
+def run_epoch(
     island: Island,
     arriving: Sequence[Population],
     evaluator: Evaluator,
@@ -48,7 +48,7 @@ def advance(
     Parameters
     ----------
     arriving : sequence of populations
-        The `emigrants` of every source, in the order of the sources' index.
+        The `select_migrants` of every source, in the order of the sources' index.
     stop : callable
         Asked before every generation.
 
@@ -59,7 +59,7 @@ def advance(
     """
     settings = problem.settings_of(island.index)
     last = next_stop(island.generation, settings)
-    island = immigrated(island, arriving, evaluator, settings)
+    island = receive_migrants(island, arriving, evaluator, settings)
     steps = []
     while island.generation < last:
         if stop():
@@ -69,7 +69,7 @@ def advance(
         else:
             island, info = step(island, evaluator, problem.pool, settings)
         steps.append(info)
-    return IslandEpoch(island, emigrants(island, settings), tuple(steps))
+    return IslandEpoch(island, select_migrants(island, settings), tuple(steps))
 
 
 def next_stop(generation: int, settings: Settings) -> int:
@@ -77,7 +77,7 @@ def next_stop(generation: int, settings: Settings) -> int:
     return 0 if generation < 0 else min(settings.generations, settings.stops.next_stop(generation))
 
 
-def emigrants(island: Island, settings: Settings) -> Population:
+def select_migrants(island: Island, settings: Settings) -> Population:
     """Return copies of those who leave an island; nobody does but at a stop of the schedule.
 
     All have a fitness that is known: whoever was abandoned stays.
@@ -86,10 +86,10 @@ def emigrants(island: Island, settings: Settings) -> Population:
         return ()
     count = settings.leaving.at(island.generation)
     draw = Stream(island.seed, island.index, island.generation, Purpose.EMIGRATION)
-    return EMIGRANTS[settings.emigrants](island.elite, count, draw)
+    return SELECTION_POLICIES[settings.emigrants](island.elite, count, draw)
 
 
-def immigrated(
+def receive_migrants(
     island: Island, arriving: Sequence[Population], evaluator: Evaluator, settings: Settings
 ) -> Island:
     """Return the island after an arrival; its population keeps its size, and the elite never shrinks.
@@ -98,25 +98,25 @@ def immigrated(
     has already does not arrive again.
     """
     known = {each.key for each in island.elite}
-    fresh = [each for each in distinct(chain(*arriving)) if each.key not in known]
+    fresh = [each for each in unique_structures(chain(*arriving)) if each.key not in known]
     immigrants = fresh[: len(island.population)]
     if not immigrants:
         return island
     draw = Stream(island.seed, island.index, island.generation, Purpose.IMMIGRATION)
-    places = REPLACED[settings.replaced](
+    places = REPLACEMENT_POLICIES[settings.replaced](
         len(island.population), lambda: _fitness(island.population, evaluator), len(immigrants), draw
     )
     population = list(island.population)
     for place, each in zip(places, immigrants, strict=True):
         population[place] = each
-    elite = elite_of((*island.elite, *immigrants), settings.elites, settings.distinct)
+    elite = select_elite((*island.elite, *immigrants), settings.elites, settings.distinct)
     return replace(island, population=tuple(population), elite=elite)
 
 
 def _fitness(population: Population, evaluator: Evaluator) -> list[float]:
     """Return everybody's fitness; who was abandoned is evaluated to the end."""
     fitness = [each.fitness for each in population]
-    places = [place for place, each in enumerate(population) if each.outcome.verdict is Verdict.ABANDONED]
+    places = [place for place, each in enumerate(population) if each.outcome.verdict is Status.ABANDONED]
     for place, each in zip(places, evaluator.settled([population[place] for place in places]), strict=True):
         fitness[place] = each.fitness
     return fitness

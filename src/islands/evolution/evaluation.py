@@ -15,33 +15,33 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
-from islands.evolution.gene_index import ZERO, Vocabulary
+from islands.evolution.gene_index import ZERO, GeneIndex
 from islands.evolution.individual import Individual
 from islands.evolution.settings import Settings
 from islands.kernels import population as kernel
 from islands.kernels.pair_table import PLACE_BYTES, clear, pair_table
 from islands.model.expression import Expression, Lagged
 from islands.model.regressor import Regressor
-from islands.program.regressor_matrix import rows_of
+from islands.program.regressor_matrix import evaluate_terms
 from islands.simulation.layout import layout
-from islands.simulation.outcome import OK, Outcome, Verdict
-from islands.simulation.predictors import bound_of
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
+from islands.simulation.predictors import divergence_bound
 
 #: y(k) is the first term of every vocabulary.
 _TARGET = 0
 
-_ABANDONED = Outcome(Verdict.ABANDONED, "the error passed what the island keeps")
+_ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error passed what the island keeps")
 
-_DIVERGED = Outcome(Verdict.DIVERGED, "an interval left the bound")
+_DIVERGED = EvaluationOutcome(Status.DIVERGED, "an interval left the bound")
 
 _OUTCOMES = {
     kernel.OK: OK,
     kernel.DIVERGED: _DIVERGED,
     kernel.ABANDONED: _ABANDONED,
-    kernel.DEPENDENT: Outcome(Verdict.SINGULAR, "the free directions depend on each other"),
-    kernel.NO_TERMS: Outcome(Verdict.INFEASIBLE, "no gene is left"),
-    kernel.OVERFLOW: Outcome(Verdict.DIVERGED, "a regressor overflows on the record"),
-    kernel.TOO_FEW_ROWS: Outcome(Verdict.TOO_FEW_ROWS, "there are as many parameters as rows"),
+    kernel.DEPENDENT: EvaluationOutcome(Status.SINGULAR, "the free directions depend on each other"),
+    kernel.NO_TERMS: EvaluationOutcome(Status.INFEASIBLE, "no gene is left"),
+    kernel.OVERFLOW: EvaluationOutcome(Status.DIVERGED, "a regressor overflows on the record"),
+    kernel.TOO_FEW_ROWS: EvaluationOutcome(Status.TOO_FEW_ROWS, "there are as many parameters as rows"),
 }
 
 
@@ -80,14 +80,14 @@ class Evaluation:
         Their parameters; empty after a failure.
     fitness : float
         Of an abandoned one all that is known is that it is larger.
-    outcome : Outcome
+    outcome : EvaluationOutcome
     """
 
     numbers: tuple[int, ...]
     regressors: tuple[Regressor, ...]
     theta: tuple[float, ...]
     fitness: float
-    outcome: Outcome
+    outcome: EvaluationOutcome
 
     def settles(self, allowed: NDArray[np.float64]) -> bool:
         """Tell whether this is all that needs to be known under these bars."""
@@ -121,18 +121,18 @@ class Evaluator:
         self.warm_up = settings.maximum_lag
         self._layout = layout(record, self.warm_up, FITNESSES[settings.fitness](settings.shooting))
         self._predicted = int(self._layout.length.sum())
-        self._bound = bound_of(record)
-        self._rows = rows_of(record, self.warm_up)
+        self._bound = divergence_bound(record)
+        self._rows = evaluate_terms(record, self.warm_up)
         self._constraint = CONSTRAINTS[settings.constraints]
         self._outcomes = _OUTCOMES | {
-            kernel.INFEASIBLE: Outcome(Verdict.INFEASIBLE, self._constraint.lacking),
+            kernel.INFEASIBLE: EvaluationOutcome(Status.INFEASIBLE, self._constraint.lacking),
         }
         self._pairs = pair_table(self.limits.pairs)
         self._seen: dict[_Key, Evaluation] = {}
         self._vocabulary = self._empty()
 
-    def _empty(self) -> Vocabulary:
-        return Vocabulary(self._constraint, [Lagged(0, 0)])
+    def _empty(self) -> GeneIndex:
+        return GeneIndex(self._constraint, [Lagged(0, 0)])
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
@@ -158,7 +158,7 @@ class Evaluator:
         ----------
         bars : sequence of float, optional
             For every size of a model, from 0 on, the fitness above which nobody needs to know it: the
-            individual is then `Verdict.ABANDONED`, its simulation stopped as soon as it passes the bar, or
+            individual is then `Status.ABANDONED`, its simulation stopped as soon as it passes the bar, or
             diverges. One that is larger than all of these is never abandoned.
 
         Returns

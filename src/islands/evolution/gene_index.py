@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from islands.estimation.parameter_constraints import Constraint
-from islands.evolution.individual import regressor_of
+from islands.evolution.individual import make_regressor
 from islands.kernels.codegen import Nodes
 from islands.kernels.population import Groups
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor
-from islands.program.term_pool import Store, Term
+from islands.program.term_pool import Term, TermPool
 
 #: Bytes that a gene takes, and a regressor with its nodes, about.
 _GENE_BYTES, _REGRESSOR_BYTES = 700, 1_600
@@ -19,7 +19,7 @@ _GENE_BYTES, _REGRESSOR_BYTES = 700, 1_600
 ZERO = -1
 
 
-class Vocabulary:
+class GeneIndex:
     """Genes, their regressors, and what a constraint says of each.
 
     The numbers follow the order of arrival: nothing that is a result may depend on them.
@@ -33,7 +33,7 @@ class Vocabulary:
 
     def __init__(self, constraint: Constraint, targets: Sequence[Term]) -> None:
         self._constraint = constraint
-        self._store = Store()
+        self._store = TermPool()
         self._known: dict[Expression, int] = {}
         self._regressors: dict[int, Regressor] = {}
         # Groups that a structure has to have come first.
@@ -83,7 +83,7 @@ class Vocabulary:
         return self._regressors[number].content
 
     def _learnt(self, gene: Expression) -> int:
-        regressor = regressor_of(gene)
+        regressor = make_regressor(gene)
         if regressor is None:
             return ZERO
         number = self._store.term(regressor)

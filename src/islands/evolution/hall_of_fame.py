@@ -60,7 +60,7 @@ def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfF
     )
 
 
-def front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
+def pareto_front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
     """Return the Pareto front of error and size: the best of every size that no smaller one beats."""
     found: list[Individual] = []
     for each in sorted(individuals, key=lambda each: (each.size, each.fitness)):

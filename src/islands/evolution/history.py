@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class HistoryPoint:
     """One point of a search's course.
 
     Attributes

@@ -7,7 +7,7 @@ from math import inf, isnan
 from islands.errors import ModelError
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor, regressor
-from islands.simulation.outcome import OK, Outcome
+from islands.simulation.outcome import OK, EvaluationOutcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +25,14 @@ class Individual:
     fitness : float
         Lower is better; infinite before evaluation and after a failure, and where NaN is given: NaN compares
         with nothing, and would win where it came first.
-    outcome : Outcome
+    outcome : EvaluationOutcome
     """
 
     genes: tuple[Expression, ...]
     regressors: tuple[Regressor, ...] = ()
     theta: tuple[float, ...] = ()
     fitness: float = inf
-    outcome: Outcome = OK
+    outcome: EvaluationOutcome = OK
 
     def __post_init__(self) -> None:
         if isnan(self.fitness):
@@ -52,7 +52,7 @@ class Individual:
 Population = tuple[Individual, ...]
 
 
-def distinct(individuals: Iterable[Individual]) -> Population:
+def unique_structures(individuals: Iterable[Individual]) -> Population:
     """Return the first individual of every structure."""
     first: dict[tuple[str, ...], Individual] = {}
     for each in individuals:
@@ -60,7 +60,7 @@ def distinct(individuals: Iterable[Individual]) -> Population:
     return tuple(first.values())
 
 
-def regressor_of(gene: Expression) -> Regressor | None:
+def make_regressor(gene: Expression) -> Regressor | None:
     """Return a gene's regressor, None where it is identically zero or its numbers overflow."""
     try:
         return regressor(gene)[1]

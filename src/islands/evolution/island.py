@@ -7,7 +7,7 @@ from math import inf, isfinite
 
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, Population, distinct
+from islands.evolution.individual import Individual, Population, unique_structures
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import tournaments
 from islands.evolution.settings import Settings
@@ -159,7 +159,7 @@ def _evaluated(
     population, _ = evaluator.evaluate(decided, _bars(island.hall, bar, settings.max_terms))
     worst = _worst(island, settings)
     contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
-    elite = elite_of(contenders, settings.elites, settings.distinct)
+    elite = select_elite(contenders, settings.elites, settings.distinct)
     hall = with_entries(island.hall, population)
     known = {each.key for each in (*island.elite, *island.population)}
     info = StepInfo(
@@ -193,9 +193,9 @@ def _bars(hall: HallOfFame, bar: float, most: int) -> list[float]:
     return [max(bar, last.get(size, inf)) for size in range(most + 1)]
 
 
-def elite_of(contenders: Iterable[Individual], count: int, each_once: bool) -> Population:
+def select_elite(contenders: Iterable[Individual], count: int, each_once: bool) -> Population:
     """Keep the fittest; ties go to the smaller, then to the structure's text."""
     ordered = sorted(contenders, key=lambda each: (each.fitness, each.size, each.key))
     if each_once:
-        ordered = list(distinct(ordered))
+        ordered = list(unique_structures(ordered))
     return tuple(ordered[:count])

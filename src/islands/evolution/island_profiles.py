@@ -1,4 +1,4 @@
-"""Characters: islands that breed in different ways. A new one is an entry of ``CHARACTERS``.
+"""Characters: islands that breed in different ways. A new one is an entry of ``ISLAND_PROFILES``.
 
 A character may change how an island breeds and selects, never what an individual means or how it is judged:
 fitness, constraints, tolerance and sizes are one for all, so that who migrates is worth the same anywhere.
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-CHARACTERS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+ISLAND_PROFILES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "plain": {},
         "explorer": {"mutation": 1.0, "outer": 0.9, "tournament": 2},

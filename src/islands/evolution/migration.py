@@ -1,6 +1,6 @@
 """Migration policies: who leaves an island, and whose place they take on another.
 
-A new one is an entry of ``EMIGRANTS`` or of ``REPLACED``.
+A new one is an entry of ``SELECTION_POLICIES`` or of ``REPLACEMENT_POLICIES``.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -8,8 +8,8 @@ from math import isfinite
 from types import MappingProxyType
 from typing import TypeVar
 
-from islands.evolution.hall_of_fame import front
-from islands.evolution.individual import Population, distinct
+from islands.evolution.hall_of_fame import pareto_front
+from islands.evolution.individual import Population, unique_structures
 from islands.evolution.rng import Stream
 
 T = TypeVar("T")
@@ -27,11 +27,11 @@ def _random(elite: Population, count: int, draw: Stream) -> Population:
 
 def _front(elite: Population, count: int, draw: Stream) -> Population:
     """Take anyone of the elite's Pareto front of error and size: small models travel too."""
-    return _drawn(front(_structures(elite)), count, draw)
+    return _drawn(pareto_front(_structures(elite)), count, draw)
 
 
 def _structures(elite: Population) -> Population:
-    return distinct(each for each in elite if isfinite(each.fitness))
+    return unique_structures(each for each in elite if isfinite(each.fitness))
 
 
 def _worst(_size: int, fitness: Callable[[], Sequence[float]], count: int, _draw: Stream) -> tuple[int, ...]:
@@ -51,12 +51,12 @@ def _drawn(pool: Sequence[T], count: int, draw: Stream) -> tuple[T, ...]:
 
 
 #: From the elite, how many at the most, and draws: those of whom copies leave.
-EMIGRANTS: Mapping[str, Callable[[Population, int, Stream], Population]] = MappingProxyType(
+SELECTION_POLICIES: Mapping[str, Callable[[Population, int, Stream], Population]] = MappingProxyType(
     {"best": _best, "random": _random, "front": _front}
 )
 
 #: From the population's size, its fitness for whoever asks (it takes evaluations), how many, and draws: the
 #: places that are taken.
-REPLACED: Mapping[str, Callable[[int, Callable[[], Sequence[float]], int, Stream], tuple[int, ...]]] = (
-    MappingProxyType({"worst": _worst, "random": _anyone})
-)
+REPLACEMENT_POLICIES: Mapping[
+    str, Callable[[int, Callable[[], Sequence[float]], int, Stream], tuple[int, ...]]
+] = MappingProxyType({"worst": _worst, "random": _anyone})

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import Any
 
-from islands.errors import chosen
+from islands.errors import lookup
 from islands.evolution.settings import Settings
 
 #: Section 6.1, the theoretical piezo: shooting over 500 steps, tolerance 1e-5.
@@ -74,7 +74,7 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
 )
 
 
-def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
+def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     """Return a preset's settings with changes.
 
     Raises
@@ -82,9 +82,9 @@ def settings_of(preset: str, changes: Mapping[str, Any]) -> Settings:
     SettingsError
         The preset or a setting is unknown, or out of range.
     """
-    base = chosen(PRESETS, preset, "preset")
+    base = lookup(PRESETS, preset, "preset")
     for name in changes:
-        chosen(asdict(base), name, "setting")
+        lookup(asdict(base), name, "setting")
     if "max_terms" in changes and "initial_terms" not in changes:
         fewest, most = (min(count, changes["max_terms"]) for count in base.initial_terms)
         changes = {**changes, "initial_terms": (max(1, fewest), max(1, most))}

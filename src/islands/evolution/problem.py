@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
 from islands.evolution.gene_structure import with_phi
-from islands.evolution.island_profiles import CHARACTERS
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.settings import Settings
 from islands.evolution.variation import Genes
 from islands.model.candidate_library import candidates
 from islands.model.expression import Expression, height
-from islands.simulation.outcome import Outcome
+from islands.simulation.outcome import EvaluationOutcome
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class Problem:
         """Return the settings with what is different about an island; characters are given out in turn."""
         characters = self.settings.characters
         return (
-            replace(self.settings, **CHARACTERS[characters[island % len(characters)]])
+            replace(self.settings, **ISLAND_PROFILES[characters[island % len(characters)]])
             if characters
             else self.settings
         )
@@ -61,7 +61,7 @@ def problem(record: Dataset, settings: Settings) -> Problem:
     genes = {item: with_phi(item.expression) for item in every}
     library = [item for item in every if height(genes[item]) <= settings.max_height]
     found = forward_selection(library, record, settings.constraints, settings.max_terms)
-    structures = () if isinstance(found, Outcome) else found
+    structures = () if isinstance(found, EvaluationOutcome) else found
     return Problem(
         record,
         settings,

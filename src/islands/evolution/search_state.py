@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from math import inf
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import Caches, Epoch
-from islands.evolution.history import Progress
+from islands.evolution.engine import ArchipelagoEpoch, Caches
+from islands.evolution.history import HistoryPoint
 from islands.evolution.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class SearchState:
     """Where a search stands: what a watcher sees, and all that a checkpoint needs.
 
     Attributes
@@ -22,7 +22,7 @@ class State:
         Since the beginning.
     outcomes : mapping
         Number of individuals by outcome.
-    history : tuple of Progress
+    history : tuple of HistoryPoint
         The first and the last point of every stretch in which nothing got better: a thousand islands go on
         for a hundred thousand generations.
     caches : mapping
@@ -33,11 +33,11 @@ class State:
     evaluations: int = 0
     duplicates: int = 0
     outcomes: Mapping[str, int] = field(default_factory=dict)
-    history: tuple[Progress, ...] = ()
+    history: tuple[HistoryPoint, ...] = ()
     caches: Caches = field(default_factory=dict)
 
 
-def after(state: State, epoch: Epoch) -> State:
+def advance(state: SearchState, epoch: ArchipelagoEpoch) -> SearchState:
     """Return the state after one more epoch."""
     evaluations, duplicates = state.evaluations, state.duplicates
     outcomes, history = Counter(state.outcomes), list(state.history)
@@ -50,18 +50,20 @@ def after(state: State, epoch: Epoch) -> State:
             for size, fitness in info.best.items():
                 best[size] = min(fitness, best.get(size, inf))
         least = tuple(min(info.best.values(), default=inf) for info in generation)
-        point = Progress(generation[0].generation, evaluations, dict(sorted(best.items())), least)
+        point = HistoryPoint(generation[0].generation, evaluations, dict(sorted(best.items())), least)
         if all(_alike(point, before) for before in history[-2:]) and len(history) > 1:
             history.pop()
         history.append(point)
-    return State(epoch.archipelago, evaluations, duplicates, dict(outcomes), tuple(history), epoch.caches)
+    return SearchState(
+        epoch.archipelago, evaluations, duplicates, dict(outcomes), tuple(history), epoch.caches
+    )
 
 
-def _alike(one: Progress, other: Progress) -> bool:
+def _alike(one: HistoryPoint, other: HistoryPoint) -> bool:
     return one.best == other.best and one.islands == other.islands
 
 
-def ended(state: State, settings: Settings) -> str:
+def stop_reason(state: SearchState, settings: Settings) -> str:
     """Return the budget that a search has used up, "" where it has to go on."""
     reached = state.history[-1].generation if state.history else state.archipelago.generation
     if reached >= settings.generations:

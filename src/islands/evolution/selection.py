@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from islands.evolution.individual import Individual
 from islands.evolution.rng import Stream
-from islands.simulation.outcome import Verdict
+from islands.simulation.outcome import Status
 
 #: Tells what is not known of abandoned individuals.
 Settle = Callable[[Sequence[Individual]], Sequence[Individual]]
@@ -25,7 +25,7 @@ def tournaments(
     """
     drawn = [[draw.below(len(pool)) for _ in range(contestants)] for _ in range(count)]
     fitness = [each.fitness for each in pool]
-    abandoned = {place for place, each in enumerate(pool) if each.outcome.verdict is Verdict.ABANDONED}
+    abandoned = {place for place, each in enumerate(pool) if each.outcome.verdict is Status.ABANDONED}
     open_ = sorted(
         {
             place

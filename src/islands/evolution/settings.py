@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from math import inf
 
-from islands.errors import SettingsError, chosen
+from islands.errors import SettingsError, lookup
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.fitness import FITNESSES
 from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import CHARACTERS
-from islands.evolution.migration import EMIGRANTS, REPLACED
+from islands.evolution.island_profiles import ISLAND_PROFILES
+from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.schedule import Schedule, schedule
 from islands.evolution.topology import topology
 from islands.model.candidate_library import library_named
@@ -83,9 +83,10 @@ class Settings:
     migrants : int or str
         How many leave an island for each of its neighbours, as a number or a schedule.
     emigrants, replaced : str
-        Who leaves, and whose places are taken: entries of ``EMIGRANTS`` and ``REPLACED``.
+        Which individuals leave and which are replaced: entries of ``SELECTION_POLICIES`` and of
+        ``REPLACEMENT_POLICIES``.
     characters : tuple of str
-        Entries of ``CHARACTERS``, given to the islands in turn; none: all are alike.
+        Entries of ``ISLAND_PROFILES``, given to the islands in turn; none: all are alike.
     max_evaluations : int
         The run ends with the first epoch at which so many individuals have been evaluated; 0: no limit.
     target_error : float
@@ -157,11 +158,11 @@ class Settings:
             raise SettingsError("genes are made of primitives and back-shifts: give at least one of them")
         if self.library:
             library_named(self.library)
-        chosen(STRUCTURES, self.structure, "structure")
-        chosen(CONSTRAINTS, self.constraints, "constraints")
-        chosen(FITNESSES, self.fitness, "fitness")
+        lookup(STRUCTURES, self.structure, "structure")
+        lookup(CONSTRAINTS, self.constraints, "constraints")
+        lookup(FITNESSES, self.fitness, "fitness")
         for name in self.primitives:
-            chosen(PRIMITIVES, name, "primitive")
+            lookup(PRIMITIVES, name, "primitive")
         if any(shift < 1 for shift in self.shifts):
             raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")
         self._check_islands()
@@ -173,10 +174,10 @@ class Settings:
             raise SettingsError(f"at most {MOST_ISLANDS} islands, got {self.islands}")
         if not 0.0 <= self.target_error < inf:
             raise SettingsError(f"target_error is a number and not negative, got {self.target_error}")
-        chosen(EMIGRANTS, self.emigrants, "emigrants")
-        chosen(REPLACED, self.replaced, "replaced")
+        lookup(SELECTION_POLICIES, self.emigrants, "emigrants")
+        lookup(REPLACEMENT_POLICIES, self.replaced, "replaced")
         for name in self.characters:
-            chosen(CHARACTERS, name, "character")
+            lookup(ISLAND_PROFILES, name, "character")
         _ = self.stops
         most = max(count for _, count in self.leaving.pieces)
         arriving = most * topology(self.topology, self.islands, 0).in_degree

@@ -10,7 +10,7 @@ from functools import lru_cache
 from math import isqrt
 from types import MappingProxyType
 
-from islands.errors import SettingsError, chosen
+from islands.errors import SettingsError, lookup
 from islands.evolution.rng import Purpose, Stream
 
 #: In-neighbours of every island, any order.
@@ -68,7 +68,7 @@ def topology(text: str, islands: int, seed: int) -> Topology:
         sources = _edges(text, islands)
     else:
         name, colon, degree = text.partition(":")
-        build = chosen(TOPOLOGIES, name, "topology")
+        build = lookup(TOPOLOGIES, name, "topology")
         if colon and (name not in WITH_DEGREE or not re.fullmatch(r"[1-9]\d?", degree)):
             raise SettingsError(f"topology {text!r}: a degree from 1 to 99 goes with {WITH_DEGREE[0]} alone")
         sources = build(islands, int(degree or _DEGREE), Stream(seed, 0, 0, Purpose.TOPOLOGY))

@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from islands.figures.style import FRAME, RESIDUAL, SHADE, SIMULATED, WIDTH, blank, house_style, settled
+from islands.figures.style import FRAME, RESIDUAL, SHADE, SIMULATED, WIDTH, blank, finish, house_style
 
 #: What "" stands for, and what was noticed without a name.
 NOTHING, UNKNOWN = "nothing", "unknown"
@@ -62,7 +62,7 @@ def draw_confusion(counts: Mapping[tuple[str, str], int], names: Sequence[str], 
     _frame(axes, rows, columns, size)
     for text in axes.texts:
         text.set_fontsize(size * (0.85 if len(text.get_text()) < 3 else 0.65))
-    return settled(figure)
+    return finish(figure)
 
 
 def _order(

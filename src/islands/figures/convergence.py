@@ -8,15 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 
-from islands.figures.style import MEASURED, SIMULATED, blank, house_style, settled
-from islands.search_result import Findings
+from islands.figures.style import MEASURED, SIMULATED, blank, finish, house_style
+from islands.search_result import SearchResult
 
 #: Sizes in a column of a legend that is as high as its figure.
 _COLUMN = 15
 
 
 @house_style()
-def draw_convergence(findings: Findings) -> Figure:
+def draw_convergence(findings: SearchResult) -> Figure:
     """Draw the least error of every size over the generations."""
     figure = blank(3.4)
     axes = figure.subplots()
@@ -32,11 +32,11 @@ def draw_convergence(findings: Findings) -> Figure:
     _against_generations(axes)
     columns = ceil(len(sizes) / _COLUMN)
     axes.legend(title="terms", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
-    return settled(figure)
+    return finish(figure)
 
 
 @house_style()
-def draw_islands(findings: Findings) -> Figure:
+def draw_islands(findings: SearchResult) -> Figure:
     """Draw the least error of every island over the generations, and the best of all."""
     figure = blank(3.4)
     axes = figure.subplots()
@@ -54,11 +54,11 @@ def draw_islands(findings: Findings) -> Figure:
     axes.step(generations, best, where="post", color=SIMULATED, lw=1.6, label="the best of all")
     _against_generations(axes)
     axes.legend(frameon=False)
-    return settled(figure)
+    return finish(figure)
 
 
 @house_style()
-def draw_front(findings: Findings) -> Figure:
+def draw_front(findings: SearchResult) -> Figure:
     """Draw the free-run error of every model against its number of terms."""
     figure = blank(3.2)
     axes = figure.subplots()
@@ -73,7 +73,7 @@ def draw_front(findings: Findings) -> Figure:
     axes.set_ylabel("free-run MAPE (% of the range)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.legend(frameon=False)
-    return settled(figure)
+    return finish(figure)
 
 
 def _against_generations(axes: Axes) -> None:

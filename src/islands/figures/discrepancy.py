@@ -23,11 +23,11 @@ from islands.figures.style import (
     SIMULATED_WIDTH,
     STEPS,
     blank,
+    finish,
     house_style,
     label,
-    settled,
 )
-from islands.figures.windows import last_loops, representative
+from islands.figures.windows import last_loops, representative_window
 
 #: Colour of the simulation as it was, where both are drawn.
 BEFORE = "#e69f00"
@@ -47,7 +47,7 @@ def draw_over_time(diagnosis: Diagnosis) -> Figure:
     such stretches: as a whole it is a band.
     """
     record = diagnosis.record
-    stretch = representative(record, record.y - diagnosis.base.output)
+    stretch = representative_window(record, record.y - diagnosis.base.output)
     if stretch is None:
         figure = blank(4.6, "Measured and simulated output")
         axes = figure.subplots(2, 1, height_ratios=(2, 1.3))
@@ -65,7 +65,7 @@ def draw_over_time(diagnosis: Diagnosis) -> Figure:
     axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     axes[-1].set_xlabel("time (s); shaded: locked away until the end")
     figure.align_ylabels()
-    return settled(figure)
+    return finish(figure)
 
 
 @house_style()
@@ -86,7 +86,7 @@ def draw_loops(diagnosis: Diagnosis) -> Figure:
     right.set(xlabel=_input(diagnosis), ylabel=label("residual", record.output_unit))
     for axes in (left, right):
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
-    return settled(figure)
+    return finish(figure)
 
 
 @house_style()
@@ -116,11 +116,11 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
     for panel in axes[:2].flat:
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
     axes[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
-    return settled(figure)
+    return finish(figure)
 
 
 @house_style()
-def draw_ladder(diagnosis: Diagnosis) -> Figure:
+def draw_screening(diagnosis: Diagnosis) -> Figure:
     """Draw what each effect alone would gain, and the share of the misfit that it explains."""
     shown = diagnosis.candidates[:_RUNGS][::-1]
     named = {finding.name for finding in diagnosis.effects}
@@ -147,7 +147,7 @@ def draw_ladder(diagnosis: Diagnosis) -> Figure:
     axes.set_xlabel(
         "gain in minus twice the log-likelihood, values paid for; percent: of the misfit; coloured: named"
     )
-    return settled(figure)
+    return finish(figure)
 
 
 def _input(diagnosis: Diagnosis) -> str:
@@ -263,5 +263,5 @@ def _autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
 
 #: Name to drawing, in the order of a report.
 DISCREPANCY_FIGURES: Mapping[str, Callable[[Diagnosis], Figure]] = MappingProxyType(
-    {"over-time": draw_over_time, "loops": draw_loops, "residual": draw_residual, "ladder": draw_ladder}
+    {"over-time": draw_over_time, "loops": draw_loops, "residual": draw_residual, "ladder": draw_screening}
 )

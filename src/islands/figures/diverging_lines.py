@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.figures.style import REMARK, SIMULATED
-from islands.simulation.predictors import bound_of
+from islands.simulation.predictors import divergence_bound
 
 #: Two remarks on one axis stand at least this share of its width apart.
 _APART = 0.12
 
 
-def drawable(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.float64]:
+def finite_part(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a simulation with NaN in place of what is infinite or beyond the bound of a divergence.
 
     Raises
@@ -30,11 +30,11 @@ def drawable(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.floa
             f"a simulation has one value for each of the record's {record.samples} samples, "
             f"got shape {values.shape}"
         )
-    values[~(np.abs(values) <= bound_of(record))] = np.nan
+    values[~(np.abs(values) <= divergence_bound(record))] = np.nan
     return values
 
 
-def broken(record: Dataset, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def break_line(record: Dataset, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values of every sample with a NaN between segments: no line leads from one to the next."""
     return np.insert(values, [end for _, end in record.bounds[:-1]], np.nan)
 
@@ -69,7 +69,7 @@ def divergence(record: Dataset, simulated: NDArray[np.float64]) -> list[tuple[sl
     return found
 
 
-def say_diverged(axes: Axes, lines: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None:
+def annotate_divergence(axes: Axes, lines: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None:
     """Write where each diverging line leaves the axes, once where several do.
 
     Parameters

@@ -7,7 +7,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.figures.diverging_lines import broken, divergence, drawable, limits, say_diverged, within_reach
+from islands.figures.diverging_lines import (
+    annotate_divergence,
+    break_line,
+    divergence,
+    finite_part,
+    limits,
+    within_reach,
+)
 from islands.figures.downsampling import thin
 from islands.figures.style import (
     FRAME,
@@ -19,11 +26,11 @@ from islands.figures.style import (
     SIMULATED_WIDTH,
     STEPS,
     blank,
+    finish,
     house_style,
     label,
-    settled,
 )
-from islands.figures.windows import representative
+from islands.figures.windows import representative_window
 from islands.validation.metrics import metrics
 
 _TYPICAL = ", whose mean absolute residual is the median of all such stretches"
@@ -54,8 +61,8 @@ def draw_free_run(record: Dataset, simulated: NDArray[np.float64], title: str = 
     SettingsError
         The simulation has not one value for every sample.
     """
-    yhat = drawable(record, simulated)
-    stretch = representative(record, record.y - yhat)
+    yhat = finite_part(record, simulated)
+    stretch = representative_window(record, record.y - yhat)
     if stretch is None:
         figure = blank(4.2, title)
         axes = figure.subplots(2, 1, height_ratios=(2, 1))
@@ -73,14 +80,14 @@ def draw_free_run(record: Dataset, simulated: NDArray[np.float64], title: str = 
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
     axes[1].set_title(_errors(record, yhat), loc="right", fontsize=8.0)
     figure.align_ylabels()
-    return settled(figure)
+    return finish(figure)
 
 
 def _pair(above: Axes, below: Axes, record: Dataset, yhat: NDArray[np.float64], weight: float) -> None:
-    time = broken(record, record.time)
-    measured, simulated = broken(record, record.y), broken(record, yhat)
+    time = break_line(record, record.time)
+    measured, simulated = break_line(record, record.y), break_line(record, yhat)
     residual = measured - simulated
-    followed = broken(record, _followed(record, yhat))
+    followed = break_line(record, _followed(record, yhat))
     above.plot(*thin(time, measured), color=MEASURED, lw=weight * MEASURED_WIDTH, label="measured")
     above.plot(*thin(time, simulated), color=SIMULATED, lw=weight * SIMULATED_WIDTH, label="simulated")
     above.set_ylim(limits(measured, followed))
@@ -111,7 +118,7 @@ def _remark(axes: Axes, record: Dataset, yhat: NDArray[np.float64]) -> None:
     for segment, last in divergence(record, yhat):
         there = segment.start + np.flatnonzero(~np.isnan(yhat[segment.start : last + 1]))
         lines.append((record.time[there], yhat[there]))
-    say_diverged(axes, lines)
+    annotate_divergence(axes, lines)
 
 
 def _mark(whole: NDArray[np.object_], stretch: Dataset) -> None:

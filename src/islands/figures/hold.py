@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.figures.diverging_lines import limits, say_diverged, within_reach
+from islands.figures.diverging_lines import annotate_divergence, limits, within_reach
 from islands.figures.downsampling import thin
-from islands.figures.style import FRAME, blank, house_style, label, settled
+from islands.figures.style import FRAME, blank, finish, house_style, label
 from islands.model.model import Model
 from islands.validation.physics import LEVELS, hold_response, percent_of_range
 
@@ -77,7 +77,7 @@ def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
         _name_inputs(left, record)
     for panel in axes[1]:
         panel.set_xlabel("time from the start of the hold (s)")
-    return settled(figure)
+    return finish(figure)
 
 
 def _held(model: Model, record: Dataset, level: float, loading: bool) -> _Held:
@@ -111,7 +111,7 @@ def _draw(left: Axes, right: Axes, side: Sequence[_Held]) -> None:
     for axes in (left, right):
         axes.axvline(0.0, color=FRAME, lw=0.6)
     lost = [held for held in side if not held.known.all()]
-    say_diverged(right, [(held.time[held.known], held.output[held.known]) for held in lost])
+    annotate_divergence(right, [(held.time[held.known], held.output[held.known]) for held in lost])
 
 
 def _name_inputs(axes: Axes, record: Dataset) -> None:

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.figures.diverging_lines import broken, divergence, drawable, limits, within_reach
+from islands.figures.diverging_lines import break_line, divergence, finite_part, limits, within_reach
 from islands.figures.downsampling import thin
 from islands.figures.style import (
     MEASURED,
@@ -14,9 +14,9 @@ from islands.figures.style import (
     SIMULATED,
     SIMULATED_WIDTH,
     blank,
+    finish,
     house_style,
     label,
-    settled,
 )
 from islands.figures.windows import LOOPS, last_loops, loop_starts
 
@@ -47,7 +47,7 @@ def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") 
     SettingsError
         The simulation has not one value for every sample.
     """
-    yhat = drawable(record, simulated)
+    yhat = finite_part(record, simulated)
     rows = last_loops(record)
     shown, shown_yhat = record[rows], yhat[rows]
     columns = min(record.inputs, _COLUMNS)
@@ -66,16 +66,16 @@ def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") 
     part = f"the last {LOOPS} of {len(loop_starts(record))} loops" if shown.samples < record.samples else ""
     lost = "no simulated value" if np.isnan(yhat).all() else "the simulation diverged" if diverged else ""
     first.set_title("; ".join(filter(None, (part, lost))), fontsize=8.0)
-    return settled(figure)
+    return finish(figure)
 
 
 def _loop(axes: Axes, record: Dataset, yhat: NDArray[np.float64], channel: int) -> None:
-    u = broken(record, record.u[:, channel])
+    u = break_line(record, record.u[:, channel])
     for values, colour, width, name in (
         (record.y, MEASURED, 0.8 * MEASURED_WIDTH, "measured"),
         (yhat, SIMULATED, SIMULATED_WIDTH, "simulated"),
     ):
-        axes.plot(*thin(u, broken(record, values)), color=colour, lw=width, label=name)
+        axes.plot(*thin(u, break_line(record, values)), color=colour, lw=width, label=name)
     axes.set_xlabel(label(record.input_names[channel], record.input_units[channel]))
     if channel % _COLUMNS == 0:
         axes.set_ylabel(label(record.output_name, record.output_unit))

@@ -3,9 +3,9 @@
 from matplotlib.figure import Figure
 
 from islands.data.dataset import Dataset
-from islands.figures.diverging_lines import broken
+from islands.figures.diverging_lines import break_line
 from islands.figures.downsampling import thin
-from islands.figures.style import FRAME, MEASURED, RESIDUAL, blank, house_style, label, settled
+from islands.figures.style import FRAME, MEASURED, RESIDUAL, blank, finish, house_style, label
 
 
 @house_style()
@@ -17,10 +17,10 @@ def draw_record(record: Dataset, title: str = "") -> Figure:
     panels = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
     for axes, name, unit, values in zip(panels, names, units, [*record.u.T, record.y], strict=True):
         colour = MEASURED if axes is panels[-1] else RESIDUAL
-        line = thin(broken(record, record.time), broken(record, values))
+        line = thin(break_line(record, record.time), break_line(record, values))
         axes.plot(*line, color=colour, linewidth=0.7)
         axes.set_ylabel(label(name, unit))
         for begin, _ in record.bounds[1:]:
             axes.axvline(record.time[begin], color=FRAME, linewidth=0.6)
     panels[-1].set_xlabel("time (s)")
-    return settled(figure)
+    return finish(figure)

@@ -14,30 +14,30 @@ from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
-from islands.search_result import Assessed, Findings
+from islands.search_result import RankedModel, SearchResult
 from islands.simulation.predictors import free_run
 
-FigureOf = Callable[[Assessed, Split], Figure]
+FigureOf = Callable[[RankedModel, Split], Figure]
 
 
-def _free_run(entry: Assessed, split: Split) -> Figure:
+def _free_run(entry: RankedModel, split: Split) -> Figure:
     return draw_free_run(split.validation, _simulated(entry, split))
 
 
-def _loop(entry: Assessed, split: Split) -> Figure:
+def _loop(entry: RankedModel, split: Split) -> Figure:
     return draw_loop(split.validation, _simulated(entry, split))
 
 
-def _simulated(entry: Assessed, split: Split) -> NDArray[np.float64]:
+def _simulated(entry: RankedModel, split: Split) -> NDArray[np.float64]:
     """Return the free run that the model's metrics are of."""
     return free_run(entry.model, split.validation, entry.assessment.warm_up).y
 
 
-def _hold(entry: Assessed, split: Split) -> Figure:
+def _hold(entry: RankedModel, split: Split) -> Figure:
     return draw_holds(entry.model, split.estimation)
 
 
-def _residuals(entry: Assessed, _split: Split) -> Figure:
+def _residuals(entry: RankedModel, _split: Split) -> Figure:
     return draw_residual_correlations(entry.assessment.residual_tests)
 
 
@@ -46,12 +46,12 @@ FIGURES: Mapping[str, FigureOf] = MappingProxyType(
 )
 
 
-def _record(findings: Findings) -> Figure:
+def _record(findings: SearchResult) -> Figure:
     return draw_record(findings.split.estimation)
 
 
 #: Figures of a whole search; those of its course need a history.
-SEARCH_FIGURES: Mapping[str, Callable[[Findings], Figure]] = MappingProxyType(
+SEARCH_FIGURES: Mapping[str, Callable[[SearchResult], Figure]] = MappingProxyType(
     {"record": _record, "front": draw_front, "convergence": draw_convergence, "islands": draw_islands}
 )
 
@@ -59,7 +59,7 @@ SEARCH_FIGURES: Mapping[str, Callable[[Findings], Figure]] = MappingProxyType(
 _ISLANDS = {"convergence": 1, "islands": 2}
 
 
-def search_figures(findings: Findings) -> tuple[str, ...]:
+def search_figures(findings: SearchResult) -> tuple[str, ...]:
     """Return the names of the search figures that these findings have."""
     history = findings.search.history
     islands = len(history[-1].islands) if history else 0

@@ -16,8 +16,8 @@ from islands.figures.style import (
     SIMULATED,
     STEPS,
     blank,
+    finish,
     house_style,
-    settled,
 )
 from islands.validation.residual_tests import CorrelationTest, ResidualTests
 
@@ -53,7 +53,7 @@ def draw_residual_correlations(tests: ResidualTests, title: str = "") -> Figure:
         if position == 0 or row == rows - 1:
             axes.set_xlabel("lag (samples)")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return settled(figure)
+    return finish(figure)
 
 
 def _verdict(tests: ResidualTests) -> str:

@@ -82,7 +82,7 @@ def blank(height: float, title: str = "") -> Figure:
     return figure
 
 
-def settled(figure: Figure) -> Figure:
+def finish(figure: Figure) -> Figure:
     """Return a finished figure laid out for good: each new layout would move it by part of a point."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")

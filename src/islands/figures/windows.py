@@ -36,7 +36,7 @@ def last_loops(record: Dataset) -> slice:
     return slice(int(starts[-LOOPS - 1]), int(starts[-1]) + 1)
 
 
-def representative(record: Dataset, residual: NDArray[np.float64]) -> slice | None:
+def representative_window(record: Dataset, residual: NDArray[np.float64]) -> slice | None:
     """Return `LOOPS` loops whose mean absolute residual is the median of all such stretches.
 
     None where the record can be read as a whole. Stretches in which a residual is missing do not count;

@@ -13,16 +13,16 @@ from typing import Any
 from islands.errors import ModelError
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.hall_of_fame import HallOfFame
-from islands.evolution.history import Progress
+from islands.evolution.history import HistoryPoint
 from islands.evolution.individual import Individual
 from islands.evolution.island import Island
-from islands.evolution.search_state import State
+from islands.evolution.search_state import SearchState
 from islands.model.expression import Primitive
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor
 from islands.model.rendering import plain
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 
 SCHEMA = "islands.checkpoint/3"
 HALL_SCHEMA = "islands.hall/1"
@@ -68,10 +68,10 @@ def read_checkpoint(
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise ModelError(f"cannot read the checkpoint {path}: {error}") from error
-    return archipelago_of(text, str(path), primitives)
+    return archipelago_from_document(text, str(path), primitives)
 
 
-def archipelago_of(
+def archipelago_from_document(
     text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> tuple[Archipelago, dict[str, Any]]:
     """Make an archipelago of a checkpoint's text, which messages call by a name.
@@ -141,11 +141,11 @@ def _read_individual(document: Mapping[str, Any], primitives: Mapping[str, Primi
         tuple(Regressor(parse(text, primitives)) for text in document["regressors"]),
         tuple(map(float, document["theta"])),
         inf if document["fitness"] is None else float(document["fitness"]),
-        Outcome(Verdict[verdict], str(reason)),
+        EvaluationOutcome(Status[verdict], str(reason)),
     )
 
 
-def state_document(state: State) -> dict[str, Any]:
+def state_document(state: SearchState) -> dict[str, Any]:
     """Describe what was counted, and the history; numbers that JSON does not know become null."""
     return {
         "evaluations": state.evaluations,
@@ -155,7 +155,7 @@ def state_document(state: State) -> dict[str, Any]:
     }
 
 
-def history_document(history: Sequence[Progress]) -> list[list[Any]]:
+def history_document(history: Sequence[HistoryPoint]) -> list[list[Any]]:
     """Describe a history: generation, evaluations, best fitness by size, best fitness by island."""
     return [
         [
@@ -168,10 +168,10 @@ def history_document(history: Sequence[Progress]) -> list[list[Any]]:
     ]
 
 
-def history_of(document: Sequence[Sequence[Any]]) -> tuple[Progress, ...]:
+def history_from_document(document: Sequence[Sequence[Any]]) -> tuple[HistoryPoint, ...]:
     """Make a history of its document."""
     return tuple(
-        Progress(
+        HistoryPoint(
             generation,
             evaluations,
             {int(size): error for size, error in best.items()},
@@ -181,7 +181,7 @@ def history_of(document: Sequence[Sequence[Any]]) -> tuple[Progress, ...]:
     )
 
 
-def state_of(archipelago: Archipelago, document: Mapping[str, Any]) -> State:
+def state_from_document(archipelago: Archipelago, document: Mapping[str, Any]) -> SearchState:
     """Make a state of its document.
 
     Raises
@@ -189,10 +189,10 @@ def state_of(archipelago: Archipelago, document: Mapping[str, Any]) -> State:
     KeyError, TypeError, ValueError, AttributeError
         It is none.
     """
-    return State(
+    return SearchState(
         archipelago,
         document["evaluations"],
         document["duplicates"],
         document["outcomes"],
-        history_of(document["history"]),
+        history_from_document(document["history"]),
     )

@@ -13,20 +13,20 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.io.models import terms_document, write_model
 from islands.model.equations import equation, latex_equation
-from islands.search_result import Assessed, Findings
+from islands.search_result import RankedModel, SearchResult
 from islands.validation.assessment import PARTS
-from islands.validation.physics import Physics
+from islands.validation.physics import PhysicsChecks
 from islands.validation.residual_tests import ResidualTests
 
 SCHEMA = "islands._result/1"
 
 
-def result_json(findings: Findings) -> str:
+def result_json(findings: SearchResult) -> str:
     """Write ``result.json``."""
     return json.dumps(result_document(findings), indent=2, allow_nan=False) + "\n"
 
 
-def result_document(findings: Findings) -> dict[str, Any]:
+def result_document(findings: SearchResult) -> dict[str, Any]:
     """Describe a result; numbers that JSON does not know (NaN, infinity) become null."""
     search = findings.search
     document = {
@@ -75,7 +75,7 @@ def content_sha256(record: Dataset) -> str:
     return digest.hexdigest()
 
 
-def _model_document(rank: int, entry: Assessed) -> dict[str, Any]:
+def _model_document(rank: int, entry: RankedModel) -> dict[str, Any]:
     model, assessment = entry.model, entry.assessment
     return {
         "rank": rank,
@@ -95,7 +95,7 @@ def _model_document(rank: int, entry: Assessed) -> dict[str, Any]:
     }
 
 
-def physics_document(physics: Physics) -> dict[str, Any]:
+def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
     """Describe a physics check."""
     return {
         "property_1": physics.property_1,
@@ -129,7 +129,7 @@ def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
     }
 
 
-def write_result(findings: Findings, folder: Path) -> None:
+def write_result(findings: SearchResult, folder: Path) -> None:
     """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``.
 
     Models of a result that was in the folder are removed.
@@ -144,7 +144,7 @@ def write_result(findings: Findings, folder: Path) -> None:
     (folder / "result.json").write_text(result_json(findings), encoding="utf-8")
 
 
-def summary(findings: Findings) -> str:
+def summary(findings: SearchResult) -> str:
     """Write the result as plain text."""
     record, search = findings.record, findings.search
     outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
@@ -175,14 +175,14 @@ COLUMNS = (
 )
 
 
-def table(models: Sequence[Assessed]) -> list[str]:
+def table(models: Sequence[RankedModel]) -> list[str]:
     """Return a table of models as lines of equal width, errors those of the free run."""
     rows = [COLUMNS, *(row(rank, entry) for rank, entry in enumerate(models, start=1))]
     widths = [max(len(line[column]) for line in rows) for column in range(len(COLUMNS))]
     return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in rows]
 
 
-def row(rank: int, entry: Assessed) -> tuple[str, ...]:
+def row(rank: int, entry: RankedModel) -> tuple[str, ...]:
     """Return one model's row of the table."""
     metrics, physics = entry.assessment.metrics, entry.assessment.physics
     estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
 from islands.kernels.regressor_columns import arena_for, evaluate
-from islands.kernels.simd import VECTOR, fold, load, multiply, room, splat, store, subtract
+from islands.kernels.simd import VECTOR, broadcast, fold, load, multiply, padded_size, store, subtract
 from islands.kernels.summation import CHUNK, dot_chunk
 
 #: Squared pivots under this, beside the regressors' own norms, leave fewer than about six digits of the
@@ -26,7 +26,7 @@ ILL_CONDITIONED = 1e-10
 SINGULAR = 1e-13
 
 
-class Factor(NamedTuple):
+class ConstrainedFactor(NamedTuple):
     """A Cholesky factor of an equilibrated matrix.
 
     Attributes
@@ -124,7 +124,7 @@ def from_columns(program, rows, terms, reduction, factor, eta):
     free = reduction.free
     count = free.size
     arena, place = arena_for(program)
-    chunk = room((terms + 1) * CHUNK)
+    chunk = padded_size((terms + 1) * CHUNK)
     reduced, right = np.zeros((count, count)), np.zeros(count)
     for index in range(rows.offset.size):
         evaluate(program, rows, index, arena, place, chunk)
@@ -149,7 +149,7 @@ def correct(program, rows, terms, reduction, factor, eta):
     """
     free = reduction.free
     arena, place = arena_for(program)
-    chunk = room((terms + 1) * CHUNK)
+    chunk = padded_size((terms + 1) * CHUNK)
     target = terms * CHUNK
     right, correction = np.zeros(free.size), np.empty(free.size)
     for index in range(rows.offset.size):
@@ -205,7 +205,7 @@ def _reduce_columns(chunk, terms, reduction):
 def _take_off(chunk, at, share, other):
     """``chunk[at] -= share * chunk[other]``, a column each."""
     for row in range(0, CHUNK, 4 * VECTOR):
-        part = multiply(splat(share, 4), load(chunk, other + row, 4))
+        part = multiply(broadcast(share, 4), load(chunk, other + row, 4))
         store(chunk, at + row, subtract(load(chunk, at + row, 4), part))
 
 

@@ -12,15 +12,15 @@ from islands.kernels.regressor_columns import arena_for, evaluate
 from islands.kernels.simd import (
     VECTOR,
     add,
+    broadcast,
     fold,
     gather,
     load,
     multiply,
     outer,
     outer_upper,
+    padded_size,
     repeat,
-    room,
-    splat,
     store,
 )
 from islands.kernels.summation import CHUNK
@@ -41,10 +41,10 @@ def inner_products(
 ):
     """Compute the inner products of some pairs of terms."""
     arena, place = arena_for(program)
-    chunk = room(program.degree.size * CHUNK)
+    chunk = padded_size(program.degree.size * CHUNK)
     for begin in range(0, pairs.shape[0], 4 * _GROUPS):
         some = pairs[begin : begin + 4 * _GROUPS]
-        running = room(4 * VECTOR * -(-some.shape[0] // 4))
+        running = padded_size(4 * VECTOR * -(-some.shape[0] // 4))
         running[:] = 0.0
         for index in range(rows.offset.size):
             evaluate(program, rows, index, arena, place, chunk)
@@ -63,12 +63,12 @@ def gram(
     terms = program.degree.size
     blocks = -(-terms // 4)
     arena, place = arena_for(program)
-    chunk = room(4 * blocks * CHUNK)
+    chunk = padded_size(4 * blocks * CHUNK)
     chunk[:] = 0.0  # behind the last term as well
     tiles = blocks * (blocks + 1) // 2
     for begin in range(0, tiles, _TILES):
         end = min(tiles, begin + _TILES)
-        running = room(16 * VECTOR * (end - begin))
+        running = padded_size(16 * VECTOR * (end - begin))
         running[:] = 0.0
         for index in range(rows.offset.size):
             evaluate(program, rows, index, arena, place, chunk)
@@ -84,7 +84,7 @@ def _add_pairs(chunk, pairs, running):
         a, b, c, d = pair, min(pair + 1, last), min(pair + 2, last), min(pair + 3, last)
         i, j, k, m = pairs[a, 0] * CHUNK, pairs[b, 0] * CHUNK, pairs[c, 0] * CHUNK, pairs[d, 0] * CHUNK
         p, q, r, s = pairs[a, 1] * CHUNK, pairs[b, 1] * CHUNK, pairs[c, 1] * CHUNK, pairs[d, 1] * CHUNK
-        sums = splat(0.0, 4)
+        sums = broadcast(0.0, 4)
         if i == j == k == m:
             for row in range(0, CHUNK, VECTOR):
                 others = gather(chunk, p + row, q + row, r + row, s + row)
@@ -106,14 +106,14 @@ def _add_tiles(chunk, blocks, begin, end, running):
             if begin <= tile < end:
                 at = 16 * VECTOR * (tile - begin)
                 if one == other:
-                    upper = splat(0.0, 10)
+                    upper = broadcast(0.0, 10)
                     for row in range(i, i + CHUNK, VECTOR):
                         x = gather(chunk, row, row + CHUNK, row + 2 * CHUNK, row + 3 * CHUNK)
                         upper = add(upper, outer_upper(x))
                     store(running, at, add(load(running, at, 10), upper))
                 else:
                     apart = 4 * (other - one) * CHUNK
-                    whole = splat(0.0, 16)
+                    whole = broadcast(0.0, 16)
                     for row in range(i, i + CHUNK, VECTOR):
                         x = gather(chunk, row, row + CHUNK, row + 2 * CHUNK, row + 3 * CHUNK)
                         there = row + apart

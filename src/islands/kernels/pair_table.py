@@ -37,13 +37,13 @@ class Pairs(NamedTuple):
 
 
 @kernel
-def key_of(one, other):
+def pair_key(one, other):
     """Return the key of an unordered pair of terms."""
     return (min(one, other) << 32) | max(one, other)
 
 
 @kernel
-def place_of(pairs, key):
+def find_pair(pairs, key):
     """Return where a key stands, or the free place where it belongs; one place is always free."""
     last = pairs.keys.size - 1
     place = ((key * _GOLDEN) >> 32) & last

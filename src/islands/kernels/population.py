@@ -14,7 +14,7 @@ from islands.kernels.codegen import link
 from islands.kernels.constrained_lstsq import (
     ILL_CONDITIONED,
     SINGULAR,
-    Factor,
+    ConstrainedFactor,
     correct,
     expand,
     from_columns,
@@ -24,7 +24,7 @@ from islands.kernels.constrained_lstsq import (
 from islands.kernels.err_selection import prune
 from islands.kernels.gram import gram, inner_products
 from islands.kernels.jit_cache import kernel
-from islands.kernels.pair_table import key_of, place_of
+from islands.kernels.pair_table import find_pair, pair_key
 from islands.kernels.simulate import COMPLETE, simulate
 from islands.kernels.summation import total
 
@@ -113,7 +113,7 @@ def evaluate(
             continue
         reduction = reduce(matrix, size, group, weight, wanted)
         count = reduction.free.size
-        factor, eta = Factor(np.empty((count, count)), np.empty(count)), np.empty(count)
+        factor, eta = ConstrainedFactor(np.empty((count, count)), np.empty(count)), np.empty(count)
         least = from_gram(matrix, size, reduction, factor, eta)
         if least < ILL_CONDITIONED:
             program = link(nodes, np.append(chosen, target), place)
@@ -146,8 +146,8 @@ def _fill(structures, sizes, target, nodes, pairs, rows, place):
             one = structures[index, i] if i < size else target
             for j in range(i, size + 1):
                 other = structures[index, j] if j < size else target
-                key = key_of(one, other)
-                at = place_of(pairs, key)
+                key = pair_key(one, other)
+                at = find_pair(pairs, key)
                 if pairs.keys[at] == key:
                     continue
                 pairs.keys[at] = key
@@ -183,7 +183,7 @@ def _read(terms, positions, size, target, pairs, gram):
         one = terms[positions[i]] if i < size else target
         for j in range(i, size + 1):
             other = terms[positions[j]] if j < size else target
-            gram[i, j] = pairs.values[place_of(pairs, key_of(one, other))]
+            gram[i, j] = pairs.values[find_pair(pairs, pair_key(one, other))]
             gram[j, i] = gram[i, j]
             finite &= np.isfinite(gram[i, j])
     return finite

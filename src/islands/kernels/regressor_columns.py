@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from islands.kernels.interpreter import TEMPORARY, execute, multiply_factors
 from islands.kernels.jit_cache import kernel
-from islands.kernels.simd import VECTOR, address, room, write
+from islands.kernels.simd import VECTOR, address, padded_size, write
 from islands.kernels.summation import CHUNK
 
 #: Lanes of a row, and rows of a chunk.
@@ -60,7 +60,7 @@ def columns(
 ):
     """Evaluate every term on every row."""
     arena, place = arena_for(program)
-    chunk = room(program.degree.size * CHUNK)
+    chunk = padded_size(program.degree.size * CHUNK)
     for index in range(rows.offset.size):
         evaluate(program, rows, index, arena, place, chunk)
         for term in range(program.degree.size):
@@ -76,7 +76,7 @@ def arena_for(program):
 
     Those of signals are filled in by `evaluate`.
     """
-    arena = room(program.temporaries * CHUNK)
+    arena = padded_size(program.temporaries * CHUNK)
     for index in range(program.constants.size):
         arena[index * CHUNK : (index + 1) * CHUNK] = program.constants[index]
     place = np.empty(program.operands.shape[0], np.int64)

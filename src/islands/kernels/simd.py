@@ -26,7 +26,7 @@ _INDEX = ir.IntType(32)
 
 
 @kernel
-def room(size):
+def padded_size(size):
     """Return an array of ``size`` numbers that begins where a line of the processor's cache does.
 
     A vector that lies across two lines costs two reads.
@@ -37,7 +37,7 @@ def room(size):
     return array[begin : begin + size]
 
 
-class Lanes(types.Type):
+class SimdVector(types.Type):
     """``count`` vectors of eight numbers."""
 
     def __init__(self, count):
@@ -45,7 +45,7 @@ class Lanes(types.Type):
         super().__init__(name=f"Lanes({count})")
 
 
-@register_model(Lanes)
+@register_model(SimdVector)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager, lanes):
         super().__init__(manager, lanes, ir.ArrayType(_VECTOR, lanes.count))
@@ -54,7 +54,7 @@ class _LanesModel(models.PrimitiveModel):
 @intrinsic(prefer_literal=True)
 def load(_typingctx, array, offset, count):
     """Return ``8 * count`` numbers of a contiguous array, from an offset on."""
-    return Lanes(count.literal_value)(array, types.int64, count), _reading(_in_array)
+    return SimdVector(count.literal_value)(array, types.int64, count), _reading(_in_array)
 
 
 @intrinsic
@@ -79,7 +79,7 @@ def address(_typingctx, array, offset):
 @intrinsic(prefer_literal=True)
 def read(_typingctx, place, count):
     """Return ``8 * count`` numbers from an address on."""
-    return Lanes(count.literal_value)(types.int64, count), _reading(_at_address)
+    return SimdVector(count.literal_value)(types.int64, count), _reading(_at_address)
 
 
 @intrinsic
@@ -89,14 +89,14 @@ def write(_typingctx, place, lanes):
 
 
 @intrinsic(prefer_literal=True)
-def splat(_typingctx, number, count):
+def broadcast(_typingctx, number, count):
     """Return lanes that all hold one number."""
 
     def generate(_context, builder, signature, arguments):
         vector = _splat(builder, arguments[0])
         return _made(builder, signature.return_type.count, lambda _i: vector)
 
-    return Lanes(count.literal_value)(types.float64, count), generate
+    return SimdVector(count.literal_value)(types.float64, count), generate
 
 
 @intrinsic
@@ -130,7 +130,7 @@ def sign(_typingctx, a):
 
 
 @intrinsic
-def outside(_typingctx, a, bound):
+def any_outside(_typingctx, a, bound):
     """Return 0 where every lane lies between ``-bound`` and ``bound``; a NaN does not."""
 
     def generate(_context, builder, signature, arguments):
@@ -154,7 +154,7 @@ def gather(_typingctx, array, a, b, c, d):
         firsts = [_in_array(context, builder, signature, (arguments[0], offset)) for offset in arguments[1:]]
         return _made(builder, 4, lambda i: _read(builder, firsts[i], 0))
 
-    return Lanes(4)(array, types.int64, types.int64, types.int64, types.int64), generate
+    return SimdVector(4)(array, types.int64, types.int64, types.int64, types.int64), generate
 
 
 @intrinsic
@@ -164,19 +164,19 @@ def repeat(_typingctx, a):
     def generate(_context, builder, _signature, arguments):
         return _made(builder, 4, lambda _i: builder.extract_value(arguments[0], 0))
 
-    return Lanes(4)(a), generate
+    return SimdVector(4)(a), generate
 
 
 @intrinsic
 def outer(_typingctx, a, b):
     """Return the products of four vectors with four others, the first with all, the second with all, ..."""
-    return Lanes(16)(a, b), _products([(i, j) for i in range(4) for j in range(4)])
+    return SimdVector(16)(a, b), _products([(i, j) for i in range(4) for j in range(4)])
 
 
 @intrinsic
 def outer_upper(_typingctx, a):
     """Return the products of four vectors among themselves: each with itself and those behind it."""
-    return Lanes(10)(a), _products([(i, j) for i in range(4) for j in range(i, 4)])
+    return SimdVector(10)(a), _products([(i, j) for i in range(4) for j in range(i, 4)])
 
 
 def _products(places):

@@ -20,12 +20,12 @@ from islands.kernels.simd import (
     VECTOR,
     add,
     address,
+    any_outside,
+    broadcast,
     load,
     multiply,
-    outside,
+    padded_size,
     read,
-    room,
-    splat,
     subtract,
     write,
 )
@@ -117,12 +117,12 @@ def _simulator(count):
         operands, factors, degree = program.operands, program.factors, program.degree
         flat = layout.signals.shape[1]
         # The predictions, the temporaries, and last the squared errors of a block.
-        arena = room((warm_up + CHUNK + program.temporaries + 1) * width)
+        arena = padded_size((warm_up + CHUNK + program.temporaries + 1) * width)
         predictions, squares = warm_up * width, arena.size - width
         temporaries = (warm_up + CHUNK) * width
         place, stride = np.empty(operands.shape[0], np.int64), np.empty(operands.shape[0], np.int64)
         for index in range(program.constants.size):
-            write(address(arena, temporaries + index * width), splat(program.constants[index], count))
+            write(address(arena, temporaries + index * width), broadcast(program.constants[index], count))
         targets = np.empty(code.shape[0], np.int64)
         for index in range(code.shape[0]):
             targets[index] = address(arena, temporaries + code[index, 1] * width)
@@ -136,7 +136,7 @@ def _simulator(count):
         for block in range(layout.block_offset.size):
             lanes = layout.block_lanes[block]
             offset = layout.block_offset[block]
-            write(address(arena, squares), splat(0.0, count))
+            write(address(arena, squares), broadcast(0.0, count))
             for lane in range(lane_base, lane_base + lanes):
                 diverged[lane] = -1
             for step in range(warm_up):
@@ -168,12 +168,12 @@ def _simulator(count):
                         first, second = place[code[index, 2]], place[code[index, 3]]
                         execute(code[index, 0], targets[index], first, second, addresses[index], count, 1)
                     # The terms are added in their order.
-                    y = splat(0.0, count)
+                    y = broadcast(0.0, count)
                     for term in range(theta.size):
                         a, b = place[factors[term, 0]], place[factors[term, 1]]
                         c, d = place[factors[term, 2]], place[factors[term, 3]]
                         product = multiply_factors(a, b, c, d, degree[term], count)
-                        y = add(y, multiply(splat(theta[term], count), product))
+                        y = add(y, multiply(broadcast(theta[term], count), product))
                     write(prediction, y)
                     error = subtract(y, read(measured, count))
                     square = add(read(address(arena, squares), count), multiply(error, error))
@@ -182,7 +182,7 @@ def _simulator(count):
                         place[index] += stride[index]
                     prediction += 8 * width
                     measured += apart
-                if outside(load(arena, squares, count), safe) and _find_divergence(
+                if any_outside(load(arena, squares, count), safe) and _find_divergence(
                     arena, predictions, width, lane_base, lanes, length, done, chunk, bound, diverged
                 ):
                     ending = DIVERGED

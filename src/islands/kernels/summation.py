@@ -11,7 +11,7 @@ not depend on which of them computed it.
 import numpy as np
 
 from islands.kernels.jit_cache import kernel
-from islands.kernels.simd import VECTOR, add, fold, load, multiply, splat
+from islands.kernels.simd import VECTOR, add, broadcast, fold, load, multiply
 
 #: Rows that are taken together; a short last chunk is filled with zeros.
 CHUNK = 256
@@ -20,7 +20,7 @@ CHUNK = 256
 @kernel(forceinline=True)
 def dot_chunk(x, x_at, y, y_at):
     """Return the eight lanes of the inner product of 256 rows of two flat arrays."""
-    lanes = splat(0.0, 1)
+    lanes = broadcast(0.0, 1)
     for row in range(0, CHUNK, VECTOR):
         lanes = add(lanes, multiply(load(x, x_at + row, 1), load(y, y_at + row, 1)))
     return lanes
@@ -29,7 +29,7 @@ def dot_chunk(x, x_at, y, y_at):
 @kernel
 def dot(x, x_at, y, y_at, rows):
     """Return the inner product of ``rows`` rows of two flat arrays, from offsets ``x_at`` and ``y_at`` on."""
-    running = splat(0.0, 1)
+    running = broadcast(0.0, 1)
     done = 0
     while done + CHUNK <= rows:
         running = add(running, dot_chunk(x, x_at + done, y, y_at + done))

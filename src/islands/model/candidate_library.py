@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from types import MappingProxyType
 
-from islands.errors import SettingsError, chosen
+from islands.errors import SettingsError, lookup
 from islands.model.expression import Apply, Constant, Expression, Lagged
 from islands.model.model import canonical_order
 from islands.model.primitives import MUL, PRIMITIVES
@@ -72,7 +72,7 @@ def library_named(name: str) -> Library:
     SettingsError
         There is none of that name.
     """
-    return chosen(LIBRARIES, name, "library")
+    return lookup(LIBRARIES, name, "library")
 
 
 def full_set(degree: int, output_lags: int, input_lags: int, inputs: int = 1) -> int:

@@ -11,7 +11,7 @@ from islands.kernels import gram as gram_kernel
 from islands.kernels import regressor_columns as column_kernel
 from islands.kernels.interpreter import Program
 from islands.kernels.regressor_columns import LANES, TIMES, Rows
-from islands.kernels.simd import room
+from islands.kernels.simd import padded_size
 from islands.program.term_pool import Term, link
 
 
@@ -30,7 +30,7 @@ def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> ND
     """
     program = link(terms)
     _refuse_unreadable(program, record, warm_up)
-    rows = rows_of(record, warm_up)
+    rows = evaluate_terms(record, warm_up)
     out = np.empty((len(terms), rows.count))
     column_kernel.columns(program, rows, out)
     return out
@@ -47,7 +47,7 @@ def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray
     program = link(terms)
     _refuse_unreadable(program, record, warm_up)
     out = np.empty((len(terms), len(terms)))
-    gram_kernel.gram(program, rows_of(record, warm_up), out)
+    gram_kernel.gram(program, evaluate_terms(record, warm_up), out)
     return out
 
 
@@ -61,7 +61,7 @@ def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
         raise SettingsError(f"the terms read {lag} samples back, the warm-up has {warm_up}")
 
 
-def rows_of(record: Dataset, warm_up: int) -> Rows:
+def evaluate_terms(record: Dataset, warm_up: int) -> Rows:
     """Return the rows that estimate: those of every segment after its warm-up.
 
     Raises
@@ -110,7 +110,7 @@ def arranged(signals: NDArray[np.float64], spans: Sequence[tuple[int, int]], war
         flat, count = flat + (warm_up + times) * LANES, count + rows
     # What stands behind a segment's last row is read and never counted.
     places = np.minimum(np.concatenate(samples), signals.shape[1] - 1).reshape(-1)
-    gathered = room(len(signals) * flat).reshape(-1, flat)
+    gathered = padded_size(len(signals) * flat).reshape(-1, flat)
     gathered[:] = signals[:, places]
     offset, lanes, row, apart = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
     return Rows(gathered, offset, lanes, row, apart, count)

@@ -22,7 +22,7 @@ _SIGNS = {SUB: interpreter.SIGN_OF_DIFFERENCE, MUL: interpreter.SIGN_OF_PRODUCT}
 Term = Regressor | Expression
 
 
-class Store:
+class TermPool:
     """Hash-consed canonical expressions: a node for every subexpression, a term for every regressor.
 
     The numbers follow the order of arrival, so nothing that is a result may depend on them.
@@ -134,7 +134,7 @@ def link(terms: Sequence[Term]) -> Program:
     A term may also be a bare canonical expression of lag 0, the target y(k) for instance: the kernel of
     columns allows it, a simulation does not.
     """
-    store = Store()
+    store = TermPool()
     numbers = store.terms(terms)
     nodes = store.nodes
     program: Program = codegen.link(nodes, numbers, np.full(nodes.operation.size, -1, np.int64))

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.kernels.simd import room
+from islands.kernels.simd import padded_size
 from islands.kernels.simulate import WIDTHS, Layout
 
 #: What an instruction costs besides the work on its row, in lanes.
@@ -50,7 +50,7 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     lanes = np.diff(np.append(cuts, len(start)))
     rows = warm_up + length[cuts]
     offset = width * (np.cumsum(rows) - rows)
-    gathered = room(len(signals) * int(rows.sum()) * width).reshape(len(signals), -1)
+    gathered = padded_size(len(signals) * int(rows.sum()) * width).reshape(len(signals), -1)
     for cut, count, at, steps in zip(cuts, lanes, offset, rows, strict=True):
         # A short lane goes on at the record's end; lanes that nobody has asked for repeat the first.
         samples = start[cut : cut + count] - warm_up + np.arange(steps)[:, None]

@@ -10,7 +10,7 @@ from islands.kernels.interpreter import Program
 from islands.kernels.simulate import WIDTHS, Layout, simulate
 from islands.model.regressor import Regressor
 from islands.program.term_pool import link
-from islands.simulation.predictors import bound_from
+from islands.simulation.predictors import divergence_bound_of_range
 
 #: A single run stands in the first lane of the narrowest row.
 _WIDTH = WIDTHS[0]
@@ -72,7 +72,7 @@ class LinkedModel:
         signals[1:, :samples] = u.T
         single, length = np.ones(1, np.int64), np.array([samples - self.warm_up])
         cut = Layout(signals, 0 * single, single, 1, self.warm_up * single, length, _WIDTH, self.warm_up, 0.0)
-        bound = bound_from(start, complete=False)
+        bound = divergence_bound_of_range(start, complete=False)
         diverged, predicted = np.empty(1, np.int64), np.full(samples, np.nan)
         simulate(self._program, theta, cut, bound, np.inf, True, np.empty(1), diverged, predicted)
         if diverged[0] >= 0:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 
-class Verdict(Enum):
+class Status(Enum):
     """The kinds of outcome; the value is the advice."""
 
     OK = "nothing to do"
@@ -23,25 +23,25 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class EvaluationOutcome:
     """A verdict and its reason.
 
     Attributes
     ----------
-    verdict : Verdict
+    verdict : Status
         Its name is the kind, its value the advice.
     reason : str
         What happened, where; empty for OK.
     """
 
-    verdict: Verdict = Verdict.OK
+    verdict: Status = Status.OK
     reason: str = ""
 
     def __bool__(self) -> bool:
-        return self.verdict is Verdict.OK
+        return self.verdict is Status.OK
 
     def __str__(self) -> str:
         return "ok" if self else f"{self.verdict.name.lower()}: {self.reason}; {self.verdict.value}"
 
 
-OK = Outcome()
+OK = EvaluationOutcome()

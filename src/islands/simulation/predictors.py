@@ -12,7 +12,7 @@ from islands.kernels.summation import total
 from islands.model.model import Model
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
-from islands.simulation.outcome import OK, Outcome, Verdict
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
 #: A prediction that leaves this many times the output's range has diverged.
 BOUND = 1e6
@@ -28,13 +28,13 @@ class Simulation:
         NaN in the warm-up of every segment, and from where an interval diverged to its end.
     mean_squared_error : float
         Over all predicted samples; infinite after a divergence, NaN where the measured output is missing.
-    outcome : Outcome
+    outcome : EvaluationOutcome
         OK, or DIVERGED with the first sample where it did.
     """
 
     y: NDArray[np.float64]
     mean_squared_error: float
-    outcome: Outcome
+    outcome: EvaluationOutcome
 
 
 def one_step_ahead(model: Model, record: Dataset, warm_up: int | None = None) -> Simulation:
@@ -63,7 +63,7 @@ def multiple_shooting(
     warm_up : int or None
         Samples before the first prediction; None takes the model's deepest lag, all that it needs.
     bound : float or None
-        A larger absolute prediction is a divergence; None takes `bound_of` the record.
+        A larger absolute prediction is a divergence; None takes `divergence_bound` the record.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def multiple_shooting(
     if warm_up < model.maximum_lag:
         raise SettingsError(f"the model reads {model.maximum_lag} samples back, the warm-up has {warm_up}")
     theta = np.array(model.parameters)
-    bound = bound_of(record) if bound is None else bound
+    bound = divergence_bound(record) if bound is None else bound
     cut = layout(record, warm_up, interval)
     squared_error = np.empty(len(cut.start))
     diverged = np.empty(len(cut.start), np.int64)
@@ -95,21 +95,21 @@ def multiple_shooting(
     if failed.size:
         sample = int((cut.start + diverged)[failed].min())
         reason = f"|y| left {bound:.3g} at sample {sample}"
-        return Simulation(predicted, np.inf, Outcome(Verdict.DIVERGED, reason))
+        return Simulation(predicted, np.inf, EvaluationOutcome(Status.DIVERGED, reason))
     return Simulation(predicted, float(total(squared_error) / cut.length.sum()), OK)
 
 
-def bound_of(record: Dataset) -> float:
+def divergence_bound(record: Dataset) -> float:
     """Return the absolute output beyond which a simulation of the record has diverged.
 
     It is `BOUND` times the output's range or largest value; where outputs are missing and what is left tells
     no scale, at least `BOUND` of the output's unit.
     """
     known = record.y[~np.isnan(record.y)]
-    return bound_from(known, complete=known.size == record.samples)
+    return divergence_bound_of_range(known, complete=known.size == record.samples)
 
 
-def bound_from(known: NDArray[np.float64], complete: bool) -> float:
+def divergence_bound_of_range(known: NDArray[np.float64], complete: bool) -> float:
     """Return the same from the measured outputs, all of the record's or those that are not missing."""
     scale = float(max(np.ptp(known), np.abs(known).max())) if known.size else 0.0
     if not complete or scale == 0.0:

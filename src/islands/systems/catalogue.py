@@ -12,7 +12,7 @@ from islands.systems.bouc_wen import AUTHORS_SEED, DT
 
 
 @dataclass(frozen=True, slots=True)
-class System:
+class SimulatedSystem:
     """A simulated system and the records that can be made of it.
 
     Attributes
@@ -41,8 +41,8 @@ _PIEZO_TESTS: Mapping[str, Callable[[], signals.Signal]] = {
     "sine-20V": lambda: signals.sine(DT, 20.0, 20.0, 1.0),
     "sine-0.25Hz": lambda: signals.sine(DT, 20.0, 40.0, 0.25),
     "sine-5Hz": lambda: signals.sine(DT, 20.0, 40.0, 5.0),
-    "hold-loading": lambda: signals.hold(DT, 20.0, amplitude=40.0, frequency=1.0, level=20.0),
-    "hold-unloading": lambda: signals.hold(
+    "hold-loading": lambda: signals.hold_signal(DT, 20.0, amplitude=40.0, frequency=1.0, level=20.0),
+    "hold-unloading": lambda: signals.hold_signal(
         DT, 20.0, amplitude=40.0, frequency=1.0, level=20.0, loading=False
     ),
     "minor-loops": lambda: signals.minor_loops(DT, amplitude=40.0, frequency=1.0),
@@ -76,24 +76,24 @@ def _appendix(system: appendix.OutputErrorSystem) -> Callable[[str, str, int], D
 
 
 #: Name to entry; a new system is one entry here.
-SYSTEMS: Mapping[str, System] = {
+SYSTEMS: Mapping[str, SimulatedSystem] = {
     system.name: system
     for system in (
-        System(
+        SimulatedSystem(
             name="bouc-wen-piezo",
             description="Piezoelectric actuator with Bouc-Wen hysteresis, equation (11)",
             variants=("authors", "consistent"),
             parts=("estimation", "validation", *_PIEZO_TESTS, "noise-2"),
             make=_piezo,
         ),
-        System(
+        SimulatedSystem(
             name="s1",
             description="Bilinear output-error system S1 of equation (A.1); variants scale the soft input",
             variants=tuple(appendix.SCALINGS),
             parts=("estimation", "validation"),
             make=_appendix(appendix.S1),
         ),
-        System(
+        SimulatedSystem(
             name="s2",
             description="Rational output-error system S2 of equation (A.1); variants scale the soft input",
             variants=tuple(appendix.SCALINGS),

@@ -57,7 +57,7 @@ def bouc_wen(u, dt, A, beta, gamma, leak, rate, asymmetry, h0, h):
         h[k + 1] = at
 
 
-def played(u, width):
+def play_from(u, width):
     """Return ``u`` behind a play of half width ``width``."""
     x = np.empty_like(u)
     play(np.ascontiguousarray(u), width, x)

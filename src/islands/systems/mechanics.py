@@ -62,7 +62,7 @@ def _call(_typingctx, address, x, rate, z, numbers):
 
 
 @kernel
-def along(x, rate, dt, elements, total):
+def integrate_along(x, rate, dt, elements, total):
     """Add up what elements do along a motion that is given; write ``total`` (samples,).
 
     Their states see the coordinate run straight from sample to sample.
@@ -99,7 +99,7 @@ def _slopes(state, drive, mass, damping, stiffness, elements, slope):
 
 
 @kernel
-def balance(u, midway, dt, mass, damping, stiffness, elements, begins, x0, v0, x):
+def integrate_motion(u, midway, dt, mass, damping, stiffness, elements, begins, x0, v0, x):
     """Integrate ``m x'' + c x' + k x = u + forces`` by RK4, a step a sample; write ``x`` (samples,).
 
     ``midway`` (2, samples) is the input half a step and nearly a whole one behind each sample: it may jump at

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from islands.errors import chosen
+from islands.errors import lookup
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
 
@@ -101,4 +101,4 @@ def published(number: str) -> Published:
     SettingsError
         There is none of that number.
     """
-    return chosen(PUBLISHED, number, "published model")
+    return lookup(PUBLISHED, number, "published model")

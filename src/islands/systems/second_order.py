@@ -26,7 +26,7 @@ class SecondOrder:
     rate: float = 0.0
 
 
-def second_order_of(u: Signal, y: Signal, dt: float, given: Mapping[str, float]) -> SecondOrder:
+def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, float]) -> SecondOrder:
     """Estimate what is not given of ``m``, ``c``, ``k`` by least squares of the simulated output.
 
     The response is linear in 1/m and in the state at the first sample, which are solved for; frequency and

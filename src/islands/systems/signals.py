@@ -147,7 +147,7 @@ def sweep(dt: float, duration: float, amplitude: float, first: float, last: floa
     return amplitude * np.sin(2 * np.pi * (first + (last - first) / (2 * duration) * time) * time)
 
 
-def hold(
+def hold_signal(
     dt: float,
     duration: float,
     *,

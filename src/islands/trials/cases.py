@@ -12,24 +12,24 @@ from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import refine
-from islands.io.simulator_spec.factory import simulation
+from islands.io.simulator_spec.factory import make_simulator
 from islands.model.expression import Apply, Expression, Lagged
 from islands.model.model import Model
 from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import Regressor, regressor
-from islands.simulation.outcome import Outcome
-from islands.trials.injection.measurement import SEEN, Hiding
+from islands.simulation.outcome import EvaluationOutcome
+from islands.trials.injection.measurement import SEEN, Injection
 from islands.trials.injection.oscillator import OSCILLATOR
 from islands.trials.injection.piezo import PIEZO
-from islands.trials.injection.rig import System
+from islands.trials.injection.rig import Rig
 from islands.trials.injection.tanks import TANKS
-from islands.trials.targets import EXACT, IDENTIFIED, Goals
+from islands.trials.targets import EXACT, IDENTIFIED, Targets
 
 #: The constraint under which it holds still where its input does.
 _CONSTRAINT = "hysteresis"
 
 
-def identified(record: Dataset) -> Model:
+def identify_actuator(record: Dataset) -> Model:
     """Identify increments of the output by those of the input, their size and sign, and levels.
 
     The structure is fixed: what an increment of a Bouc-Wen actuator is made of, the levels up to the second
@@ -42,10 +42,10 @@ def identified(record: Dataset) -> Model:
         No such model can be estimated on this record.
     """
     found = estimate(_structure(), record, _CONSTRAINT)
-    if isinstance(found, Outcome):
+    if isinstance(found, EvaluationOutcome):
         raise RecordError(f"no NARX model of this structure can be estimated: {found}")
     refined = refine(found.model, record, None, _CONSTRAINT)
-    return found.model if isinstance(refined, Outcome) else refined.model
+    return found.model if isinstance(refined, EvaluationOutcome) else refined.model
 
 
 def _structure() -> list[Regressor]:
@@ -63,16 +63,16 @@ def _structure() -> list[Regressor]:
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
+class SimulatedCase:
     """A simulation in trials.
 
     Attributes
     ----------
-    system : System
+    system : Rig
         What records are of.
     made : callable
         Makes the simulation that is held against a record.
-    goals : Goals
+    goals : Targets
     tolerance : mapping
         What is stated of the simulation's parameters.
     apart : bool
@@ -84,9 +84,9 @@ class Simulated:
         tolerances. Hidden all the same, they are unknown causes.
     """
 
-    system: System
-    made: Callable[[Hiding], Simulator]
-    goals: Goals
+    system: Rig
+    made: Callable[[Injection], Simulator]
+    goals: Targets
     tolerance: Mapping[str, float]
     apart: bool = True
     free: bool = False
@@ -103,16 +103,16 @@ class Simulated:
         return (*self.system.unknown, *sorted(self.without))
 
 
-def _narx(hiding: Hiding) -> Simulator:
+def _narx(hiding: Injection) -> Simulator:
     record = hiding.record
     alone = replace(record, u=record.u[:, :1], input_names=record.input_names[:1], input_units=("V",))
-    model = identified(alone[: int(SEEN * record.samples)])
+    model = identify_actuator(alone[: int(SEEN * record.samples)])
     return NarxSimulator(model, "narx", record.y[: model.maximum_lag])
 
 
-def _estimated(name: str) -> Callable[[Hiding], Simulator]:
+def _estimated(name: str) -> Callable[[Injection], Simulator]:
     """Return what makes a physical system whose parameters are estimated from the record."""
-    return lambda hiding: simulation(name, hiding.record)
+    return lambda hiding: make_simulator(name, hiding.record)
 
 
 _EQUATION = frozenset(("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing"))
@@ -121,17 +121,17 @@ _INPUT = frozenset(
 )
 
 #: By name; a new one is an entry here, and where its system is new, a file in `islands.trials.injection`.
-CORES: Mapping[str, Simulated] = MappingProxyType(
+CORES: Mapping[str, SimulatedCase] = MappingProxyType(
     {
-        "bouc-wen-piezo": Simulated(PIEZO, lambda _: BoucWenPiezoSimulator(), EXACT, PIEZO.tolerance),
-        "narx": Simulated(
+        "bouc-wen-piezo": SimulatedCase(PIEZO, lambda _: BoucWenPiezoSimulator(), EXACT, PIEZO.tolerance),
+        "narx": SimulatedCase(
             PIEZO,
             _narx,
             IDENTIFIED,
             {},
             without=_EQUATION | {"sensor-gain", "input-gain", "wrong-parameter"},
         ),
-        "column": Simulated(
+        "column": SimulatedCase(
             PIEZO,
             lambda hiding: RecordedOutput("column", hiding.nominal),
             replace(IDENTIFIED, first=85.0),
@@ -139,7 +139,7 @@ CORES: Mapping[str, Simulated] = MappingProxyType(
             apart=False,
             without=_EQUATION | _INPUT | {"wrong-parameter"},
         ),
-        "second-order": Simulated(OSCILLATOR, _estimated("second-order"), EXACT, {}, free=True),
-        "cascaded-tanks": Simulated(TANKS, _estimated("cascaded-tanks"), EXACT, {}, free=True),
+        "second-order": SimulatedCase(OSCILLATOR, _estimated("second-order"), EXACT, {}, free=True),
+        "cascaded-tanks": SimulatedCase(TANKS, _estimated("cascaded-tanks"), EXACT, {}, free=True),
     }
 )

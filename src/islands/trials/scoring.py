@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import betaincinv
 
-from islands.trials.targets import EXACT, Goals
-from islands.trials.trial import Outcome
+from islands.trials.targets import EXACT, Targets
+from islands.trials.trial import TrialOutcome
 
 #: Bounds of the bands of misfits, in standard deviations of the noise; names are counted from the second on.
 FAINT, FROM, STRONG = 0.05, 0.2, 1.0
@@ -21,7 +21,7 @@ _OUTSIDE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Share:
+class Proportion:
     """How many of some trials came out in a way.
 
     Attributes
@@ -63,7 +63,7 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
-class Measure:
+class Statistic:
     """A number of some trials.
 
     Attributes
@@ -88,14 +88,14 @@ class Measure:
         return _kept(self.value, self)
 
 
-def _kept(value: float, asked: Share | Measure) -> bool | None:
+def _kept(value: float, asked: Proportion | Statistic) -> bool | None:
     if asked.goal is None or not asked.of:
         return None
     return value <= asked.goal if asked.most else value >= asked.goal
 
 
 @dataclass(frozen=True, slots=True)
-class Bin:
+class ReliabilityBin:
     """Names that were said with about the same confidence: how sure the analysis was, and how often right."""
 
     low: float
@@ -105,7 +105,9 @@ class Bin:
     right: float
 
 
-def tally(outcomes: Sequence[Outcome], unknown: Sequence[str], goals: Goals = EXACT) -> list[Share | Measure]:
+def score(
+    outcomes: Sequence[TrialOutcome], unknown: Sequence[str], goals: Targets = EXACT
+) -> list[Proportion | Statistic]:
     """Count outcomes by what was hidden.
 
     That the form of an identified model is wrong is true of the model, on clean records as well: outcomes do
@@ -114,10 +116,10 @@ def tally(outcomes: Sequence[Outcome], unknown: Sequence[str], goals: Goals = EX
 
     Parameters
     ----------
-    outcomes : sequence of Outcome
+    outcomes : sequence of TrialOutcome
     unknown : sequence of str
         Names of causes that the simulation has no name for.
-    goals : Goals
+    goals : Targets
     """
     known = [each for each in outcomes if not set(each.trial.effects) & set(unknown)]
     clean = [each for each in known if not each.trial.effects]
@@ -133,14 +135,14 @@ def tally(outcomes: Sequence[Outcome], unknown: Sequence[str], goals: Goals = EX
 
     def share(
         name: str,
-        among: Sequence[Outcome],
-        right: Callable[[Outcome], bool],
+        among: Sequence[TrialOutcome],
+        right: Callable[[TrialOutcome], bool],
         goal: float | None,
         most: bool = False,
-    ) -> Share:
-        return Share(name, sum(map(right, among)), len(among), goal, most)
+    ) -> Proportion:
+        return Proportion(name, sum(map(right, among)), len(among), goal, most)
 
-    def seen(name: str, low: float, high: float, goal: float | None) -> Share:
+    def seen(name: str, low: float, high: float, goal: float | None) -> Proportion:
         among = [each for each in every if low < each.misfit <= high]
         return share(f"detected, misfit {name} sigma", among, lambda each: each.noticed, goal)
 
@@ -157,15 +159,15 @@ def tally(outcomes: Sequence[Outcome], unknown: Sequence[str], goals: Goals = EX
         ),
         share("family, where detected", detected, lambda each: each.family_right, goals.family),
         share("truth within the reported set", detected, lambda each: each.within_set, goals.within),
-        Measure("names in the reported set, mean", _mean([each.set_size for each in named]), len(named)),
+        Statistic("names in the reported set, mean", _mean([each.set_size for each in named]), len(named)),
         share("false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True),
         share("pairs exact", pairs, lambda each: each.exact, goals.pairs),
         share("triples exact", triples, lambda each: each.exact, goals.triples),
-        Measure("share of the oracle's gain, median", _quantile(gains, 0.5), len(gains), goals.gain),
-        Measure(
+        Statistic("share of the oracle's gain, median", _quantile(gains, 0.5), len(gains), goals.gain),
+        Statistic(
             "share of the oracle's gain, 10th percentile", _quantile(gains, 0.1), len(gains), goals.gain_tenth
         ),
-        Measure(
+        Statistic(
             "calibration error of the confidence",
             calibration_error(bins),
             sum(each.count for each in bins),
@@ -182,7 +184,7 @@ def tally(outcomes: Sequence[Outcome], unknown: Sequence[str], goals: Goals = EX
     ]
 
 
-def reliability(outcomes: Sequence[Outcome]) -> list[Bin]:
+def reliability(outcomes: Sequence[TrialOutcome]) -> list[ReliabilityBin]:
     """Hold confidences against frequencies: first names in equally wide bins, those that hold any.
 
     A name on a clean record is a wrong one.
@@ -191,7 +193,7 @@ def reliability(outcomes: Sequence[Outcome]) -> list[Bin]:
     right = np.array([each.first_right for each in outcomes if each.named])
     place = np.minimum((BINS * said).astype(int), BINS - 1)
     return [
-        Bin(
+        ReliabilityBin(
             each / BINS,
             (each + 1) / BINS,
             int(np.sum(place == each)),
@@ -203,13 +205,13 @@ def reliability(outcomes: Sequence[Outcome]) -> list[Bin]:
     ]
 
 
-def calibration_error(bins: Sequence[Bin]) -> float:
+def calibration_error(bins: Sequence[ReliabilityBin]) -> float:
     """Return how far confidences are from frequencies, on average over the names (Naeini et al., 2015)."""
     count = sum(each.count for each in bins)
     return sum(each.count * abs(each.said - each.right) for each in bins) / count if count else float("nan")
 
 
-def confusion(outcomes: Sequence[Outcome]) -> Mapping[tuple[str, str], int]:
+def confusion(outcomes: Sequence[TrialOutcome]) -> Mapping[tuple[str, str], int]:
     """Count what single hidden effects were called: (hidden, named first) to how often; "" is no name.
 
     What was noticed and got no name is called "unknown".

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Goals:
+class Targets:
     """Goals of an analysis that is given a kind of simulation.
 
     Attributes
@@ -42,7 +42,7 @@ class Goals:
 
 
 #: The truth itself, but for what is hidden.
-EXACT = Goals(
+EXACT = Targets(
     weak=95.0,
     middle=95.0,
     strong=97.0,
@@ -60,7 +60,7 @@ EXACT = Goals(
 )
 
 #: A model that was identified with what is hidden already in the record.
-IDENTIFIED = Goals(
+IDENTIFIED = Targets(
     weak=None,
     middle=None,
     strong=97.0,

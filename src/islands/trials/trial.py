@@ -7,7 +7,7 @@ import numpy as np
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE, model_form
 from islands.trials.cases import CORES
-from islands.trials.injection.measurement import hide
+from islands.trials.injection.measurement import inject
 from islands.trials.injection.piezo import PIEZO
 from islands.trials.oracle import share_of_gain
 
@@ -57,7 +57,7 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TrialOutcome:
     """What came of a trial.
 
     Attributes
@@ -126,10 +126,10 @@ class Outcome:
         return bool(self.named) and _family(self.named[0]) in {_family(name) for name in self.trial.effects}
 
 
-def carried_out(trial: Trial) -> Outcome:
+def run_trial(trial: Trial) -> TrialOutcome:
     """Hide, diagnose, compare."""
     simulated = CORES[trial.core]
-    hiding = hide(
+    hiding = inject(
         trial.effects,
         np.random.default_rng([trial.seed, *map(ord, "".join(trial.effects))]),
         trial.seconds,
@@ -143,7 +143,7 @@ def carried_out(trial: Trial) -> Outcome:
     found = diagnose(hiding.record, simulated.made(hiding), simulated.tolerance, trial.seed)
     causes = [each for each in found.effects if each.eta is not None and each.name != model_form.CORE_SHAPE]
     asked = trial.oracle and trial.effects
-    return Outcome(
+    return TrialOutcome(
         trial,
         hiding.misfit,
         str(found.verdict),

@@ -10,10 +10,10 @@ from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import RecordError
 from islands.model.model import Model
-from islands.simulation.outcome import Outcome
+from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import multiple_shooting
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
-from islands.validation.physics import Physics, physics
+from islands.validation.physics import PhysicsChecks, check_physics
 from islands.validation.residual_tests import ResidualTests, residual_tests
 
 #: Parts of a split and ways to simulate, as they are named in a result.
@@ -41,16 +41,16 @@ class Assessment:
     residual_tests : ResidualTests
         Of the one-step-ahead residual on the longest recording of the validation data; where it diverged
         there, no test passed and each one's note says so.
-    physics : Physics
+    physics : PhysicsChecks
     warm_up : int
         Samples before the first prediction of all these simulations: another one would give other errors.
     """
 
     metrics: Mapping[str, Mapping[str, Metrics]]
-    outcomes: Mapping[str, Mapping[str, Outcome]]
+    outcomes: Mapping[str, Mapping[str, EvaluationOutcome]]
     information: InformationCriteria
     residual_tests: ResidualTests
-    physics: Physics
+    physics: PhysicsChecks
     warm_up: int
 
 
@@ -71,7 +71,7 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
     """
     intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}
-    outcomes: dict[str, dict[str, Outcome]] = {}
+    outcomes: dict[str, dict[str, EvaluationOutcome]] = {}
     for part, record in zip(PARTS, (split.estimation, split.validation), strict=True):
         runs = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
         outcomes[part] = {mode: run.outcome for mode, run in runs.items()}
@@ -83,7 +83,7 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
         outcomes,
         _information(model, split.estimation, warm_up),
         _residual_tests(model, split.validation, warm_up),
-        physics(model, split.estimation),
+        check_physics(model, split.estimation),
         model.maximum_lag if warm_up is None else warm_up,
     )
 

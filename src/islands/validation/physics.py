@@ -15,8 +15,8 @@ from islands.estimation.parameter_constraints import PROPERTY_1
 from islands.model import rendering
 from islands.model.clusters import OUTPUT_AT_REST, clusters
 from islands.model.model import Model
-from islands.simulation.predictors import bound_of, free_run
-from islands.systems.signals import hold, minor_loops, sine
+from islands.simulation.predictors import divergence_bound, free_run
+from islands.systems.signals import hold_signal, minor_loops, sine
 
 #: A cluster's sum meets its target within this.
 SUM_TOLERANCE = 1e-9
@@ -52,7 +52,7 @@ class ClusterSum:
 
 
 @dataclass(frozen=True, slots=True)
-class Hold:
+class HoldTest:
     """The output while the input rests.
 
     Attributes
@@ -76,7 +76,7 @@ class Hold:
 
 
 @dataclass(frozen=True, slots=True)
-class Excursion:
+class ExcursionTest:
     """The output under an excitation that the record does not hold.
 
     Attributes
@@ -99,20 +99,20 @@ class Excursion:
 
 
 @dataclass(frozen=True, slots=True)
-class Physics:
+class PhysicsChecks:
     """The physics check of a model.
 
     Attributes
     ----------
     clusters : tuple of ClusterSum
-    holds : tuple of Hold
+    holds : tuple of HoldTest
         At five levels, each reached while loading and while unloading.
-    excursions : tuple of Excursion
+    excursions : tuple of ExcursionTest
     """
 
     clusters: tuple[ClusterSum, ...]
-    holds: tuple[Hold, ...]
-    excursions: tuple[Excursion, ...]
+    holds: tuple[HoldTest, ...]
+    excursions: tuple[ExcursionTest, ...]
 
     @property
     def property_1(self) -> bool:
@@ -130,7 +130,7 @@ class Physics:
         return max(entry.drift_percent for entry in self.holds)
 
 
-def physics(model: Model, record: Dataset) -> Physics:
+def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
     """Check a model under excitations made from the record's own ranges and rate.
 
     The base loop is a sine over each input's whole range, its period such that its slope has the rms of the
@@ -153,7 +153,7 @@ def physics(model: Model, record: Dataset) -> Physics:
             holds.append(_hold(kind, at_rest, record.output_range))
         else:
             excursions.append(_excursion(kind, signal, y, record.output_range))
-    return Physics(cluster_sums(model), tuple(holds), tuple(excursions))
+    return PhysicsChecks(cluster_sums(model), tuple(holds), tuple(excursions))
 
 
 def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
@@ -198,7 +198,7 @@ def _holds(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
 
 
 def _hold_signal(period: int, level: float, loading: bool) -> NDArray[np.float64]:
-    return hold(
+    return hold_signal(
         1.0, HOLD_PERIODS * period, amplitude=1.0, frequency=1.0 / period, level=level, loading=loading
     )
 
@@ -234,32 +234,32 @@ def _responses(
             Dataset(u, y, record.dt, record.input_names, record.output_name, record.input_units)
         )
     joined = join(tuple(recordings))
-    simulated = free_run(model, joined, bound=bound_of(record)).y
+    simulated = free_run(model, joined, bound=divergence_bound(record)).y
     for begin, end in joined.bounds:
         yield simulated[begin + rest : end]
 
 
-def _hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float) -> Hold:
+def _hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float) -> HoldTest:
     """Judge the output from where every lag of the input has its level: before that it may still answer."""
     level, loading = kind
     # A divergence on the way to the level leaves NaN at rest as well.
     bounded = not np.isnan(y).any()
     drift = percent_of_range(y[-1] - y[0], output_range) if bounded else np.inf
     moves = np.ptp(y[len(y) // 2 :]) if bounded else np.inf
-    return Hold(level, loading, bounded, bool(moves <= CONSTANT * output_range), drift)
+    return HoldTest(level, loading, bounded, bool(moves <= CONSTANT * output_range), drift)
 
 
 def _excursion(
     name: str, signal: NDArray[np.float64], y: NDArray[np.float64], output_range: float
-) -> Excursion:
+) -> ExcursionTest:
     bounded = not np.isnan(y).any()
     if not bounded:
-        return Excursion(name, False, np.inf, np.inf)
+        return ExcursionTest(name, False, np.inf, np.inf)
     # The last return of the input to its largest value, and the one before it: two samples side by side, as
     # near to a crest from before as from behind, are one return.
     largest = np.flatnonzero(signal >= signal.max() * (1 - 1e-9))
     before, last = largest[np.diff(largest, prepend=-2) > 1][-2:]
-    return Excursion(
+    return ExcursionTest(
         name,
         True,
         percent_of_range(y[last] - y[before], output_range),

@@ -6,7 +6,7 @@ from math import nan
 import pytest
 
 import islands
-from islands.search_result import Assessed, Search, ranked
+from islands.search_result import RankedModel, SearchStatistics, rank_models
 from islands.validation.assessment import Assessment
 from islands.validation.metrics import Metrics
 
@@ -21,12 +21,12 @@ def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
         },
     }
     model = islands.model_of([(islands.parse(text), theta) for text in terms])
-    return Assessed(model, Assessment(errors, {}, None, None, None, 0))
+    return RankedModel(model, Assessment(errors, {}, None, None, None, 0))
 
 
 def in_any_order(*expected):
     for order in itertools.permutations(expected):
-        assert [id(item) for item in ranked(order)] == [id(item) for item in expected]
+        assert [id(item) for item in rank_models(order)] == [id(item) for item in expected]
 
 
 def test_the_least_free_run_error_on_the_validation_data_comes_first():
@@ -55,11 +55,11 @@ def test_a_tie_is_decided_by_the_last_digit_of_a_parameter():
 
 
 def test_of_no_model_none_is_first():
-    assert ranked(()) == ()
+    assert rank_models(()) == ()
 
 
 def test_a_search_knows_its_speed_only_where_somebody_looked_at_a_clock():
-    search = Search(8, {"ok": 8}, {"candidates": 10, "bytes": 800})
+    search = SearchStatistics(8, {"ok": 8}, {"candidates": 10, "bytes": 800})
     assert search.evaluations_per_second is None
-    timed = Search(8, {"ok": 8}, {"candidates": 10, "bytes": 800}, wall_s=0.5)
+    timed = SearchStatistics(8, {"ok": 8}, {"candidates": 10, "bytes": 800}, wall_s=0.5)
     assert timed.evaluations_per_second == pytest.approx(16.0)

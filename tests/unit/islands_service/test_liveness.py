@@ -7,16 +7,16 @@ from threading import Thread
 
 import pytest
 
-from islands_service.liveness import Wish
+from islands_service.liveness import StopRequest
 
 #: Waits a short time again and again while signals come at every moment of it.
 WAITING = """
 import signal
-from islands_service.liveness import Wish, stop_on_signals
+from islands_service.liveness import StopRequest, stop_on_signals
 made = 0
 signal.setitimer(signal.ITIMER_REAL, 0.5, 2e-4)
 for _ in range(20_000):
-    stopping = Wish()
+    stopping = StopRequest()
     stop_on_signals(stopping)
     signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGTERM))
     made += stopping.wait(1e-5)
@@ -34,7 +34,7 @@ def test_a_signal_in_the_midst_of_a_look_is_not_waited_for_for_ever() -> None:
 
 
 def test_a_wish_ends_the_wait_at_once_and_stays() -> None:
-    stopping = Wish()
+    stopping = StopRequest()
     assert not stopping.wait(0.0)
     assert not stopping.made
     thread = Thread(target=lambda: (time.sleep(0.1), stopping.make()))

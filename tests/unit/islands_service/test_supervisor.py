@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.supervisor import FolderTaken, folder_lock
+from islands_service.supervisor import DataDirLockedError, folder_lock
 from support.processes import alive, eventually
 
 #: Runs roles until it is told to end, with some of the supervisor's constants changed.
@@ -308,7 +308,7 @@ def test_a_folder_belongs_to_one_service(tmp_path: Path) -> None:
     with folder_lock(folder):
         assert folder.stat().st_mode & 0o077 == 0
         with (
-            pytest.raises(FolderTaken, match=f"process {os.getpid()}.*another --data-dir"),
+            pytest.raises(DataDirLockedError, match=f"process {os.getpid()}.*another --data-dir"),
             folder_lock(folder),
         ):
             pass
@@ -325,7 +325,7 @@ def test_the_lock_of_a_killed_service_is_free(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as owner:
         assert owner.stdout is not None
         assert owner.stdout.readline() == "mine\n"
-        with pytest.raises(FolderTaken, match=f"process {owner.pid}"), folder_lock(tmp_path):
+        with pytest.raises(DataDirLockedError, match=f"process {owner.pid}"), folder_lock(tmp_path):
             pass
         owner.kill()
         owner.wait()

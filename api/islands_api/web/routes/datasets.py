@@ -9,15 +9,15 @@ from pydantic import FiniteFloat
 
 from islands_api.schemas import DatasetPage, DatasetView
 from islands_api.web.auth import Reader, Writer
-from islands_api.web.dependencies import AtDoors, Doors
-from islands_api.web.pagination import Cursor, Limit, cursor_of, place_of
+from islands_api.web.dependencies import AppState, AppStateDep
+from islands_api.web.pagination import Cursor, Limit, decode_cursor, encode_cursor
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import FormRoute
-from islands_api.web.responses import Document, dataset_document
+from islands_api.web.responses import JSONDocument, dataset_document
 from islands_api.web.uploads import name_of, receive
 from islands_service.domain.job_spec import Name
-from islands_service.intake.file_inspection import Asked, inspected
-from islands_service.intake.job_inputs import named
+from islands_service.intake.file_inspection import InspectionRequest, inspect_file
+from islands_service.intake.job_inputs import link_blob
 from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
@@ -48,7 +48,7 @@ Id = Annotated[
 async def upload(
     file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],
     caller: Writer,
-    doors: AtDoors,
+    doors: AppStateDep,
     inputs: Annotated[list[Name], Form(max_length=16, description="Columns to check as inputs.")] = [],  # noqa: B006
     output: Annotated[Name | None, Form(description="Column to check as the output.")] = None,
     dt: Annotated[FiniteFloat | None, Form(description="Sampling time in seconds.", gt=0.0)] = None,
@@ -61,22 +61,24 @@ async def upload(
     set: 200 in the place of 201.
     """
     name, compressed = name_of(file.filename)
-    stored, new = await _stored(doors, caller.owner, file, name, compressed, Asked(tuple(inputs), output, dt))
+    stored, new = await _stored(
+        doors, caller.owner, file, name, compressed, InspectionRequest(tuple(inputs), output, dt)
+    )
     doors.measures.received.inc(stored.bytes if new else 0)
     headers = {"Location": f"{router.prefix}/{stored.id}"}
-    return Document(dataset_document(stored), 201 if new else 200, headers)
+    return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
 
 
 async def _stored(
-    doors: Doors, owner: str, file: UploadFile, name: str, compressed: bool, asked: Asked
+    doors: AppState, owner: str, file: UploadFile, name: str, compressed: bool, asked: InspectionRequest
 ) -> tuple[StoredDataset, bool]:
     settings = doors.settings
     with doors.blobs.receiving() as stream:
         # A few at a time: a small file may unpack to a thousand times its size.
         async with doors.inspections:
             size, blob = await doors.do(receive, file.file, stream, name, compressed, settings.max_unpacked)
-            with named(Path(stream.name), name) as path:
-                preview = await inspected(
+            with link_blob(Path(stream.name), name) as path:
+                preview = await inspect_file(
                     path, asked, settings.inspection_memory, settings.inspection_seconds
                 )
             suffix = Path(name).suffix.lower()
@@ -89,19 +91,19 @@ async def _stored(
 
 
 @router.get("", response_model=DatasetPage)
-async def datasets(caller: Reader, doors: AtDoors, cursor: Cursor = None, limit: Limit = 50) -> Any:
+async def datasets(caller: Reader, doors: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
     """List the data sets, newest first."""
-    found, after = await doors.do(doors.store.datasets.page, caller.owner, place_of(cursor), limit)
-    return Document({"items": [dataset_document(each) for each in found], "next": cursor_of(after)})
+    found, after = await doors.do(doors.store.datasets.page, caller.owner, decode_cursor(cursor), limit)
+    return JSONDocument({"items": [dataset_document(each) for each in found], "next": encode_cursor(after)})
 
 
 @router.get("/{dataset}", response_model=DatasetView)
-async def dataset(dataset: Id, caller: Reader, doors: AtDoors) -> Any:
+async def dataset(dataset: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Look at a data set: columns, units, statistics, sampling, warnings."""
-    return Document(dataset_document(await doors.do(doors.store.datasets.get, caller.owner, dataset)))
+    return JSONDocument(dataset_document(await doors.do(doors.store.datasets.get, caller.owner, dataset)))
 
 
 @router.delete("/{dataset}", status_code=204)
-async def delete(dataset: Id, caller: Writer, doors: AtDoors) -> None:
+async def delete(dataset: Id, caller: Writer, doors: AppStateDep) -> None:
     """Delete a data set that no unfinished job needs."""
     await doors.do(doors.store.datasets.delete, caller.owner, dataset)

@@ -6,9 +6,16 @@ from fastapi import APIRouter, Response
 
 from islands_api.schemas import DiscrepancyRequest, JobView
 from islands_api.web.auth import Reader, Writer
-from islands_api.web.dependencies import AtDoors
-from islands_api.web.job_submission import ACCEPTED, JOBS, IdempotencyKey, accept, finished, of_kind
-from islands_api.web.problems import RESPONSES, NoSuchThing
+from islands_api.web.dependencies import AppStateDep
+from islands_api.web.job_submission import (
+    ACCEPTED,
+    JOBS,
+    IdempotencyKey,
+    get_job_of_kind,
+    get_result,
+    submit_job,
+)
+from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.requests import JSONRoute
 from islands_api.web.routes.jobs import Id
 from islands_service.domain.jobs import DISCREPANCY, EXTENDED
@@ -18,24 +25,24 @@ router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSON
 
 @router.post("/v1/discrepancies", status_code=202, response_model=JobView, responses=ACCEPTED)
 async def submit(
-    request: DiscrepancyRequest, caller: Writer, doors: AtDoors, idempotency_key: IdempotencyKey = None
+    request: DiscrepancyRequest, caller: Writer, doors: AppStateDep, idempotency_key: IdempotencyKey = None
 ) -> Any:
     """Submit a job that finds out what a simulation gets wrong about a record, and why.
 
     It is a job as all others are, under `/v1/jobs`: followed, cancelled and resumed there. Its `result` is
     what the command line writes as `discrepancy.json`, its `report` says it in words and figures.
     """
-    return await accept(doors, caller, request, DISCREPANCY, idempotency_key)
+    return await submit_job(doors, caller, request, DISCREPANCY, idempotency_key)
 
 
 @router.get(JOBS + "/{job}/extended", response_model=dict[str, Any])
-async def extended(job: Id, caller: Reader, doors: AtDoors) -> Response:
+async def extended(job: Id, caller: Reader, doors: AppStateDep) -> Response:
     """Take the simulation with the effects that it lacked; there is none where nothing was named."""
-    found = await of_kind(doors, caller, job, DISCREPANCY)
-    document = await finished(doors, found)
+    found = await get_job_of_kind(doors, caller, job, DISCREPANCY)
+    document = await get_result(doors, found)
     blob = await doors.do(doors.store.results.artefact, job, EXTENDED)
     if blob is None:
-        raise NoSuchThing(
+        raise ResourceNotFoundError(
             f"job {job} has nothing to extend the simulation by: it found {document['verdict']}"
         )
     return Response(await doors.do(doors.blobs.read, blob), media_type="application/json")

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.responses import StreamingResponse
 
-from islands_api.web.auth import Caller, KeyRing, Reader
-from islands_api.web.dependencies import AtDoors, Doors
+from islands_api.web.auth import KeyCache, Principal, Reader
+from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.responses import json_text
 from islands_api.web.routes.jobs import Id
@@ -51,7 +51,7 @@ async def events(
     request: Request,
     job: Id,
     caller: Reader,
-    doors: AtDoors,
+    doors: AppStateDep,
     last_event_id: Annotated[
         int, Header(ge=0, le=2**62, description="The last event that was seen: what came after it is sent.")
     ] = 0,
@@ -70,14 +70,16 @@ async def events(
     )
 
 
-async def _stream(doors: Doors, job: Job, last: int) -> AsyncGenerator[bytes]:
+async def _stream(doors: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:
     with doors.measures.streams.track_inprogress():
         async with aclosing(doors.hub.events(job.id, job.version, last, _ALIVE)) as events:
             async for event in events:
                 yield b": alive\n\n" if event is None else _encoded(event)
 
 
-async def _while_open(keys: KeyRing, caller: Caller, stream: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:
+async def _while_open(
+    keys: KeyCache, caller: Principal, stream: AsyncGenerator[bytes]
+) -> AsyncIterator[bytes]:
     let_in = monotonic()
     async with aclosing(stream):
         async for piece in stream:

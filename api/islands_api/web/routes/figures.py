@@ -12,16 +12,16 @@ from fastapi import APIRouter, Path, Response
 
 from islands.errors import IslandsError
 from islands_api.schemas import Names
-from islands_api.web.auth import Caller, Reader
-from islands_api.web.dependencies import AtDoors, Doors
-from islands_api.web.job_submission import finished, of_kind
-from islands_api.web.problems import RESPONSES, NoSuchThing
+from islands_api.web.auth import Principal, Reader
+from islands_api.web.dependencies import AppState, AppStateDep
+from islands_api.web.job_submission import get_job_of_kind, get_result
+from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, stored
 from islands_service.domain.job_spec import identification_of
 from islands_service.domain.jobs import IDENTIFICATION, REPORT
-from islands_service.store.blobs import NoSuchBlob
-from islands_service.store.database import StoreFull, StoreUnavailable
+from islands_service.store.blobs import BlobNotFoundError
+from islands_service.store.database import StorageFullError, StoreUnavailableError
 
 log = structlog.get_logger()
 
@@ -69,11 +69,11 @@ SearchFigure = Annotated[
 ]
 
 
-class DrawingFailed(IslandsError):
+class FigureError(IslandsError):
     """The figures cannot be drawn."""
 
 
-class Failures:
+class FigureFailures:
     """What could not be drawn of late: to try it again would keep others from their figures."""
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class Failures:
 
         Raises
         ------
-        DrawingFailed, NoSuchBlob
+        FigureError, BlobNotFoundError
         """
         until, error = self._known.get((job, rank), (0.0, None))
         if error is not None and monotonic() < until:
@@ -99,31 +99,33 @@ class Failures:
 
 
 #: Of this process: a job's id is of no other service.
-_FAILURES = Failures()
+_FAILURES = FigureFailures()
 
 
 @router.get("/{job}/figures", response_model=Names)
-async def search_figures(job: Id, caller: Reader, doors: AtDoors) -> Any:
+async def search_figures(job: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Say which figures of the search there may be."""
     return {"items": await _of_search(doors, caller, job)}
 
 
 @router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG)
-async def search_figure(job: Id, figure: SearchFigure, caller: Reader, doors: AtDoors) -> Response:
+async def search_figure(job: Id, figure: SearchFigure, caller: Reader, doors: AppStateDep) -> Response:
     """See a figure of the search: the record, error against size, convergence, the islands' course."""
     _known(figure, await _of_search(doors, caller, job))
     return await _figure(doors, caller, job, f"{figure}.svg", None)
 
 
 @router.get("/{job}/models/{rank}/figures", response_model=Names)
-async def model_figures(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Any:
+async def model_figures(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) -> Any:
     """Say which figures of a model there are."""
     await stored(doors, caller, job, rank)
     return {"items": MODEL_FIGURES}
 
 
 @router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG)
-async def model_figure(job: Id, rank: Rank, figure: ModelFigure, caller: Reader, doors: AtDoors) -> Response:
+async def model_figure(
+    job: Id, rank: Rank, figure: ModelFigure, caller: Reader, doors: AppStateDep
+) -> Response:
     """See a figure of a model: free run, hysteresis loop, holds, residual correlations."""
     await stored(doors, caller, job, rank)
     _known(figure, MODEL_FIGURES)
@@ -131,34 +133,34 @@ async def model_figure(job: Id, rank: Rank, figure: ModelFigure, caller: Reader,
 
 
 @router.get("/{job}/models/{rank}/simulation", response_model=dict[str, Any])
-async def simulation(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Response:
+async def simulation(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) -> Response:
     """Take a model's free run over the validation data as numbers, thinned for a screen."""
     await stored(doors, caller, job, rank)
     return await _figure(doors, caller, job, f"{rank}/{SIMULATION}", rank, "application/json")
 
 
 @router.get("/{job}/report", response_class=Response, responses=_HTML)
-async def report(job: Id, caller: Reader, doors: AtDoors) -> Response:
+async def report(job: Id, caller: Reader, doors: AppStateDep) -> Response:
     """Take the report of a job: one HTML file with what it found and its figures, to be kept or sent."""
-    await finished(doors, await doors.do(doors.store.jobs.get, caller.owner, job))
+    await get_result(doors, await doors.do(doors.store.jobs.get, caller.owner, job))
     answer = await _figure(doors, caller, job, REPORT, None, "text/html; charset=utf-8")
     answer.headers["Content-Security-Policy"] = _REPORT_POLICY
     return answer
 
 
-async def _of_search(doors: Doors, caller: Caller, job: str) -> tuple[str, ...]:
-    document = await finished(doors, await of_kind(doors, caller, job, IDENTIFICATION))
+async def _of_search(doors: AppState, caller: Principal, job: str) -> tuple[str, ...]:
+    document = await get_result(doors, await get_job_of_kind(doors, caller, job, IDENTIFICATION))
     several = document["settings"]["islands"] > 1
     return tuple(name for name in SEARCH_FIGURES if several or name != _OF_SEVERAL)
 
 
 def _known(figure: str, figures: tuple[str, ...]) -> None:
     if figure not in figures:
-        raise NoSuchThing(f"there is no figure {figure!r}: take one of {', '.join(figures)}")
+        raise ResourceNotFoundError(f"there is no figure {figure!r}: take one of {', '.join(figures)}")
 
 
 async def _figure(
-    doors: Doors, caller: Caller, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
+    doors: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
 ) -> Response:
     blob = await doors.do(doors.store.results.artefact, job, name)
     if blob is None:
@@ -169,26 +171,26 @@ async def _figure(
                 await _draw(doors, caller, job, rank)
                 blob = await doors.do(doors.store.results.artefact, job, name)
     if blob is None:
-        raise NoSuchThing(f"job {job} has no figure {name}")
+        raise ResourceNotFoundError(f"job {job} has no figure {name}")
     data = await doors.do(doors.blobs.read, blob)
     # A browser may have several keys, one after the other.
     headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization"}
     return Response(data, media_type=media, headers=headers)
 
 
-async def _draw(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
-    found = await of_kind(doors, caller, job, IDENTIFICATION)
+async def _draw(doors: AppState, caller: Principal, job: str, rank: int | None) -> None:
+    found = await get_job_of_kind(doors, caller, job, IDENTIFICATION)
     for dataset in identification_of(found.spec).datasets:
         await doors.do(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
     _FAILURES.refuse(job, rank)
     try:
         await _drawn(doors, caller, job, rank)
-    except (DrawingFailed, NoSuchBlob) as error:
+    except (FigureError, BlobNotFoundError) as error:
         _FAILURES.remember(job, rank, error)
         raise
 
 
-async def _drawn(doors: Doors, caller: Caller, job: str, rank: int | None) -> None:
+async def _drawn(doors: AppState, caller: Principal, job: str, rank: int | None) -> None:
     of = () if rank is None else ("--rank", str(rank))
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "islands_service.reports.figure_worker", job, f"--owner={caller.owner}", *of),
@@ -200,7 +202,7 @@ async def _drawn(doors: Doors, caller: Caller, job: str, rank: int | None) -> No
         async with asyncio.timeout(_PATIENCE):
             said, complaint = await process.communicate()
     except TimeoutError:
-        raise DrawingFailed(f"the figures of job {job} take longer than {_PATIENCE:.0f} s to draw") from None
+        raise FigureError(f"the figures of job {job} take longer than {_PATIENCE:.0f} s to draw") from None
     finally:
         if process.returncode is None:
             process.kill()
@@ -211,15 +213,15 @@ async def _drawn(doors: Doors, caller: Caller, job: str, rank: int | None) -> No
     reason = _text(complaint)
     match process.returncode:
         case errno.EINVAL:
-            raise DrawingFailed(f"the figures of job {job} cannot be drawn: {_text(said)}")
+            raise FigureError(f"the figures of job {job} cannot be drawn: {_text(said)}")
         case errno.ENOSPC:
-            raise StoreFull(reason)
+            raise StorageFullError(reason)
         case errno.EAGAIN:
-            raise StoreUnavailable(reason)
+            raise StoreUnavailableError(reason)
         case errno.ENODATA:
-            raise NoSuchBlob(reason)
+            raise BlobNotFoundError(reason)
     log.error("drawing failed", job=job, status=process.returncode, reason=reason)
-    raise DrawingFailed(
+    raise FigureError(
         f"the figures of job {job} cannot be drawn: why stands in the log, for whoever runs this service"
     )
 

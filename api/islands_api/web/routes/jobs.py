@@ -6,12 +6,12 @@ from fastapi import APIRouter, Header, Path, Query, Response
 
 from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
 from islands_api.web.auth import Reader, Writer
-from islands_api.web.dependencies import AtDoors, Doors
-from islands_api.web.job_submission import ACCEPTED, ETAG, IdempotencyKey, accept, etag, of_kind
-from islands_api.web.pagination import Cursor, Limit, cursor_of, place_of
+from islands_api.web.dependencies import AppState, AppStateDep
+from islands_api.web.job_submission import ACCEPTED, ETAG, IdempotencyKey, etag, get_job_of_kind, submit_job
+from islands_api.web.pagination import Cursor, Limit, decode_cursor, encode_cursor
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import JSONRoute
-from islands_api.web.responses import Document, Items, job_document
+from islands_api.web.responses import JSONDocument, JSONItems, job_document
 from islands_service.domain.jobs import IDENTIFICATION, TERMINAL, Job, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
@@ -38,33 +38,35 @@ _POINTS, _FEWEST, _ERRORS = 5000, 50, 100_000
 
 @router.post("", status_code=202, response_model=JobView, responses=ACCEPTED)
 async def submit(
-    request: JobRequest, caller: Writer, doors: AtDoors, idempotency_key: IdempotencyKey = None
+    request: JobRequest, caller: Writer, doors: AppStateDep, idempotency_key: IdempotencyKey = None
 ) -> Any:
     """Submit a job that identifies a record. Once this answers 202 it is not lost, whatever happens.
 
     It waits until a coordinator is free; follow it by its `events`, or by `GET` with `wait`.
     """
-    return await accept(doors, caller, request, IDENTIFICATION, idempotency_key)
+    return await submit_job(doors, caller, request, IDENTIFICATION, idempotency_key)
 
 
 @router.get("", response_model=JobPage)
 async def jobs(
     caller: Reader,
-    doors: AtDoors,
+    doors: AppStateDep,
     state: Annotated[JobState | None, Query(description="Of this state alone.")] = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:
     """List the jobs of every kind, newest first."""
-    page = await doors.do(doors.store.jobs.page, caller.owner, state, place_of(cursor), limit)
-    return Document({"items": [job_document(job) for job in page.jobs], "next": cursor_of(page.after)})
+    page = await doors.do(doors.store.jobs.page, caller.owner, state, decode_cursor(cursor), limit)
+    return JSONDocument(
+        {"items": [job_document(job) for job in page.jobs], "next": encode_cursor(page.after)}
+    )
 
 
 @router.get("/{job}", response_model=JobView, responses=_SEEN)
 async def job(
     job: Id,
     caller: Reader,
-    doors: AtDoors,
+    doors: AppStateDep,
     wait: Annotated[
         float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
     ] = 0.0,
@@ -81,24 +83,24 @@ async def job(
         headers["Retry-After"] = "1"
     if _known(if_none_match, found):
         return Response(status_code=304, headers=headers)
-    return Document(job_document(found), headers=headers)
+    return JSONDocument(job_document(found), headers=headers)
 
 
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
-async def cancel(job: Id, caller: Writer, doors: AtDoors) -> Any:
+async def cancel(job: Id, caller: Writer, doors: AppStateDep) -> Any:
     """Cancel a job: at once if it waits; if it runs, within a second or so."""
-    return Document(job_document(await doors.do(doors.store.jobs.cancel, caller.owner, job)), 202)
+    return JSONDocument(job_document(await doors.do(doors.store.jobs.cancel, caller.owner, job)), 202)
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
-async def resume(job: Id, caller: Writer, doors: AtDoors) -> Any:
+async def resume(job: Id, caller: Writer, doors: AppStateDep) -> Any:
     """Have a job that failed or was cancelled go on from its last checkpoint."""
     resumed = await doors.do(doors.store.jobs.resume, caller.owner, job, doors.settings.max_active)
-    return Document(job_document(resumed), 202)
+    return JSONDocument(job_document(resumed), 202)
 
 
 @router.delete("/{job}", status_code=204)
-async def delete(job: Id, caller: Writer, doors: AtDoors) -> None:
+async def delete(job: Id, caller: Writer, doors: AppStateDep) -> None:
     """Delete a finished job with its result."""
     await doors.do(doors.store.jobs.delete, caller.owner, job)
 
@@ -107,7 +109,7 @@ async def delete(job: Id, caller: Writer, doors: AtDoors) -> None:
 async def history(
     job: Id,
     caller: Reader,
-    doors: AtDoors,
+    doors: AppStateDep,
     after: Annotated[
         int, Query(ge=-1, le=2**31 - 1, description="From the generation behind this one on.")
     ] = -1,
@@ -116,19 +118,19 @@ async def history(
 
     It comes in pages: ask for what is behind the last generation of one, until a page is empty.
     """
-    found = await of_kind(doors, caller, job, IDENTIFICATION)
+    found = await get_job_of_kind(doors, caller, job, IDENTIFICATION)
     return await doors.do(_course, doors, found, after)
 
 
-def _course(doors: Doors, job: Job, after: int) -> Items:
+def _course(doors: AppState, job: Job, after: int) -> JSONItems:
     islands = (job.spec.get("settings") or {}).get("islands") or 1
     most = min(_POINTS, max(_FEWEST, _ERRORS // islands))
     names = ("generation", "evaluations", "best", "islands")
     points = doors.store.results.history(job.id, after, most)
-    return Items([dict(zip(names, point, strict=True)) for point in points])
+    return JSONItems([dict(zip(names, point, strict=True)) for point in points])
 
 
-async def _changed(doors: Doors, job: Job, seconds: float) -> Job:
+async def _changed(doors: AppState, job: Job, seconds: float) -> Job:
     with doors.hub.watching(job.id, job.version) as feed:
         await doors.hub.wait(feed, job.version, seconds)
     return await doors.do(doors.store.jobs.get, job.owner, job.id)

@@ -7,11 +7,11 @@ from fastapi import APIRouter, Path, Query, Response
 from islands.io.export import EXPORTS, export
 from islands.io.models import model_from_json
 from islands_api.schemas import ModelPage, ModelView
-from islands_api.web.auth import Caller, Reader
-from islands_api.web.dependencies import AtDoors, Doors
-from islands_api.web.job_submission import finished, of_kind
-from islands_api.web.problems import RESPONSES, NoSuchThing
-from islands_api.web.responses import Document, Items
+from islands_api.web.auth import Principal, Reader
+from islands_api.web.dependencies import AppState, AppStateDep
+from islands_api.web.job_submission import get_job_of_kind, get_result
+from islands_api.web.problems import RESPONSES, ResourceNotFoundError
+from islands_api.web.responses import JSONDocument, JSONItems
 from islands_api.web.routes.jobs import Id
 from islands_service.domain.jobs import IDENTIFICATION
 from islands_service.store.results import StoredModel
@@ -38,16 +38,16 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/{job}/models", response_model=ModelPage)
-async def models(job: Id, caller: Reader, doors: AtDoors) -> Any:
+async def models(job: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Look at the models of a job, best first; there are none before it has succeeded."""
-    await of_kind(doors, caller, job, IDENTIFICATION)
-    return await doors.do(lambda: Items([model.document for model in doors.store.results.models(job)]))
+    await get_job_of_kind(doors, caller, job, IDENTIFICATION)
+    return await doors.do(lambda: JSONItems([model.document for model in doors.store.results.models(job)]))
 
 
 @router.get("/{job}/models/{rank}", response_model=ModelView)
-async def model(job: Id, rank: Rank, caller: Reader, doors: AtDoors) -> Any:
+async def model(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) -> Any:
     """Look at one model."""
-    return Document((await stored(doors, caller, job, rank)).document)
+    return JSONDocument((await stored(doors, caller, job, rank)).document)
 
 
 @router.get(
@@ -59,7 +59,7 @@ async def exported(
     job: Id,
     rank: Rank,
     caller: Reader,
-    doors: AtDoors,
+    doors: AppStateDep,
     form: Annotated[
         str, Query(alias="format", description="A kind of text.", json_schema_extra={"enum": list(EXPORTS)})
     ] = "python",
@@ -76,25 +76,25 @@ async def exported(
 
 
 @router.get("/{job}/result", response_model=dict[str, Any])
-async def result(job: Id, caller: Reader, doors: AtDoors) -> Any:
+async def result(job: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Take the whole result, in the form of `result.json`, or of `discrepancy.json`."""
     found = await doors.do(doors.store.jobs.get, caller.owner, job)
-    document = await finished(doors, found)
+    document = await get_result(doors, found)
     if found.kind != IDENTIFICATION:
-        return Document(document)
+        return JSONDocument(document)
     models = await doors.do(doors.store.results.models, job)
-    return Document({**document, "models": [model.document for model in models]})
+    return JSONDocument({**document, "models": [model.document for model in models]})
 
 
-async def stored(doors: Doors, caller: Caller, job: str, rank: int) -> StoredModel:
+async def stored(doors: AppState, caller: Principal, job: str, rank: int) -> StoredModel:
     """Return a model of a finished job.
 
     Raises
     ------
-    NotFinished, NoSuchThing
+    ResultNotReadyError, ResourceNotFoundError
     """
-    await finished(doors, await of_kind(doors, caller, job, IDENTIFICATION))
+    await get_result(doors, await get_job_of_kind(doors, caller, job, IDENTIFICATION))
     found = await doors.do(doors.store.results.models, job, rank)
     if not found:
-        raise NoSuchThing(f"job {job} has no model {rank}: look at its /models")
+        raise ResourceNotFoundError(f"job {job} has no model {rank}: look at its /models")
     return found[0]

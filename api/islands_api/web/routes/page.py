@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 
-from islands_api.web.problems import NoSuchThing
+from islands_api.web.problems import ResourceNotFoundError
 
 router = APIRouter(include_in_schema=False)
 
@@ -62,7 +62,7 @@ async def index(if_none_match: Annotated[str | None, Header()] = None) -> Respon
 async def file(name: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
     """Give a file of the page."""
     if name not in FILES:
-        raise NoSuchThing(f"the page has no file {name!r}")
+        raise ResourceNotFoundError(f"the page has no file {name!r}")
     return _given(name, if_none_match)
 
 

@@ -7,8 +7,8 @@ from prometheus_client import CONTENT_TYPE_LATEST
 
 from islands_api.schemas import Health
 from islands_api.web.auth import Operator
-from islands_api.web.dependencies import AtDoors
-from islands_api.web.problems import PROBLEMS, RESPONSES, NoSuchThing
+from islands_api.web.dependencies import AppStateDep
+from islands_api.web.problems import PROBLEMS, RESPONSES, ResourceNotFoundError
 
 router = APIRouter(tags=["service"], responses=RESPONSES)
 
@@ -20,7 +20,7 @@ async def healthz() -> Any:
 
 
 @router.get("/readyz", response_model=Health)
-async def readyz(doors: AtDoors) -> Any:
+async def readyz(doors: AppStateDep) -> Any:
     """Say that jobs are accepted: the database answers. Ray may still be starting."""
     await doors.do(doors.store.jobs.versions, [])
     return {"status": "ready"}
@@ -31,7 +31,7 @@ async def readyz(doors: AtDoors) -> Any:
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
-async def metrics(_operator: Operator, doors: AtDoors) -> Response:
+async def metrics(_operator: Operator, doors: AppStateDep) -> Response:
     """Measure, for Prometheus: queue, leases, evaluations a second, best error, latency."""
     return Response(await doors.do(doors.measures.page), media_type=CONTENT_TYPE_LATEST)
 
@@ -46,4 +46,4 @@ async def problem(
     for entry in PROBLEMS.values():
         if entry.type == kind:
             return {"type": f"/problems/{kind}", "status": int(entry.status), "title": entry.title}
-    raise NoSuchThing(f"there is no type of problem {kind!r}")
+    raise ResourceNotFoundError(f"there is no type of problem {kind!r}")

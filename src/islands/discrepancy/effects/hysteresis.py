@@ -6,7 +6,7 @@ import numpy as np
 
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, SimulationContext, Site
-from islands.systems.hysteresis_operators import played, slider
+from islands.systems.hysteresis_operators import play_from, slider
 
 
 def _stiction_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
@@ -42,7 +42,7 @@ STICTION = Effect(
 
 
 def _backlash_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
-    return played(u, values[0]) if values[0] > 0.0 else u
+    return play_from(u, values[0]) if values[0] > 0.0 else u
 
 
 def _backlash_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:

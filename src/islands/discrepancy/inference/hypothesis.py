@@ -15,7 +15,7 @@ from islands.discrepancy.inference.screening import (
     transfer_parameters,
 )
 from islands.discrepancy.interfaces.effect import Effect
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +85,7 @@ def without_effect(found: Hypothesis, effect: Effect, target: Target) -> Hypothe
 
 
 def find_alternatives(
-    found: Hypothesis, target: Target, effects: Sequence[Effect], spread: Spread = map
+    found: Hypothesis, target: Target, effects: Sequence[Effect], spread: ParallelMap = map
 ) -> tuple[Alternatives, ...]:
     """Take each effect out, and try all others in its place."""
     rivals = []

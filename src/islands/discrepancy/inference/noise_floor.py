@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 
 from islands.discrepancy.interfaces.effect import Signal
-from islands.systems.hysteresis_operators import played
+from islands.systems.hysteresis_operators import play_from
 
 #: Lags in samples, time constants of memories in samples, widths of plays in standard deviations.
 LAGS, MEMORIES, PLAYS = (1, 2, 4, 8, 16, 32), (5.0, 20.0, 80.0, 320.0), (0.1, 0.4, 1.2)
@@ -59,7 +59,7 @@ def _features(u: Signal, simulated: Signal) -> Signal:
             a = np.exp(-1.0 / memory)
             columns.append(scipy.signal.lfilter([1.0 - a], [1.0, -a], signal - signal[0]))
         for width in PLAYS:
-            columns.append(played(signal, width * float(np.std(signal))))
+            columns.append(play_from(signal, width * float(np.std(signal))))
     return np.column_stack(columns)
 
 

@@ -17,7 +17,7 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 #: Points of a grid that a fit begins from, the steps that each may take before one is chosen, and how far a
 #: strength is carried from its grid's value.
@@ -59,13 +59,13 @@ def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
 
 
 def screen_effects(
-    base: CalibrationResult, target: Target, effects: Iterable[Effect], spread: Spread = map
+    base: CalibrationResult, target: Target, effects: Iterable[Effect], spread: ParallelMap = map
 ) -> list[ScreenedEffect]:
     """Extend a simulation by each effect in turn; return the rungs, the best first.
 
     Parameters
     ----------
-    spread : Spread
+    spread : ParallelMap
         Fits the effects, side by side perhaps.
     """
     space = _Projection(base, target)

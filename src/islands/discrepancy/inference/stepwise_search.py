@@ -19,7 +19,7 @@ from islands.discrepancy.inference.hypothesis import (
 )
 from islands.discrepancy.inference.screening import EQUAL, ScreenedEffect, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 #: The least that an effect has to gain, in minus twice the log-likelihood: six is one to twenty.
 LEAST = 6.0
@@ -44,7 +44,7 @@ def stepwise_search(
     target: Target,
     effects: Sequence[Effect],
     tell: Tell,
-    spread: Spread = map,
+    spread: ParallelMap = map,
     pairs: bool = False,
 ) -> tuple[Hypothesis, Target]:
     """Return the best explanation, and what it was held against.
@@ -109,7 +109,7 @@ def refine_by_swaps(
     target: Target,
     effects: Sequence[Effect],
     tell: Tell,
-    spread: Spread = map,
+    spread: ParallelMap = map,
     most: int = MOST,
 ) -> tuple[Hypothesis, Target]:
     """Leave out what is not needed, put what explains more in an effect's place, and add what pays beside it.

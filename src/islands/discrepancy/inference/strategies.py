@@ -30,7 +30,7 @@ from islands.discrepancy.inference.verdict import (
     validate_out_of_sample,
 )
 from islands.discrepancy.interfaces.effect import Effect
-from islands.parallel import Spread, once
+from islands.parallel import ParallelMap, memoised_map
 
 #: Share of the misfit that a single effect has to explain for pairs to be looked for: of noise none does.
 WORTHWHILE = 0.1
@@ -77,7 +77,7 @@ def search_with_ar_noise(
     target: Target,
     effects: Sequence[Effect],
     tell: Tell,
-    spread: Spread,
+    spread: ParallelMap,
 ) -> SearchOutcome:
     """Look for what explains a record, what is left being noise that may remember.
 
@@ -98,13 +98,15 @@ def search_with_ar_noise(
 
 
 def search_with_model_error(
-    base: CalibrationResult, target: Target, effects: Sequence[Effect], tell: Tell, spread: Spread
+    base: CalibrationResult, target: Target, effects: Sequence[Effect], tell: Tell, spread: ParallelMap
 ) -> SearchOutcome:
     """Look for what explains a record's misfit, whatever is left being of the simulation's form."""
     tell("the form is wrong: once more by the misfit alone")
     rungs: Sequence[ScreenedEffect] = ()
     found = Hypothesis(base, base.score, ())
-    spread = once(spread, is_same_fit)  # how many samples count changes what a fit is worth, and not the fit
+    spread = memoised_map(
+        spread, is_same_fit
+    )  # how many samples count changes what a fit is worth, and not the fit
     for _ in range(2):
         # Neighbours say less that is new the more misfit there is: counted anew with the best causes in.
         target = replace(target, effective=effective_samples(target.residual(found.fit.output)))

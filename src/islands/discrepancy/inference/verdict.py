@@ -23,7 +23,7 @@ from islands.discrepancy.inference.hypothesis import (
 from islands.discrepancy.inference.screening import ScreenedEffect
 from islands.discrepancy.inference.stepwise_search import LEAST
 from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.parallel import Spread
+from islands.parallel import ParallelMap
 
 #: Share of the explainable misfit that names have to explain, and from which on a remainder is no more than
 #: one.
@@ -156,7 +156,7 @@ def describe_effects(
     target: Target,
     effects: Sequence[Effect],
     floor: float,
-    spread: Spread = map,
+    spread: ParallelMap = map,
 ) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
     """Say what was found, and which other rungs could stand in the place of one.
 

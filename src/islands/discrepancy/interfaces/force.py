@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
-from islands.systems.mechanics import WIDTH, Elements, along, compiled
+from islands.systems.mechanics import WIDTH, Elements, compiled, integrate_along
 
 #: ``(coordinate, rate, own state, numbers) -> number``, a scalar function that can be compiled.
 Law = Callable[[float, float, float, Any], float]
@@ -75,5 +75,7 @@ def add_output_forces(
     if not parts:
         return total
     x = np.ascontiguousarray(x)
-    along(x, np.gradient(x, scene.dt), scene.dt, pack_force_laws(parts, scene, balance=False), total)
+    integrate_along(
+        x, np.gradient(x, scene.dt), scene.dt, pack_force_laws(parts, scene, balance=False), total
+    )
     return total

@@ -17,7 +17,7 @@ from islands.discrepancy.interfaces.force import pack_force_laws
 from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import output_coordinate
 from islands.errors import RecordError
-from islands.systems.mechanics import balance
+from islands.systems.mechanics import integrate_motion
 
 #: What its state is called.
 FORCE = "force"
@@ -100,7 +100,7 @@ class RigidAxisSimulator:
 
         def shots(position: Signal, rate: Signal) -> Signal:
             y = np.empty(x.size)
-            balance(
+            integrate_motion(
                 *(x * gain + offset, scene.midway_of(x) * gain + offset),
                 *(scene.dt, mass, damping, 0.0, elements),
                 *(starts, np.repeat(position, times), np.repeat(rate, times), y),

@@ -13,8 +13,8 @@ from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.force import pack_force_laws
 from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import output_coordinate
-from islands.systems.mechanics import balance
-from islands.systems.second_order import SecondOrder, second_order_of
+from islands.systems.mechanics import integrate_motion
+from islands.systems.second_order import SecondOrder, estimate_second_order
 
 #: What its state is called.
 FORCE = "force"
@@ -79,7 +79,7 @@ class SecondOrderSimulator:
         begins = np.zeros(x.size, dtype=bool)
         begins[0] = True
         y = np.empty(x.size)
-        balance(
+        integrate_motion(
             *(x * gain + offset, scene.midway_of(x) * gain + offset),
             *(scene.dt, mass, damping, stiffness),
             pack_force_laws(forces, scene, balance=True),
@@ -90,7 +90,7 @@ class SecondOrderSimulator:
 
 def make_second_order(given: Mapping[str, float], record: Dataset) -> SecondOrderSimulator:
     """Return the core of parameters that are given; what is missing is estimated from a record."""
-    found = second_order_of(record.u[:, 0], record.y, record.dt, given)
+    found = estimate_second_order(record.u[:, 0], record.y, record.dt, given)
     units = (record.input_units[0] or "1", record.output_unit or "1")
     return SecondOrderSimulator(found, units, float(np.std(record.y)))
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.errors import chosen
+from islands.errors import lookup
 from islands.io.export.c import c_source
 from islands.io.export.matlab import matlab_source
 from islands.io.export.python import python_source
@@ -32,4 +32,4 @@ def export(model: Model, kind: str) -> str:
     SettingsError
         There is no such kind.
     """
-    return chosen(EXPORTS, kind, "format")(model)
+    return lookup(EXPORTS, kind, "format")(model)

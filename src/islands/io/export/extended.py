@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.discrepancy.effects import summary_of
-from islands.errors import chosen
+from islands.errors import lookup
 from islands.io.simulator_spec.schema import LocalExtendedSpec
 
 
@@ -65,4 +65,4 @@ def export_extended(asked: LocalExtendedSpec, kind: str) -> str:
     SettingsError
         There is no such kind.
     """
-    return chosen(EXTENDED_EXPORTS, kind, "format of an extended simulation")(asked)
+    return lookup(EXTENDED_EXPORTS, kind, "format of an extended simulation")(asked)

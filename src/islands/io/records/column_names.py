@@ -19,7 +19,7 @@ _TIME = re.compile(r"t(_.*|\s*[\[(].*)?|time.*", re.IGNORECASE)
 _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]*?)\s*[\])]")
 
 
-def unit_of(name: str) -> str:
+def parse_unit(name: str) -> str:
     """Return the unit in a column's name: ``V`` of ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
 
     It is what follows the last underscore, unless that is a bare number (``u_1``); ``""`` without one.
@@ -30,7 +30,7 @@ def unit_of(name: str) -> str:
     return "" if suffix.isdigit() else suffix
 
 
-def structures_of(names: Iterable[str]) -> dict[str, str]:
+def split_structures(names: Iterable[str]) -> dict[str, str]:
     """Return the structure in which each column is a field: ``run_1.`` of ``run_1.u_V``, ``""`` at the top.
 
     It takes two fields to make a structure: a point alone may belong to a unit (``k_N.m``).
@@ -40,19 +40,19 @@ def structures_of(names: Iterable[str]) -> dict[str, str]:
     return {name: structure if fields[structure] > 1 else "" for name, structure in before.items()}
 
 
-def column_of(name: str, columns: Iterable[str]) -> str:
+def find_column(name: str, columns: Iterable[str]) -> str:
     """Return the column that an input names: ``u_V`` of ``u_V+1``, unless a column has the very name."""
     return name if name in tuple(columns) else name.removesuffix(AT_ONCE)
 
 
 def looks_like_time(name: str) -> bool:
     """Tell whether a column is called ``t``, ``t_*`` or ``time*``; ``T_K`` is a temperature."""
-    return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and unit_of(name) in TEMPERATURE_UNITS)
+    return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
 
 
 def seconds_per_unit(name: str) -> float | None:
     """Return the seconds of a time column's unit, None where the unit is unknown."""
-    return TIME_UNITS.get(unit_of(name).lower())
+    return TIME_UNITS.get(parse_unit(name).lower())
 
 
 def time_column(
@@ -72,15 +72,15 @@ def time_column(
     taken : collection of str
         Inputs and output, which are not the time.
     structure : str
-        The structure of the output (see `structures_of`): a time among its fields goes before one at the top,
-        and the fields of other structures are none of its business.
+        The structure of the output (see `split_structures`). A time among its fields precedes one at the top;
+        fields of other structures are ignored.
 
     Raises
     ------
     RecordError
         Several columns may be the time.
     """
-    structures = structures_of(names)
+    structures = split_structures(names)
     for home in dict.fromkeys((structure, "")):
         own = {
             name: name.removeprefix(home) for name in names if structures[name] == home and name not in taken
@@ -89,7 +89,7 @@ def time_column(
             name for name, word in own.items() if looks_like_time(word) and seconds_per_unit(word) is not None
         ]
         plain = [
-            name for name in candidates if own[name].lower() in {"t", "time"} or unit_of(own[name])
+            name for name in candidates if own[name].lower() in {"t", "time"} or parse_unit(own[name])
         ] or candidates
         if len(plain) > 1:
             raise RecordError(

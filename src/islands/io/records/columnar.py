@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.column_names import structures_of
-from islands.io.records.table import Columns, Rows, select
+from islands.io.records.column_names import split_structures
+from islands.io.records.table import Columns, RowRange, select
 from islands.io.records.validation import check_equal_length
 
 #: Names, in lower case, under which a file states its sampling, and the sampling time in seconds.
@@ -21,7 +21,7 @@ SAMPLING: dict[str, Callable[[float], float]] = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Channels:
+class ColumnarFile:
     """A file of arrays; an array is loaded when it is asked for.
 
     Attributes
@@ -43,7 +43,7 @@ class Channels:
 
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times that the file states; see `islands.io.records.table.Table`."""
-        structures = structures_of(self.names)
+        structures = split_structures(self.names)
         stated: dict[str, float] = {}
         for home in dict.fromkeys((structure, "")):
             for name in self.scalars:
@@ -61,7 +61,7 @@ class Channels:
         check_equal_length({name: len(channel) for name, channel in channels.items()}, self.file)
         chosen = select(rows, len(channels[names[0]]), self.file)
         return Columns(
-            Rows(self.file, "sample", chosen),
+            RowRange(self.file, "sample", chosen),
             {name: channel[chosen.start : chosen.stop] for name, channel in channels.items()},
             chosen.start,
         )

@@ -13,7 +13,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.columnar import Channels
+from islands.io.records.columnar import ColumnarFile
 from islands.io.records.size_limits import check_samples, check_stored
 
 #: What NumPy and the standard library raise on damaged archives, and on Python objects in sound ones.
@@ -23,7 +23,7 @@ UNREADABLE = (ValueError, OSError, EOFError, RuntimeError, struct.error, zipfile
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-def read_archive(path: Path) -> Channels:
+def read_archive(path: Path) -> ColumnarFile:
     """Open a NumPy archive.
 
     Raises
@@ -41,7 +41,7 @@ def read_archive(path: Path) -> Channels:
     except UNREADABLE as error:
         raise RecordError(f"{path.name} is damaged ({error}): write it anew with numpy.savez") from error
     names = tuple(member.removesuffix(".npy") for member in members)
-    return Channels(path.name, names, partial(_array, path), names)
+    return ColumnarFile(path.name, names, partial(_array, path), names)
 
 
 def _array(path: Path, name: str) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.column_names import looks_like_time
-from islands.io.records.table import Rows
+from islands.io.records.table import RowRange
 
 #: Cells that mean "no value here", in lower case.
 MISSING = frozenset({"", "nan", "na", "n/a", "null"})
@@ -22,14 +22,14 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text))
 
 
-def numbers_of(texts: Mapping[str, Sequence[str]], rows: Rows) -> dict[str, NDArray[np.float64]]:
+def parse_numbers(texts: Mapping[str, Sequence[str]], rows: RowRange) -> dict[str, NDArray[np.float64]]:
     """Convert columns of cells to float64, shape (samples,); NaN where a cell is one of `MISSING`.
 
     Parameters
     ----------
     texts : mapping of str to sequence of str
         The cells of every column, all of one length.
-    rows : Rows
+    rows : RowRange
         Where the cells stand in the file.
 
     Raises
@@ -54,7 +54,7 @@ def _converted(texts: Sequence[str]) -> NDArray[np.float64] | None:
     return None if "_" in "".join(texts) else numbers  # to Python, 1_5 is fifteen
 
 
-def decimal_comma(texts: Mapping[str, Sequence[str]], rows: Rows) -> str | None:
+def decimal_comma(texts: Mapping[str, Sequence[str]], rows: RowRange) -> str | None:
     """Return the place of the first decimal comma, None where there is none.
 
     Raises
@@ -79,7 +79,7 @@ def decimal_comma(texts: Mapping[str, Sequence[str]], rows: Rows) -> str | None:
     return comma
 
 
-def _mended(texts: Sequence[str], name: str, mark: str, rows: Rows) -> NDArray[np.float64]:
+def _mended(texts: Sequence[str], name: str, mark: str, rows: RowRange) -> NDArray[np.float64]:
     """Convert a column with missing cells or decimal commas, or name the cell that is text."""
     mended = ["nan" if text.strip().lower() in MISSING else text.replace(mark, ".") for text in texts]
     numbers = _converted(mended)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 from islands.io.records.column_names import seconds_per_unit
-from islands.io.records.columnar import Channels
+from islands.io.records.columnar import ColumnarFile
 from islands.io.records.size_limits import check_samples
 
 #: Rows that are decoded at a time. Memory then follows what the pages hold, never what the file claims.
@@ -21,7 +21,7 @@ _BATCH = 2**16
 _TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
-def read_parquet(path: Path) -> Channels:
+def read_parquet(path: Path) -> ColumnarFile:
     """Open a Parquet file; a column is read when it is asked for.
 
     Numbers of all kinds and booleans become float64, nulls NaN. Dates and times become numbers in the unit of
@@ -37,7 +37,7 @@ def read_parquet(path: Path) -> Channels:
         raise RecordError(f"{file} is empty: write it anew")
     with _opened(path) as parquet:
         names, rows = tuple(parquet.schema_arrow.names), parquet.metadata.num_rows
-    return Channels(file, names, partial(_column, path, rows))
+    return ColumnarFile(file, names, partial(_column, path, rows))
 
 
 @contextmanager

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from islands.errors import RecordError
-from islands.io.records.column_names import structures_of, time_column, unit_of
-from islands.io.records.reader import opened
-from islands.io.records.sampling import sampling_of
-from islands.io.records.table import Columns, Rows, Table
+from islands.io.records.column_names import parse_unit, split_structures, time_column
+from islands.io.records.reader import open_record
+from islands.io.records.sampling import find_sampling
+from islands.io.records.table import Columns, RowRange, Table
 from islands.io.records.validation import (
     MIN_SAMPLES,
     check_equal_length,
@@ -82,7 +82,7 @@ def preview(path: str | Path) -> Preview:
     RecordError
         The file is not there or cannot be read at all; never because of a column.
     """
-    table, file = opened(path), Path(path).name
+    table, file = open_record(path), Path(path).name
     columns, unread = _read(table)
     groups = _of_equal_length(columns)
     main = groups[0][0] if groups else None
@@ -100,8 +100,8 @@ def preview(path: str | Path) -> Preview:
     )
     return Preview(
         columns=tuple(
-            _described(name, unit_of(name.removeprefix(structure)), columns.get(name), problems[name])
-            for name, structure in structures_of(table.names).items()
+            _described(name, parse_unit(name.removeprefix(structure)), columns.get(name), problems[name])
+            for name, structure in split_structures(table.names).items()
             if name
         ),
         time=time,
@@ -168,18 +168,18 @@ def _sampling(
 ) -> tuple[str | None, float | None, str]:
     """Return the time column, the sampling time in seconds, and why there is none."""
     time = None
-    structure = structures_of(table.names)[main] if main else ""
+    structure = split_structures(table.names)[main] if main else ""
     try:
         time = time_column(table.names, file, structure=structure)
         asked = time or main
         if asked is not None and asked in problems:
             return time, None, problems[asked]
-        known = columns[asked] if asked else Columns(Rows(file, "sample", ()), {}, 0)
+        known = columns[asked] if asked else Columns(RowRange(file, "sample", ()), {}, 0)
         if time is not None:
             check_values(known, time)
             if len(known.rows) < 2:  # no step: `check_length` has more to say
                 return time, None, ""
-        return time, sampling_of(table, known, time, None, structure)[0], ""
+        return time, find_sampling(table, known, time, None, structure)[0], ""
     except RecordError as error:
         return time, None, str(error)
 

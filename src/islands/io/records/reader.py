@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.io.records.column_names import column_of, structures_of, time_column, unit_of
+from islands.io.records.column_names import find_column, parse_unit, split_structures, time_column
 from islands.io.records.mat.reader import read_matlab
 from islands.io.records.npz import read_archive
 from islands.io.records.parquet import read_parquet
-from islands.io.records.sampling import sampling_of
+from islands.io.records.sampling import find_sampling
 from islands.io.records.table import Table
 from islands.io.records.text_table import read_delimited
 from islands.io.records.validation import check_choice, check_length, check_values, check_varies
@@ -78,17 +78,17 @@ def read_record(
         The record cannot be used as it is. The message names row and column and says what to do.
     """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    table = opened(path)
+    table = open_record(path)
     file = Path(path).name
-    sources = [column_of(name, table.names) for name in inputs]
+    sources = [find_column(name, table.names) for name in inputs]
     check_choice(table.names, sources, output, file)
-    structures = structures_of(table.names)
+    structures = split_structures(table.names)
     time = time_column(table.names, file, (*sources, output), structures[output])
     columns = table.read((*sources, output, *([time] if time else [])), rows)
     check_length(columns)
     for name in columns.numbers:
         check_values(columns, name, missing=missing_output and name == output)
-    step, start = sampling_of(table, columns, time, dt, structures[output])
+    step, start = find_sampling(table, columns, time, dt, structures[output])
     for name in () if missing_output else (*sources, output):
         check_varies(columns, name)
     return Dataset(
@@ -102,8 +102,8 @@ def read_record(
         dt=step,
         input_names=inputs,
         output_name=output,
-        input_units=tuple(unit_of(source.removeprefix(structures[source])) for source in sources),
-        output_unit=unit_of(output.removeprefix(structures[output])),
+        input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
+        output_unit=parse_unit(output.removeprefix(structures[output])),
         start=step * columns.first if start is None else start,
         sha256=fingerprint(path),
     )
@@ -114,7 +114,7 @@ def _early(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.append(values[1:], values[-1])
 
 
-def columns_of(path: str | Path) -> tuple[str, ...]:
+def read_columns(path: str | Path) -> tuple[str, ...]:
     """Return the names of a file's columns (of an NPZ or MAT file: of its arrays), in the file's order.
 
     Raises
@@ -122,7 +122,7 @@ def columns_of(path: str | Path) -> tuple[str, ...]:
     RecordError
         The file is not there or cannot be read.
     """
-    return opened(path).names
+    return open_record(path).names
 
 
 def fingerprint(path: str | Path) -> str:
@@ -137,7 +137,7 @@ def fingerprint(path: str | Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def opened(path: str | Path) -> Table:
+def open_record(path: str | Path) -> Table:
     """Open a file by the reader of its suffix.
 
     Raises

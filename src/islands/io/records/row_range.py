@@ -3,7 +3,7 @@
 from islands.errors import SettingsError
 
 
-def rows_of(text: str | None) -> slice | None:
+def parse_rows(text: str | None) -> slice | None:
     """Read ``START:STOP``.
 
     Raises

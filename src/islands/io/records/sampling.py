@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit, unit_of
-from islands.io.records.table import Columns, Rows, Table
+from islands.io.records.column_names import TIME_UNITS, looks_like_time, parse_unit, seconds_per_unit
+from islands.io.records.table import Columns, RowRange, Table
 
 #: Part of a step by which time stamps may leave the grid, and by which two sampling times may differ.
 AGREEMENT = 0.01
@@ -19,7 +19,7 @@ AGREEMENT = 0.01
 ROUNDING = 0.25
 
 
-def sampling_of(
+def find_sampling(
     table: Table, columns: Columns, time: str | None, dt: float | None, structure: str = ""
 ) -> tuple[float, float | None]:
     """Return the sampling time and the first sample's time in seconds, None where no column tells it.
@@ -45,7 +45,7 @@ def sampling_of(
     start = None
     if time is not None:
         stamps = columns.numbers[time]
-        seconds = TIME_UNITS[unit_of(time.removeprefix(structure)).lower()]
+        seconds = TIME_UNITS[parse_unit(time.removeprefix(structure)).lower()]
         known[f"column {time}"] = uniform_step(stamps, time, columns.rows) * seconds
         start = float(stamps[0]) * seconds
     if dt is not None:
@@ -60,7 +60,7 @@ def sampling_of(
     return _agreed(known, file), start
 
 
-def uniform_step(stamps: NDArray[np.float64], name: str, rows: Rows) -> float:
+def uniform_step(stamps: NDArray[np.float64], name: str, rows: RowRange) -> float:
     """Return the step of a uniform time column, in the column's unit, from its first to its last stamp.
 
     Parameters
@@ -114,7 +114,7 @@ def _rounding(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
     return half_unit
 
 
-def _refuse_standstill(stamps: NDArray[np.float64], sample: int, name: str, rows: Rows) -> NoReturn:
+def _refuse_standstill(stamps: NDArray[np.float64], sample: int, name: str, rows: RowRange) -> NoReturn:
     before, now = stamps[sample - 1], stamps[sample]
     what = "repeats the time stamp" if now == before else f"jumps back to {now:.10g} from"
     raise RecordError(
@@ -123,7 +123,7 @@ def _refuse_standstill(stamps: NDArray[np.float64], sample: int, name: str, rows
     )
 
 
-def _refuse_uneven(stamps: NDArray[np.float64], sample: int, name: str, rows: Rows) -> NoReturn:
+def _refuse_uneven(stamps: NDArray[np.float64], sample: int, name: str, rows: RowRange) -> NoReturn:
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     gaps = steps > 1.5 * usual

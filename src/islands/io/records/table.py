@@ -11,7 +11,7 @@ from islands.errors import RecordError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class RowRange:
     """Where the samples stand in their file, as a person counts them there.
 
     Attributes
@@ -46,7 +46,7 @@ class Columns:
 
     Attributes
     ----------
-    rows : Rows
+    rows : RowRange
         Where the samples stand in the file.
     numbers : mapping of str to ndarray, shape (samples,)
         float64, all of one length; NaN where the cell is missing.
@@ -54,7 +54,7 @@ class Columns:
         Number of the first selected sample in the file, from 0.
     """
 
-    rows: Rows
+    rows: RowRange
     numbers: Mapping[str, NDArray[np.float64]]
     first: int
 
@@ -70,7 +70,7 @@ class Table(Protocol):
     def stated(self, structure: str) -> Mapping[str, float]:
         """Return the sampling times in seconds that the file states besides a time column, by their arrays.
 
-        Those among the fields of the structure (`islands.io.records.column_names.structures_of`) go before
+        Those among the fields of the structure (`islands.io.records.column_names.split_structures`) go before
         those at the top, and those of other structures do not count.
 
         Raises

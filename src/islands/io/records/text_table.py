@@ -12,8 +12,8 @@ from operator import itemgetter
 from pathlib import Path
 
 from islands.errors import RecordError
-from islands.io.records.number_parsing import decimal_comma, is_number, numbers_of
-from islands.io.records.table import Columns, Rows, select
+from islands.io.records.number_parsing import decimal_comma, is_number, parse_numbers
+from islands.io.records.table import Columns, RowRange, select
 
 #: A comma stands behind the others, as it may be a decimal mark; blanks, in runs, come last.
 SEPARATORS = (";", "\t", "|", ",", " ")
@@ -31,14 +31,14 @@ class DelimitedText:
         One of `SEPARATORS`.
     cells : sequence of list of str
         One list per sample, without blank lines at the end of the file.
-    rows : Rows
+    rows : RowRange
         The samples' lines.
     """
 
     names: tuple[str, ...]
     separator: str
     cells: Sequence[list[str]]
-    rows: Rows
+    rows: RowRange
 
     def stated(self, structure: str) -> Mapping[str, float]:  # noqa: ARG002
         """Return nothing: a text table has no place for a sampling time."""
@@ -48,10 +48,10 @@ class DelimitedText:
         """Convert the named columns over the selected rows; see `islands.io.records.table.Table`."""
         chosen = select(rows, len(self.cells), self.rows.file)
         kept = slice(chosen.start, chosen.stop)
-        cells, where = self.cells[kept], Rows(self.rows.file, "line", self.rows.numbers[kept])
+        cells, where = self.cells[kept], RowRange(self.rows.file, "line", self.rows.numbers[kept])
         self._refuse_ragged(cells, where)
         texts = self._texts(names, cells)
-        return Columns(where, numbers_of(texts, where), chosen.start)
+        return Columns(where, parse_numbers(texts, where), chosen.start)
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
         """Say where a comma is taken for a decimal mark, or that points stand beside it."""
@@ -65,7 +65,7 @@ class DelimitedText:
         places = {name: place for place, name in enumerate(self.names)}
         return {name: list(map(itemgetter(places[name]), cells)) for name in names}
 
-    def _refuse_ragged(self, cells: Sequence[list[str]], rows: Rows) -> None:
+    def _refuse_ragged(self, cells: Sequence[list[str]], rows: RowRange) -> None:
         width = len(self.names)
         if set(map(len, cells)) <= {width}:
             return
@@ -119,7 +119,7 @@ def read_delimited(path: Path) -> DelimitedText:
     _refuse_numbers_as_names(names, path.name, top + 1)
     if not samples:
         raise RecordError(f"{path.name} has a header in line {top + 1} and not a single sample below it")
-    where = Rows(path.name, "line", [number for number, _ in samples])
+    where = RowRange(path.name, "line", [number for number, _ in samples])
     return DelimitedText(names, separator, [cells for _, cells in samples], where)
 
 

@@ -68,7 +68,7 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
     ).model_dump(mode="json", by_alias=True)
 
 
-def described(
+def describe_extension(
     core: Simulator,
     values: Signal,
     inputs: tuple[str, ...],
@@ -130,7 +130,7 @@ def _extended(
     return LocalExtendedSpec(
         inputs=inputs,
         output=output,
-        core=described(inner, values, inputs, output, shape),
+        core=describe_extension(inner, values, inputs, output, shape),
         hold=hold.value,
         times=times,
         effects=tuple(effects),

@@ -28,7 +28,7 @@ from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.rigid_axis import make_rigid_axis
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.discrepancy.simulators.second_order import make_second_order
-from islands.errors import ModelError, RecordError, SettingsError, chosen
+from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.schema import (
     PARAMETERS,
@@ -41,7 +41,7 @@ from islands.io.simulator_spec.schema import (
     PhysicalSpec,
     ProgramSpec,
     SimulationSpec,
-    spec_of,
+    parse_spec,
 )
 from islands.systems.bouc_wen import BoucWenPiezo
 
@@ -49,7 +49,7 @@ from islands.systems.bouc_wen import BoucWenPiezo
 FEWEST = 20
 
 
-def simulation(
+def make_simulator(
     asked: str | SimulationSpec | LocalSpec,
     record: Dataset,
     columns: Mapping[str, Any] | None = None,
@@ -70,7 +70,7 @@ def simulation(
     SettingsError, ModelError
         It asks for nothing that there is.
     """
-    found = spec_of(asked) if isinstance(asked, str) else asked
+    found = parse_spec(asked) if isinstance(asked, str) else asked
     match found:
         case PhysicalSpec(kind=kind, parameters=parameters):
             return PHYSICAL[kind](parameters, record)
@@ -88,7 +88,7 @@ def simulation(
         case ExtendedSpec():
             return _extension(found, record, columns or {})
         case ColumnSpec(column=name):
-            return _column(name, chosen(columns or {}, name, "column"), record)
+            return _column(name, lookup(columns or {}, name, "column"), record)
 
 
 def simulated(
@@ -106,7 +106,7 @@ def simulated(
     """
     if isinstance(asked, Mapping):
         asked = LocalExtendedSpec.model_validate(asked)
-    core = simulation(asked, record, columns)
+    core = make_simulator(asked, record, columns)
     alone = ExtendedSimulator(core, (), make_context(record, core, record.samples))
     begins = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
     if not begins:
@@ -130,7 +130,7 @@ def simulated(
 
 
 def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
-    core = simulation(document.core, record, columns)
+    core = make_simulator(document.core, record, columns)
     solved: Simulator = core
     if (document.hold, document.times) != ("first-order", 1):
         solved = ResampledSimulator(core, InterSample(document.hold), document.times)

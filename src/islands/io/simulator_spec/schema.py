@@ -188,7 +188,7 @@ KINDS = (
 )
 
 
-def spec_of(text: str) -> LocalSpec:
+def parse_spec(text: str) -> LocalSpec:
     """Read what the command line asks for: a name, and behind a colon what it needs.
 
     Raises

@@ -13,7 +13,7 @@ _SLOW, _NEAR = 0.05, 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class Excitation:
     """What acts on the truth, at the truth's own rate, and the sizes that strengths refer to.
 
     Attributes
@@ -39,14 +39,14 @@ class Drive:
     output: float
 
 
-def driven(
+def make_excitation(
     rng: np.random.Generator, u: Signal, rate: float, band: float, peak: float, output: float
-) -> Drive:
+) -> Excitation:
     """Draw what acts on the truth beside its input; ``band`` is the input's highest frequency in Hz."""
-    wander = np.cumsum(noise(rng, u.size, rate, _SLOW * band, band))
+    wander = np.cumsum(random_noise(rng, u.size, rate, _SLOW * band, band))
     wander -= wander[0]
-    neighbour = noise(rng, u.size, rate, _NEAR * band, band)
-    return Drive(
+    neighbour = random_noise(rng, u.size, rate, _NEAR * band, band)
+    return Excitation(
         np.arange(u.size) / rate,
         u,
         wander / np.ptp(wander),
@@ -57,7 +57,7 @@ def driven(
     )
 
 
-def noise(rng: np.random.Generator, count: int, rate: float, band: float, quickest: float) -> Signal:
+def random_noise(rng: np.random.Generator, count: int, rate: float, band: float, quickest: float) -> Signal:
     """Return noise below a frequency.
 
     What the filter needs to begin and to end is cut off: four periods of the quickest that is drawn.
@@ -76,6 +76,6 @@ def multisine(rng: np.random.Generator, count: int, rate: float, band: float) ->
     return np.fft.irfft(spectrum, count)
 
 
-def sign(rng: np.random.Generator) -> float:
+def random_sign(rng: np.random.Generator) -> float:
     """Draw a sign."""
     return float(rng.choice([-1.0, 1.0]))

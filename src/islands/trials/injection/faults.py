@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from islands.trials.injection.excitation import sign
-from islands.trials.injection.plant import Force, Map, Truth
+from islands.trials.injection.excitation import random_sign
+from islands.trials.injection.plant import Force, Map, Plant
 
 #: Takes chance, the strength, and a truth; gives that truth with something hidden in it.
-Hide = Callable[[np.random.Generator, float, Truth], Truth]
+Inject = Callable[[np.random.Generator, float, Plant], Plant]
 
 
 @dataclass(frozen=True, slots=True)
-class Hidden:
+class Fault:
     """An effect, as it may be hidden.
 
     Attributes
@@ -32,56 +32,56 @@ class Hidden:
     name: str
     least: float
     most: float
-    forms: tuple[Hide, ...]
+    forms: tuple[Inject, ...]
     usual: int = 1
 
 
-def altered(truth: Truth, **parts: Any) -> Truth:
+def alter_parameter(truth: Plant, **parts: Any) -> Plant:
     """Return a truth with other parts, of its own kind as well."""
     return replace(truth, **parts)
 
 
-def before(make: Callable[[np.random.Generator, float], Map]) -> Hide:
+def before_plant(make: Callable[[np.random.Generator, float], Map]) -> Inject:
     """Hide a map on the input."""
     return lambda rng, strength, truth: replace(truth, before=(*truth.before, make(rng, strength)))
 
 
-def behind(make: Callable[[np.random.Generator, float], Map]) -> Hide:
+def after_plant(make: Callable[[np.random.Generator, float], Map]) -> Inject:
     """Hide a map on the output."""
     return lambda rng, strength, truth: replace(truth, behind=(*truth.behind, make(rng, strength)))
 
 
-def beside(make: Callable[[np.random.Generator, float], Force]) -> Hide:
+def add_force(make: Callable[[np.random.Generator, float], Force]) -> Inject:
     """Hide a force."""
     return lambda rng, strength, truth: replace(truth, beside=(*truth.beside, make(rng, strength)))
 
 
-def wrong(which: str) -> Hide:
+def wrong(which: str) -> Inject:
     """Hide another value of a parameter."""
 
-    def hide(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
-        factor = float(np.exp(sign(rng) * strength))
-        return altered(truth, **{which: getattr(truth, which) * factor})
+    def hide(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
+        factor = float(np.exp(random_sign(rng) * strength))
+        return alter_parameter(truth, **{which: getattr(truth, which) * factor})
 
     return hide
 
 
-def own(which: str, signed: bool = True, per: float = 1.0) -> Hide:
+def set_attribute(which: str, signed: bool = True, per: float = 1.0) -> Inject:
     """Hide something that a truth's own equation knows, ``strength / per`` of it."""
 
-    def hide(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
-        return altered(truth, **{which: (sign(rng) if signed else 1.0) * strength / per})
+    def hide(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
+        return alter_parameter(truth, **{which: (random_sign(rng) if signed else 1.0) * strength / per})
 
     return hide
 
 
-def gain_step(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
+def gain_step(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
     """Let the gain change at an instant."""
-    k, at = sign(rng) * strength, float(rng.uniform(0.15, 0.6))
+    k, at = random_sign(rng) * strength, float(rng.uniform(0.15, 0.6))
     return replace(truth, gain=lambda time: 1.0 + k * (time > at * time[-1]))
 
 
-def ageing(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
+def ageing(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
     """Let the gain drift."""
-    k = sign(rng) * strength
+    k = random_sign(rng) * strength
     return replace(truth, gain=lambda time: 1.0 + k * time / time[-1])

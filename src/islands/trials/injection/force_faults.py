@@ -8,7 +8,7 @@ from math import copysign, tanh
 
 import numpy as np
 
-from islands.trials.injection.excitation import sign
+from islands.trials.injection.excitation import random_sign
 from islands.trials.injection.plant import Force
 
 
@@ -29,7 +29,7 @@ def stribeck(_rng: np.random.Generator, strength: float) -> Force:
 
 def one_sided(rng: np.random.Generator, strength: float) -> Force:
     """Rub more in one direction."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda _q, w, _z: (-c * abs(w), 0.0)
 
 
@@ -40,19 +40,19 @@ def drag(_rng: np.random.Generator, strength: float) -> Force:
 
 def square(rng: np.random.Generator, strength: float) -> Force:
     """Act evenly."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda q, _w, _z: (c * q * q, 0.0)
 
 
 def cube(rng: np.random.Generator, strength: float) -> Force:
     """Act oddly."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda q, _w, _z: (c * q * q * q, 0.0)
 
 
 def parallel(rng: np.random.Generator, strength: float) -> Force:
     """Act as a Bouc-Wen element of its own."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda _q, w, z: (c * z, 1.0 - 2.4 * copysign(1.0, w) * z - 0.4 * abs(z))
 
 

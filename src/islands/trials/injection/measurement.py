@@ -7,11 +7,11 @@ import numpy as np
 import scipy
 
 from islands.data.dataset import Dataset
-from islands.trials.injection.excitation import Drive, Signal
-from islands.trials.injection.faults import Hidden, Hide, altered
+from islands.trials.injection.excitation import Excitation, Signal
+from islands.trials.injection.faults import Fault, Inject, alter_parameter
 from islands.trials.injection.piezo import PIEZO
-from islands.trials.injection.plant import Truth, respond
-from islands.trials.injection.rig import System
+from islands.trials.injection.plant import Plant, simulate_plant
+from islands.trials.injection.rig import Rig
 
 #: Part of a record in which what is hidden has to be seen: the rest may be locked away.
 SEEN = 0.75
@@ -30,7 +30,7 @@ _BELOW, _ABOVE, _TRIES, _DRAWS, _RECORDS = 3.0, 1.5, 14, 5, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hiding:
+class Injection:
     """A record with something hidden in it.
 
     Attributes
@@ -53,17 +53,17 @@ class Hiding:
     nominal: Signal
 
 
-def hide(
+def inject(
     names: Sequence[str],
     rng: np.random.Generator,
     seconds: float | None = None,
     pole: float = 0.0,
     band: tuple[float, float] | None = None,
     variant: bool = False,
-    system: System = PIEZO,
+    system: Rig = PIEZO,
     apart: bool = True,
     free: bool = False,
-) -> Hiding:
+) -> Injection:
     """Hide effects, or nothing, in a record.
 
     Parameters
@@ -79,7 +79,7 @@ def hide(
         Between which the misfit of each effect alone has to be, in standard deviations of the noise.
     variant : bool
         In forms unlike the usual ones, where there are others.
-    system : System
+    system : Rig
     apart : bool
         The truth's parameters are not the nominal ones, within what tolerances say. Else they are, for a
         simulation that cannot be calibrated: then gains and parameters can be seen in full.
@@ -97,9 +97,9 @@ def hide(
         truth = system.truth
         for name, spread in system.spread.items() if apart else ():
             factor = float(np.exp(spread * rng.standard_normal()))
-            truth = altered(truth, **{name: getattr(truth, name) * factor})
+            truth = alter_parameter(truth, **{name: getattr(truth, name) * factor})
         seen = _Seen(system, driven, truth, free)
-        affected: Truth | None = truth
+        affected: Plant | None = truth
         for name in names:
             scale = free or (apart and name in SCALE)
             affected = affected and _hidden(entries[name], scale, rng, truth, affected, seen, band, variant)
@@ -119,22 +119,22 @@ def hide(
         output_unit=system.output[1],
     )
     misfit = seen.left if names and (free or (apart and set(names) & set(SCALE))) else seen.misfit
-    return Hiding(record, misfit(y), seen.sigma, seen.nominal)
+    return Injection(record, misfit(y), seen.sigma, seen.nominal)
 
 
 class _Seen:
     """What a record shows of a truth, and how far that is from the truth with nothing hidden in it."""
 
-    def __init__(self, system: System, driven: Drive, truth: Truth, free: bool) -> None:
+    def __init__(self, system: Rig, driven: Excitation, truth: Plant, free: bool) -> None:
         self._system, self._driven, self._free = system, driven, free
         self.clean = self.of(truth)
         self.nominal = self.of(system.truth)
         self.sigma = system.noise * driven.output
         self._moved: Signal | None = None
 
-    def of(self, truth: Truth) -> Signal:
+    def of(self, truth: Plant) -> Signal:
         """Return the samples of a truth that are recorded, without noise."""
-        return respond(truth, self._driven)[:: self._system.decimation]
+        return simulate_plant(truth, self._driven)[:: self._system.decimation]
 
     def misfit(self, y: Signal) -> float:
         """Return the root mean square of what was hidden, in the noise's."""
@@ -160,7 +160,7 @@ class _Seen:
     def _by(self, name: str, far: float) -> Signal:
         nominal = self._system.truth
         change = {name: getattr(nominal, name) * (1.0 + far)}
-        return self.of(altered(nominal, **change)) - self.nominal
+        return self.of(alter_parameter(nominal, **change)) - self.nominal
 
 
 def _within(columns: Signal, target: Signal, reach: float) -> Signal:
@@ -179,15 +179,15 @@ def _within(columns: Signal, target: Signal, reach: float) -> Signal:
 
 
 def _hidden(
-    entry: Hidden,
+    entry: Fault,
     scale: bool,
     rng: np.random.Generator,
-    truth: Truth,
-    affected: Truth,
+    truth: Plant,
+    affected: Plant,
     seen: _Seen,
     band: tuple[float, float] | None,
     variant: bool,
-) -> Truth | None:
+) -> Plant | None:
     """Return a truth with an effect hidden in it too; None where that cannot be seen in this record.
 
     Such as a limit that only the locked part comes near.
@@ -202,20 +202,20 @@ def _hidden(
 
 
 def _sought(
-    entry: Hidden,
-    form: Hide,
+    entry: Fault,
+    form: Inject,
     scale: bool,
     rng: np.random.Generator,
-    truth: Truth,
+    truth: Plant,
     seen: _Seen,
     band: tuple[float, float] | None,
-) -> Callable[[Truth], Truth] | None:
+) -> Callable[[Plant], Plant] | None:
     """Return what hides a form with a strength whose misfit is in a band, if there is one."""
     low, high = np.log(entry.least), np.log(entry.most)
     logarithm = float(rng.uniform(low, high))
     state = rng.bit_generator.state
 
-    def hidden(in_truth: Truth) -> Truth:
+    def hidden(in_truth: Plant) -> Plant:
         # The same draws each time: signs, instants and frequencies stay as the strength is sought.
         rng.bit_generator.state = state
         return form(rng, float(np.exp(logarithm)), in_truth)

@@ -6,10 +6,10 @@ import numpy as np
 import scipy
 
 from islands.trials.injection import force_faults, signal_faults
-from islands.trials.injection.excitation import Drive, Signal, driven, multisine, noise
-from islands.trials.injection.faults import Hidden, ageing, before, behind, beside, gain_step
-from islands.trials.injection.plant import Truth
-from islands.trials.injection.rig import System, table
+from islands.trials.injection.excitation import Excitation, Signal, make_excitation, multisine, random_noise
+from islands.trials.injection.faults import Fault, add_force, after_plant, ageing, before_plant, gain_step
+from islands.trials.injection.plant import Plant
+from islands.trials.injection.rig import Rig, fault_table
 
 #: Samples a second of the truth, and the frequency in Hz up to which the force moves it.
 RATE, BAND = 2000, 20.0
@@ -19,7 +19,7 @@ PEAK, OUTPUT, SPEED = 20.0, 20.0, 400.0
 
 
 @dataclass(frozen=True, slots=True)
-class Oscillator(Truth):
+class Oscillator(Plant):
     """``m x'' + c x' + k x = u``; its coordinate is the displacement, and a force is a part of the spring's.
 
     Attributes
@@ -32,8 +32,8 @@ class Oscillator(Truth):
     c: float = 8e-3
     k: float = 2.0
 
-    def equation(self, drive: Drive, x: Signal) -> Signal:
-        """See `Truth`.
+    def equation(self, drive: Excitation, x: Signal) -> Signal:
+        """See `Plant`.
 
         The linear part is solved exactly over a step; the forces are those of its beginning and its end in
         equal parts, as Heun has it.
@@ -72,16 +72,16 @@ class Oscillator(Truth):
         return np.array(places)
 
 
-def _drive(rng: np.random.Generator, seconds: float) -> Drive:
+def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
     """Draw a random multisine, or noise through a low-pass; it begins at rest."""
     count = int(seconds * RATE)
     shaken = bool(rng.integers(2))
-    u = noise(rng, count, RATE, BAND, 1.0) if shaken else multisine(rng, count, RATE, BAND)
+    u = random_noise(rng, count, RATE, BAND, 1.0) if shaken else multisine(rng, count, RATE, BAND)
     u = u * np.minimum(1.0, 10 * np.arange(count) / RATE)
-    return driven(rng, PEAK * u / np.max(np.abs(u)), RATE, 1.0, PEAK, OUTPUT)
+    return make_excitation(rng, PEAK * u / np.max(np.abs(u)), RATE, 1.0, PEAK, OUTPUT)
 
 
-OSCILLATOR = System(
+OSCILLATOR = Rig(
     truth=Oscillator(),
     spread={"m": 0.01, "c": 0.03, "k": 0.01},
     drive=_drive,
@@ -91,35 +91,48 @@ OSCILLATOR = System(
     input=("F_N", "N"),
     output=("x_mm", "mm"),
     neighbour=("w_V", "V"),
-    known=table(
-        Hidden("delay", 0.0005, 0.01, (before(signal_faults.later), before(signal_faults.two_lags))),
-        Hidden("sensor-lag", 0.0005, 0.01, (behind(signal_faults.sensor), behind(signal_faults.averaging))),
-        Hidden("offset", 0.001, 0.05, (behind(signal_faults.zero),)),
-        Hidden("linear-drift", 0.002, 0.1, (behind(signal_faults.drift),)),
-        Hidden("jump", 0.002, 0.1, (behind(signal_faults.jump),)),
-        Hidden(
-            "thermal-drift", 0.002, 0.1, (behind(signal_faults.thermal), behind(signal_faults.slow_thermal))
+    known=fault_table(
+        Fault(
+            "delay", 0.0005, 0.01, (before_plant(signal_faults.later), before_plant(signal_faults.two_lags))
         ),
-        Hidden("exponential-creep", 0.01, 1.0, (behind(signal_faults.creep(0.3, 4.0)),)),
-        Hidden("second-hysteresis", 0.002, 0.3, (beside(force_faults.hysteresis),)),
-        Hidden("backlash", 0.05, 2.5, (before(signal_faults.play),)),
-        Hidden(
-            "coulomb-friction", 0.001, 0.05, (beside(force_faults.coulomb), beside(force_faults.stribeck))
+        Fault(
+            "sensor-lag",
+            0.0005,
+            0.01,
+            (after_plant(signal_faults.sensor), after_plant(signal_faults.averaging)),
         ),
-        Hidden("viscous-asymmetry", 0.002, 0.1, (beside(force_faults.one_sided),)),
-        Hidden("quadratic-drag", 0.002, 0.2, (beside(force_faults.drag),)),
-        Hidden("even-nonlinearity", 0.002, 0.2, (beside(force_faults.square),)),
-        Hidden("cubic-stiffness", 0.004, 0.3, (beside(force_faults.cube),)),
-        Hidden("input-saturation", 0.04, 0.5, (before(signal_faults.cut_input),)),
-        Hidden("output-saturation", 0.03, 0.5, (behind(signal_faults.cut_output),)),
-        Hidden("dead-zone", 0.05, 2.5, (before(signal_faults.dead),)),
-        Hidden("gain-step", 0.005, 0.15, (gain_step,)),
-        Hidden("ageing", 0.005, 0.15, (ageing,)),
-        Hidden("periodic-disturbance", 5e-4, 0.03, (behind(signal_faults.hum(25.0, 90.0)),)),
-        Hidden("cross-coupling", 0.002, 0.1, (behind(signal_faults.coupling),)),
+        Fault("offset", 0.001, 0.05, (after_plant(signal_faults.zero),)),
+        Fault("linear-drift", 0.002, 0.1, (after_plant(signal_faults.drift),)),
+        Fault("jump", 0.002, 0.1, (after_plant(signal_faults.jump),)),
+        Fault(
+            "thermal-drift",
+            0.002,
+            0.1,
+            (after_plant(signal_faults.thermal), after_plant(signal_faults.slow_thermal)),
+        ),
+        Fault("exponential-creep", 0.01, 1.0, (after_plant(signal_faults.creep(0.3, 4.0)),)),
+        Fault("second-hysteresis", 0.002, 0.3, (add_force(force_faults.hysteresis),)),
+        Fault("backlash", 0.05, 2.5, (before_plant(signal_faults.play),)),
+        Fault(
+            "coulomb-friction",
+            0.001,
+            0.05,
+            (add_force(force_faults.coulomb), add_force(force_faults.stribeck)),
+        ),
+        Fault("viscous-asymmetry", 0.002, 0.1, (add_force(force_faults.one_sided),)),
+        Fault("quadratic-drag", 0.002, 0.2, (add_force(force_faults.drag),)),
+        Fault("even-nonlinearity", 0.002, 0.2, (add_force(force_faults.square),)),
+        Fault("cubic-stiffness", 0.004, 0.3, (add_force(force_faults.cube),)),
+        Fault("input-saturation", 0.04, 0.5, (before_plant(signal_faults.cut_input),)),
+        Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.cut_output),)),
+        Fault("dead-zone", 0.05, 2.5, (before_plant(signal_faults.dead),)),
+        Fault("gain-step", 0.005, 0.15, (gain_step,)),
+        Fault("ageing", 0.005, 0.15, (ageing,)),
+        Fault("periodic-disturbance", 5e-4, 0.03, (after_plant(signal_faults.hum(25.0, 90.0)),)),
+        Fault("cross-coupling", 0.002, 0.1, (after_plant(signal_faults.coupling),)),
     ),
     unknown={
-        "slew-rate": Hidden("", 150.0, 500.0, (before(signal_faults.slew),)),
-        "ripple": Hidden("", 0.003, 0.03, (behind(signal_faults.ripple(2.0, 5.0)),)),
+        "slew-rate": Fault("", 150.0, 500.0, (before_plant(signal_faults.slew),)),
+        "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(2.0, 5.0)),)),
     },
 )

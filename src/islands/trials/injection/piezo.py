@@ -6,10 +6,19 @@ from itertools import pairwise
 import numpy as np
 
 from islands.trials.injection import force_faults, signal_faults
-from islands.trials.injection.excitation import Drive, Signal, driven, noise
-from islands.trials.injection.faults import Hidden, ageing, before, behind, beside, gain_step, own, wrong
-from islands.trials.injection.plant import Truth
-from islands.trials.injection.rig import System, table
+from islands.trials.injection.excitation import Excitation, Signal, make_excitation, random_noise
+from islands.trials.injection.faults import (
+    Fault,
+    add_force,
+    after_plant,
+    ageing,
+    before_plant,
+    gain_step,
+    set_attribute,
+    wrong,
+)
+from islands.trials.injection.plant import Plant
+from islands.trials.injection.rig import Rig, fault_table
 
 #: Samples a second of the truth, and the frequency in Hz up to which its input moves.
 RATE, BAND = 1000, 1.0
@@ -19,7 +28,7 @@ PEAK, OUTPUT, SPEED = 40.0, 45.0, 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Piezo(Truth):
+class Piezo(Plant):
     """A Bouc-Wen actuator; its coordinate is the voltage, and a force adds to the displacement.
 
     Attributes
@@ -42,8 +51,8 @@ class Piezo(Truth):
     hurry: float = 0.0
     lean: float = 0.0
 
-    def equation(self, drive: Drive, x: Signal) -> Signal:
-        """See `Truth`."""
+    def equation(self, drive: Excitation, x: Signal) -> Signal:
+        """See `Plant`."""
         y = self.dp * x
         if self.gain is not None:
             y = y * self.gain(drive.time)
@@ -83,14 +92,14 @@ class Piezo(Truth):
         return states
 
 
-def _drive(rng: np.random.Generator, seconds: float) -> Drive:
+def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
     """Draw noise through a low-pass; it begins at rest."""
     count = int(seconds * RATE)
-    u = noise(rng, count, RATE, BAND, BAND) * np.minimum(1.0, np.arange(count) / RATE)
-    return driven(rng, PEAK * u / np.max(np.abs(u)), RATE, BAND, PEAK, OUTPUT)
+    u = random_noise(rng, count, RATE, BAND, BAND) * np.minimum(1.0, np.arange(count) / RATE)
+    return make_excitation(rng, PEAK * u / np.max(np.abs(u)), RATE, BAND, PEAK, OUTPUT)
 
 
-PIEZO = System(
+PIEZO = Rig(
     truth=Piezo(),
     spread={"A": 0.01, "beta": 0.01, "gamma": 0.01, "dp": 0.005},
     drive=_drive,
@@ -100,47 +109,60 @@ PIEZO = System(
     input=("u_V", "V"),
     output=("y_um", "um"),
     neighbour=("w_V", "V"),
-    known=table(
-        Hidden("delay", 0.002, 0.06, (before(signal_faults.later), before(signal_faults.two_lags))),
-        Hidden("sensor-lag", 0.002, 0.08, (behind(signal_faults.sensor), behind(signal_faults.averaging))),
-        Hidden("resonance", 1 / 25, 1 / 4, (behind(signal_faults.mode),)),
-        Hidden("viscous", 0.001, 0.06, (beside(force_faults.viscous),)),
-        Hidden("clock-skew", 5e-5, 2e-3, (before(signal_faults.clock),)),
-        Hidden("sensor-gain", 0.005, 0.1, (behind(signal_faults.sensor_gain),)),
-        Hidden("input-gain", 0.005, 0.1, (before(signal_faults.sensor_gain),)),
-        Hidden("wrong-parameter", 0.02, 0.6, tuple(map(wrong, ("A", "beta", "gamma", "dp"))), usual=4),
-        Hidden("offset", 0.001, 0.05, (behind(signal_faults.zero),)),
-        Hidden("linear-drift", 0.002, 0.1, (behind(signal_faults.drift),)),
-        Hidden("jump", 0.002, 0.1, (behind(signal_faults.jump),)),
-        Hidden(
-            "thermal-drift", 0.002, 0.1, (behind(signal_faults.thermal), behind(signal_faults.slow_thermal))
+    known=fault_table(
+        Fault(
+            "delay", 0.002, 0.06, (before_plant(signal_faults.later), before_plant(signal_faults.two_lags))
         ),
-        Hidden("exponential-creep", 0.005, 0.15, (behind(signal_faults.creep(1.0, 15.0)),)),
-        Hidden("logarithmic-creep", 0.002, 0.03, (behind(signal_faults.log_creep),)),
-        Hidden("relaxation", 0.02, 1.0, (own("decay", signed=False),)),
-        Hidden("rate-dependent-loop", 0.02, 0.4, (own("hurry", per=SPEED),)),
-        Hidden("loop-asymmetry", 1e-4, 4e-3, (own("lean"),)),
-        Hidden("second-hysteresis", 0.02, 0.15, (beside(force_faults.parallel),)),
-        Hidden("backlash", 0.1, 5.0, (before(signal_faults.play),)),
-        Hidden("stiction", 0.3, 5.0, (before(signal_faults.stick),)),
-        Hidden(
-            "coulomb-friction", 0.002, 0.05, (beside(force_faults.coulomb), beside(force_faults.stribeck))
+        Fault(
+            "sensor-lag",
+            0.002,
+            0.08,
+            (after_plant(signal_faults.sensor), after_plant(signal_faults.averaging)),
         ),
-        Hidden("viscous-asymmetry", 0.001, 0.06, (beside(force_faults.one_sided),)),
-        Hidden("quadratic-drag", 0.001, 0.06, (beside(force_faults.drag),)),
-        Hidden("even-nonlinearity", 0.002, 0.1, (beside(force_faults.square),)),
-        Hidden("cubic-stiffness", 0.004, 0.2, (beside(force_faults.cube),)),
-        Hidden("input-saturation", 0.04, 0.4, (before(signal_faults.cut_input),)),
-        Hidden("output-saturation", 0.03, 0.35, (behind(signal_faults.cut_output),)),
-        Hidden("dead-zone", 0.1, 5.0, (before(signal_faults.dead),)),
-        Hidden("absolute-value-sensor", 0.004, 0.1, (behind(signal_faults.kink),)),
-        Hidden("gain-step", 0.005, 0.15, (gain_step,)),
-        Hidden("ageing", 0.005, 0.15, (ageing,)),
-        Hidden("periodic-disturbance", 5e-4, 0.03, (behind(signal_faults.hum(2.0, 45.0)),)),
-        Hidden("cross-coupling", 0.002, 0.1, (behind(signal_faults.coupling),)),
+        Fault("resonance", 1 / 25, 1 / 4, (after_plant(signal_faults.mode),)),
+        Fault("viscous", 0.001, 0.06, (add_force(force_faults.viscous),)),
+        Fault("clock-skew", 5e-5, 2e-3, (before_plant(signal_faults.clock),)),
+        Fault("sensor-gain", 0.005, 0.1, (after_plant(signal_faults.sensor_gain),)),
+        Fault("input-gain", 0.005, 0.1, (before_plant(signal_faults.sensor_gain),)),
+        Fault("wrong-parameter", 0.02, 0.6, tuple(map(wrong, ("A", "beta", "gamma", "dp"))), usual=4),
+        Fault("offset", 0.001, 0.05, (after_plant(signal_faults.zero),)),
+        Fault("linear-drift", 0.002, 0.1, (after_plant(signal_faults.drift),)),
+        Fault("jump", 0.002, 0.1, (after_plant(signal_faults.jump),)),
+        Fault(
+            "thermal-drift",
+            0.002,
+            0.1,
+            (after_plant(signal_faults.thermal), after_plant(signal_faults.slow_thermal)),
+        ),
+        Fault("exponential-creep", 0.005, 0.15, (after_plant(signal_faults.creep(1.0, 15.0)),)),
+        Fault("logarithmic-creep", 0.002, 0.03, (after_plant(signal_faults.log_creep),)),
+        Fault("relaxation", 0.02, 1.0, (set_attribute("decay", signed=False),)),
+        Fault("rate-dependent-loop", 0.02, 0.4, (set_attribute("hurry", per=SPEED),)),
+        Fault("loop-asymmetry", 1e-4, 4e-3, (set_attribute("lean"),)),
+        Fault("second-hysteresis", 0.02, 0.15, (add_force(force_faults.parallel),)),
+        Fault("backlash", 0.1, 5.0, (before_plant(signal_faults.play),)),
+        Fault("stiction", 0.3, 5.0, (before_plant(signal_faults.stick),)),
+        Fault(
+            "coulomb-friction",
+            0.002,
+            0.05,
+            (add_force(force_faults.coulomb), add_force(force_faults.stribeck)),
+        ),
+        Fault("viscous-asymmetry", 0.001, 0.06, (add_force(force_faults.one_sided),)),
+        Fault("quadratic-drag", 0.001, 0.06, (add_force(force_faults.drag),)),
+        Fault("even-nonlinearity", 0.002, 0.1, (add_force(force_faults.square),)),
+        Fault("cubic-stiffness", 0.004, 0.2, (add_force(force_faults.cube),)),
+        Fault("input-saturation", 0.04, 0.4, (before_plant(signal_faults.cut_input),)),
+        Fault("output-saturation", 0.03, 0.35, (after_plant(signal_faults.cut_output),)),
+        Fault("dead-zone", 0.1, 5.0, (before_plant(signal_faults.dead),)),
+        Fault("absolute-value-sensor", 0.004, 0.1, (after_plant(signal_faults.kink),)),
+        Fault("gain-step", 0.005, 0.15, (gain_step,)),
+        Fault("ageing", 0.005, 0.15, (ageing,)),
+        Fault("periodic-disturbance", 5e-4, 0.03, (after_plant(signal_faults.hum(2.0, 45.0)),)),
+        Fault("cross-coupling", 0.002, 0.1, (after_plant(signal_faults.coupling),)),
     ),
     unknown={
-        "slew-rate": Hidden("", 40.0, 90.0, (before(signal_faults.slew),)),
-        "ripple": Hidden("", 0.003, 0.03, (behind(signal_faults.ripple(3.0, 8.0)),)),
+        "slew-rate": Fault("", 40.0, 90.0, (before_plant(signal_faults.slew),)),
+        "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(3.0, 8.0)),)),
     },
 )

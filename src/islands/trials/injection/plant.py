@@ -4,10 +4,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from islands.trials.injection.excitation import Drive, Signal
+from islands.trials.injection.excitation import Excitation, Signal
 
 #: Takes what drives the truth and a signal, and gives the signal as it really is.
-Map = Callable[[Drive, Signal], Signal]
+Map = Callable[[Excitation, Signal], Signal]
 
 #: Takes coordinate and rate, each in its usual size, and a state of its own; gives a force in the usual size,
 #: and how the state changes with the coordinate.
@@ -15,7 +15,7 @@ Force = Callable[[float, float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
-class Truth(ABC):
+class Plant(ABC):
     """A system with whatever was hidden in it; one with parameters and an equation derives from it.
 
     Attributes
@@ -32,11 +32,11 @@ class Truth(ABC):
     behind: tuple[Map, ...] = field(default=())
 
     @abstractmethod
-    def equation(self, drive: Drive, x: Signal) -> Signal:
+    def equation(self, drive: Excitation, x: Signal) -> Signal:
         """Return what the system makes of an input behind its map, shape (samples,)."""
 
 
-def respond(truth: Truth, drive: Drive) -> Signal:
+def simulate_plant(truth: Plant, drive: Excitation) -> Signal:
     """Return what the truth does, at its own rate, shape (samples,)."""
     x = drive.u
     for change in truth.before:

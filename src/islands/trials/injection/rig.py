@@ -5,21 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from islands.trials.injection.excitation import Drive
-from islands.trials.injection.faults import Hidden
-from islands.trials.injection.plant import Truth
+from islands.trials.injection.excitation import Excitation
+from islands.trials.injection.faults import Fault
+from islands.trials.injection.plant import Plant
 
 #: Stated tolerances are so many times the spread of the truth.
 _STATED = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class System:
+class Rig:
     """A system.
 
     Attributes
     ----------
-    truth : Truth
+    truth : Plant
         With its nominal parameters.
     spread : mapping
         How far a truth's parameters are from their nominal values, as relative standard deviations.
@@ -41,17 +41,17 @@ class System:
         Causes that the catalogue has no name for, by what they are.
     """
 
-    truth: Truth
+    truth: Plant
     spread: Mapping[str, float]
-    drive: Callable[[np.random.Generator, float], Drive]
+    drive: Callable[[np.random.Generator, float], Excitation]
     seconds: float
     decimation: int
     noise: float
     input: tuple[str, str]
     output: tuple[str, str]
     neighbour: tuple[str, str]
-    known: Mapping[str, Hidden]
-    unknown: Mapping[str, Hidden]
+    known: Mapping[str, Fault]
+    unknown: Mapping[str, Fault]
 
     @property
     def tolerance(self) -> Mapping[str, float]:
@@ -59,6 +59,6 @@ class System:
         return {name: _STATED * spread for name, spread in self.spread.items()}
 
 
-def table(*hidden: Hidden) -> Mapping[str, Hidden]:
+def fault_table(*hidden: Fault) -> Mapping[str, Fault]:
     """Return what can be hidden by its name."""
     return {each.name: each for each in hidden}

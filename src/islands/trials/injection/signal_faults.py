@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from islands.trials.injection.excitation import Drive, Signal, sign
+from islands.trials.injection.excitation import Excitation, Signal, random_sign
 from islands.trials.injection.plant import Map
 
 Make = Callable[[np.random.Generator, float], Map]
@@ -33,7 +33,7 @@ def sensor(_rng: np.random.Generator, tau: float) -> Map:
 def averaging(_rng: np.random.Generator, tau: float) -> Map:
     """Average over twice the lag."""
 
-    def average(drive: Drive, y: Signal) -> Signal:
+    def average(drive: Excitation, y: Signal) -> Signal:
         # Of a spline's integral, so that no width has to be a whole number of samples; it began at rest.
         integral = scipy.interpolate.CubicSpline(drive.time, y).antiderivative()
         ago = drive.time - 2 * tau
@@ -48,7 +48,7 @@ def mode(rng: np.random.Generator, strength: float) -> Map:
     damping = float(np.exp(rng.uniform(np.log(0.02), np.log(0.3))))
     w = 2 * np.pi / strength
 
-    def ring(drive: Drive, y: Signal) -> Signal:
+    def ring(drive: Excitation, y: Signal) -> Signal:
         mode = ([w * w], [1.0, 2 * damping * w, w * w])
         system = scipy.signal.cont2discrete(mode, 1 / drive.rate, method="foh")
         rung: Signal = scipy.signal.lfilter(np.ravel(system[0]), np.ravel(system[1]), y - y[0])
@@ -59,7 +59,7 @@ def mode(rng: np.random.Generator, strength: float) -> Map:
 
 def clock(rng: np.random.Generator, strength: float) -> Map:
     """Let the clocks run apart."""
-    e = sign(rng) * strength
+    e = random_sign(rng) * strength
     return lambda drive, u: np.interp(drive.time * (1.0 + e), drive.time, u)
 
 
@@ -72,37 +72,37 @@ def lag(signal: Signal, tau: float, rate: float) -> Signal:
 
 def sensor_gain(rng: np.random.Generator, strength: float) -> Map:
     """Scale."""
-    factor = 1.0 + sign(rng) * strength
+    factor = 1.0 + random_sign(rng) * strength
     return lambda _drive, y: factor * y
 
 
 def zero(rng: np.random.Generator, strength: float) -> Map:
     """Shift."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda drive, y: y + c * drive.output
 
 
 def drift(rng: np.random.Generator, strength: float) -> Map:
     """Drift over the record."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda drive, y: y + c * drive.output * drive.time / drive.time[-1]
 
 
 def jump(rng: np.random.Generator, strength: float) -> Map:
     """Jump at an instant."""
-    c, at = sign(rng) * strength, float(rng.uniform(0.15, 0.6))
+    c, at = random_sign(rng) * strength, float(rng.uniform(0.15, 0.6))
     return lambda drive, y: y + c * drive.output * (drive.time > at * drive.time[-1])
 
 
 def thermal(rng: np.random.Generator, strength: float) -> Map:
     """Follow the temperature."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda drive, y: y + c * drive.output * drive.temperature
 
 
 def slow_thermal(rng: np.random.Generator, strength: float) -> Map:
     """Let the body follow the sensor's temperature within two seconds."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda drive, y: y + c * drive.output * lag(drive.temperature, 2.0, drive.rate)
 
 
@@ -125,7 +125,7 @@ def log_creep(_rng: np.random.Generator, strength: float) -> Map:
 def play(_rng: np.random.Generator, strength: float) -> Map:
     """Follow with a play."""
 
-    def follow(_drive: Drive, u: Signal) -> Signal:
+    def follow(_drive: Excitation, u: Signal) -> Signal:
         places, place = [], float(u[0])
         for wanted in u.tolist():
             place = min(max(place, wanted - strength), wanted + strength)
@@ -138,7 +138,7 @@ def play(_rng: np.random.Generator, strength: float) -> Map:
 def stick(_rng: np.random.Generator, strength: float) -> Map:
     """Follow in slips."""
 
-    def follow(_drive: Drive, u: Signal) -> Signal:
+    def follow(_drive: Excitation, u: Signal) -> Signal:
         places, place = [], float(u[0])
         for wanted in u.tolist():
             if abs(wanted - place) > strength:
@@ -157,7 +157,7 @@ def cut_input(_rng: np.random.Generator, strength: float) -> Map:
 def cut_output(_rng: np.random.Generator, strength: float) -> Map:
     """Cut the output off."""
 
-    def cut(_drive: Drive, y: Signal) -> Signal:
+    def cut(_drive: Excitation, y: Signal) -> Signal:
         level = float(np.max(np.abs(y))) * (1 - strength)
         return np.clip(y, -level, level)
 
@@ -171,7 +171,7 @@ def dead(_rng: np.random.Generator, strength: float) -> Map:
 
 def kink(rng: np.random.Generator, strength: float) -> Map:
     """Bend at zero."""
-    k = sign(rng) * strength
+    k = random_sign(rng) * strength
     return lambda _drive, y: np.where(y > 0.0, (1 + k) * y, (1 - k) * y)
 
 
@@ -189,14 +189,14 @@ def hum(least: float, most: float) -> Make:
 
 def coupling(rng: np.random.Generator, strength: float) -> Map:
     """Add the neighbour's signal."""
-    c = sign(rng) * strength
+    c = random_sign(rng) * strength
     return lambda drive, y: y + c * drive.output * drive.neighbour
 
 
 def slew(_rng: np.random.Generator, strength: float) -> Map:
     """Follow at a limited rate, in the input's unit a second."""
 
-    def follow(drive: Drive, u: Signal) -> Signal:
+    def follow(drive: Excitation, u: Signal) -> Signal:
         most, places, place = strength / drive.rate, [], float(u[0])
         for wanted in u.tolist():
             place += min(max(wanted - place, -most), most)

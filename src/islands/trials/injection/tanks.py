@@ -6,10 +6,25 @@ from math import inf, sqrt
 import numpy as np
 
 from islands.trials.injection import signal_faults
-from islands.trials.injection.excitation import Drive, Signal, driven, multisine, noise, sign
-from islands.trials.injection.faults import Hidden, Hide, ageing, altered, before, behind, gain_step
-from islands.trials.injection.plant import Truth
-from islands.trials.injection.rig import System, table
+from islands.trials.injection.excitation import (
+    Excitation,
+    Signal,
+    make_excitation,
+    multisine,
+    random_noise,
+    random_sign,
+)
+from islands.trials.injection.faults import (
+    Fault,
+    Inject,
+    after_plant,
+    ageing,
+    alter_parameter,
+    before_plant,
+    gain_step,
+)
+from islands.trials.injection.plant import Plant
+from islands.trials.injection.rig import Rig, fault_table
 
 #: Samples a second of the truth, and the frequency in Hz up to which the pump's voltage moves.
 RATE, BAND = 2.5, 0.004
@@ -25,7 +40,7 @@ _PUMPED = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Tanks(Truth):
+class Tanks(Plant):
     """``x1' = k4 u - k1 sqrt(x1)``, ``x2' = k1 sqrt(x1) - k3 sqrt(x2)``, ``y = x2``; levels in V.
 
     Attributes
@@ -55,8 +70,8 @@ class Tanks(Truth):
     exponent: float = 0.5
     inflows: tuple[float, float] = (0.0, 0.0)
 
-    def equation(self, drive: Drive, x: Signal) -> Signal:
-        """See `Truth`."""
+    def equation(self, drive: Excitation, x: Signal) -> Signal:
+        """See `Plant`."""
         pumped = self.k4 * (x if self.gain is None else x * self.gain(drive.time))
         between = ((pumped[1:] + pumped[:-1]) / 2).tolist()
         upper, lower = self._levels(between, (inf, inf))
@@ -94,47 +109,49 @@ class Tanks(Truth):
         return levels, levels_below
 
 
-def _upper_edge(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
+def _upper_edge(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
     """Let the upper tank overflow, and a part of that fall into the lower one."""
-    return altered(truth, below=(strength, 0.0), spilled=float(rng.uniform(0.1, 0.9)))
+    return alter_parameter(truth, below=(strength, 0.0), spilled=float(rng.uniform(0.1, 0.9)))
 
 
-def _lower_edge(_rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
+def _lower_edge(_rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
     """Let the lower tank overflow."""
-    return altered(truth, below=(0.0, strength))
+    return alter_parameter(truth, below=(0.0, strength))
 
 
-def _leak(upper: float, lower: float) -> Hide:
+def _leak(upper: float, lower: float) -> Inject:
     """Let outflows have a linear part."""
-    return lambda _rng, strength, truth: altered(
+    return lambda _rng, strength, truth: alter_parameter(
         truth, leaks=(upper * strength * _LAW, lower * strength * _LAW)
     )
 
 
-def _inflow(upper: float, lower: float) -> Hide:
+def _inflow(upper: float, lower: float) -> Inject:
     """Let something flow in beside the pump."""
 
-    def hide(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
-        c = sign(rng) * strength * _PUMPED
-        return altered(truth, inflows=(upper * c, lower * c))
+    def hide(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
+        c = random_sign(rng) * strength * _PUMPED
+        return alter_parameter(truth, inflows=(upper * c, lower * c))
 
     return hide
 
 
-def _steeper(rng: np.random.Generator, strength: float, truth: Truth) -> Truth:
+def _steeper(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
     """Let the outflows' law have another exponent."""
-    return altered(truth, exponent=0.5 * (1.0 + sign(rng) * strength))
+    return alter_parameter(truth, exponent=0.5 * (1.0 + random_sign(rng) * strength))
 
 
-def _drive(rng: np.random.Generator, seconds: float) -> Drive:
+def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
     """Draw a random multisine, or noise through a low-pass, about a level."""
     count = int(seconds * RATE)
-    spread = noise(rng, count, RATE, BAND, BAND) if rng.integers(2) else multisine(rng, count, RATE, BAND)
+    spread = (
+        random_noise(rng, count, RATE, BAND, BAND) if rng.integers(2) else multisine(rng, count, RATE, BAND)
+    )
     u = 0.56 * PEAK + 0.44 * PEAK * spread / np.max(np.abs(spread))
-    return driven(rng, u, RATE, BAND, PEAK, OUTPUT)
+    return make_excitation(rng, u, RATE, BAND, PEAK, OUTPUT)
 
 
-TANKS = System(
+TANKS = Rig(
     truth=Tanks(),
     spread={"k1": 0.02, "k3": 0.02, "k4": 0.02},
     drive=_drive,
@@ -144,25 +161,27 @@ TANKS = System(
     input=("u_V", "V"),
     output=("y_V", "V"),
     neighbour=("w_V", "V"),
-    known=table(
-        Hidden("state-clip", 0.02, 0.6, (_upper_edge, _lower_edge), usual=2),
-        Hidden("outflow-law", 0.002, 0.5, (_leak(0.0, 1.0), _leak(1.0, 0.0), _steeper), usual=2),
-        Hidden("input-offset", 0.001, 0.2, (_inflow(1.0, 0.0), _inflow(0.0, 1.0)), usual=2),
-        Hidden("delay", 1.0, 40.0, (before(signal_faults.later), before(signal_faults.two_lags))),
-        Hidden("sensor-lag", 1.0, 40.0, (behind(signal_faults.sensor), behind(signal_faults.averaging))),
-        Hidden("offset", 0.005, 0.1, (behind(signal_faults.zero),)),
-        Hidden("linear-drift", 0.005, 0.2, (behind(signal_faults.drift),)),
-        Hidden("jump", 0.005, 0.2, (behind(signal_faults.jump),)),
-        Hidden("thermal-drift", 0.005, 0.2, (behind(signal_faults.thermal),)),
-        Hidden("output-saturation", 0.03, 0.5, (behind(signal_faults.cut_output),)),
-        Hidden("input-saturation", 0.03, 0.5, (before(signal_faults.cut_input),)),
-        Hidden("gain-step", 0.01, 0.2, (gain_step,)),
-        Hidden("ageing", 0.01, 0.2, (ageing,)),
-        Hidden("periodic-disturbance", 0.002, 0.05, (behind(signal_faults.hum(0.006, 0.1)),)),
-        Hidden("cross-coupling", 0.005, 0.2, (behind(signal_faults.coupling),)),
+    known=fault_table(
+        Fault("state-clip", 0.02, 0.6, (_upper_edge, _lower_edge), usual=2),
+        Fault("outflow-law", 0.002, 0.5, (_leak(0.0, 1.0), _leak(1.0, 0.0), _steeper), usual=2),
+        Fault("input-offset", 0.001, 0.2, (_inflow(1.0, 0.0), _inflow(0.0, 1.0)), usual=2),
+        Fault("delay", 1.0, 40.0, (before_plant(signal_faults.later), before_plant(signal_faults.two_lags))),
+        Fault(
+            "sensor-lag", 1.0, 40.0, (after_plant(signal_faults.sensor), after_plant(signal_faults.averaging))
+        ),
+        Fault("offset", 0.005, 0.1, (after_plant(signal_faults.zero),)),
+        Fault("linear-drift", 0.005, 0.2, (after_plant(signal_faults.drift),)),
+        Fault("jump", 0.005, 0.2, (after_plant(signal_faults.jump),)),
+        Fault("thermal-drift", 0.005, 0.2, (after_plant(signal_faults.thermal),)),
+        Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.cut_output),)),
+        Fault("input-saturation", 0.03, 0.5, (before_plant(signal_faults.cut_input),)),
+        Fault("gain-step", 0.01, 0.2, (gain_step,)),
+        Fault("ageing", 0.01, 0.2, (ageing,)),
+        Fault("periodic-disturbance", 0.002, 0.05, (after_plant(signal_faults.hum(0.006, 0.1)),)),
+        Fault("cross-coupling", 0.005, 0.2, (after_plant(signal_faults.coupling),)),
     ),
     unknown={
-        "slew-rate": Hidden("", 0.002, 0.01, (before(signal_faults.slew),)),
-        "ripple": Hidden("", 0.003, 0.03, (behind(signal_faults.ripple(1.0, 3.0)),)),
+        "slew-rate": Fault("", 0.002, 0.01, (before_plant(signal_faults.slew),)),
+        "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(1.0, 3.0)),)),
     },
 )

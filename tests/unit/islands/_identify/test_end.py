@@ -7,12 +7,12 @@ import pytest
 
 from islands._identify import identify
 from islands.errors import SettingsError
-from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.engine import Epoch
-from islands.evolution.history import Progress
+from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.engine import ArchipelagoEpoch
+from islands.evolution.history import HistoryPoint
 from islands.evolution.island import StepInfo
-from islands.evolution.presets import settings_of
-from islands.evolution.search_state import State, after, ended
+from islands.evolution.presets import resolve_settings
+from islands.evolution.search_state import SearchState, advance, stop_reason
 from support.identifications import BUDGET, Telling, into
 
 
@@ -21,16 +21,18 @@ def told(*best, evaluations=10):
 
 
 def test_what_islands_did_in_a_generation_is_gathered():
-    before = State(founded(2, 0), 100, 7, {"ok": 100}, (Progress(2, 100, {1: 9.0}, (9.0, inf)),))
+    before = SearchState(
+        empty_archipelago(2, 0), 100, 7, {"ok": 100}, (HistoryPoint(2, 100, {1: 9.0}, (9.0, inf)),)
+    )
     steps = ((told((2, 0.5), (1, 4.0)), told((1, 2.0), (2, 0.5))), (told(), told((3, 1.0), (2, 0.25))))
-    state = after(before, Epoch(founded(2, 1), steps, {"pairs": (1, 2)}))
-    assert state.archipelago == founded(2, 1)
+    state = advance(before, ArchipelagoEpoch(empty_archipelago(2, 1), steps, {"pairs": (1, 2)}))
+    assert state.archipelago == empty_archipelago(2, 1)
     assert (state.evaluations, state.duplicates) == (140, 23)
     assert state.outcomes == {"ok": 136, "diverged": 4}
     assert state.history == (
         *before.history,
-        Progress(3, 120, {1: 4.0, 2: 0.5}, (0.5, inf)),
-        Progress(3, 140, {1: 2.0, 2: 0.25, 3: 1.0}, (0.5, 0.25)),
+        HistoryPoint(3, 120, {1: 4.0, 2: 0.5}, (0.5, inf)),
+        HistoryPoint(3, 140, {1: 2.0, 2: 0.25, 3: 1.0}, (0.5, 0.25)),
     )
     assert [list(point.best) for point in state.history] == [[1], [1, 2], [1, 2, 3]]
     assert state.caches == {"pairs": (1, 2)}
@@ -61,24 +63,26 @@ def test_what_islands_did_in_a_generation_is_gathered():
 )
 def test_a_search_has_ended_when_one_of_its_budgets_is_used_up(changes, expected):
     """The error is that of the best island, in the output's unit, as it is now."""
-    archipelago = Archipelago(tuple(replace(island, generation=7) for island in founded(2, 0).islands))
-    history = (Progress(6, 350, {3: 0.3}, (inf, 0.3)), Progress(7, 400, {3: 0.25}, (inf, 0.25)))
-    state = State(archipelago, 400, history=history)
-    assert ended(state, settings_of("narx", changes)) == expected
+    archipelago = Archipelago(
+        tuple(replace(island, generation=7) for island in empty_archipelago(2, 0).islands)
+    )
+    history = (HistoryPoint(6, 350, {3: 0.3}, (inf, 0.3)), HistoryPoint(7, 400, {3: 0.25}, (inf, 0.25)))
+    state = SearchState(archipelago, 400, history=history)
+    assert stop_reason(state, resolve_settings("narx", changes)) == expected
 
 
 @pytest.mark.parametrize("target", [0.0, 1.0, 1.7976931348623157e308])
 def test_a_search_has_not_ended_before_anybody_has_a_model(target):
-    settings = settings_of("narx", {"target_error": target, "max_evaluations": 1, "generations": 0})
-    assert ended(State(founded(2, 0)), settings) == ""
-    waiting = State(founded(2, 0), history=(Progress(0, 0, {}, (inf, inf)),))
-    assert ended(waiting, replace(settings, generations=1)) == ""
+    settings = resolve_settings("narx", {"target_error": target, "max_evaluations": 1, "generations": 0})
+    assert stop_reason(SearchState(empty_archipelago(2, 0)), settings) == ""
+    waiting = SearchState(empty_archipelago(2, 0), history=(HistoryPoint(0, 0, {}, (inf, inf)),))
+    assert stop_reason(waiting, replace(settings, generations=1)) == ""
 
 
 def test_an_exact_model_meets_every_target_and_without_a_target_none():
-    exact = State(founded(1, 0), history=(Progress(0, 0, {1: 0.0}, (0.0,)),))
-    assert ended(exact, settings_of("narx", {"target_error": 1e-9})) == "target error"
-    assert ended(exact, settings_of("narx", {"target_error": 0.0})) == ""
+    exact = SearchState(empty_archipelago(1, 0), history=(HistoryPoint(0, 0, {1: 0.0}, (0.0,)),))
+    assert stop_reason(exact, resolve_settings("narx", {"target_error": 1e-9})) == "target error"
+    assert stop_reason(exact, resolve_settings("narx", {"target_error": 0.0})) == ""
 
 
 @pytest.mark.parametrize(
@@ -173,4 +177,4 @@ def test_a_search_that_is_stopped_before_its_first_population_is_refused(data):
 
 def test_a_state_is_that_of_an_archipelago():
     with pytest.raises(TypeError, match="archipelago"):
-        State()
+        SearchState()

@@ -9,12 +9,12 @@ from islands._identify import identify
 from islands.data.split import split
 from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
-from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.presets import settings_of
-from islands.evolution.search_state import State
+from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.presets import resolve_settings
+from islands.evolution.search_state import SearchState
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.candidate_library import full_set
-from islands.validation.physics import physics
+from islands.validation.physics import check_physics
 from support.identifications import BUDGET, Telling, parameters
 
 # What a result says.
@@ -52,13 +52,13 @@ def test_the_full_set_is_that_of_the_lags_and_degree_of_what_was_found(result, s
     assert full["lags"] == lags >= 2
     assert full["degree"] == max(item.degree for item in found) >= 2
     assert full["candidates"] == full_set(full["degree"], lags, lags)
-    rows = 2250 - settings_of("hysteresis", BUDGET).maximum_lag
+    rows = 2250 - resolve_settings("hysteresis", BUDGET).maximum_lag
     assert full["bytes"] == 8 * rows * full["candidates"]
 
 
 def test_a_result_holds_every_setting_that_determines_it(result):
     described = dict(result.findings.settings)
-    expected = asdict(settings_of("hysteresis", BUDGET))
+    expected = asdict(resolve_settings("hysteresis", BUDGET))
     assert {name: described[name] for name in expected} == expected
     assert (described["method"], described["preset"], described["islands"]) == ("identify", "hysteresis", 1)
     assert described["validation"] == 0.25
@@ -94,7 +94,7 @@ def test_a_model_without_property_1_is_never_the_answer_under_the_constraint(dat
         estimate(entry.regressors, estimation, "hysteresis", 26).model
         for entry in states[-1].archipelago.hall.entries
     ]
-    assert not all(physics(model, estimation).property_1 for model in known)
+    assert not all(check_physics(model, estimation).property_1 for model in known)
 
 
 # Seeds and starts.
@@ -124,22 +124,22 @@ def test_a_start_goes_on_as_if_never_stopped(data, result, states, stop, tmp_pat
 @pytest.mark.parametrize(
     "other",
     [
-        founded(1, 5),
-        founded(3, 5),
-        founded(2, 6),
+        empty_archipelago(1, 5),
+        empty_archipelago(3, 5),
+        empty_archipelago(2, 6),
         Archipelago(),
-        Archipelago(founded(2, 5).islands[::-1]),
-        Archipelago(founded(3, 5).islands[1:]),
-        Archipelago((founded(2, 5).islands[0], founded(2, 6).islands[1])),
+        Archipelago(empty_archipelago(2, 5).islands[::-1]),
+        Archipelago(empty_archipelago(3, 5).islands[1:]),
+        Archipelago((empty_archipelago(2, 5).islands[0], empty_archipelago(2, 6).islands[1])),
     ],
 )
 def test_a_start_of_other_islands_or_another_seed_is_refused(data, other):
     with pytest.raises(SettingsError, match="the start has other islands than the settings, or another seed"):
-        identify(data, **BUDGET, islands=2, seed=5, start=State(other), progress=pytest.fail)
+        identify(data, **BUDGET, islands=2, seed=5, start=SearchState(other), progress=pytest.fail)
 
 
 def test_a_start_of_its_own_islands_that_nobody_lives_on_is_the_beginning(data, result):
-    begun = identify(data, **BUDGET, seed=5, start=State(founded(1, 5)))
+    begun = identify(data, **BUDGET, seed=5, start=SearchState(empty_archipelago(1, 5)))
     assert parameters(begun) == parameters(result)
     assert begun.findings.search.history == result.findings.search.history
 

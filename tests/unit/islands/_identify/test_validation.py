@@ -10,11 +10,11 @@ from islands.data.dataset import Dataset
 from islands.data.split import split
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
-from islands.evolution.presets import PRESETS, settings_of
+from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.problem import problem
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
-from islands.validation.physics import physics
+from islands.validation.physics import check_physics
 from support.identifications import BUDGET, parameters, record, two_inputs
 from support.searches import distinct_genes
 
@@ -49,14 +49,14 @@ def test_a_result_is_never_worse_than_the_forward_selection_that_seeds_it(seed, 
     data = record(seed=seed)
     parts = split(data, 0.25)
     budget = {**BUDGET, "population": 8, "generations": 1, **changes}
-    settings = settings_of("hysteresis", budget)
+    settings = resolve_settings("hysteresis", budget)
     found = identify(data, **budget, seed=seed)
     errors = {fitted.model.size: fitted.metrics["validation"]["free_run"].rmse for fitted in found.models}
     compared = 0
     for genes in problem(parts.estimation, settings).seeds:
         seeded = estimate(distinct_genes(genes), parts.estimation, "hysteresis", settings.maximum_lag).model
         simulated = free_run(seeded, parts.validation, settings.maximum_lag)
-        if simulated.outcome and physics(seeded, parts.estimation).property_1:
+        if simulated.outcome and check_physics(seeded, parts.estimation).property_1:
             compared += 1
             assert errors[seeded.size] <= metrics(parts.validation.y, simulated.y).rmse * (1 + 1e-12)
     assert compared >= 3
@@ -177,6 +177,6 @@ def test_where_no_model_is_found_the_outcomes_say_why():
     ],
 )
 def test_smaller_models_begin_smaller(changes, expected):
-    made = asdict(settings_of("paper-case1", changes))
+    made = asdict(resolve_settings("paper-case1", changes))
     assert {name: made[name] for name in expected} == expected
     assert {name: made[name] for name in changes} == changes

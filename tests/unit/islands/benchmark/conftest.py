@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from islands.benchmark.workload import drawn, monomial, tree
+from islands.benchmark.workload import monomial, random_workload, tree
 from islands.data.dataset import Dataset
 
 WARM_UP, INTERVAL = 26, 20
@@ -20,4 +20,4 @@ def record():
 
 @pytest.fixture(scope="session")
 def candidates():
-    return (*drawn(monomial, 3), *drawn(tree, 3), *drawn(monomial, 1, terms=1))
+    return (*random_workload(monomial, 3), *random_workload(tree, 3), *random_workload(monomial, 1, terms=1))

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from islands.benchmark import compiled_c, plain_numpy
-from islands.benchmark.compiled_c import compiled, compiler
+from islands.benchmark.compiled_c import compile_model, find_compiler
 from islands.benchmark.machine import peak
 from islands.errors import ModelError
 
 WARM_UP, INTERVAL = 26, 20
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler is called cc")
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 
 
 @needs_compiler
 @pytest.mark.parametrize("flags", compiled_c.FLAGS)
 def test_its_error_is_that_of_plain_numpy(record, candidates, flags, tmp_path):
-    rows = compiled_c.rows_of(record, WARM_UP, INTERVAL)
+    rows = compiled_c.row_pointers(record, WARM_UP, INTERVAL)
     assert rows.lanes > compiled_c.LANES, "two blocks, the second one not full"
     for each in (candidates[0], candidates[4]):
         simulate = compiled_c.simulation(each.regressors, each.theta, rows, flags, tmp_path)
@@ -27,7 +27,7 @@ def test_its_error_is_that_of_plain_numpy(record, candidates, flags, tmp_path):
 
 @needs_compiler
 def test_two_individuals_in_one_folder_stay_apart(record, candidates, tmp_path):
-    rows = compiled_c.rows_of(record, WARM_UP, INTERVAL)
+    rows = compiled_c.row_pointers(record, WARM_UP, INTERVAL)
     calls = [
         compiled_c.simulation(each.regressors, each.theta, rows, compiled_c.FLAGS[0], tmp_path)
         for each in candidates[:2]
@@ -40,7 +40,7 @@ def test_two_individuals_in_one_folder_stay_apart(record, candidates, tmp_path):
 
 
 def test_a_row_holds_the_same_time_of_every_interval(record):
-    rows = compiled_c.rows_of(record, WARM_UP, INTERVAL)
+    rows = compiled_c.row_pointers(record, WARM_UP, INTERVAL)
     assert rows.u.shape == rows.y.shape == (2, WARM_UP + INTERVAL, compiled_c.LANES)
     assert rows.lanes == 130
     assert rows.y[1, 3, 7] == record.y[(104 + 7) * INTERVAL + 3]
@@ -52,7 +52,7 @@ def test_a_row_holds_the_same_time_of_every_interval(record):
 @needs_compiler
 def test_what_does_not_compile_says_why(tmp_path):
     with pytest.raises(ModelError, match=r"does not compile the benchmark: [\s\S]*error"):
-        compiled("int this is not C;", ("-O1",), tmp_path)
+        compile_model("int this is not C;", ("-O1",), tmp_path)
 
 
 @needs_compiler
@@ -64,10 +64,10 @@ def test_the_peak_is_that_of_a_processor(tmp_path):
 
 def test_without_a_compiler_there_is_no_peak_and_nothing_to_compile(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert compiler() is None
+    assert find_compiler() is None
     assert peak(tmp_path) is None
     with pytest.raises(ModelError, match="install one"):
-        compiled("int one;", (), tmp_path)
+        compile_model("int one;", (), tmp_path)
 
 
 @needs_compiler
@@ -77,7 +77,7 @@ def test_more_chains_than_one_add_up_to_the_operations_counted(tmp_path):
 
     from islands.benchmark import machine as module
 
-    library = compiled(module._SOURCE, module._FLAGS, tmp_path)
+    library = compile_model(module._SOURCE, module._FLAGS, tmp_path)
     library.multiply_add.restype = ctypes.c_double
     result = ctypes.c_double()
     once = library.multiply_add(ctypes.c_long(1), ctypes.c_double(0.5), ctypes.byref(result))

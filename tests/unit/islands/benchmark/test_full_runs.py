@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from islands.benchmark.full_runs import Run, run_apart, run_island
+from islands.benchmark.full_runs import Run, run_in_processes, run_island
 from islands.benchmark.workload import ISLAND, benchmark_record
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.island import first_generation, step
@@ -27,7 +27,7 @@ def test_two_islands_are_the_papers_population():
 def test_a_timed_search_evaluates_what_the_engine_does(piezo):
     told = []
     found = run_island(piezo, SMALL, 0, told.append)
-    epochs = SerialEngine().run(Problem(piezo, SMALL), founded(1, 0), lambda: False)
+    epochs = SerialEngine().run(Problem(piezo, SMALL), empty_archipelago(1, 0), lambda: False)
     assert found.evaluations == sum(info.evaluations for epoch in epochs for info in epoch.steps[0]) == 40
     assert told == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert 0.0 < found.evaluating_cpu_s < found.cpu_s
@@ -78,7 +78,7 @@ def test_rates_are_counts_over_times():
 @pytest.mark.nightly
 @pytest.mark.parametrize("warm", [False, True])
 def test_processes_run_the_same_searches_as_this_one(piezo, warm):
-    seconds, runs = run_apart(piezo, SMALL, [0, 1], warm)
+    seconds, runs = run_in_processes(piezo, SMALL, [0, 1], warm)
     here = [run_island(piezo, SMALL, index) for index in (0, 1)]
     assert [(run.evaluations, run.duplicates) for run in runs] == [
         (run.evaluations, run.duplicates) for run in here

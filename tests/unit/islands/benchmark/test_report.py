@@ -7,13 +7,13 @@ import pytest
 
 from islands.benchmark.full_runs import Run
 from islands.benchmark.machine import this_machine
-from islands.benchmark.report import document, goals
+from islands.benchmark.report import check_goals, to_document
 from islands.benchmark.scaling import Scaling
 from support.made_reports import KINDS, POINTS, comparison, report
 
 
 def test_the_document_has_every_key_and_is_json():
-    found = json.loads(json.dumps(document(report())))
+    found = json.loads(json.dumps(to_document(report())))
     assert found["evaluation_ratio_numpy_uncached"] == pytest.approx(80.0)
     # The search took 8 s for 100 000 new structures.
     assert found["evaluation_ratio_numpy_amortised"] == pytest.approx(24.0 / 0.08)
@@ -42,7 +42,7 @@ def test_the_single_numbers_are_those_of_a_search():
         "general": comparison(uncached_ms=1.0, simulation_fraction_of_c=0.1, gram_flops=1e10),
         "gp": comparison(),
     }
-    found = document(report(kinds=kinds))
+    found = to_document(report(kinds=kinds))
     assert found["evaluation_ratio_numpy_uncached"] == pytest.approx(80.0)
     assert found["simulation_fraction_of_c"] == 0.5
     assert found["gram_fraction_of_peak"] == 0.5
@@ -51,7 +51,7 @@ def test_the_single_numbers_are_those_of_a_search():
 
 
 def met(changed):
-    return {goal.text: goal.met for goal in goals(changed)}
+    return {goal.text: goal.met for goal in check_goals(changed)}
 
 
 def test_every_goal_is_met_by_a_fast_machine():
@@ -97,10 +97,10 @@ def test_what_was_not_measured_is_neither_met_nor_missed():
     changed = report(kinds=without, peak_flops=None, case1_wall_s=None)
     unknown = [text for text, reached in met(changed).items() if reached is None]
     assert len(unknown) == 3
-    found = document(changed)
+    found = to_document(changed)
     for name in ("simulation_fraction_of_c", "gram_fraction_of_peak", "case1_wall_s", "peak_flops"):
         assert found[name] is None
-    shown = {goal.measured for goal in goals(changed) if goal.met is None}
+    shown = {goal.measured for goal in check_goals(changed) if goal.met is None}
     assert shown == {"no C compiler", "not measured"}
 
 

@@ -13,12 +13,12 @@ from islands.benchmark.workload import (
     WARM_UP,
     Candidate,
     benchmark_record,
-    drawn,
-    evolved,
+    candidate_text,
+    evolved_workload,
     fingerprint,
     full_tree,
     monomial,
-    text_of,
+    random_workload,
     tree,
 )
 from islands.errors import ModelError
@@ -31,7 +31,7 @@ from islands.simulation.predictors import multiple_shooting
 
 
 def kinds(count=2):
-    return {"poly": drawn(monomial, count), "general": drawn(tree, count)}
+    return {"poly": random_workload(monomial, count), "general": random_workload(tree, count)}
 
 
 def test_a_hash_is_the_same_twice_and_pinned():
@@ -55,14 +55,14 @@ def test_a_hash_knows_every_kind_every_individual_and_every_term():
 
 
 def test_text_names_what_is_measured():
-    text = text_of({"poly": drawn(monomial, 1, terms=1)})
+    text = candidate_text({"poly": random_workload(monomial, 1, terms=1)})
     assert text.splitlines() == ["100000 samples", "poly", "individual", "y(k-1)"]
 
 
 @pytest.mark.parametrize("make", [monomial, tree])
 @pytest.mark.parametrize("terms", [1, 10])
 def test_drawn_individuals_have_so_many_different_terms_and_y(make, terms):
-    for each in drawn(make, 4, terms):
+    for each in random_workload(make, 4, terms):
         assert len(each.regressors) == len(set(each.regressors)) == len(each.theta) == terms
         assert each.regressors[0].text == "y(k-1)"
         assert each.theta[0] == 0.97
@@ -72,7 +72,7 @@ def test_drawn_individuals_have_so_many_different_terms_and_y(make, terms):
 
 
 def test_more_individuals_begin_with_the_same_ones():
-    assert drawn(tree, 5)[:2] == drawn(tree, 2)
+    assert random_workload(tree, 5)[:2] == random_workload(tree, 2)
 
 
 @pytest.mark.parametrize("edges", [0, 1, 3])
@@ -103,8 +103,8 @@ def test_the_record_is_in_units_of_three_times_its_spread(piezo):
 
 def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo):
     short = replace(ISLAND, population=12, generations=6)
-    found = evolved(piezo, 4, short)
-    assert found == evolved(piezo, 4, short)
+    found = evolved_workload(piezo, 4, short)
+    assert found == evolved_workload(piezo, 4, short)
     assert len(found) == 4
     assert {each.constraints for each in found} == {"hysteresis"}
     for each in found:
@@ -116,7 +116,7 @@ def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo):
 def test_individuals_of_a_search_come_from_its_whole_course(piezo, monkeypatch):
     asked = []
     monkeypatch.setattr(module, "_bounded", lambda individuals, _evaluator: asked.append(individuals))
-    evolved(piezo, 3, replace(ISLAND, population=12, generations=8))
+    evolved_workload(piezo, 3, replace(ISLAND, population=12, generations=8))
     bred = asked[-1][::-1]
     # Nine populations, less those whose structure was known.
     assert 12 < len(bred) <= 9 * 12

@@ -30,7 +30,7 @@ from islands.discrepancy.surrogates import (
     injection_strengths,
     make_surrogates,
 )
-from islands.trials.injection.measurement import hide
+from islands.trials.injection.measurement import inject
 from islands.trials.trial import TOLERANCE
 
 CORE = BoucWenPiezoSimulator()
@@ -46,7 +46,7 @@ def _small_reference() -> Iterator[None]:
 
 
 def clean() -> Diagnosis:
-    return diagnose(hide([], np.random.default_rng(5), 6.0).record, CORE, TOLERANCE)
+    return diagnose(inject([], np.random.default_rng(5), 6.0).record, CORE, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def steps(source: Surrogates, effect: Effect, seed: int = 0) -> tuple[Injection,
 
 
 def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
-    hiding = hide([], np.random.default_rng(5), 6.0, 0.8, apart=False)
+    hiding = inject([], np.random.default_rng(5), 6.0, 0.8, apart=False)
     core = RecordedOutput("theirs", hiding.nominal)
     found = diagnose(hiding.record, core)
     source = make_surrogates(found, core, {})

@@ -14,13 +14,13 @@ from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.io.diagnosis_json import as_json, diagnosis_document
 from islands.systems.bouc_wen import BoucWenPiezo
-from islands.trials.injection.measurement import hide
+from islands.trials.injection.measurement import inject
 from islands.trials.trial import TOLERANCE
 
 
 @pytest.fixture(scope="module")
 def record() -> Dataset:
-    return hide(["quadratic-drag"], np.random.default_rng(8), seconds=6.0, band=(1.0, 4.0)).record
+    return inject(["quadratic-drag"], np.random.default_rng(8), seconds=6.0, band=(1.0, 4.0)).record
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_what_is_locked_away_is_seen_by_the_gain_alone(record: Dataset, found: D
 
 @pytest.fixture(scope="module")
 def clean() -> Dataset:
-    return hide([], np.random.default_rng(9), seconds=6.0).record
+    return inject([], np.random.default_rng(9), seconds=6.0).record
 
 
 #: A simulation with two parameters that are far from those of the records.

@@ -8,10 +8,10 @@ import pytest
 from islands.data.dataset import Dataset, join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.estimate import estimate
-from islands.estimation.refinement import Refined, _Residual, refine
+from islands.estimation.refinement import RefinedModel, _Residual, refine
 from islands.model.model import model_of
 from islands.model.parsing import parse
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
 from islands.validation.physics import cluster_sums
 
@@ -57,7 +57,7 @@ def perturbed(terms, by=0.05):
 
 def refined(*arguments, **options):
     found = refine(*arguments, **options)
-    assert isinstance(found, Refined), found
+    assert isinstance(found, RefinedModel), found
     return found
 
 
@@ -86,7 +86,7 @@ def test_the_shooting_error_never_grows_and_the_constraints_keep_holding(seed, i
     start = estimate(model(CLUSTERED).regressors, record, constraints).model
     found = refine(start, record, interval, constraints)
     simulated = multiple_shooting(start, record, interval)
-    if isinstance(found, Outcome):
+    if isinstance(found, EvaluationOutcome):
         assert found == simulated.outcome
         assert not found
         return
@@ -249,8 +249,8 @@ def test_a_parameter_that_starts_at_zero_is_moved():
 
 def test_a_model_that_diverges_as_it_is_is_an_outcome():
     found = refine(model({**HYSTERESIS, "y(k-1)": 1.5}), driven(HYSTERESIS), 200)
-    assert isinstance(found, Outcome)
-    assert found.verdict is Verdict.DIVERGED
+    assert isinstance(found, EvaluationOutcome)
+    assert found.verdict is Status.DIVERGED
     assert "left" in found.reason
     assert "at sample" in found.reason
 
@@ -258,11 +258,11 @@ def test_a_model_that_diverges_as_it_is_is_an_outcome():
 def test_a_model_that_the_constraint_refuses_is_an_outcome():
     record = driven(HYSTERESIS)
     without_y = refine(model({"phi1(u(k-1), u(k-2))": 0.8}), record, 50, "hysteresis")
-    assert isinstance(without_y, Outcome)
+    assert isinstance(without_y, EvaluationOutcome)
     assert without_y.reason == "no regressor is y at rest: add y(k-1)"
     alone = refine(model({"y(k-1)": 1.0, "u(k-1)": 0.0}), record, 50, "hysteresis")
-    assert isinstance(alone, Outcome)
-    assert alone.verdict is Verdict.INFEASIBLE
+    assert isinstance(alone, EvaluationOutcome)
+    assert alone.verdict is Status.INFEASIBLE
     assert "leave its term out" in alone.reason
 
 

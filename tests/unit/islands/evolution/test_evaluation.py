@@ -9,13 +9,13 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Individual, regressor_of
+from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands.model.expression import height
 from islands.model.parsing import parse
 from islands.program.regressor_matrix import regressor_matrix
-from islands.simulation.outcome import Verdict
+from islands.simulation.outcome import Status
 from islands.simulation.predictors import multiple_shooting
 from islands.systems.catalogue import make_record
 from islands.systems.published_models import PUBLISHED
@@ -71,7 +71,7 @@ def test_theta_and_fitness_are_those_of_estimation_and_multiple_shooting(
     data = record(segments=(300, 450, 50))
     found = evaluated(individual(*texts), data, constraints=constraints, fitness=fitness)
     expected = estimate(
-        [regressor_of(parse(text)) for text in texts], data, constraints, SETTINGS.maximum_lag
+        [make_regressor(parse(text)) for text in texts], data, constraints, SETTINGS.maximum_lag
     ).model
     assert found.regressors == expected.regressors
     assert found.theta == pytest.approx(expected.theta, rel=1e-9)
@@ -82,7 +82,7 @@ def test_theta_and_fitness_are_those_of_estimation_and_multiple_shooting(
         own = multiple_shooting(expected.with_parameters(found.theta), data, interval, SETTINGS.maximum_lag)
         assert found.fitness == own.mean_squared_error
     else:
-        assert found.outcome.verdict is Verdict.DIVERGED
+        assert found.outcome.verdict is Status.DIVERGED
 
 
 def test_a_regressor_that_the_constraint_forces_to_zero_leaves_and_is_not_counted():
@@ -116,7 +116,7 @@ def test_pruning_shrinks_the_individual_itself_to_what_explains():
 
 def test_without_y_the_constraint_cannot_be_met():
     found = evaluated(individual("u(k-1)", "phi1(u(k-1), q1(u(k-1)))"))
-    assert found.outcome.verdict is Verdict.INFEASIBLE
+    assert found.outcome.verdict is Status.INFEASIBLE
     assert found.outcome.reason == "no regressor is y at rest: add y(k-1)"
     assert (found.fitness, found.theta) == (np.inf, ())
     # What is alone in its cluster has gone before that was asked.
@@ -125,7 +125,7 @@ def test_without_y_the_constraint_cannot_be_met():
 
 def test_nothing_left_is_infeasible():
     found = evaluated(individual("phi1(u(k-1), u(k-1))"))
-    assert (found.outcome.verdict, found.outcome.reason) == (Verdict.INFEASIBLE, "no gene is left")
+    assert (found.outcome.verdict, found.outcome.reason) == (Status.INFEASIBLE, "no gene is left")
     pruned = evaluated(individual("u(k-1)"), pruned=True, constraints="none", tolerance=0.999)
     assert (pruned.outcome.reason, pruned.genes) == ("no gene is left", individual("u(k-1)").genes)
 
@@ -136,7 +136,7 @@ def test_regressors_that_depend_on_each_other_on_this_record_are_singular():
     u = np.sign(rng.normal(size=500))
     data = Dataset(u, np.convolve(u, [0.0, 1.0, 0.5])[:500] + 0.01 * rng.normal(size=500), 0.1)
     found = evaluated(individual("u(k-1)", "u(k-1)*u(k-1)*u(k-1)", "y(k-1)"), data, constraints="none")
-    assert found.outcome.verdict is Verdict.SINGULAR
+    assert found.outcome.verdict is Status.SINGULAR
     assert found.outcome.reason == "the free directions depend on each other"
 
 
@@ -144,19 +144,19 @@ def test_a_regressor_that_is_zero_on_the_record_is_singular():
     u = np.concatenate([np.zeros(300), [1.0]])
     data = Dataset(u, np.sin(np.arange(301.0)), 0.1)
     found = evaluated(individual("y(k-1)", "phi2(u(k-1), q1(u(k-1)))"), data, constraints="none")
-    assert found.outcome.verdict is Verdict.SINGULAR
+    assert found.outcome.verdict is Status.SINGULAR
 
 
 def test_a_model_whose_simulation_leaves_the_bound_has_diverged():
     """Two solutions side by side, the second not damped: the constraint allows it, one step shows nothing."""
     texts, data = ("y(k-2)", "y(k-3)"), searches.record()
     model = estimate(
-        [regressor_of(parse(text)) for text in texts], data, "hysteresis", SETTINGS.maximum_lag
+        [make_regressor(parse(text)) for text in texts], data, "hysteresis", SETTINGS.maximum_lag
     ).model
     assert max(map(abs, model.parameters)) > 1.0
     assert not multiple_shooting(model, data, 60, SETTINGS.maximum_lag).outcome
     found = evaluated(individual(*texts), data, shooting=60)
-    assert (found.outcome.verdict, found.outcome.reason) == (Verdict.DIVERGED, "an interval left the bound")
+    assert (found.outcome.verdict, found.outcome.reason) == (Status.DIVERGED, "an interval left the bound")
     assert (found.fitness, found.theta, found.size) == (np.inf, (), 2)
     assert evaluated(individual(*texts), data, fitness="one-step").outcome
 
@@ -165,7 +165,7 @@ def test_a_regressor_that_overflows_on_the_record_has_diverged():
     data = record()
     huge = replace(data, u=1e200 * data.u)
     found = evaluated(individual("y(k-1)", "u(k-1)*u(k-1)"), huge, constraints="none")
-    assert found.outcome.verdict is Verdict.DIVERGED
+    assert found.outcome.verdict is Status.DIVERGED
     assert found.outcome.reason == "a regressor overflows on the record"
 
 
@@ -218,7 +218,7 @@ DIFFERENCES = ("y(k-1)", "u(k-1)", "q1(u(k-1))", "q2(u(k-1))")
 )
 def test_ill_conditioned_structures_agree_with_their_columns(texts, constraints, frequency):
     data = slow(frequency=frequency)
-    regressors = [regressor_of(parse(text)) for text in texts]
+    regressors = [make_regressor(parse(text)) for text in texts]
     expected = estimate(regressors, data, constraints, SETTINGS.maximum_lag).model
     # The Gram matrix by itself would not do: of sixteen digits its solution loses ten and more.
     psi = regressor_matrix(regressors, data, SETTINGS.maximum_lag)
@@ -230,7 +230,7 @@ def test_ill_conditioned_structures_agree_with_their_columns(texts, constraints,
 
 def test_what_only_roundings_tell_apart_is_singular():
     found = evaluated(individual(*DIFFERENCES, "q3(u(k-1))"), slow(frequency=0.003), constraints="none")
-    assert found.outcome.verdict is Verdict.SINGULAR
+    assert found.outcome.verdict is Status.SINGULAR
 
 
 # Counting, and the paper's model.

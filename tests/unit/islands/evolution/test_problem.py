@@ -9,8 +9,8 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.evolution.gene_structure import with_phi
-from islands.evolution.individual import regressor_of
-from islands.evolution.island_profiles import CHARACTERS
+from islands.evolution.individual import make_regressor
+from islands.evolution.island_profiles import ISLAND_PROFILES
 from islands.evolution.problem import Problem, problem
 from islands.evolution.settings import Settings
 from islands.model.candidate_library import candidates
@@ -40,7 +40,7 @@ def test_without_a_library_there_is_neither_seed_nor_pool():
 def test_the_pool_is_the_library_and_the_seeds_its_forward_selection():
     posed = problem(record(), SETTINGS)
     library = candidates("phi-polynomial", 3, 3, 1)
-    assert [regressor_of(gene) for gene in posed.pool] == list(library)
+    assert [make_regressor(gene) for gene in posed.pool] == list(library)
     expected = forward_selection(library, record(), "hysteresis", SETTINGS.max_terms)
     assert [tuple(canonical_order(distinct_genes(genes))) for genes in posed.seeds] == list(expected)
 
@@ -70,7 +70,7 @@ def test_a_library_s_genes_are_written_with_phi_functions():
 )
 def test_differences_of_one_input_become_phi_functions_and_mean_the_same(canonical, written):
     assert with_phi(parse(canonical)) == parse(written)
-    assert regressor_of(parse(written)) == regressor_of(parse(canonical))
+    assert make_regressor(parse(written)) == make_regressor(parse(canonical))
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_seeds_have_no_more_terms_than_an_individual():
 def test_characters_are_given_to_the_islands_in_turn():
     posed = Problem(record(), Settings(islands=5, characters=("plain", "explorer", "pruner")))
     plain_, explorer, pruner = (
-        replace(posed.settings, **CHARACTERS[name]) for name in posed.settings.characters
+        replace(posed.settings, **ISLAND_PROFILES[name]) for name in posed.settings.characters
     )
     assert plain_ == posed.settings
     assert [posed.settings_of(island) for island in range(5)] == [plain_, explorer, pruner, plain_, explorer]

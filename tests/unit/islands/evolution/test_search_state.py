@@ -5,10 +5,10 @@ from math import inf
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import founded
-from islands.evolution.engine import Epoch
+from islands.evolution.archipelago import empty_archipelago
+from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.island import StepInfo
-from islands.evolution.search_state import State, after
+from islands.evolution.search_state import SearchState, advance
 
 #: Epochs of two islands: the best error of either at every generation; inf has no model yet.
 ERRORS = st.sampled_from([1.0, 2.0, inf])
@@ -22,13 +22,13 @@ def step(generation, error):
 
 def states(course):
     """Yield the state after every epoch of a course."""
-    state, generation = State(founded(2, 0)), 0
+    state, generation = SearchState(empty_archipelago(2, 0)), 0
     for epoch in course:
         steps = tuple(
             tuple(step(generation + at, pair[island]) for at, pair in enumerate(epoch)) for island in (0, 1)
         )
         generation += len(epoch)
-        state = after(state, Epoch(founded(2, 0), steps, {}))
+        state = advance(state, ArchipelagoEpoch(empty_archipelago(2, 0), steps, {}))
         yield state
 
 

@@ -12,9 +12,9 @@ from islands.evolution.individual import Individual
 from islands.evolution.rng import Purpose, Stream
 from islands.evolution.selection import tournaments
 from islands.model.expression import Lagged
-from islands.simulation.outcome import Outcome, Verdict
+from islands.simulation.outcome import EvaluationOutcome, Status
 
-ABANDONED = Outcome(Verdict.ABANDONED, "beyond the bar")
+ABANDONED = EvaluationOutcome(Status.ABANDONED, "beyond the bar")
 
 
 def pool(*fitness):
@@ -142,5 +142,5 @@ def test_a_known_contestant_at_the_bar_beats_whoever_was_abandoned_unasked():
 
 
 def test_a_failure_that_is_known_is_never_settled():
-    failed = Individual((Lagged(0),), outcome=Outcome(Verdict.SINGULAR, "dependent"))
+    failed = Individual((Lagged(0),), outcome=EvaluationOutcome(Status.SINGULAR, "dependent"))
     assert tournaments([failed], 3, 2, stream(), 1.0, nobody) == [failed] * 3

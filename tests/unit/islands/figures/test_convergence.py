@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from islands.evolution.history import Progress
+from islands.evolution.history import HistoryPoint
 from islands.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.figures.registry import search_figures
 from islands.figures.style import save
@@ -30,16 +30,16 @@ def findings(history=(), models=()):
 
 #: Two sizes from the start, a third from generation 2 on; squared errors.
 COURSE = (
-    Progress(0, 10, {1: 4.0, 3: 0.04}, (0.04,)),
-    Progress(1, 20, {1: 4.0, 3: 0.01}, (0.01,)),
-    Progress(2, 30, {1: 1.0, 2: 0.09, 3: 0.01}, (0.01,)),
+    HistoryPoint(0, 10, {1: 4.0, 3: 0.04}, (0.04,)),
+    HistoryPoint(1, 20, {1: 4.0, 3: 0.01}, (0.01,)),
+    HistoryPoint(2, 30, {1: 1.0, 2: 0.09, 3: 0.01}, (0.01,)),
 )
 
 #: Three islands; the last one has a model from generation 1 on.
 ISLANDS = (
-    Progress(4, 10, {1: 4.0}, (4.0, 9.0, np.inf)),
-    Progress(5, 20, {1: 1.0}, (4.0, 1.0, 16.0)),
-    Progress(6, 30, {1: 0.25}, (0.25, 1.0, 16.0)),
+    HistoryPoint(4, 10, {1: 4.0}, (4.0, 9.0, np.inf)),
+    HistoryPoint(5, 20, {1: 1.0}, (4.0, 1.0, 16.0)),
+    HistoryPoint(6, 30, {1: 0.25}, (0.25, 1.0, 16.0)),
 )
 MODELS = ((3, 0.2, 0.3), (1, 20.0, 30.0), (2, 2.0, 1.0))
 
@@ -127,7 +127,7 @@ def test_a_model_that_diverged_or_is_exact_leaves_the_others_to_be_seen():
 @pytest.mark.parametrize("sizes", [1, 9, 30])
 def test_the_legend_of_many_sizes_stays_inside_the_figure(sizes):
     history = [
-        Progress(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)}, (1.0 / sizes,))
+        HistoryPoint(generation, 0, {size: 1.0 / size for size in range(1, sizes + 1)}, (1.0 / sizes,))
         for generation in (0, 1, 2)
     ]
     figure = draw_convergence(findings(history))
@@ -158,8 +158,8 @@ def test_the_course_of_every_island_is_a_line_and_so_is_the_best_of_all():
 
 
 def test_a_generation_without_any_model_is_left_empty():
-    blank = (Progress(0, 1, {}, (np.inf, np.inf)), *ISLANDS)
-    figure = draw_islands(findings([Progress(p.generation, 1, {}, p.islands[:2]) for p in blank]))
+    blank = (HistoryPoint(0, 1, {}, (np.inf, np.inf)), *ISLANDS)
+    figure = draw_islands(findings([HistoryPoint(p.generation, 1, {}, p.islands[:2]) for p in blank]))
     best = axes_of(figure).lines[-1].get_xydata()[:, 1]
     np.testing.assert_array_equal(best, [np.nan, 2.0, 1.0, 0.5])
 

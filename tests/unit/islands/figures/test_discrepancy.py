@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import islands
-from islands.figures.discrepancy import DISCREPANCY_FIGURES, draw_ladder, draw_residual
+from islands.figures.discrepancy import DISCREPANCY_FIGURES, draw_residual, draw_screening
 from islands.figures.style import save
 
 pytestmark = pytest.mark.usefixtures("without_layout")
@@ -107,7 +107,7 @@ def test_where_nothing_was_found_there_is_no_after() -> None:
 
 def test_the_ladder_is_coloured_where_something_is_named() -> None:
     found = diagnosis()
-    axes = draw_ladder(found).axes[0]
+    axes = draw_screening(found).axes[0]
     names = [text.get_text() for text in axes.get_yticklabels()]
     orange = [name for name, bar in zip(names, axes.patches, strict=True) if bar.get_facecolor()[0] > 0.8]
     assert orange == ["coulomb-friction"]

@@ -7,7 +7,14 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.figures.diverging_lines import broken, divergence, drawable, limits, say_diverged, within_reach
+from islands.figures.diverging_lines import (
+    annotate_divergence,
+    break_line,
+    divergence,
+    finite_part,
+    limits,
+    within_reach,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,19 +28,19 @@ def record(y: list[float], **changes: object) -> Dataset:
 
 
 def test_what_is_infinite_or_beyond_the_bound_is_not_drawn():
-    made = drawable(record([0.0, 1.0, 2.0, 3.0, 4.0]), np.array([1.0, np.inf, NAN, -1e7, 1e305]))
+    made = finite_part(record([0.0, 1.0, 2.0, 3.0, 4.0]), np.array([1.0, np.inf, NAN, -1e7, 1e305]))
     np.testing.assert_array_equal(made, [1.0, NAN, NAN, NAN, NAN])
 
 
 def test_a_simulation_of_another_length_is_refused():
     with pytest.raises(SettingsError, match=r"each of the record's 3 samples, got shape \(2,\)"):
-        drawable(record([0.0, 1.0, 2.0]), np.zeros(2))
+        finite_part(record([0.0, 1.0, 2.0]), np.zeros(2))
 
 
 def test_a_line_is_broken_between_segments_alone():
-    made = broken(record([1.0, 2.0, 3.0, 4.0, 5.0], segments=(2, 2, 1)), np.arange(5.0))
+    made = break_line(record([1.0, 2.0, 3.0, 4.0, 5.0], segments=(2, 2, 1)), np.arange(5.0))
     np.testing.assert_array_equal(made, [0.0, 1.0, NAN, 2.0, 3.0, NAN, 4.0])
-    np.testing.assert_array_equal(broken(record([1.0, 2.0]), np.arange(2.0)), [0.0, 1.0])
+    np.testing.assert_array_equal(break_line(record([1.0, 2.0]), np.arange(2.0)), [0.0, 1.0])
 
 
 def test_an_axis_follows_one_range_beyond_the_measured_output():
@@ -69,7 +76,7 @@ def lost(*lines: tuple[list[float], list[float]]) -> "Figure":
     figure = Figure()
     axes = figure.subplots()
     axes.set(xlim=(0.0, 100.0), ylim=(0.0, 10.0))
-    say_diverged(axes, [(np.array(x), np.array(y)) for x, y in lines])
+    annotate_divergence(axes, [(np.array(x), np.array(y)) for x, y in lines])
     return figure
 
 

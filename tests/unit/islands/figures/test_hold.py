@@ -10,7 +10,7 @@ from islands.figures.hold import draw_holds
 from islands.figures.style import save
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
-from islands.validation.physics import LEVELS, physics
+from islands.validation.physics import LEVELS, check_physics
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,7 +93,7 @@ def test_a_continuum_of_equilibria_is_flat(still):
 
 def test_a_leaking_model_is_seen_to_drift_by_what_the_physics_check_says(record):
     figure = draw_holds(LEAKING, record)
-    largest = physics(LEAKING, record).hold_drift_percent
+    largest = check_physics(LEAKING, record).hold_drift_percent
     said = [axes.get_title(loc="left") for axes in (figure.axes[1], figure.axes[3])]
     assert largest > 10
     assert any(f"largest drift {largest:.0f} % of the output range" in title for title in said)

@@ -8,7 +8,7 @@ from islands.data.split import Split
 from islands.figures.registry import FIGURES
 from islands.model.model import model_of
 from islands.model.parsing import parse
-from islands.search_result import Assessed
+from islands.search_result import RankedModel
 from islands.validation.assessment import assess
 from support.searches import record
 
@@ -19,7 +19,7 @@ MODEL = model_of([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 @pytest.mark.parametrize("warm_up", [None, 60])
 def test_a_free_run_s_figure_has_the_error_of_the_table(warm_up):
     split = Split(record(400), record(300, seed=1))
-    assessed = Assessed(MODEL, assess(MODEL, split, 50, warm_up))
+    assessed = RankedModel(MODEL, assess(MODEL, split, 50, warm_up))
     figure = FIGURES["free-run"](assessed, split)
     texts = [text.get_text() for text in figure.findobj(match=lambda artist: hasattr(artist, "get_text"))]
     (drawn,) = re.findall(r"RMSE ([0-9.e-]+)", " ".join(texts))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.figures.windows import LOOPS, last_loops, loop_starts, representative
+from islands.figures.windows import LOOPS, last_loops, loop_starts, representative_window
 
 
 def sine(periods: int, length: int = 100, **changes: object) -> Dataset:
@@ -51,35 +51,35 @@ def test_a_record_of_few_loops_is_shown_as_a_whole():
 
 
 def test_a_stretch_is_asked_for_beyond_twenty_loops():
-    assert representative(sine(20), np.ones(2000)) is None
-    assert representative(sine(21), np.ones(2100)) is not None
+    assert representative_window(sine(20), np.ones(2000)) is None
+    assert representative_window(sine(21), np.ones(2100)) is not None
 
 
 def test_a_short_record_is_shown_as_a_whole_whatever_its_loops():
     record = sine(60, length=3)
     assert len(loop_starts(record)) > 20
-    assert representative(record, np.ones(record.samples)) is None
+    assert representative_window(record, np.ones(record.samples)) is None
 
 
 def test_the_stretch_has_the_median_residual():
     record = sine(25)
     residual = np.repeat([5.0, 1.0, 4.0, 3.0, 2.0], 500)
-    assert representative(record, residual) == slice(1500, 2000)
+    assert representative_window(record, residual) == slice(1500, 2000)
 
 
 def test_a_stretch_without_a_residual_never_stands_for_the_whole():
     record = sine(25)
     residual = np.repeat([5.0, np.nan, np.nan, np.nan, 2.0], 500)
-    assert representative(record, residual) == slice(0, 500)
+    assert representative_window(record, residual) == slice(0, 500)
 
 
 def test_without_any_residual_the_first_stretch_is_shown():
-    assert representative(sine(25), np.full(2500, np.nan)) == slice(0, 500)
+    assert representative_window(sine(25), np.full(2500, np.nan)) == slice(0, 500)
 
 
 def test_no_stretch_reaches_across_a_boundary_where_segments_are_long_enough():
     record = sine(30, segments=(700, 1300, 1000))
-    stretch = representative(record, np.arange(3000.0))
+    stretch = representative_window(record, np.arange(3000.0))
     assert stretch is not None
     assert any(begin <= stretch.start and stretch.stop <= end for begin, end in record.bounds)
     assert stretch == slice(1200, 1700)

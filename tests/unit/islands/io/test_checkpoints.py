@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 
 from islands.errors import ModelError
-from islands.evolution.archipelago import Archipelago, founded
+from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
-from islands.evolution.individual import Individual, regressor_of
+from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.island import Island
 from islands.io.checkpoints import HALL_SCHEMA, SCHEMA, read_checkpoint, write_checkpoint, write_hall
 from islands.model.expression import Apply
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
-from islands.simulation.outcome import OK, Outcome, Verdict
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
 #: Floats that lose something in any but an exact round trip.
 FLOATS = (0.1 + 0.2, 5e-324, -1.7976931348623157e308, 1 / 3, -0.0, 1e22)
@@ -35,7 +35,7 @@ GENES = (
 
 def individual(*texts, fitness=0.5, outcome=OK):
     genes = tuple(parse(text) for text in texts)
-    regressors = tuple(canonical_order(regressor_of(gene) for gene in genes))
+    regressors = tuple(canonical_order(make_regressor(gene) for gene in genes))
     theta = tuple(FLOATS[: len(regressors)]) if outcome else ()
     return Individual(genes, regressors, theta, fitness, outcome)
 
@@ -43,10 +43,12 @@ def individual(*texts, fitness=0.5, outcome=OK):
 def archipelago():
     good = individual(*GENES, fitness=1 / 3)
     failed = individual(
-        "u1(k-1)", fitness=inf, outcome=Outcome(Verdict.INFEASIBLE, 'no "y" at rest \u2013 add it')
+        "u1(k-1)", fitness=inf, outcome=EvaluationOutcome(Status.INFEASIBLE, 'no "y" at rest \u2013 add it')
     )
     unevaluated = Individual((parse("phi1(u1(k-1), u1(k-1))"),))
-    abandoned = individual("y(k-3)", fitness=inf, outcome=Outcome(Verdict.ABANDONED, "beyond the bar"))
+    abandoned = individual(
+        "y(k-3)", fitness=inf, outcome=EvaluationOutcome(Status.ABANDONED, "beyond the bar")
+    )
     population = (good, failed, unevaluated, individual("y(k-2)", fitness=5e-324), abandoned)
     hall = with_entries(HallOfFame(), population)
     assert len(hall.entries) == 2
@@ -56,7 +58,7 @@ def archipelago():
 
 
 #: Nobody lives there yet.
-EMPTY = founded(2, 5)
+EMPTY = empty_archipelago(2, 5)
 
 
 ABOUT = {
@@ -113,7 +115,7 @@ def test_primitives_of_the_user_s_own_are_read_back_from_their_table(path):
 
     table = {**PRIMITIVES, "twice": primitive("twice", _twice)}
     gene = Apply(table["twice"], (parse("u(k-1)"),))
-    own = Individual((gene,), (regressor_of(gene),), (1.0,), 0.25)
+    own = Individual((gene,), (make_regressor(gene),), (1.0,), 0.25)
     kept = Archipelago((Island(0, 0, 0, (own,), (own,), HallOfFame((own,))),))
     write_checkpoint(kept, path, {})
     assert read_checkpoint(path, table)[0] == kept

@@ -12,10 +12,10 @@ import islands
 from islands.data.dataset import Dataset
 from islands.io.models import read_model, terms_document
 from islands.io.result_folder import content_sha256, number, result_json, summary, table, write_result
-from islands.search_result import Assessed
-from islands.simulation.outcome import Outcome, Verdict
+from islands.search_result import RankedModel
+from islands.simulation.outcome import EvaluationOutcome, Status
 
-LOST = Outcome(Verdict.DIVERGED, "|y| left 1e+06 at sample 17")
+LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
 
 
 def record(samples=300, seed=0, **changes):
@@ -44,7 +44,7 @@ def loaded(findings):
 def with_best(findings, **changes):
     """Change what is known of the best model."""
     best, *others = findings.models
-    changed = Assessed(best.model, replace(best.assessment, **changes))
+    changed = RankedModel(best.model, replace(best.assessment, **changes))
     return replace(findings, models=(changed, *others))
 
 

@@ -17,7 +17,7 @@ from islands.kernels import constrained_lstsq
 from islands.kernels.constrained_lstsq import (
     ILL_CONDITIONED,
     SINGULAR,
-    Factor,
+    ConstrainedFactor,
     correct,
     expand,
     from_columns,
@@ -26,7 +26,7 @@ from islands.kernels.constrained_lstsq import (
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import arranged, gram_matrix, regressor_matrix, rows_of
+from islands.program.regressor_matrix import arranged, evaluate_terms, gram_matrix, regressor_matrix
 from islands.program.term_pool import link
 from islands.simulation.outcome import OK
 
@@ -71,7 +71,10 @@ LEAST = {"gram": ILL_CONDITIONED, "corrected": SINGULAR, "columns": SINGULAR}
 def solved(route, gram, program, rows, reduction):
     """Return theta by the Gram matrix, by it and a correction, or by the columns and one; None: refused."""
     terms, count = len(gram) - 1, reduction.free.size
-    factor, eta = Factor(np.full((count, count), np.nan), np.full(count, np.nan)), np.full(count, np.nan)
+    factor, eta = (
+        ConstrainedFactor(np.full((count, count), np.nan), np.full(count, np.nan)),
+        np.full(count, np.nan),
+    )
     if route == "columns":
         least = from_columns(program, rows, terms, reduction, factor, eta)
     else:
@@ -268,7 +271,7 @@ def slow(frequency, segments):
 def test_lags_of_a_slow_input_need_the_columns_which_keep_six_digits(texts, group, segments):
     record, count = slow(0.003, segments), len(texts)
     terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]
-    gram, program, rows = gram_matrix(terms, record, 3), link(terms), rows_of(record, 3)
+    gram, program, rows = gram_matrix(terms, record, 3), link(terms), evaluate_terms(record, 3)
     reduction = reduced(gram, group)
     psi = regressor_matrix(terms, record, 3)
     expected = constrained_least_squares(psi[:-1], psi[-1], *sums(group or [-1] * count, np.ones(count)))
@@ -283,7 +286,7 @@ def test_lags_of_a_slow_input_need_the_columns_which_keep_six_digits(texts, grou
 def test_lags_of_an_input_that_hardly_moves_are_refused(route):
     record = slow(0.001, (4000,))
     terms = [*(regressor(parse(text))[1] for text in LAGS), Lagged(0, 0)]
-    gram, program, rows = gram_matrix(terms, record, 3), link(terms), rows_of(record, 3)
+    gram, program, rows = gram_matrix(terms, record, 3), link(terms), evaluate_terms(record, 3)
     assert solved(route, gram, program, rows, reduced(gram)) is None
     # Their sums fixed, what is left has digits again.
     assert solved(route, gram, program, rows, reduced(gram, [0, 0, 0, 1, 1, 1])) is not None
@@ -345,6 +348,6 @@ def test_a_gram_matrix_may_be_larger_than_the_terms():
         reduction = constrained_lstsq.reduce(
             matrix, 3, np.array([0, -1, 0]), np.ones(3), np.array([1.0, 0.0, 1.0])
         )
-        factor, eta = Factor(np.empty((2, 2)), np.empty(2)), np.empty(2)
+        factor, eta = ConstrainedFactor(np.empty((2, 2)), np.empty(2)), np.empty(2)
         found.append((from_gram(matrix, 3, reduction, factor, eta), *eta, *factor.scale))
     assert found[0] == found[1]

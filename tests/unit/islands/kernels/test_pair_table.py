@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.kernels.pair_table import FREE, PLACE_BYTES, Pairs, clear, key_of, pair_table, place_of
+from islands.kernels.pair_table import FREE, PLACE_BYTES, Pairs, clear, find_pair, pair_key, pair_table
 
 term = st.integers(0, 2**31 - 1)
 #: Small numbers meet each other more often, and their keys differ in few bits.
@@ -17,16 +17,16 @@ def table(places):
 
 
 def put(pairs, key, number):
-    at = place_of(pairs, key)
+    at = find_pair(pairs, key)
     pairs.taken[0] += pairs.keys[at] != key
     pairs.keys[at], pairs.values[at] = key, number
 
 
 @given(pair, pair)
 def test_a_key_says_which_two_terms_in_whatever_order(one, other):
-    assert key_of(*one) == key_of(*reversed(one))
-    assert (key_of(*one) == key_of(*other)) == (sorted(one) == sorted(other))
-    assert key_of(*one) != FREE
+    assert pair_key(*one) == pair_key(*reversed(one))
+    assert (pair_key(*one) == pair_key(*other)) == (sorted(one) == sorted(other))
+    assert pair_key(*one) != FREE
 
 
 @pytest.mark.parametrize("places", [2, 16, 64])
@@ -34,25 +34,25 @@ def test_a_key_says_which_two_terms_in_whatever_order(one, other):
 def test_the_table_is_a_dictionary_even_when_nearly_full(places, data):
     pairs, known = table(places), {}
     for number, drawn in enumerate(data.draw(st.lists(pair, max_size=3 * places))):
-        key = key_of(*drawn)
+        key = pair_key(*drawn)
         if key not in known and len(known) == places - 1:
             continue  # One place is always free.
         known[key] = float(number)
         put(pairs, key, float(number))
     assert pairs.taken[0] == len(known) == np.count_nonzero(pairs.keys != FREE)
-    assert {key: pairs.values[place_of(pairs, key)] for key in known} == known
+    assert {key: pairs.values[find_pair(pairs, key)] for key in known} == known
     for absent in data.draw(st.lists(pair, max_size=10)):
-        if (key := key_of(*absent)) not in known:
-            assert pairs.keys[place_of(pairs, key)] == FREE
+        if (key := pair_key(*absent)) not in known:
+            assert pairs.keys[find_pair(pairs, key)] == FREE
 
 
 def test_a_table_is_filled_to_its_last_place_but_one():
     pairs = table(1024)
-    keys = [key_of(one, other) for one in range(200) for other in range(one, 200)][: 1024 - 1]
+    keys = [pair_key(one, other) for one in range(200) for other in range(one, 200)][: 1024 - 1]
     for key in keys:
         put(pairs, key, float(key % 1000))
     assert np.count_nonzero(pairs.keys == FREE) == 1
-    assert [pairs.values[place_of(pairs, key)] for key in keys] == [float(key % 1000) for key in keys]
+    assert [pairs.values[find_pair(pairs, key)] for key in keys] == [float(key % 1000) for key in keys]
 
 
 @pytest.mark.parametrize(("terms", "places"), [(128, 1 << 14), (360, 1 << 17)])
@@ -60,10 +60,10 @@ def test_the_pairs_of_a_search_seldom_meet(terms, places):
     """At half load a key is found after less than one step on average, whatever the table's size."""
     pairs, steps = table(places), []
     empty = table(places)
-    for key in (key_of(one, other) for one in range(terms) for other in range(one, terms)):
-        at = place_of(pairs, key)
+    for key in (pair_key(one, other) for one in range(terms) for other in range(one, terms)):
+        at = find_pair(pairs, key)
         pairs.keys[at] = key
-        steps.append((at - place_of(empty, key)) % places)
+        steps.append((at - find_pair(empty, key)) % places)
     assert len(steps) > 0.45 * places
     assert np.mean(steps) < 1.0
 
@@ -71,7 +71,7 @@ def test_the_pairs_of_a_search_seldom_meet(terms, places):
 def test_a_table_is_emptied():
     pairs = table(64)
     for one in range(9):
-        put(pairs, key_of(one, one + 1), 1.0)
+        put(pairs, pair_key(one, one + 1), 1.0)
     clear(pairs)
     assert (pairs.keys == FREE).all()
     assert pairs.taken.tolist() == [0]

@@ -28,10 +28,10 @@ from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import gram_matrix, regressor_matrix, rows_of
-from islands.program.term_pool import Store
+from islands.program.regressor_matrix import evaluate_terms, gram_matrix, regressor_matrix
+from islands.program.term_pool import TermPool
 from islands.simulation.layout import layout
-from islands.simulation.predictors import bound_of, multiple_shooting
+from islands.simulation.predictors import divergence_bound, multiple_shooting
 
 TOLERANCE, INTERVAL, WARM_UP = 1e-3, 20, 4
 TEXTS = [
@@ -84,7 +84,7 @@ def evaluated(
     structures, pruned, data=RECORD, terms=TERMS, constrained=False, pairs=None, allowed=math.inf, before=()
 ):
     """Return kept positions, theta, error and ending of every structure, a list of positions in ``terms``."""
-    store = Store()
+    store = TermPool()
     store.terms([Lagged(0, 0), *terms])
     store.terms(before)
     most = max(map(len, structures))
@@ -103,9 +103,9 @@ def evaluated(
         store.nodes,
         groups_of(terms, constrained),
         table() if pairs is None else pairs,
-        rows_of(data, WARM_UP),
+        evaluate_terms(data, WARM_UP),
         layout(data, WARM_UP, INTERVAL),
-        bound_of(data),
+        divergence_bound(data),
         np.full(most + 1, allowed),
         kept,
         lengths,

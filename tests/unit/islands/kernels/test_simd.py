@@ -11,17 +11,17 @@ from islands.kernels import simd
 from islands.kernels.simd import (
     VECTOR,
     address,
+    any_outside,
+    broadcast,
     fold,
     gather,
     load,
     outer,
     outer_upper,
-    outside,
+    padded_size,
     read,
     repeat,
-    room,
     sign,
-    splat,
     store,
     write,
 )
@@ -103,7 +103,7 @@ def products(x, y, whole, upper):
 def bounded(count):
     @njit
     def run(x, bound):
-        return outside(load(x, 0, count), bound)
+        return any_outside(load(x, 0, count), bound)
 
     return run
 
@@ -120,7 +120,7 @@ def moved(x, x_at, out, out_at):
 
 @njit
 def filled(number, out, at):
-    store(out, np.uint64(at), splat(number, 3))
+    store(out, np.uint64(at), broadcast(number, 3))
 
 
 @njit
@@ -221,7 +221,7 @@ def test_a_splat_fills_every_lane(number, at):
 
 @pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 1000])
 def test_a_room_has_its_size_and_begins_at_a_line_of_the_cache(size):
-    rooms = [room(size) for _ in range(20)]
+    rooms = [padded_size(size) for _ in range(20)]
     for found in rooms:
         assert found.shape == (size,)
         assert found.dtype == np.float64

@@ -30,11 +30,11 @@ from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import gram_matrix, regressor_matrix, rows_of
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, evaluate_terms
 from islands.kernels.pair_table import pair_table
-from islands.program.term_pool import Store
+from islands.program.term_pool import TermPool
 from islands.simulation.layout import layout
-from islands.simulation.predictors import bound_of, multiple_shooting
+from islands.simulation.predictors import divergence_bound, multiple_shooting
 
 texts = ["y(k-1)", "y(k-2)", "u(k-1)", "u(k-2)", "u(k-3)", "u(k-1)*y(k-1)", "u(k-2)^3*y(k-1)",
          "sign(u(k-1) - u(k-2))*u(k-2)", "tanh(y(k-3)) + u(k-3)^2", "y(k-1)/(2 + abs(u(k-4)))"]
@@ -51,7 +51,7 @@ made, chosen = factor(psi[:-1], psi[-1]), froe(gram)
 found = {"columns": psi, "gram": gram, "triangle": made.triangle, "projection": made.projection,
          "order": np.array(chosen.order), "err": np.array(chosen.err)}
 
-store = Store()
+store = TermPool()
 store.terms([Lagged(0, 0), *terms])
 sizes = np.array([count, 4, 6, 3])
 structures = np.zeros((4, count), np.int64)
@@ -67,8 +67,8 @@ for name, groups in (("clusters", clusters), ("free", free)):
         out = {"kept": np.zeros((4, count), np.int64), "lengths": np.zeros(4, np.int64),
                "theta": np.zeros((4, count)), "error": np.zeros(4), "ending": np.zeros(4, np.int64)}
         evaluate(structures, sizes, np.array([True, False, False, False]), 0, 1e-4, store.nodes, groups,
-                 pair_table(1 << 16), rows_of(record, 4), cut, bound_of(record), np.full(count + 1, np.inf),
-                 *out.values())
+                 pair_table(1 << 16), evaluate_terms(record, 4), cut, divergence_bound(record),
+                 np.full(count + 1, np.inf), *out.values())
         found |= {f"{name}, {interval}, {part}": array for part, array in out.items()}
         print(name, interval, "width", cut.width, "endings", out["ending"])
 model = Model(tuple(terms[:4]), tuple(found["free, 50, theta"][1][:4].tolist()), ("u",), "y", 0.1)

@@ -14,7 +14,7 @@ from islands.model.expression import Constant, Lagged
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import gram_matrix, regressor_matrix, rows_of
+from islands.program.regressor_matrix import evaluate_terms, gram_matrix, regressor_matrix
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value
 
@@ -150,7 +150,7 @@ def test_the_gram_matrix_is_the_inner_products_whatever_the_segments(record, ter
 
 
 def test_the_rows_of_a_record_are_those_of_every_segment_after_its_warm_up():
-    found = rows_of(ramp((3, 5, 2, 4)), 3)
+    found = evaluate_terms(ramp((3, 5, 2, 4)), 3)
     assert found.count == 3
     # One stretch is at most one row long: two rows side by side, and one; a chunk for each segment.
     assert found.apart.tolist() == [1, 1]

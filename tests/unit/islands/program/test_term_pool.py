@@ -18,7 +18,7 @@ from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.model.regressor import regressor
 from islands.program.primitive_functions import row_address
-from islands.program.term_pool import Store, link
+from islands.program.term_pool import TermPool, link
 from support.oracles import NUMBERS
 from support.strategies import regressors, signals
 
@@ -60,7 +60,7 @@ def test_the_factors_of_a_term_multiply_to_the_value_of_the_expression(terms, si
         expected = [value(item.expression, signal) for item in terms]
     except ValueError:  # The sine of an infinite number.
         assume(False)
-    store = Store()
+    store = TermPool()
     numbers = store.terms(terms)
     nodes = node_values(store, signal)
     for number, wanted in zip(numbers, expected, strict=True):
@@ -72,7 +72,7 @@ def test_the_factors_of_a_term_multiply_to_the_value_of_the_expression(terms, si
 
 @given(several)
 def test_equal_expressions_are_one_node_and_operands_stand_before_what_reads_them(terms):
-    store = Store()
+    store = TermPool()
     store.terms(terms)
     nodes = taken(store)
     assert len(set(nodes)) == len(nodes)
@@ -83,7 +83,7 @@ def test_equal_expressions_are_one_node_and_operands_stand_before_what_reads_the
 
 @given(several, several)
 def test_what_is_known_keeps_its_number_and_adds_no_node(terms, others):
-    store = Store()
+    store = TermPool()
     numbers = store.terms(terms).tolist()
     store.terms(others)
     size, nodes = len(store), len(taken(store))
@@ -97,7 +97,7 @@ def test_what_is_known_keeps_its_number_and_adds_no_node(terms, others):
 @given(several, several)
 def test_a_program_does_not_depend_on_what_else_the_store_knows(terms, others):
     """Whatever came before: the nodes have other numbers, the program is the same."""
-    store = Store()
+    store = TermPool()
     store.terms(others)
     numbers = store.terms(terms)
     place = np.full(store.nodes.operation.size, -1, np.int64)
@@ -107,7 +107,7 @@ def test_a_program_does_not_depend_on_what_else_the_store_knows(terms, others):
 
 
 def test_a_store_grows_and_keeps_what_it_knows():
-    store = Store()
+    store = TermPool()
     texts = [f"exp({factor}*u(k-{lag})) + y(k-1)" for factor in range(2, 30) for lag in range(1, 40)]
     numbers = store.terms([made(text) for text in texts]).tolist()
     assert numbers == list(range(len(texts)))
@@ -130,7 +130,7 @@ def test_a_deep_expression_and_many_nodes_are_linked():
 
 
 def test_a_number_of_the_store_is_found_for_an_expression_as_for_its_regressor():
-    store, item = Store(), made("y(k-1)*exp(u(k-1))")
+    store, item = TermPool(), made("y(k-1)*exp(u(k-1))")
     assert store.term(item) == store.term(item.expression) == 0
     assert store.term(Lagged(0, 0)) == 1
     assert store.term(Constant(2.5)) == 2

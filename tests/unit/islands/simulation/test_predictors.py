@@ -13,8 +13,8 @@ from islands.model.expression import value
 from islands.model.model import model_of
 from islands.model.parsing import parse
 from islands.simulation.layout import layout
-from islands.simulation.outcome import OK, Verdict
-from islands.simulation.predictors import BOUND, bound_of, free_run, multiple_shooting, one_step_ahead
+from islands.simulation.outcome import OK, Status
+from islands.simulation.predictors import BOUND, divergence_bound, free_run, multiple_shooting, one_step_ahead
 
 SAMPLES = 300
 
@@ -39,7 +39,7 @@ def spikes(**at):
 
 def judged(chosen, data, interval=None, bound=None):
     """Simulate in plain floats; return predictions up to each divergence and the first sample of any."""
-    bound = bound_of(data) if bound is None else bound
+    bound = divergence_bound(data) if bound is None else bound
     u, y, found = data.u[:, 0].tolist(), data.y.tolist(), np.full(data.samples, np.nan)
     first = None
     for begin, end in data.bounds:
@@ -91,8 +91,8 @@ def test_divergence_is_an_outcome_with_its_first_sample(name, interval):
         assert found.outcome == OK
         assert math.isfinite(found.mean_squared_error)
     else:
-        assert found.outcome.verdict is Verdict.DIVERGED
-        assert found.outcome.reason == f"|y| left {bound_of(data):.3g} at sample {first}"
+        assert found.outcome.verdict is Status.DIVERGED
+        assert found.outcome.reason == f"|y| left {divergence_bound(data):.3g} at sample {first}"
         assert found.mean_squared_error == math.inf
 
 
@@ -141,7 +141,7 @@ def test_what_a_block_left_behind_is_not_read_as_the_next_ones(monkeypatch):
 
 def test_an_unstable_model_that_is_shot_often_enough_does_not_diverge():
     chosen = model((1.2, "y(k-1)"), (1.0, "u(k-1)"))
-    assert free_run(chosen, record()).outcome.verdict is Verdict.DIVERGED
+    assert free_run(chosen, record()).outcome.verdict is Status.DIVERGED
     assert multiple_shooting(chosen, record(), 20).outcome
     assert one_step_ahead(chosen, record()).outcome
 
@@ -171,7 +171,7 @@ def test_a_bound_of_ones_own_replaces_that_of_the_record():
     ],
 )
 def test_the_bound_is_a_million_times_what_is_known_of_the_outputs_scale(y, scale):
-    assert bound_of(Dataset(np.zeros(3), np.array(y), 1.0)) == pytest.approx(BOUND * scale)
+    assert divergence_bound(Dataset(np.zeros(3), np.array(y), 1.0)) == pytest.approx(BOUND * scale)
     assert BOUND == 1e6
 
 

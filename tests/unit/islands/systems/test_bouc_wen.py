@@ -67,16 +67,16 @@ def test_under_a_growing_voltage_the_state_saturates_at_its_known_level():
 
 @pytest.mark.parametrize("loading", [True, False])
 def test_at_a_constant_voltage_the_output_stays_where_it_is(loading):
-    u = signals.hold(DT, 20.0, amplitude=40.0, frequency=1.0, level=20.0, loading=loading)
+    u = signals.hold_signal(DT, 20.0, amplitude=40.0, frequency=1.0, level=20.0, loading=loading)
     rest = simulate(PIEZO, u, DT)[-20000:]
     assert (rest == rest[0]).all()
 
 
 def test_loading_and_unloading_to_one_voltage_end_apart():
     ends = [
-        simulate(PIEZO, signals.hold(DT, 1.0, amplitude=40.0, frequency=1.0, level=20.0, loading=side), DT)[
-            -1
-        ]
+        simulate(
+            PIEZO, signals.hold_signal(DT, 1.0, amplitude=40.0, frequency=1.0, level=20.0, loading=side), DT
+        )[-1]
         for side in (True, False)
     ]
     assert ends[1] - ends[0] > 5.0

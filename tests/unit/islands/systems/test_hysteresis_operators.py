@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from islands.systems.hysteresis_operators import bouc_wen, played, slider
+from islands.systems.hysteresis_operators import bouc_wen, play_from, slider
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def test_one_that_breaks_away_at_once_stays_behind_by_nothing(u: Array) -> None:
 
 @given(paths, widths)
 def test_play_is_within_its_width_and_moves_by_its_edges_alone(u: Array, width: float) -> None:
-    x = played(u, width)
+    x = play_from(u, width)
     assert x[0] == u[0]
     assert (np.abs(u - x) <= width).all()
     moved = np.flatnonzero(np.diff(x)) + 1

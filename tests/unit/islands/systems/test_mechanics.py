@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.discrepancy.effects import hysteresis
-from islands.systems.mechanics import WIDTH, Elements, along, balance, compiled
+from islands.systems.mechanics import WIDTH, Elements, compiled, integrate_along, integrate_motion
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def moved(
     for k, (position, rate) in (starts or {}).items():
         begins[k], x0[k], v0[k] = True, position, rate
     midway = np.stack([u(t + dt / 2), u(t + dt)])
-    balance(u(t), midway, dt, MASS, DAMPING, STIFFNESS, parts, begins, x0, v0, x)
+    integrate_motion(u(t), midway, dt, MASS, DAMPING, STIFFNESS, parts, begins, x0, v0, x)
     return x
 
 
@@ -190,28 +190,28 @@ def test_along_a_motion_forces_are_their_formulas() -> None:
     x, rate, dt = motion()
     total = np.full(x.size, 7.0)
     parts = elements((cubic, None, 1.0, 0.0, (2.0,)), (drag, None, -1.0, 0.0, (0.7,)))
-    along(x, rate, dt, parts, total)
+    integrate_along(x, rate, dt, parts, total)
     assert total == pytest.approx(2.0 * x**3 - 0.7 * rate, abs=1e-13)
 
 
 def test_along_a_motion_nothing_is_nothing() -> None:
     x, rate, dt = motion()
     total = np.full(x.size, 7.0)
-    along(x, rate, dt, elements(), total)
+    integrate_along(x, rate, dt, elements(), total)
     assert not total.any()
 
 
 def test_along_a_motion_what_is_remembered_is_integrated_from_its_beginning() -> None:
     x, rate, dt = motion()
     total = np.empty(x.size)
-    along(x, rate, dt, elements((stored, travelled, 1.0, 0.4, (3.0,))), total)
+    integrate_along(x, rate, dt, elements((stored, travelled, 1.0, 0.4, (3.0,))), total)
     assert total == pytest.approx(3.0 * (0.4 + x - x[0]), abs=1e-12)
 
 
 def test_along_a_motion_a_memory_is_the_solution_of_its_equation() -> None:
     x, rate, dt = motion()
     total = np.empty(x.size)
-    along(x, rate, dt, elements((stored, leaking, 1.0, 0.4, (1.0, 2.0, 0.5))), total)
+    integrate_along(x, rate, dt, elements((stored, leaking, 1.0, 0.4, (1.0, 2.0, 0.5))), total)
     z, known = 0.4, []
     for k in range(x.size):
         known.append(z)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.errors import SettingsError
-from islands.systems.second_order import SecondOrder, second_order_of
+from islands.systems.second_order import SecondOrder, estimate_second_order
 from support.strategies import part_of_the_examples
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def same(found: SecondOrder, truth: SecondOrder, rel: float = 1e-5) -> None:
 @given(systems)
 def test_what_made_a_record_is_found_again(system: tuple[float, float, float, float, float]) -> None:
     truth, u = oscillator(*system), pushed()
-    same(second_order_of(u, moved(truth, u), DT, {}), truth)
+    same(estimate_second_order(u, moved(truth, u), DT, {}), truth)
 
 
 GIVEN = [names for many in (1, 2, 3) for names in combinations("mck", many)]
@@ -73,7 +73,7 @@ def test_what_is_given_is_kept_and_the_rest_found(names: tuple[str, ...]) -> Non
     truth, u = oscillator(3.0, 0.08, 0.4, 0.5, -0.7), pushed()
     values = {"m": truth.mass, "c": truth.damping, "k": truth.stiffness}
     chosen = {name: values[name] for name in names}
-    found = second_order_of(u, moved(truth, u), DT, chosen)
+    found = estimate_second_order(u, moved(truth, u), DT, chosen)
     same(found, truth)
     kept = {"m": found.mass, "c": found.damping, "k": found.stiffness}
     assert {name: kept[name] for name in names} == chosen
@@ -84,7 +84,7 @@ def test_what_is_given_is_kept_where_it_is_wrong(names: str) -> None:
     truth, u = oscillator(3.0, 0.08, 0.4, 0.5, -0.7), pushed()
     wrong = {"m": 1.3 * truth.mass, "c": 0.6 * truth.damping, "k": 1.2 * truth.stiffness}
     chosen = {name: wrong[name] for name in names}
-    found = second_order_of(u, moved(truth, u), DT, chosen)
+    found = estimate_second_order(u, moved(truth, u), DT, chosen)
     kept = {"m": found.mass, "c": found.damping, "k": found.stiffness}
     assert {name: kept[name] for name in names} == chosen
 
@@ -95,7 +95,7 @@ def test_a_zero_that_is_given_says_nothing_of_the_size(name: str) -> None:
     u = pushed()
     known = {"m": 0.4, "c": 1.5, "k": 140.0, name: 0.0}
     truth = SecondOrder(known["m"], known["c"], known["k"])
-    found = second_order_of(u, moved(truth, u), DT, {name: 0.0})
+    found = estimate_second_order(u, moved(truth, u), DT, {name: 0.0})
     assert (found.mass, found.damping, found.stiffness) == pytest.approx(
         (truth.mass, truth.damping, truth.stiffness), rel=1e-4
     )
@@ -104,13 +104,13 @@ def test_a_zero_that_is_given_says_nothing_of_the_size(name: str) -> None:
 def test_a_mass_of_zero_is_refused() -> None:
     u = pushed()
     with pytest.raises(SettingsError, match="a mass of zero"):
-        second_order_of(u, u, DT, {"m": 0.0})
+        estimate_second_order(u, u, DT, {"m": 0.0})
 
 
 def test_the_state_at_the_first_sample_knows_nothing_of_what_was_before() -> None:
     """The input begins at a value of its own: before the first sample there is none."""
     truth, u = oscillator(1.0, 0.2, 2.0, 0.0, 0.0), 30.0 + pushed()
-    found = second_order_of(u, moved(truth, u), DT, {})
+    found = estimate_second_order(u, moved(truth, u), DT, {})
     size = 30.0 / truth.stiffness
     assert found.position == pytest.approx(0.0, abs=1e-6 * size)
     assert found.rate == pytest.approx(0.0, abs=1e-5 * size)
@@ -120,4 +120,4 @@ def test_noise_moves_it_by_as_much_as_it_has_to() -> None:
     truth, u = oscillator(3.0, 0.08, 0.4, 0.5, -0.7), pushed()
     y = moved(truth, u)
     noisy = y + 0.01 * y.std() * np.random.default_rng(4).standard_normal(y.size)
-    same(second_order_of(u, noisy, DT, {}), truth, rel=0.01)
+    same(estimate_second_order(u, noisy, DT, {}), truth, rel=0.01)

@@ -120,7 +120,7 @@ def test_a_sweep_passes_from_its_first_to_its_last_frequency():
 @pytest.mark.parametrize("level", [20.0, 0.0, -15.0])
 @pytest.mark.parametrize("loading", [True, False])
 def test_a_hold_comes_from_its_side_and_then_rests(level, loading):
-    u = signals.hold(DT, 3.0, amplitude=40.0, frequency=1.0, level=level, loading=loading)
+    u = signals.hold_signal(DT, 3.0, amplitude=40.0, frequency=1.0, level=level, loading=loading)
     rest = u[-3000:]
     approach = u[:-3000]
     assert (rest == level).all()
@@ -135,7 +135,7 @@ def test_a_hold_comes_from_its_side_and_then_rests(level, loading):
 
 def test_a_level_out_of_the_sines_reach_is_refused():
     with pytest.raises(SettingsError, match=r"never reaches the level 41\.0"):
-        signals.hold(DT, 1.0, amplitude=40.0, frequency=1.0, level=41.0)
+        signals.hold_signal(DT, 1.0, amplitude=40.0, frequency=1.0, level=41.0)
 
 
 def test_minor_loops_turn_where_they_are_told_and_close():

@@ -8,8 +8,8 @@ import pytest
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.simulation.predictors import free_run
-from islands.trials.cases import CORES, identified
-from islands.trials.injection.measurement import hide
+from islands.trials.cases import CORES, identify_actuator
+from islands.trials.injection.measurement import inject
 from islands.trials.injection.piezo import PIEZO
 from islands.trials.oracle import share_of_gain
 
@@ -18,7 +18,7 @@ from islands.trials.oracle import share_of_gain
 def test_what_is_hidden_is_what_a_simulation_can_name(name: str) -> None:
     simulated = CORES[name]
     system = simulated.system
-    hiding = hide([], np.random.default_rng(4), system.seconds / 3, system=system, apart=simulated.apart)
+    hiding = inject([], np.random.default_rng(4), system.seconds / 3, system=system, apart=simulated.apart)
     core = simulated.made(hiding)
     scene = make_context(hiding.record, core, count_fitted_samples(hiding.record))
     found = {effect.name.partition(":")[0] for effect in select_effects(core, scene, simulated.tolerance)}
@@ -28,10 +28,10 @@ def test_what_is_hidden_is_what_a_simulation_can_name(name: str) -> None:
 
 def test_an_identified_model_follows_a_clean_record() -> None:
     """It is another model than the truth: what it lacks is within the size of the noise."""
-    hiding = hide([], np.random.default_rng(4), 40.0)
+    hiding = inject([], np.random.default_rng(4), 40.0)
     record = hiding.record
     alone = type(record)(u=record.u[:, :1], y=record.y, dt=record.dt)
-    model = identified(alone[:3000])
+    model = identify_actuator(alone[:3000])
     missed = (free_run(model, alone).y - record.y)[model.maximum_lag :]
     assert np.std(missed[:3000]) < 1.5 * hiding.sigma
     assert np.std(missed[3000:]) < 2.5 * hiding.sigma
@@ -40,7 +40,7 @@ def test_an_identified_model_follows_a_clean_record() -> None:
 
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
-    hiding = hide(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), apart=False)
+    hiding = inject(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), apart=False)
     return diagnose(hiding.record, CORES["column"].made(hiding))
 
 
@@ -61,7 +61,7 @@ def test_an_oracle_without_a_name_or_without_a_gain_is_none(found: Diagnosis) ->
 
 @pytest.mark.ci
 def test_two_names_are_told_one_after_the_other() -> None:
-    hiding = hide(
+    hiding = inject(
         ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), apart=False
     )
     found = diagnose(hiding.record, CORES["column"].made(hiding))

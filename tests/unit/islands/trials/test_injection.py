@@ -7,20 +7,20 @@ import pytest
 import scipy
 
 from islands.trials.injection import force_faults, measurement
-from islands.trials.injection.measurement import SCALE, Hiding, hide
+from islands.trials.injection.measurement import SCALE, Injection, inject
 from islands.trials.injection.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
 from islands.trials.injection.piezo import PIEZO, Piezo
-from islands.trials.injection.plant import Force, respond
-from islands.trials.injection.rig import System
+from islands.trials.injection.plant import Force, simulate_plant
+from islands.trials.injection.rig import Rig
 from islands.trials.injection.tanks import TANKS, Tanks
 
 #: Every system, with a record that is quickly made.
 SYSTEMS = {"piezo": (PIEZO, 5.0), "oscillator": (OSCILLATOR, 4.0), "tanks": (TANKS, 2048.0)}
 
 
-def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> Hiding:
+def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> Injection:
     which, seconds = SYSTEMS[system]
-    return hide(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
+    return inject(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
 
 
 @pytest.mark.ci
@@ -62,7 +62,7 @@ def test_what_tolerances_allow_is_no_misfit() -> None:
         replace(PIEZO, known={"sensor-gain": replace(gain, least=k, most=k)}) for k in (0.015, 0.08)
     )
     allowed, off, in_full = (
-        hide(["sensor-gain"], np.random.default_rng(3), 12.0, system=system, apart=apart)
+        inject(["sensor-gain"], np.random.default_rng(3), 12.0, system=system, apart=apart)
         for system, apart in ((small, True), (large, True), (small, False))
     )
     assert allowed.misfit < 0.05
@@ -87,7 +87,7 @@ def test_the_oscillator_is_solved(force: object) -> None:
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
     truth = Oscillator(beside=made)
     drive = OSCILLATOR.drive(rng, 2.0)
-    y = respond(truth, drive)
+    y = simulate_plant(truth, drive)
 
     def slope(t: float, state: np.ndarray) -> list[float]:
         x, v, z = state
@@ -114,14 +114,14 @@ def test_the_tanks_are_solved() -> None:
     ideal = scipy.integrate.solve_ivp(
         slope, (0.0, drive.time[-1]), truth.start, t_eval=drive.time, max_step=1.0, rtol=1e-8
     ).y[1]
-    assert np.max(np.abs(respond(truth, drive) - ideal)) < 1e-3
+    assert np.max(np.abs(simulate_plant(truth, drive) - ideal)) < 1e-3
 
 
 def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
     drive = TANKS.drive(np.random.default_rng(2), 4096.0)
-    free = respond(Tanks(), drive)
-    lower = respond(Tanks(below=(0.0, 0.2)), drive)
-    lost, caught = (respond(Tanks(below=(0.3, 0.0), spilled=part), drive) for part in (0.0, 1.0))
+    free = simulate_plant(Tanks(), drive)
+    lower = simulate_plant(Tanks(below=(0.0, 0.2)), drive)
+    lost, caught = (simulate_plant(Tanks(below=(0.3, 0.0), spilled=part), drive) for part in (0.0, 1.0))
     assert lower.max() == pytest.approx(0.8 * free.max())
     assert lost.max() < free.max()
     assert caught.mean() > lost.mean()
@@ -131,14 +131,16 @@ def test_a_gain_that_changes_shows_behind_its_instant() -> None:
     for system, truth in ((PIEZO, Piezo()), (OSCILLATOR, Oscillator()), (TANKS, Tanks())):
         drive = system.drive(np.random.default_rng(2), 0.3 * system.seconds)
         half = float(drive.time[-1]) / 2
-        changed = respond(replace(truth, gain=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive)
-        moved = np.abs(changed - respond(truth, drive)) > 1e-9
+        changed = simulate_plant(
+            replace(truth, gain=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive
+        )
+        moved = np.abs(changed - simulate_plant(truth, drive)) > 1e-9
         assert not moved[: moved.size // 2].any()
         assert moved[moved.size // 2 + 10 :].mean() > 0.9
 
 
 def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
-    def scales(system: System) -> set[str]:
+    def scales(system: Rig) -> set[str]:
         return set(system.known) & set(SCALE)
 
     assert scales(PIEZO) == set(SCALE)
@@ -148,15 +150,15 @@ def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
 def test_a_misfit_that_no_strength_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measurement, "_RECORDS", 2)
     with pytest.raises(ValueError, match=r"delay cannot be hidden with a misfit within"):
-        hide(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
+        inject(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
 
 
 @pytest.mark.ci
 def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
 
-    def hidden_peak() -> Hiding:
-        return hide(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))
+    def hidden_peak() -> Injection:
+        return inject(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))
 
     assert 0.3 <= hidden_peak().misfit <= 2.0
     monkeypatch.setattr(measurement, "_RECORDS", 1)

@@ -2,27 +2,29 @@
 
 import pytest
 
-from islands.trials.scoring import Measure, Share, calibration_error, confusion, reliability, tally
+from islands.trials.scoring import Proportion, Statistic, calibration_error, confusion, reliability, score
 from islands.trials.targets import EXACT, IDENTIFIED
-from islands.trials.trial import Outcome, Trial
+from islands.trials.trial import Trial, TrialOutcome
 
 
-def outcome(hidden: tuple[str, ...], named: tuple[str, ...], misfit: float = 1.5, **said: object) -> Outcome:
+def outcome(
+    hidden: tuple[str, ...], named: tuple[str, ...], misfit: float = 1.5, **said: object
+) -> TrialOutcome:
     verdict = said.pop("verdict", "named" if named else "nothing")
     sets = said.pop("equivalents", ((),) * len(named))
     sure, gain = said.pop("confidence", 0.9), said.pop("gain_share", None)
     form = said.pop("form", False)
     assert not said
-    return Outcome(Trial(hidden, 1), misfit, str(verdict), named, (), sets, named[:1], sure, gain, form)  # type: ignore[arg-type]
+    return TrialOutcome(Trial(hidden, 1), misfit, str(verdict), named, (), sets, named[:1], sure, gain, form)  # type: ignore[arg-type]
 
 
-def counted(*outcomes: Outcome) -> dict[str, tuple[int, int]]:
-    rows = tally(outcomes, ["ripple"])
-    return {row.name: (row.count, row.of) for row in rows if isinstance(row, Share)}
+def counted(*outcomes: TrialOutcome) -> dict[str, tuple[int, int]]:
+    rows = score(outcomes, ["ripple"])
+    return {row.name: (row.count, row.of) for row in rows if isinstance(row, Proportion)}
 
 
-def measured(*outcomes: Outcome) -> dict[str, Measure]:
-    return {row.name: row for row in tally(outcomes, ["ripple"]) if isinstance(row, Measure)}
+def measured(*outcomes: TrialOutcome) -> dict[str, Statistic]:
+    return {row.name: row for row in score(outcomes, ["ripple"]) if isinstance(row, Statistic)}
 
 
 def test_everything_is_counted_where_it_belongs() -> None:
@@ -124,21 +126,21 @@ def test_whoever_is_sure_is_in_the_last_bin() -> None:
 def test_goals_are_those_of_the_simulation() -> None:
     said = [outcome(("delay",), (name,)) for name in ["delay"] * 9 + ["jump"]]
     kept = [
-        {row.name: row.kept for row in tally(said, [], goals)}["named first, where detected"]
+        {row.name: row.kept for row in score(said, [], goals)}["named first, where detected"]
         for goals in (EXACT, IDENTIFIED)
     ]
     assert kept == [False, True]
 
 
 def test_without_trials_nothing_is_kept_or_missed() -> None:
-    assert {row.kept for row in tally([], [])} == {None}
+    assert {row.kept for row in score([], [])} == {None}
 
 
 def test_bounds_are_those_of_clopper_and_pearson() -> None:
     """0 of 300 allows 1.2 %, 97 of 100 stands for 91.5 to 99.4 %."""
-    assert Share("", 0, 300).bounds == pytest.approx((0.0, 1.2221), abs=1e-3)
-    assert Share("", 97, 100).bounds == pytest.approx((91.482, 99.377), abs=1e-2)
-    assert Share("", 5, 5).bounds[1] == 100.0
+    assert Proportion("", 0, 300).bounds == pytest.approx((0.0, 1.2221), abs=1e-3)
+    assert Proportion("", 97, 100).bounds == pytest.approx((91.482, 99.377), abs=1e-2)
+    assert Proportion("", 5, 5).bounds[1] == 100.0
 
 
 @pytest.mark.parametrize(
@@ -146,8 +148,8 @@ def test_bounds_are_those_of_clopper_and_pearson() -> None:
     [(97, 97.0, False, True), (96, 97.0, False, False), (1, 1.0, True, True), (2, 1.0, True, False)],
 )
 def test_a_goal_is_kept_or_missed(count: int, goal: float, most: bool, kept: bool) -> None:
-    assert Share("", count, 100, goal, most).kept is kept
-    assert Measure("", count, 100, goal, most).kept is kept
+    assert Proportion("", count, 100, goal, most).kept is kept
+    assert Statistic("", count, 100, goal, most).kept is kept
 
 
 def test_a_confusion_says_what_was_taken_for_what() -> None:

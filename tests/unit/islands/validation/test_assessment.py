@@ -13,7 +13,7 @@ from islands.errors import RecordError
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead
 from islands.validation.assessment import MODES, PARTS, assess
 from islands.validation.metrics import metrics
-from islands.validation.physics import physics
+from islands.validation.physics import check_physics
 from islands.validation.residual_tests import residual_tests
 
 SHOOTING = 7
@@ -70,8 +70,8 @@ def test_every_part_and_mode_has_the_metrics_of_its_simulation(warm_up):
 def test_the_physics_is_that_of_the_estimation_data():
     split = Split(record(200), record(90, seed=1, size=5.0))
     found = assess(LINEAR, split, SHOOTING)
-    assert found.physics == physics(LINEAR, split.estimation)
-    assert found.physics != physics(LINEAR, split.validation)
+    assert found.physics == check_physics(LINEAR, split.estimation)
+    assert found.physics != check_physics(LINEAR, split.validation)
 
 
 def test_the_information_criteria_weigh_the_one_step_ahead_residual_of_the_estimation_data():

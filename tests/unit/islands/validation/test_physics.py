@@ -7,7 +7,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.estimate import estimate
-from islands.validation.physics import LEVELS, ClusterSum, cluster_sums, hold_response, physics
+from islands.validation.physics import LEVELS, ClusterSum, check_physics, cluster_sums, hold_response
 
 PERIOD = 200
 AMPLITUDE, MIDDLE = 10.0, 5.0
@@ -37,7 +37,7 @@ HYSTERESIS = {
 
 
 def test_a_model_of_hysteresis_has_property_1_and_does_not_drift():
-    checked = physics(model(HYSTERESIS), record())
+    checked = check_physics(model(HYSTERESIS), record())
     assert checked.property_1 is True
     assert checked.hold_drift_percent < 1e-9
     assert checked.clusters == (ClusterSum("y", 1.0, 1.0),)
@@ -56,7 +56,7 @@ def test_what_constrained_least_squares_estimates_has_property_1():
 
 def test_the_sums_alone_do_not_give_property_1():
     # Both meet the sum of 1; this one's modes are 1 and 1.5, so whatever moves it sends it away.
-    checked = physics(model({"y(k-1)": 2.5, "y(k-2)": -1.5, "u(k-1) - u(k-2)": 0.1}), record())
+    checked = check_physics(model({"y(k-1)": 2.5, "y(k-2)": -1.5, "u(k-1) - u(k-2)": 0.1}), record())
     assert [(entry.cluster, entry.met) for entry in checked.clusters] == [("y", True)]
     assert not any(entry.bounded for entry in checked.holds)
     assert checked.property_1 is False
@@ -64,7 +64,7 @@ def test_the_sums_alone_do_not_give_property_1():
 
 def test_holds_that_stay_do_not_give_property_1_either():
     # It settles wherever the input rests, but in one place only.
-    checked = physics(model({"y(k-1)": 0.5, "u(k-1)": 0.4}), record())
+    checked = check_physics(model({"y(k-1)": 0.5, "u(k-1)": 0.4}), record())
     assert all(entry.bounded and entry.constant for entry in checked.holds)
     sums = {entry.cluster: (entry.sum, entry.target, entry.met) for entry in checked.clusters}
     assert sums == {"y": (0.5, 1.0, False), "u": (0.4, 0.0, False)}
@@ -74,13 +74,13 @@ def test_holds_that_stay_do_not_give_property_1_either():
 @pytest.mark.parametrize("terms", [{"u(k-1) - u(k-2)": 0.5}, {"1": 2.0}, {"y(k-1)*u(k-1)": 0.01}])
 def test_an_output_that_is_not_fed_back_has_no_continuum_of_equilibria(terms):
     # The first has no cluster at all, and its output is zero and constant in every hold.
-    checked = physics(model(terms), record())
+    checked = check_physics(model(terms), record())
     assert checked.clusters[0] == ClusterSum("y", 0.0, 1.0)
     assert checked.property_1 is False
 
 
 def test_an_output_that_hops_between_two_values_is_not_constant():
-    checked = physics(model({"y(k-2)": 1.0, "u(k-1) - u(k-2)": 0.1}), record())
+    checked = check_physics(model({"y(k-2)": 1.0, "u(k-1) - u(k-2)": 0.1}), record())
     assert checked.clusters == (ClusterSum("y", 1.0, 1.0),)
     assert all(entry.bounded for entry in checked.holds)
     assert not all(entry.constant for entry in checked.holds)
@@ -90,7 +90,7 @@ def test_an_output_that_hops_between_two_values_is_not_constant():
 def test_a_transient_that_dies_out_is_no_want_of_constancy():
     # Modes 1 and -0.4: it still answers when the hold begins, and stands still in its second half.
     settling = model({"y(k-1)": 0.6, "y(k-2)": 0.4, "u(k-1) - u(k-2)": 0.1})
-    checked = physics(settling, record())
+    checked = check_physics(settling, record())
     assert checked.hold_drift_percent > 1e-3
     assert checked.property_1 is True
     # It swings about its end, and what counts is how far that is from where it began.
@@ -101,7 +101,7 @@ def test_a_transient_that_dies_out_is_no_want_of_constancy():
 
 
 def test_there_are_ten_holds_at_five_levels():
-    holds = physics(model(HYSTERESIS), record()).holds
+    holds = check_physics(model(HYSTERESIS), record()).holds
     assert len(LEVELS) == 5
     assert sorted((entry.level, entry.loading) for entry in holds) == sorted(
         (level, loading) for level in LEVELS for loading in (True, False)
@@ -123,7 +123,7 @@ def test_a_hold_ends_at_its_level_from_the_side_that_it_names(level, loading):
 def test_the_drift_is_that_of_a_hand_computation():
     forgetful = model({"y(k-1)": 0.9999, "u(k-1) - u(k-2)": 0.8})
     data = record()
-    checked = physics(forgetful, data)
+    checked = check_physics(forgetful, data)
     drifts = {(entry.level, entry.loading): entry.drift_percent for entry in checked.holds}
     for (level, loading), drift in drifts.items():
         signal, simulated = hold_response(forgetful, data, level, loading)
@@ -142,7 +142,7 @@ def test_the_drift_is_that_of_a_hand_computation():
 
 
 def test_a_divergence_is_infinite_and_gives_no_warning():
-    checked = physics(model({"y(k-1)": 1.0, "y(k-1)^3*u(k-1)^2": 1.0}), record())
+    checked = check_physics(model({"y(k-1)": 1.0, "y(k-1)^3*u(k-1)^2": 1.0}), record())
     assert not any(entry.bounded or entry.constant for entry in checked.holds)
     assert {entry.drift_percent for entry in checked.holds} == {np.inf}
     assert checked.hold_drift_percent == np.inf
@@ -155,7 +155,7 @@ def test_a_divergence_is_infinite_and_gives_no_warning():
 
 
 def test_the_excursions_are_minor_loops_half_the_amplitude_and_other_rates():
-    names = list(excursions(physics(model(HYSTERESIS), record())))
+    names = list(excursions(check_physics(model(HYSTERESIS), record())))
     assert names == ["minor-loops", "amplitude x 0.5", "rate x 0.25", "rate x 5"]
 
 
@@ -163,7 +163,7 @@ def test_the_excursions_are_minor_loops_half_the_amplitude_and_other_rates():
 # one on either side, equally high.
 @pytest.mark.parametrize("period", [160, 165, 170, 175, 180, 190])
 def test_a_rate_independent_model_closes_its_loops(period):
-    found = excursions(physics(model(HYSTERESIS), record(period)))
+    found = excursions(check_physics(model(HYSTERESIS), record(period)))
     # At half the amplitude its memory fades more slowly: by exp(-0.3 * 20) in a turn.
     assert found["amplitude x 0.5"].closure_percent < 1e-4
     assert found["rate x 0.25"].closure_percent < 1e-9
@@ -173,7 +173,7 @@ def test_a_rate_independent_model_closes_its_loops(period):
 
 
 def test_a_copy_of_the_input_closes_at_every_crest():
-    found = excursions(physics(model({"y(k-1)": 1.0, "u(k-1) - u(k-2)": 0.5}), record(170)))
+    found = excursions(check_physics(model({"y(k-1)": 1.0, "u(k-1) - u(k-2)": 0.5}), record(170)))
     for name in ("amplitude x 0.5", "rate x 0.25", "rate x 5"):
         assert found[name].closure_percent < 1e-9
     assert found["amplitude x 0.5"].range_percent == pytest.approx(100 * 0.5 * AMPLITUDE / 8, rel=1e-3)
@@ -184,7 +184,7 @@ def test_a_copy_of_the_input_closes_at_every_crest():
 def test_a_ratchet_opens_by_the_way_of_a_turn():
     # It climbs by a hundredth of the way that the input goes: four amplitudes a turn.
     ratchet = model({"y(k-1)": 1.0, "abs(u(k-1) - u(k-2))": 0.01})
-    found = excursions(physics(ratchet, record(160)))
+    found = excursions(check_physics(ratchet, record(160)))
     turn = 100 * 0.01 * 4 * AMPLITUDE / 8
     assert found["amplitude x 0.5"].closure_percent == pytest.approx(turn / 2, rel=1e-9)
     assert found["rate x 0.25"].closure_percent == pytest.approx(turn, rel=1e-9)
@@ -239,7 +239,7 @@ def test_all_inputs_of_a_model_move_together_over_their_own_ranges():
     angle = 2 * np.pi * np.arange(800) / 200
     u = np.column_stack([2 * np.sin(angle), 40 + 10 * np.cos(angle)])
     data = Dataset(u, 4.0 * np.sin(angle), 0.1)
-    checked = physics(model(TWO, ("a", "b")), data)
+    checked = check_physics(model(TWO, ("a", "b")), data)
     assert checked.property_1 is True
     assert checked.hold_drift_percent < 1e-9
     # 0.5 * 2 and -0.25 * 10 together, up and down, of a range of 8.
@@ -258,18 +258,18 @@ def test_the_period_comes_from_the_first_input_that_varies():
     angle = 2 * np.pi * np.arange(800) / 200
     data = Dataset(np.column_stack([np.ones(800), np.sin(angle)]), np.sin(angle), 0.1)
     assert rest_of(data, TWO, ("a", "b")) == 20 * 200
-    assert physics(model(TWO, ("a", "b")), data).property_1 is True
+    assert check_physics(model(TWO, ("a", "b")), data).property_1 is True
 
 
 def test_of_a_constant_output_what_stays_has_not_drifted_and_what_moves_has_infinitely():
     data = Dataset(record().u, np.full(record().samples, 2.0), 0.01)
-    still = physics(model({"y(k-1)": 1.0}), data)
+    still = check_physics(model({"y(k-1)": 1.0}), data)
     assert still.property_1 is True
     assert still.hold_drift_percent == 0.0
     assert {(entry.bounded, entry.closure_percent, entry.range_percent) for entry in still.excursions} == {
         (True, 0.0, 0.0)
     }
-    moved = physics(model({"y(k-1)": 0.9999, "u(k-1) - u(k-2)": 0.5}), data)
+    moved = check_physics(model({"y(k-1)": 0.9999, "u(k-1) - u(k-2)": 0.5}), data)
     assert moved.property_1 is False
     assert moved.hold_drift_percent == np.inf
     assert all(entry.bounded and entry.range_percent == np.inf for entry in moved.excursions)
@@ -278,13 +278,13 @@ def test_of_a_constant_output_what_stays_has_not_drifted_and_what_moves_has_infi
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_record_of_a_few_samples_is_enough_for_the_check(samples):
     u, y = np.array([1.0, 2.0, 4.0])[:samples], np.array([0.0, 0.5, 0.2])[:samples]
-    checked = physics(model(HYSTERESIS), Dataset(u, y, 0.1))
+    checked = check_physics(model(HYSTERESIS), Dataset(u, y, 0.1))
     assert len(checked.holds) == 10
     assert checked.property_1 is True
 
 
 def test_a_constant_model_reads_no_past_and_is_checked_all_the_same():
-    checked = physics(model({"1": 2.0}), record())
+    checked = check_physics(model({"1": 2.0}), record())
     assert len(checked.holds) == 10
     assert checked.hold_drift_percent == 0.0
     assert [(entry.cluster, entry.sum) for entry in checked.clusters] == [("y", 0.0), ("1", 2.0)]
@@ -293,4 +293,4 @@ def test_a_constant_model_reads_no_past_and_is_checked_all_the_same():
 def test_without_an_output_to_start_from_there_is_no_check():
     data = Dataset(record().u, np.full(record().samples, np.nan), 0.01)
     with pytest.raises(RecordError, match="the output is missing at sample 0, where a simulation starts"):
-        physics(model(HYSTERESIS), data)
+        check_physics(model(HYSTERESIS), data)

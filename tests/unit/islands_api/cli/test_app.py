@@ -13,7 +13,7 @@ from islands.data.dataset import Dataset
 from islands.errors import IslandsError, RecordError, SettingsError
 from islands.io.models import write_model
 from islands.io.records import write_record
-from islands.io.records.row_range import rows_of
+from islands.io.records.row_range import parse_rows
 from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
@@ -84,13 +84,13 @@ def test_inputs_are_repeated_or_separated_by_commas(texts, names):
     ],
 )
 def test_rows_are_start_and_stop(text, expected):
-    assert rows_of(text) == expected
+    assert parse_rows(text) == expected
 
 
 @pytest.mark.parametrize("text", ["5", "a:b", "1:2:3", "", "1.5:3"])
 def test_other_rows_are_refused(text):
     with pytest.raises(SettingsError) as caught:
-        rows_of(text)
+        parse_rows(text)
     assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
 
 

@@ -7,13 +7,13 @@ from math import inf
 import pytest
 from rich.console import Console
 
-from islands.evolution.archipelago import Archipelago, founded
-from islands.evolution.history import Progress
-from islands.evolution.search_state import State
+from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.history import HistoryPoint
+from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
 from islands_api.cli import console
 from islands_api.cli import search_progress as showing
-from islands_api.cli.search_progress import SHOWN, course
+from islands_api.cli.search_progress import SHOWN, search_progress
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def told(monkeypatch):
     def show(settings, *states):
         found, clock = [], [100.0]
         monkeypatch.setattr(showing, "monotonic", lambda: clock[0])
-        watch = course(lambda text, share, lines=(): found.append((text, share, list(lines))))
+        watch = search_progress(lambda text, share, lines=(): found.append((text, share, list(lines))))
         for state in states:
             watch(state, settings)
             clock[0] += 4.0
@@ -35,11 +35,15 @@ def told(monkeypatch):
 def at(generation, evaluations, *history):
     """A state whose history holds every island's least fitness, generation by generation, up to now."""
     points = tuple(
-        Progress(generation - len(history) + 1 + place, evaluations, {1: 4.0, 3: min(least)}, tuple(least))
+        HistoryPoint(
+            generation - len(history) + 1 + place, evaluations, {1: 4.0, 3: min(least)}, tuple(least)
+        )
         for place, least in enumerate(history)
     )
-    islands = (replace(island, generation=generation) for island in founded(len(history[-1]), 0).islands)
-    return State(Archipelago(tuple(islands)), evaluations, history=points)
+    islands = (
+        replace(island, generation=generation) for island in empty_archipelago(len(history[-1]), 0).islands
+    )
+    return SearchState(Archipelago(tuple(islands)), evaluations, history=points)
 
 
 def test_the_course_tells_generation_speed_time_left_and_the_best_of_every_size(told):

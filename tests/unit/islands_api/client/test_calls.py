@@ -14,7 +14,7 @@ import islands_api
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.settings import Settings
 from islands_api.client import AsyncClient, Client, ServiceError, calls, diagnosis_calls
-from islands_api.client.calls import Call
+from islands_api.client.calls import RequestSpec
 from islands_api.schemas import DatasetView, JobPage, JobRequest, JobView
 from islands_api.web.responses import job_document
 from islands_service.domain.jobs import JobState
@@ -377,7 +377,7 @@ def test_a_closed_client_is_closed(service: Service, me: Any) -> None:
 
 
 def test_a_call_that_may_not_be_repeated_says_so() -> None:
-    made: list[Call[Any]] = [
+    made: list[RequestSpec[Any]] = [
         calls.cancel("0"),
         calls.resume("0"),
         calls.delete("0"),

@@ -7,9 +7,16 @@ from typing import Any
 
 import pytest
 
-from islands_api.client import AsyncClient, Event, JobFailed, ServiceError, Unreachable, transport
+from islands_api.client import (
+    AsyncClient,
+    Event,
+    JobFailedError,
+    ServiceError,
+    ServiceUnreachableError,
+    transport,
+)
 from islands_api.client.response_parsing import EventLines
-from islands_service.domain.jobs import JobState, Outcome
+from islands_service.domain.jobs import JobOutcome, JobState
 from support.service import Service
 from support.stores import CANCELLED, FAILED, FOUND, brought_on
 
@@ -25,7 +32,7 @@ GENERATIONS = range(1, 7)
 def carried_out(service: Service, claimed: Any) -> Callable[..., None]:
     """What carries a job out, with a pause between the steps."""
 
-    def carry_out(job: Any, pause: float = 0.0, outcome: Outcome = FOUND) -> None:
+    def carry_out(job: Any, pause: float = 0.0, outcome: JobOutcome = FOUND) -> None:
         lease = claimed(job)
         for generation in GENERATIONS:
             time.sleep(pause)
@@ -90,10 +97,10 @@ def test_waiting_returns_the_job_that_has_succeeded(
     ("outcome", "told"), [(FAILED, "failed: it broke"), (CANCELLED, "cancelled: it was cancelled")]
 )
 def test_waiting_for_a_job_that_does_not_succeed_says_why(
-    client: Any, job: Any, carried_out: Any, later: Any, outcome: Outcome, told: str
+    client: Any, job: Any, carried_out: Any, later: Any, outcome: JobOutcome, told: str
 ) -> None:
     later(0.1, carried_out, job, 0.0, outcome)
-    with pytest.raises(JobFailed) as caught:
+    with pytest.raises(JobFailedError) as caught:
         client.wait(job)
     assert str(caught.value) == f"job {job.id} {told}"
 
@@ -142,7 +149,7 @@ def test_a_service_that_is_away_for_too_long_ends_the_waiting(connect: Any, me: 
     client = connect(wire.url, me.secret, retry=0.3)
     job = client.submit(me.dataset, **SPEC)
     wire.tear()
-    with pytest.raises(Unreachable, match="does not answer"):
+    with pytest.raises(ServiceUnreachableError, match="does not answer"):
         client.wait(job, 60.0)
 
 
@@ -254,7 +261,7 @@ def test_events_of_a_service_that_stays_away_end_in_time(connect: Any, me: Any, 
     events = client.events(job)
     assert next(iter(events)).kind == "queued"
     wire.tear()
-    with pytest.raises(Unreachable, match="does not answer"):
+    with pytest.raises(ServiceUnreachableError, match="does not answer"):
         list(events)
 
 
@@ -290,7 +297,7 @@ def test_what_looks_like_a_line_s_end_ends_no_event(
 ) -> None:
     text = "a\u2028b\x85c\r\nd\x0be\x1cf\n\ng\U0001f600"
     problem = {"type": "broken", "detail": text}
-    service.store.leases.finish(claimed(job), Outcome(JobState.FAILED, problem=problem))
+    service.store.leases.finish(claimed(job), JobOutcome(JobState.FAILED, problem=problem))
     *_, last = client.events(job)
     assert last.data["detail"] == text
 
@@ -300,7 +307,7 @@ def test_a_line_that_is_cut_within_a_letter_loses_nothing(
 ) -> None:
     detail = "ü" * 500
     problem = {"type": "broken", "detail": detail}
-    service.store.leases.finish(claimed(job), Outcome(JobState.FAILED, problem=problem))
+    service.store.leases.finish(claimed(job), JobOutcome(JobState.FAILED, problem=problem))
     wire.cuts = [1500, 1501]  # one of them is the middle of a letter
     *_, last = connect(wire.url, me.secret).events(job)
     assert last.data["detail"] == detail

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from islands_api.client import ServiceError, Unreachable, calls, transport
+from islands_api.client import ServiceError, ServiceUnreachableError, calls, transport
 from islands_service.domain.jobs import JobState
-from islands_service.store.database import StoreInDoubt
+from islands_service.store.database import CommitUnknownError
 from support.service import Service, served
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -66,7 +66,7 @@ def test_what_would_do_harm_is_not_sent_twice(client: Any, connect: Any, me: Any
     for call in ("resume", "delete"):
         wire.cuts, before = [0], wire.asked
         with pytest.raises(
-            Unreachable, match=r"broke off before it answered .*: it may have done what was asked"
+            ServiceUnreachableError, match=r"broke off before it answered .*: it may have done what was asked"
         ):
             getattr(connect(wire.url, me.secret), call)(job)
         assert wire.asked == before + 1
@@ -84,7 +84,7 @@ def test_what_may_have_been_done_is_not_sent_twice(
 
     def resume(*_: Any) -> None:
         asked.append(1)
-        raise StoreInDoubt("the database went away")
+        raise CommitUnknownError("the database went away")
 
     monkeypatch.setattr(service.store.jobs, "resume", resume)
     with pytest.raises(ServiceError, match="nobody knows whether it was written") as caught:
@@ -120,7 +120,7 @@ def test_a_service_that_stays_away_is_told_of_in_time(connect: Any, me: Any, wir
     client.jobs()
     wire.tear()
     began = time.monotonic()
-    with pytest.raises(Unreachable) as caught:
+    with pytest.raises(ServiceUnreachableError) as caught:
         client.jobs()
     assert 0.2 <= time.monotonic() - began < 25.0
     assert str(caught.value) == (
@@ -131,7 +131,7 @@ def test_a_service_that_stays_away_is_told_of_in_time(connect: Any, me: Any, wir
 
 def test_nobody_waits_who_does_not_want_to(connect: Any, wire: Any, pauses: list[float]) -> None:
     wire.tear()
-    with pytest.raises(Unreachable):
+    with pytest.raises(ServiceUnreachableError):
         connect(wire.url, retry=0.0).jobs()
     assert pauses == []
 
@@ -139,7 +139,7 @@ def test_nobody_waits_who_does_not_want_to(connect: Any, wire: Any, pauses: list
 def test_a_service_that_hangs_is_told_of(connect: Any, scripted: Any) -> None:
     server = scripted(EMPTY, delay=60.0)
     began = time.monotonic()
-    with pytest.raises(Unreachable, match=r"does not answer \(timed out|ReadTimeout\)"):
+    with pytest.raises(ServiceUnreachableError, match=r"does not answer \(timed out|ReadTimeout\)"):
         connect(server.url, timeout=0.2, retry=0.1).jobs()
     assert time.monotonic() - began < 25.0
 

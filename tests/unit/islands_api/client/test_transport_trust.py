@@ -12,7 +12,7 @@ import pytest
 import trustme
 
 from islands.errors import SettingsError
-from islands_api.client import ServiceError, Unreachable
+from islands_api.client import ServiceError, ServiceUnreachableError
 from islands_api.web.app import create_app
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -103,7 +103,7 @@ def test_a_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted:
     ]
     for client in clients:
         for call in (client.jobs, partial(client.wait, "0")):
-            with pytest.raises((ServiceError, Unreachable)) as caught:
+            with pytest.raises((ServiceError, ServiceUnreachableError)) as caught:
                 call()
             assert SECRET not in shown(caught.value)
         assert SECRET not in repr(client) + str(client) + repr(vars(getattr(client, "client", client)))
@@ -149,7 +149,7 @@ def test_a_certificate_that_does_not_hold_is_refused_at_once(
     client = connect(f"https://{name}:{secure}", SECRET, verify=str(path), retry=60.0)
     for call in (client.jobs, lambda: list(client.events("0"))):
         with pytest.raises(
-            Unreachable, match=r"the certificate of the service at .* is not trusted"
+            ServiceUnreachableError, match=r"the certificate of the service at .* is not trusted"
         ) as caught:
             call()
         assert "SSL_CERT_FILE" in str(caught.value)

@@ -7,19 +7,21 @@ from contextvars import ContextVar
 
 import pytest
 
-from islands_api.web.concurrency import Threads
+from islands_api.web.concurrency import BlockingExecutor
 
 who: ContextVar[str] = ContextVar("who", default="nobody")
 
 
 @pytest.fixture
-def threads() -> Iterator[Threads]:
-    opened = Threads()
+def threads() -> Iterator[BlockingExecutor]:
+    opened = BlockingExecutor()
     yield opened
     opened.close()
 
 
-def test_an_operation_runs_in_a_thread_and_what_it_returns_or_raises_comes_back(threads: Threads) -> None:
+def test_an_operation_runs_in_a_thread_and_what_it_returns_or_raises_comes_back(
+    threads: BlockingExecutor,
+) -> None:
     async def ask() -> None:
         assert await threads.do(threading.get_ident) != threading.get_ident()
         assert await threads.do(int, "ff", base=16) == 255
@@ -29,7 +31,7 @@ def test_an_operation_runs_in_a_thread_and_what_it_returns_or_raises_comes_back(
     asyncio.run(ask())
 
 
-def test_an_operation_knows_whose_request_it_serves(threads: Threads) -> None:
+def test_an_operation_knows_whose_request_it_serves(threads: BlockingExecutor) -> None:
     """Every line of the log has its request's id."""
 
     async def ask(name: str) -> str:
@@ -43,7 +45,7 @@ def test_an_operation_knows_whose_request_it_serves(threads: Threads) -> None:
     assert asyncio.run(all_ask()) == ["a", "b", "c"]
 
 
-def test_where_a_client_goes_away_its_operation_is_waited_for(threads: Threads) -> None:
+def test_where_a_client_goes_away_its_operation_is_waited_for(threads: BlockingExecutor) -> None:
     """What it works with, a file that is received perhaps, is closed only then."""
     begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
 

@@ -7,10 +7,10 @@ import pytest
 import structlog
 
 from islands_api.web import event_hub as hubs
-from islands_api.web.concurrency import Threads
-from islands_api.web.event_hub import Hub
+from islands_api.web.concurrency import BlockingExecutor
+from islands_api.web.event_hub import JobEventHub
 from islands_service.store import Store
-from islands_service.store.database import StoreUnavailable
+from islands_service.store.database import StoreUnavailableError
 from support.stores import CANCELLED, FOUND, LONG, brought_on, claimed, submitted
 
 
@@ -28,7 +28,7 @@ def store(sqlite_database):
 
 @asynccontextmanager
 async def running(store):
-    hub = Hub(store, Threads())
+    hub = JobEventHub(store, BlockingExecutor())
     task = asyncio.create_task(hub.run())
     try:
         yield hub
@@ -103,7 +103,7 @@ def test_a_reader_of_the_past_hides_nothing_from_those_who_wait(store):
     async def scene():
         job = submitted(store)
         lease = claimed(store)
-        hub = Hub(store, Threads())
+        hub = JobEventHub(store, BlockingExecutor())
         with hub.watching(job.id, 2) as feed:
             store.leases.report(lease, brought_on(0))
             await hub._look()
@@ -230,7 +230,7 @@ def test_a_stream_outlives_a_database_that_is_away(store, monkeypatch):
         def away(job, after=0):
             calls.append(job)
             if len(calls) < 4:
-                raise StoreUnavailable("gone: try again")
+                raise StoreUnavailableError("gone: try again")
             return answer(job, after)
 
         monkeypatch.setattr(store.jobs, "events", away)

@@ -9,21 +9,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.errors import SettingsError
-from islands_api.web.pagination import cursor_of, place_of
+from islands_api.web.pagination import decode_cursor, encode_cursor
 
 IDENTITIES = st.from_regex(r"\A[0-9A-Za-z_-]{1,64}\Z")
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), IDENTITIES)
 def test_a_cursor_is_read_as_it_was_written(created, identity):
-    cursor = cursor_of((created, identity))
+    cursor = encode_cursor((created, identity))
     assert len(cursor) <= 200
-    assert place_of(cursor) == (created, identity)
+    assert decode_cursor(cursor) == (created, identity)
 
 
 def test_no_place_is_no_cursor():
-    assert cursor_of(None) is None
-    assert place_of(None) is None
+    assert encode_cursor(None) is None
+    assert decode_cursor(None) is None
 
 
 def encoded(value):
@@ -59,13 +59,13 @@ def encoded(value):
 )
 def test_what_is_no_cursor_of_ours_is_refused(cursor):
     with pytest.raises(SettingsError, match=r"is no cursor: give `next` of the page before as it is"):
-        place_of(cursor)
+        decode_cursor(cursor)
 
 
 @given(st.text(max_size=200))
 def test_garbage_is_a_place_or_refused_and_nothing_else(cursor):
     try:
-        created, identity = place_of(cursor)
+        created, identity = decode_cursor(cursor)
     except SettingsError:
         return
     assert math.isfinite(created)

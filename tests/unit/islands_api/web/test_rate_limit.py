@@ -3,8 +3,8 @@
 import pytest
 
 from islands_api.web import rate_limit
-from islands_api.web.problems import TooManyRequests
-from islands_api.web.rate_limit import Rate
+from islands_api.web.problems import RateLimitError
+from islands_api.web.rate_limit import RateLimiter
 
 
 @pytest.fixture
@@ -23,13 +23,13 @@ def taken(bucket, who, most=1000):
     for count in range(most):
         try:
             bucket.take(who)
-        except TooManyRequests:
+        except RateLimitError:
             return count
     return most
 
 
 def test_a_burst_is_let_through_and_then_so_many_a_second(clock):
-    bucket = Rate(rate=5.0, burst=20)
+    bucket = RateLimiter(rate=5.0, burst=20)
     assert taken(bucket, "a") == 20
     clock.now += 2.0
     assert taken(bucket, "a") == 10
@@ -38,47 +38,47 @@ def test_a_burst_is_let_through_and_then_so_many_a_second(clock):
 
 
 def test_nobody_uses_up_what_is_anothers(clock):
-    bucket = Rate(rate=5.0, burst=20)
+    bucket = RateLimiter(rate=5.0, burst=20)
     assert taken(bucket, "a") == 20
     assert taken(bucket, "b") == 20
 
 
 def test_who_is_refused_is_told_when_to_come_back(clock):
-    bucket = Rate(rate=0.5, burst=1)
+    bucket = RateLimiter(rate=0.5, burst=1)
     bucket.take("a")
     clock.now += 0.5
-    with pytest.raises(TooManyRequests, match=r"more than 0\.5 requests a second: wait 1\.5 s") as refused:
+    with pytest.raises(RateLimitError, match=r"more than 0\.5 requests a second: wait 1\.5 s") as refused:
         bucket.take("a")
     clock.now += refused.value.seconds
     bucket.take("a")
 
 
 def test_to_be_refused_costs_nothing(clock):
-    bucket = Rate(rate=1.0, burst=1)
+    bucket = RateLimiter(rate=1.0, burst=1)
     bucket.take("a")
     for _ in range(100):
-        with pytest.raises(TooManyRequests):
+        with pytest.raises(RateLimitError):
             bucket.take("a")
     clock.now += 1.0
     bucket.take("a")
 
 
 def test_a_dear_request_takes_more(clock):
-    bucket = Rate(rate=1.0, burst=20)
+    bucket = RateLimiter(rate=1.0, burst=20)
     bucket.take("a", 10.0)
     bucket.take("a", 10.0)
-    with pytest.raises(TooManyRequests):
+    with pytest.raises(RateLimitError):
         bucket.take("a", 10.0)
     assert taken(bucket, "a") == 0
 
 
 def test_without_a_rate_nobody_is_refused(clock):
-    assert taken(Rate(rate=0.0, burst=1), "a") == 1000
+    assert taken(RateLimiter(rate=0.0, burst=1), "a") == 1000
 
 
 def test_strangers_take_up_no_memory_without_end(clock, monkeypatch):
     monkeypatch.setattr(rate_limit, "_REMEMBERED", 10)
-    bucket = Rate(rate=1.0, burst=2)
+    bucket = RateLimiter(rate=1.0, burst=2)
     bucket.take("first")
     for stranger in range(1000):
         bucket.take(f"address {stranger}")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands_api.web.problems import Unreadable
+from islands_api.web.problems import MalformedBodyError
 from islands_api.web.requests import read_json
 from support.service import PROBLEM, csv, kept, problem_of, spec
 
@@ -44,7 +44,7 @@ def test_json_is_read_as_it_was_written(value):
 
 @pytest.mark.parametrize("body", DAMAGED, ids=lambda body: repr(body[:20]))
 def test_what_is_no_json_is_refused(body):
-    with pytest.raises(Unreadable) as refused:
+    with pytest.raises(MalformedBodyError) as refused:
         read_json(body)
     assert DAMAGED[body] in refused.value.detail
 
@@ -199,12 +199,12 @@ def test_a_name_that_stands_twice_is_found_among_as_many_as_a_body_holds():
     """A look at every name for each of them would keep all other requests waiting for minutes."""
     names = [f"{number:x}" for number in range(120_000)]
     body = json.dumps(dict.fromkeys(names)).encode()[:-1] + b', "1d4bf": 1}'
-    with pytest.raises(Unreadable, match="'1d4bf' stands in it twice"):
+    with pytest.raises(MalformedBodyError, match="'1d4bf' stands in it twice"):
         read_json(body)
 
 
 def test_a_long_name_that_stands_twice_is_not_sent_back_whole():
     name = "n" * 100_000
-    with pytest.raises(Unreadable) as refused:
+    with pytest.raises(MalformedBodyError) as refused:
         read_json(f'{{"{name}": 1, "{name}": 2}}'.encode())
     assert len(refused.value.detail) < 100

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands_api.schemas import DatasetView, JobRequest, JobView
-from islands_api.web.responses import Document, dataset_document, job_document, json_text
-from islands_service.domain.jobs import Report
+from islands_api.web.responses import JSONDocument, dataset_document, job_document, json_text
+from islands_service.domain.jobs import ProgressReport
 from support.service import kept, queued
 
 FLOATS = st.recursive(
@@ -26,7 +26,7 @@ def no_constant(text):
 @given(FLOATS)
 def test_what_is_written_is_json(content):
     try:
-        text = Document(content).body.decode()
+        text = JSONDocument(content).body.decode()
     except UnicodeEncodeError:
         return
     assert text == json_text(content)
@@ -61,7 +61,7 @@ def test_progress_without_an_end_does_not_hide_the_job(service):
     """An error may be infinite; the page with that job, and all others on it, is shown nevertheless."""
     job = queued(service.store, priority=1)
     lease = service.store.leases.claim("test", 60.0)
-    service.store.leases.report(lease, Report({"best_error": math.inf, "islands": [math.nan, 0.5]}))
+    service.store.leases.report(lease, ProgressReport({"best_error": math.inf, "islands": [math.nan, 0.5]}))
     for path in ("/v1/jobs", f"/v1/jobs/{job.id}"):
         answer = service.client.get(path)
         assert answer.status_code == 200, answer.text

@@ -8,7 +8,7 @@ import tempfile
 import pytest
 
 from islands.errors import RecordError
-from islands_api.web.problems import TooLarge
+from islands_api.web.problems import PayloadTooLargeError
 from islands_api.web.uploads import NAME, name_of, receive
 
 #: What strangers call a file, and what we do.
@@ -82,14 +82,14 @@ def test_a_gzip_is_unpacked_from_a_file_as_the_framework_hands_it_over(spooled):
 def test_one_byte_too_many_is_refused(compressed):
     sent = gzip.compress(b"x" * 100) if compressed else b"x" * 100
     assert receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 100) == told(b"x" * 100)
-    with pytest.raises(TooLarge) as refused:
+    with pytest.raises(PayloadTooLargeError) as refused:
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 99)
     assert refused.value.detail == "a.csv has more than 0 MB unpacked, the most that is taken here"
 
 
 def test_a_bomb_is_never_unpacked_beyond_the_limit():
     target = io.BytesIO()
-    with pytest.raises(TooLarge):
+    with pytest.raises(PayloadTooLargeError):
         receive(io.BytesIO(gzip.compress(bytes(20_000_000))), target, "a.csv", True, 5_000_000)
     assert len(target.getvalue()) <= 5_000_000
 

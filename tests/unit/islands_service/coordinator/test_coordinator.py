@@ -19,18 +19,18 @@ from islands_service.domain.jobs import (
     DISCREPANCY,
     IDENTIFICATION,
     Job,
+    JobOutcome,
     JobState,
     Lease,
-    Outcome,
-    Report,
+    ProgressReport,
     Submission,
 )
-from islands_service.liveness import Wish
+from islands_service.liveness import StopRequest
 from islands_service.runtime.errors import ClusterError
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
-from islands_service.store.blobs import Blobs, NoSuchBlob
-from islands_service.store.database import StoreFull, StoreUnavailable
+from islands_service.store.blobs import BlobNotFoundError, Blobs
+from islands_service.store.database import StorageFullError, StoreUnavailableError
 from support.processes import eventually
 from support.service import held
 from support.stores import ALICE, child
@@ -51,7 +51,7 @@ class Alone(Coordinator):
 @pytest.fixture
 def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
     """Run a coordinator in a thread; it is told to stop at the end."""
-    stopping = Wish()
+    stopping = StopRequest()
     threads = []
 
     def run(kind: type[Coordinator] = Alone, name: str = "me") -> Thread:
@@ -73,13 +73,13 @@ def ends(store: Store, job: Job) -> Job:
     return store.jobs.get(ALICE, job.id)
 
 
-def working(monkeypatch: pytest.MonkeyPatch, how: Callable[..., Outcome]) -> None:
+def working(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcome]) -> None:
     """Let jobs be carried out in another way: an entry of the table, as any kind of job is."""
     monkeypatch.setattr(coordinator_module, "WORK", MappingProxyType({"identification": how}))
     monkeypatch.setattr(coordinator_module, "RETRY", 0.02)
 
 
-DONE = Outcome(JobState.SUCCEEDED, {}, (), {"done": True})
+DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
 
 
 def test_a_coordinator_carries_out_one_job_after_the_other(
@@ -110,7 +110,7 @@ def test_a_coordinator_carries_out_jobs_of_every_kind(
     ("error", "kind", "detail"),
     [
         (RecordError("line 7 is wrong"), "invalid-record", "line 7 is wrong"),
-        (NoSuchBlob("the blob is gone"), "no-such-blob", "the blob is gone"),
+        (BlobNotFoundError("the blob is gone"), "no-such-blob", "the blob is gone"),
         (IslandsError("something else"), "job-failed", "something else"),
         (ZeroDivisionError("by zero"), "defect", "ZeroDivisionError: by zero. Please report it"),
     ],
@@ -124,7 +124,7 @@ def test_what_goes_wrong_in_a_job_is_told_with_a_type_and_holds_up_nobody(
     kind: str,
     detail: str,
 ) -> None:
-    def fail_first(lease: Lease, *_: object) -> Outcome:
+    def fail_first(lease: Lease, *_: object) -> JobOutcome:
         if lease.job.id == job.id:
             raise error
         return DONE
@@ -143,7 +143,7 @@ def test_what_goes_wrong_in_a_job_is_told_with_a_type_and_holds_up_nobody(
 
 def wait_for_end(
     _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, _s: float
-) -> Outcome:
+) -> JobOutcome:
     while True:
         check()
         time.sleep(0.01)
@@ -176,7 +176,7 @@ def test_a_job_that_is_taken_away_is_left_to_who_has_it(
 ) -> None:
     gone = []
 
-    def lose(lease: Lease, *arguments: Any) -> Outcome:
+    def lose(lease: Lease, *arguments: Any) -> JobOutcome:
         if not gone:
             gone.append(store.leases.claim("me", 60.0))  # who has the name may take it
             wait_for_end(lease, *arguments)
@@ -197,12 +197,12 @@ class Full(Alone):
         finish = self._store.leases.finish
         self.tries = 0
 
-        def full(lease: Lease, outcome: Outcome) -> None:
+        def full(lease: Lease, outcome: JobOutcome) -> None:
             self.tries += 1
             if self.tries == 2:
                 self._store.jobs.cancel(ALICE, lease.job.id)
             if self.tries < 8:
-                raise StoreFull("the disk is full")
+                raise StorageFullError("the disk is full")
             finish(lease, outcome)
 
         self._store.leases.finish = full  # type: ignore[method-assign]
@@ -225,10 +225,10 @@ def test_a_store_that_is_away_in_the_middle_of_a_job_costs_no_attempt(
 ) -> None:
     away = [7]  # more often than a job may be tried in vain
 
-    def work(*_: object) -> Outcome:
+    def work(*_: object) -> JobOutcome:
         if away[0]:
             away[0] -= 1
-            raise StoreUnavailable("the database does not answer")
+            raise StoreUnavailableError("the database does not answer")
         return DONE
 
     monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY", 0.01)
@@ -241,11 +241,11 @@ def test_a_store_that_is_away_in_the_middle_of_a_job_costs_no_attempt(
 def test_a_lost_cluster_ends_the_coordinator_and_gives_the_job_back_as_an_attempt(
     store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def lost(*_: object) -> Outcome:
+    def lost(*_: object) -> JobOutcome:
         raise ClusterError("no more")
 
     working(monkeypatch, lost)
-    doomed = Alone(settings, "me", Wish())
+    doomed = Alone(settings, "me", StopRequest())
     doomed._connected = True
     with pytest.raises(ClusterError, match="no more"):
         doomed.run()
@@ -294,10 +294,10 @@ def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
         os.utime(blobs.path(blob), (1e9, 1e9))
         return blob
 
-    def keeps_checkpoints(lease: Lease, *arguments: Any) -> Outcome:
+    def keeps_checkpoints(lease: Lease, *arguments: Any) -> JobOutcome:
         for data in (b"replaced", b"named"):
             left.append(old(data))
-            store.leases.report(lease, Report({}, checkpoint=left[-1]))
+            store.leases.report(lease, ProgressReport({}, checkpoint=left[-1]))
         left.append(blobs.write(b"about to be named"))
         return wait_for_end(lease, *arguments)
 
@@ -311,7 +311,8 @@ def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
 
 
 @pytest.mark.parametrize(
-    "error", [StoreUnavailable("the database does not answer"), OSError(errno.ESTALE, "Stale file handle")]
+    "error",
+    [StoreUnavailableError("the database does not answer"), OSError(errno.ESTALE, "Stale file handle")],
 )
 def test_a_sweep_that_fails_costs_a_job_nothing(
     store: Store,
@@ -328,7 +329,7 @@ def test_a_sweep_that_fails_costs_a_job_nothing(
                 tries.append(1)
                 raise error
 
-    def works(*arguments: Any) -> Outcome:
+    def works(*arguments: Any) -> JobOutcome:
         while len(tries) < 3:
             arguments[4]()
         return DONE
@@ -345,7 +346,7 @@ def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
 ) -> None:
     """A coordinator may stand still between two steps of a sweep, for longer than a blob may be unnamed."""
     monkeypatch.setattr(coordinator_module, "ORPHAN", 0.1)
-    sweeping = Alone(settings, "me", Wish())
+    sweeping = Alone(settings, "me", StopRequest())
     named_blobs = sweeping._store.retention.named_blobs
     written: list[str] = []
 
@@ -364,7 +365,7 @@ def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
 HANGING = """
 import sys, time
 from pathlib import Path
-from islands_service.liveness import Wish
+from islands_service.liveness import StopRequest
 from islands_service.coordinator import heartbeat
 from islands_service.coordinator.coordinator import Coordinator
 from islands_service.settings import ServiceSettings
@@ -377,7 +378,7 @@ class Engine:
 class Alone(Coordinator):
     def _wait_for_ray(self, *_): pass
     def _engine(self, _): return Engine()
-Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", Wish()).run()
+Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", StopRequest()).run()
 """
 
 

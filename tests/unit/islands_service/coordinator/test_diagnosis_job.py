@@ -20,14 +20,14 @@ from islands_service.domain.jobs import (
     EXTENDED,
     REPORT,
     Job,
+    JobOutcome,
     JobState,
     Lease,
-    Outcome,
     Submission,
 )
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import StoreUnavailable
+from islands_service.store.database import StoreUnavailableError
 from support.command_line import write_offset
 from support.service import held
 from support.stores import ALICE
@@ -76,7 +76,9 @@ def claim(store: Store) -> Lease:
     return lease
 
 
-def carried_out(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> Outcome:
+def carried_out(
+    lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None
+) -> JobOutcome:
     return discrepancy(lease, store, blobs, SerialEngine(), check, 1.0, map)
 
 
@@ -84,7 +86,7 @@ def phases(store: Store, job: Job) -> list[str]:
     return [each.data["phase"] for each in store.jobs.events(job.id) if each.kind == "progress"]
 
 
-def without_time(outcome: Outcome) -> Outcome:
+def without_time(outcome: JobOutcome) -> JobOutcome:
     document, summary = dict(outcome.document or {}), dict(outcome.summary or {})
     assert document.pop("wall_s") == summary.pop("wall_s") > 0.0
     return replace(outcome, document=document, summary=summary)
@@ -157,7 +159,7 @@ class Away:
         self._store, self.leases = store, self
 
     def report(self, *_: object) -> None:
-        raise StoreUnavailable("the database does not answer")
+        raise StoreUnavailableError("the database does not answer")
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._store, name)

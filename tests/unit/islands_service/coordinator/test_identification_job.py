@@ -12,10 +12,10 @@ from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.identification_job import identification
-from islands_service.domain.jobs import Job, JobState, Lease, LeaseLost, Outcome
+from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
-from islands_service.store.database import StoreUnavailable
+from islands_service.store.database import StoreUnavailableError
 from support.stores import ALICE
 
 Found = tuple[list[Any], list[Any]]
@@ -27,11 +27,11 @@ def claim(store: Store, name: str = "me") -> Lease:
     return lease
 
 
-def carried_out(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> Outcome:
+def carried_out(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> JobOutcome:
     return identification(lease, store, blobs, SerialEngine(), check, 1e-9)
 
 
-def models_of(outcome: Outcome) -> list[Any]:
+def models_of(outcome: JobOutcome) -> list[Any]:
     return [json.loads(json.dumps(document)) for document, _ in outcome.models]
 
 
@@ -135,7 +135,7 @@ class Flaky:
     def report(self, *arguments: Any) -> Job:
         self.reports += 1
         if self._fails(self.reports):
-            raise StoreUnavailable("the database does not answer")
+            raise StoreUnavailableError("the database does not answer")
         return self._store.leases.report(*arguments)
 
     def __getattr__(self, name: str) -> Any:
@@ -162,7 +162,7 @@ def test_who_has_lost_the_lease_stops_at_its_next_report(store: Store, blobs: Bl
     old = store.leases.claim("me", 60.0)
     assert old is not None
     new = claim(store)  # the same name: the one before must be gone
-    with pytest.raises(LeaseLost):
+    with pytest.raises(LeaseLostError):
         carried_out(old, store, blobs)
     assert store.jobs.get(ALICE, job.id).version == new.job.version
     assert store.jobs.get(ALICE, job.id).checkpoint is None

@@ -10,7 +10,7 @@ from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS
 from islands.evolution.settings import Settings
 from islands_api.schemas import JobRequest
-from islands_service.domain.job_spec import LIMITS, Identification, SettingsChanges, checked
+from islands_service.domain.job_spec import LIMITS, Identification, SettingsChanges, resolve_job_settings
 from support.service import spec
 
 DATASET = "0" * 32 + "-csv"
@@ -24,20 +24,20 @@ def refused(settings, **changes):
     """What is said of settings that can be read and not be carried out, and the seconds that it takes."""
     began = time.perf_counter()
     with pytest.raises(SettingsError) as error:
-        checked(order(settings=settings, **changes), 256, 10**10)
+        resolve_job_settings(order(settings=settings, **changes), 256, 10**10)
     assert time.perf_counter() - began < 20.0
     return str(error.value)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_is_accepted_as_it_is(preset):
-    assert checked(order(preset=preset), 256, 10**10) == PRESETS[preset]
+    assert resolve_job_settings(order(preset=preset), 256, 10**10) == PRESETS[preset]
 
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_setting_of_a_preset_can_be_said(preset):
     said = asdict(PRESETS[preset])
-    assert checked(order(preset=preset, settings=said), 256, 10**10) == PRESETS[preset]
+    assert resolve_job_settings(order(preset=preset, settings=said), 256, 10**10) == PRESETS[preset]
 
 
 def test_every_setting_says_what_it_means():
@@ -105,9 +105,9 @@ def test_many_inputs_make_a_library_too_large():
 
 def test_the_budget_counts_the_first_population_too():
     settings = {"population": 10, "generations": 9, "islands": 1, "max_terms": 3}
-    assert checked(order(settings=settings), 256, 100).population == 10
+    assert resolve_job_settings(order(settings=settings), 256, 100).population == 10
     with pytest.raises(SettingsError, match="100 individuals, and this service evaluates at most 99"):
-        checked(order(settings=settings), 256, 99)
+        resolve_job_settings(order(settings=settings), 256, 99)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from islands.errors import RecordError
-from islands_service.intake.file_inspection import Asked, inspected
+from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from support.processes import alive, descendants, eventually
 from support.service import csv
 
@@ -34,7 +34,7 @@ for path in sys.argv[1:]:
 
 
 def looked_into(path, asked=None, memory=MEMORY, seconds=SECONDS):
-    return asyncio.run(inspected(path, asked or Asked(), memory, seconds))
+    return asyncio.run(inspect_file(path, asked or InspectionRequest(), memory, seconds))
 
 
 def inspections():
@@ -62,7 +62,7 @@ def endless(tmp_path):
 
 
 def test_a_record_is_described(record):
-    found = looked_into(record, Asked(("u_V",), "y_um", 0.01, "0:100"))
+    found = looked_into(record, InspectionRequest(("u_V",), "y_um", 0.01, "0:100"))
     assert [column["name"] for column in found["columns"]] == ["t_s", "u_V", "y_um"]
     assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
 
@@ -70,13 +70,19 @@ def test_a_record_is_described(record):
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (Asked(("u_V",), "y_um", dt=0.02), "the sampling time is 0.01 s by column t_s and 0.02 s"),
-        (Asked(("u_V",), "y_um", rows="150:250"), "has samples 0 to 199: rows 150:250 are not a part of it"),
-        (Asked(("u_V",), "y_um", rows="5:1"), "rows 5:1 are not a part of it"),
-        (Asked(("u_V",), "y_um", rows="0:20"), "20 samples, from line 2 to line 21, are too few"),
-        (Asked(("force",), "y_um"), "a.csv has no column force"),
-        (Asked(("force",)), "no column force; it has t_s, u_V, y_um"),
-        (Asked(("u_V+1",), "y_um", rows="-20:"), "are too few"),
+        (
+            InspectionRequest(("u_V",), "y_um", dt=0.02),
+            "the sampling time is 0.01 s by column t_s and 0.02 s",
+        ),
+        (
+            InspectionRequest(("u_V",), "y_um", rows="150:250"),
+            "has samples 0 to 199: rows 150:250 are not a part of it",
+        ),
+        (InspectionRequest(("u_V",), "y_um", rows="5:1"), "rows 5:1 are not a part of it"),
+        (InspectionRequest(("u_V",), "y_um", rows="0:20"), "20 samples, from line 2 to line 21, are too few"),
+        (InspectionRequest(("force",), "y_um"), "a.csv has no column force"),
+        (InspectionRequest(("force",)), "no column force; it has t_s, u_V, y_um"),
+        (InspectionRequest(("u_V+1",), "y_um", rows="-20:"), "are too few"),
     ],
 )
 def test_what_is_asked_of_a_record_is_checked(record, asked, words):
@@ -108,7 +114,7 @@ def test_a_process_that_turns_in_circles_has_so_much_time_of_the_processor():
 
 def test_who_gives_up_takes_the_process_along(endless):
     async def scene():
-        task = asyncio.create_task(inspected(endless, Asked(), MEMORY, SECONDS))
+        task = asyncio.create_task(inspect_file(endless, InspectionRequest(), MEMORY, SECONDS))
         while not inspections():
             await asyncio.sleep(0.01)
         task.cancel()
@@ -124,7 +130,7 @@ def test_the_process_knows_no_secret_and_holds_no_file_of_ours(endless, tmp_path
     (tmp_path / "islands.db").touch()
 
     async def scene():
-        task = asyncio.create_task(inspected(endless, Asked(), MEMORY, SECONDS))
+        task = asyncio.create_task(inspect_file(endless, InspectionRequest(), MEMORY, SECONDS))
         while not (found := inspections()) or _limits(found[0])["Max file size"] != ["0", "0"]:
             await asyncio.sleep(0.01)
         (pid,) = found

@@ -7,10 +7,10 @@ import pytest
 
 from islands.errors import RecordError
 from islands_service.domain.job_spec import Identification
-from islands_service.intake.file_inspection import Asked
-from islands_service.intake.job_validation import admit
+from islands_service.intake.file_inspection import InspectionRequest
+from islands_service.intake.job_validation import validate_job
 from islands_service.settings import ServiceSettings
-from islands_service.store.datasets import NoSuchDataset, StoredDataset
+from islands_service.store.datasets import DatasetNotFoundError, StoredDataset
 from support.service import spec
 
 ONE, OTHER = "0" * 32 + "-csv", "1" * 32 + "-csv"
@@ -41,12 +41,12 @@ def doubts(*datasets, **changes):
 
     def get(owner, identity):
         if owner != "me" or identity not in known:
-            raise NoSuchDataset(identity)
+            raise DatasetNotFoundError(identity)
         return known[identity]
 
     store = SimpleNamespace(datasets=SimpleNamespace(get=get))
     order = Identification.model_validate(spec(ONE, **changes))
-    return admit(order, "me", store, ServiceSettings())
+    return validate_job(order, "me", store, ServiceSettings())
 
 
 def test_a_clean_record_leaves_nothing_open():
@@ -73,7 +73,7 @@ def test_a_clean_record_leaves_nothing_open():
 def test_what_a_preview_cannot_settle_is_read_as_the_job_would(record, changes):
     (doubt,) = doubts(record, **changes)
     inputs = tuple(changes.get("inputs", ["u_V"]))
-    asked = Asked(inputs, changes.get("output", "y_um"), changes.get("dt"), changes.get("rows"))
+    asked = InspectionRequest(inputs, changes.get("output", "y_um"), changes.get("dt"), changes.get("rows"))
     assert (doubt.dataset, doubt.asked) == (record, asked)
 
 
@@ -83,7 +83,7 @@ def test_a_validation_record_is_looked_at_like_the_first():
     assert doubt.dataset == other
     (doubt,) = doubts(dataset(), dataset(OTHER), validation={"dataset": OTHER, "rows": "5:"})
     assert (doubt.dataset.id, doubt.asked.rows) == (OTHER, "5:")
-    with pytest.raises(NoSuchDataset):
+    with pytest.raises(DatasetNotFoundError):
         doubts(dataset(), validation={"dataset": OTHER})
 
 

@@ -9,7 +9,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.evaluation import Evaluator
 from islands_service.runtime import packed_epoch as reports
-from islands_service.runtime.packed_epoch import PackedIslands, report_of, unpacked
+from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_island
 from support.searches import SMALL, exactly, islands_of, record
 
 
@@ -20,12 +20,12 @@ def islands():
 
 @pytest.fixture
 def packed(islands):
-    return PackedIslands([report_of(IslandEpoch(island, (), ())) for island in islands])
+    return PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands])
 
 
 def test_an_island_comes_out_as_it_went_in(islands):
     for island in islands:
-        back = unpacked(report_of(IslandEpoch(island, island.elite[:2], ())))
+        back = unpack_island(pack_epoch(IslandEpoch(island, island.elite[:2], ())))
         assert exactly(back) == exactly(island)
         # And goes on to breed the same: hashes are of one process, and made anew.
         assert {gene: 0 for each in back.population for gene in each.genes} == {
@@ -35,7 +35,7 @@ def test_an_island_comes_out_as_it_went_in(islands):
 
 def test_a_report_says_what_the_epoch_brought(islands):
     epoch = IslandEpoch(islands[-1], islands[-1].elite[:2], ())
-    found = report_of(epoch, "me", {"pairs": (1, 2)})
+    found = pack_epoch(epoch, "me", {"pairs": (1, 2)})
     assert (found.emigrants, found.steps) == (epoch.emigrants, epoch.steps)
     assert (found.actor, found.caches) == ("me", {"pairs": (1, 2)})
     assert pickle.loads(pickle.dumps(found)) == found
@@ -69,8 +69,10 @@ def test_places_that_are_not_there_are_refused(islands, packed):
 
 def test_an_island_is_unpacked_once_and_not_before_somebody_looks(monkeypatch, islands):
     opened = []
-    monkeypatch.setattr(reports, "unpacked", lambda report: opened.append(report) or unpacked(report))
-    found = PackedIslands([report_of(IslandEpoch(island, (), ())) for island in islands])
+    monkeypatch.setattr(
+        reports, "unpack_island", lambda report: opened.append(report) or unpack_island(report)
+    )
+    found = PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands])
     assert len(found) == len(islands)
     assert not opened
     assert found[2] is found[2]

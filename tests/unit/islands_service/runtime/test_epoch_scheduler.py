@@ -12,8 +12,8 @@ from itertools import pairwise
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from islands.evolution.archipelago import Archipelago, founded
-from islands_service.runtime.epoch_scheduler import Leg
+from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands_service.runtime.epoch_scheduler import EpochTask
 
 #: Where numbers stand for islands nobody looks at the record.
 from support.itineraries import (
@@ -70,7 +70,9 @@ def test_all_that_is_not_too_far_ahead_is_sent_at_once(search):
     """Nobody has to come back first: not the island itself, and not those that it receives from."""
     problem_, ends, ahead = search
     islands, stages = range(problem_.settings.islands), list(pairwise(ends))[:ahead]
-    assert Voyage(problem_, ends, ahead).send() == [Leg(each, *stage) for stage in stages for each in islands]
+    assert Voyage(problem_, ends, ahead).send() == [
+        EpochTask(each, *stage) for stage in stages for each in islands
+    ]
 
 
 @given(searches(), orders, st.data())
@@ -78,7 +80,10 @@ def test_it_goes_on_from_any_epoch_as_if_it_had_begun_there(search, choose, data
     problem_, ends, ahead = search
     first = data.draw(st.sampled_from(ends))
     start = Archipelago(
-        tuple(replace(each, generation=first) for each in founded(problem_.settings.islands, SEED).islands)
+        tuple(
+            replace(each, generation=first)
+            for each in empty_archipelago(problem_.settings.islands, SEED).islands
+        )
     )
     left = ends[ends.index(first) :]
     done = sailed(Voyage(problem_, left, ahead, start), choose, losses=3)
@@ -145,7 +150,7 @@ def test_who_does_not_depend_on_the_slowest_is_not_held_back_by_it(search, choos
 def test_by_default_an_island_is_on_one_epoch_and_has_two_in_the_queue():
     plan = itinerary(islands=2)
     assert list(plan.due()) == [
-        Leg(island, *stage) for stage in ((-1, 0), (0, 4), (4, 8)) for island in (0, 1)
+        EpochTask(island, *stage) for stage in ((-1, 0), (0, 4), (4, 8)) for island in (0, 1)
     ]
     assert list(plan.due()) == []
     assert (plan.complete, plan.finished) == (-1, False)

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.epoch import IslandEpoch, advance, emigrants
+from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
 from islands.evolution.evaluation import Evaluator
 from islands.evolution.individual import Individual
 from islands.evolution.problem import problem
-from islands_service.runtime.epoch_scheduler import Itinerary, Leg
+from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 
 #: Where numbers stand for islands nobody looks at the record.
 from support.itineraries import (
@@ -28,15 +28,20 @@ from support.searches import SMALL, exactly, record
 def test_a_lost_leg_and_what_was_sent_after_it_are_due_again_and_nobody_else_s():
     plan = itinerary(ahead=3)
     assert len(list(plan.due())) == 9
-    plan.lost(Leg(1, 0, 4))
-    assert list(plan.due()) == [Leg(1, 0, 4), Leg(1, 4, 8)]
-    plan.lost(Leg(2, 4, 8))
-    plan.lost(Leg(0, -1, 0))
-    assert list(plan.due()) == [Leg(0, -1, 0), Leg(0, 0, 4), Leg(0, 4, 8), Leg(2, 4, 8)]
+    plan.lost(EpochTask(1, 0, 4))
+    assert list(plan.due()) == [EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
+    plan.lost(EpochTask(2, 4, 8))
+    plan.lost(EpochTask(0, -1, 0))
+    assert list(plan.due()) == [
+        EpochTask(0, -1, 0),
+        EpochTask(0, 0, 4),
+        EpochTask(0, 4, 8),
+        EpochTask(2, 4, 8),
+    ]
     # Told of the later one besides, as late as may be.
-    plan.lost(Leg(1, -1, 0))
-    plan.lost(Leg(1, 4, 8))
-    assert list(plan.due()) == [Leg(1, -1, 0), Leg(1, 0, 4), Leg(1, 4, 8)]
+    plan.lost(EpochTask(1, -1, 0))
+    plan.lost(EpochTask(1, 4, 8))
+    assert list(plan.due()) == [EpochTask(1, -1, 0), EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
 
 
 def test_a_loss_of_what_is_known_already_holds_nobody_up():
@@ -50,7 +55,7 @@ def test_a_loss_of_what_is_known_already_holds_nobody_up():
     assert list(plan.completed()) == [(epoch_of(first),), (epoch_of(second),)]
     for leg in again[1:]:
         plan.lost(leg)
-    assert Leg(0, 4, 8) in list(plan.due())
+    assert EpochTask(0, 4, 8) in list(plan.due())
 
 
 def completed_twice():
@@ -59,7 +64,7 @@ def completed_twice():
     first, second, _ = plan.due()
     plan.back(second, epoch_of(second))
     plan.lost(first)
-    assert list(plan.due()) == [first, second, Leg(0, 4, 8)]
+    assert list(plan.due()) == [first, second, EpochTask(0, 4, 8)]
     plan.back(first, epoch_of(first))
     assert len(list(plan.completed())) == 2
     return plan, second
@@ -68,14 +73,14 @@ def completed_twice():
 def test_a_loss_of_what_is_complete_loses_what_was_sent_after_it():
     plan, second = completed_twice()
     plan.lost(second)
-    assert list(plan.due()) == [Leg(0, 4, 8), Leg(0, 8, 10)]
+    assert list(plan.due()) == [EpochTask(0, 4, 8), EpochTask(0, 8, 10)]
 
 
 def test_what_comes_back_of_what_is_complete_already_is_forgotten():
     plan, second = completed_twice()
     before = [dict(known) for known in plan.known]
     plan.back(second, replace(epoch_of(second), emigrants=(Individual(()),)))
-    plan.back(Leg(0, -1, 0), epoch_of(Leg(0, -1, 0)))
+    plan.back(EpochTask(0, -1, 0), epoch_of(EpochTask(0, -1, 0)))
     assert plan.known == before
     assert list(plan.completed()) == []
 
@@ -101,11 +106,11 @@ def evolving():
 
 
 def test_it_begins_with_those_who_leave_the_islands_of_its_start(evolving):
-    for epoch in SerialEngine().run(evolving, founded(3, SEED), lambda: False):
+    for epoch in SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False):
         start = epoch.archipelago
-        known = Itinerary(evolving, start, as_it_is).known
+        known = EpochScheduler(evolving, start, as_it_is).known
         for island, each in zip(start.islands, known, strict=True):
-            leaving = emigrants(island, evolving.settings_of(island.index))
+            leaving = select_migrants(island, evolving.settings_of(island.index))
             assert each == {start.generation: IslandEpoch(island, leaving, ())}
             assert bool(leaving) == (start.generation in (2, 4))
 
@@ -113,11 +118,11 @@ def test_it_begins_with_those_who_leave_the_islands_of_its_start(evolving):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("first", [None, 1])
 def test_in_any_order_and_with_losses_islands_evolve_as_one_after_the_other(evolving, first, seed):
-    whole = list(SerialEngine().run(evolving, founded(3, SEED), lambda: False))
-    start = founded(3, SEED) if first is None else whole[first].archipelago
+    whole = list(SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False))
+    start = empty_archipelago(3, SEED) if first is None else whole[first].archipelago
     whole = whole if first is None else whole[first + 1 :]
     plan, evaluator, choose = (
-        Itinerary(evolving, start, as_it_is),
+        EpochScheduler(evolving, start, as_it_is),
         Evaluator(evolving.record, evolving.settings),
         random.Random(seed),
     )
@@ -139,7 +144,7 @@ def test_in_any_order_and_with_losses_islands_evolve_as_one_after_the_other(evol
         out.remove(leg)
         arriving = [plan.known[source][leg.begin].emigrants for source in plan.sources[leg.island]]
         island = plan.known[leg.island][leg.begin].island
-        plan.back(leg, advance(island, arriving, evaluator, evolving, lambda: False))
+        plan.back(leg, run_epoch(island, arriving, evaluator, evolving, lambda: False))
         found += plan.completed()
     assert losses > 0
     assert len(found) == len(whole)

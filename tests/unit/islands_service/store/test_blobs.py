@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from islands_service.store.blobs import Blobs, NoSuchBlob, full_disk_told
-from islands_service.store.database import StoreFull
+from islands_service.store.blobs import BlobNotFoundError, Blobs, translate_disk_full
+from islands_service.store.database import StorageFullError
 from support.stores import MANY, at_once
 
 LONG_AGO = 1_000_000.0
@@ -58,7 +58,7 @@ def test_many_who_write_the_same_bytes_at_once_write_one_blob(blobs, folder):
 
 
 def test_a_blob_that_is_not_there_says_what_to_do(blobs, folder):
-    with pytest.raises(NoSuchBlob, match=f"{'0' * 64} is not in .*blobs: restore .* from a backup"):
+    with pytest.raises(BlobNotFoundError, match=f"{'0' * 64} is not in .*blobs: restore .* from a backup"):
         blobs.read("0" * 64)
 
 
@@ -160,11 +160,11 @@ def test_a_blob_that_is_written_again_is_young_again(blobs):
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
 def test_a_full_disk_is_told(number):
-    with pytest.raises(StoreFull, match="make room"), full_disk_told():
+    with pytest.raises(StorageFullError, match="make room"), translate_disk_full():
         raise OSError(number, os.strerror(number))
 
 
 def test_another_fault_of_the_disk_is_not_called_a_full_one():
-    with pytest.raises(OSError, match="Input/output error") as raised, full_disk_told():
+    with pytest.raises(OSError, match="Input/output error") as raised, translate_disk_full():
         raise OSError(errno.EIO, os.strerror(errno.EIO))
-    assert not isinstance(raised.value, StoreFull)
+    assert not isinstance(raised.value, StorageFullError)

@@ -13,12 +13,12 @@ from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError
 
 from islands_service.store import Store, connections
 from islands_service.store.database import (
+    CommitUnknownError,
     Database,
-    StoreCollision,
+    StorageFullError,
+    StoreCollisionError,
     StoreError,
-    StoreFull,
-    StoreInDoubt,
-    StoreUnavailable,
+    StoreUnavailableError,
 )
 from support.databases import emptied
 from support.stores import at_once
@@ -26,14 +26,14 @@ from support.stores import at_once
 RAISE = "DO $$ BEGIN RAISE EXCEPTION 'in this test' USING ERRCODE = '{}'; END $$"
 
 MEANS = {
-    "53100": StoreFull,  # disk full
-    "08006": StoreUnavailable,  # connection failure
-    "57P01": StoreUnavailable,  # admin shutdown
-    "57P03": StoreUnavailable,  # cannot connect now
-    "53300": StoreUnavailable,  # too many connections
-    "25006": StoreUnavailable,  # read-only transaction: this one is another one's copy now
-    "40001": StoreCollision,  # serialization failure
-    "40P01": StoreCollision,  # deadlock
+    "53100": StorageFullError,  # disk full
+    "08006": StoreUnavailableError,  # connection failure
+    "57P01": StoreUnavailableError,  # admin shutdown
+    "57P03": StoreUnavailableError,  # cannot connect now
+    "53300": StoreUnavailableError,  # too many connections
+    "25006": StoreUnavailableError,  # read-only transaction: this one is another one's copy now
+    "40001": StoreCollisionError,  # serialization failure
+    "40P01": StoreCollisionError,  # deadlock
     "23505": IntegrityError,  # unique violation: somebody's mistake, and nobody's but its own
     "42P01": ProgrammingError,  # undefined table
 }
@@ -70,7 +70,7 @@ def test_what_postgresql_raises_is_told_as_what_it_means(postgresql, state):
 
 
 def test_a_read_is_told_alike(postgresql):
-    with pytest.raises(StoreUnavailable), postgresql.read() as connection:
+    with pytest.raises(StoreUnavailableError), postgresql.read() as connection:
         connection.execute(text(RAISE.format("57P01")))
 
 
@@ -81,7 +81,7 @@ def test_a_collision_is_tried_again_and_in_the_end_given_up(postgresql):
         tries.append(1)
         connection.execute(text(RAISE.format("40P01")))
 
-    with pytest.raises(StoreCollision, match="try again"):
+    with pytest.raises(StoreCollisionError, match="try again"):
         postgresql.write(collides)
     assert 2 <= len(tries) <= 10
 
@@ -104,15 +104,15 @@ def ending(connection):
 
 
 def test_who_is_cut_off_before_the_commit_is_told_that_nothing_was_written(postgresql):
-    with pytest.raises(StoreUnavailable, match="nothing was written") as raised:
+    with pytest.raises(StoreUnavailableError, match="nothing was written") as raised:
         postgresql.write(ending)
-    assert not isinstance(raised.value, StoreInDoubt)
+    assert not isinstance(raised.value, CommitUnknownError)
     postgresql.write(executing("SELECT 1"))
 
 
 def test_who_is_cut_off_during_the_commit_is_not_told_that_nothing_was_written(postgresql):
     event.listen(postgresql.engine, "commit", ending, once=True)
-    with pytest.raises(StoreInDoubt, match="nobody knows whether it was written") as raised:
+    with pytest.raises(CommitUnknownError, match="nobody knows whether it was written") as raised:
         postgresql.write(executing("SELECT 1"))
     assert "nothing was written" not in str(raised.value)
     postgresql.write(executing("SELECT 1"))
@@ -132,7 +132,7 @@ def test_a_file_that_is_locked_is_waited_for_and_then_told(sqlite, tmp_path, mon
     with closing(sqlite3.connect(tmp_path / "islands.db", isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")
         began = time.monotonic()
-        with pytest.raises(StoreUnavailable, match="locked"):
+        with pytest.raises(StoreUnavailableError, match="locked"):
             hasty.write(executing("SELECT 1"))
         assert time.monotonic() - began > 0.15
         with hasty.read() as connection:
@@ -150,7 +150,7 @@ def test_a_new_file_that_is_locked_is_waited_for_and_then_told(tmp_path, monkeyp
         other.execute("BEGIN EXCLUSIVE")
         other.execute("CREATE TABLE taken (a)")
         began = time.monotonic()
-        with pytest.raises(StoreUnavailable, match="locked"):
+        with pytest.raises(StoreUnavailableError, match="locked"):
             database.write(executing("SELECT 1"))
         assert 0.3 < time.monotonic() - began < 25
         other.execute("COMMIT")
@@ -169,7 +169,7 @@ def test_a_file_that_is_no_database_is_not_written(tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):
-    with pytest.raises(StoreUnavailable, match="unable to open"):
+    with pytest.raises(StoreUnavailableError, match="unable to open"):
         Store(f"sqlite:///{tmp_path / 'nowhere' / 'islands.db'}")
 
 
@@ -209,7 +209,7 @@ def test_a_server_that_takes_connections_and_never_answers_is_given_up(monkeypat
     with socket.create_server(("127.0.0.1", 0)) as silent:
         database = Database(f"postgresql+psycopg://nobody@127.0.0.1:{silent.getsockname()[1]}/none")
         began = time.monotonic()
-        with pytest.raises(StoreUnavailable, match="timeout"):
+        with pytest.raises(StoreUnavailableError, match="timeout"):
             database.write(executing("SELECT 1"))
         assert time.monotonic() - began < 25
         database.close()

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from islands.errors import RecordError
-from islands.io.records.columnar import Channels
+from islands.io.records.columnar import ColumnarFile
 from islands.io.records.mat import v4, v5, v73
-from islands.io.records.mat.workspace import channels_of
+from islands.io.records.mat.workspace import make_columns
 
 #: How HDF5 begins, and where: MATLAB puts 512 bytes of its own before it.
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -18,7 +18,7 @@ _OTHERS = {
 }
 
 
-def read_matlab(path: Path) -> Channels:
+def read_matlab(path: Path) -> ColumnarFile:
     """Open a MAT-file.
 
     Columns are vectors by their names, fields of structures as ``run.u``, and matrices of a few channels as
@@ -36,10 +36,10 @@ def read_matlab(path: Path) -> Channels:
     if not head:
         raise RecordError(f"{file} is empty: save it anew in MATLAB or Octave by save -v7 {file}")
     if any(head.startswith(_HDF5, start) for start in _HDF5_STARTS):
-        return channels_of(v73.variables_of(path), file)
+        return make_columns(v73.read_variables(path), file)
     content = path.read_bytes()
-    variables = v5.variables_of(content) or v4.variables_of(content)
+    variables = v5.read_variables(content) or v4.read_variables(content)
     if variables is None:
         words = next(words for begin, words in _OTHERS.items() if head.startswith(begin))
         raise RecordError(f"{file} {words.format(file=file)}")
-    return channels_of(variables, file)
+    return make_columns(variables, file)

@@ -32,7 +32,7 @@ class _Matrix:
     stop: int
 
 
-def variables_of(content: bytes) -> Iterator[Variable] | None:
+def read_variables(content: bytes) -> Iterator[Variable] | None:
     """Yield the variables of a MAT-file of version 4; None if the bytes are none.
 
     The iterator raises ValueError where the bytes are not as they claim.

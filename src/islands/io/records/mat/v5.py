@@ -62,7 +62,7 @@ class _Matrix:
     parts: Iterator[tuple[int, _Span]]
 
 
-def variables_of(content: bytes) -> Iterator[Variable] | None:
+def read_variables(content: bytes) -> Iterator[Variable] | None:
     """Yield the variables of a MAT-file of version 5 to 7 and the fields of structures; None if it is none.
 
     The iterator raises one of `islands.io.records.mat.workspace.DAMAGED` if the bytes are damaged.

@@ -21,7 +21,7 @@ _FILTERS = {_DEFLATE, 2, 3}  # also shuffle and Fletcher's checksum: MATLAB uses
 _DEEPEST = 32  # groups in one another
 
 
-def variables_of(path: Path) -> Iterator[Variable]:
+def read_variables(path: Path) -> Iterator[Variable]:
     """Yield the variables of a MAT-file of version 7.3, and the fields of its structures.
 
     Raises one of `islands.io.records.mat.workspace.DAMAGED` where the file is not what it claims to be.

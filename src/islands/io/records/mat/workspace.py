@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from islands.errors import RecordError
-from islands.io.records.columnar import Channels
+from islands.io.records.columnar import ColumnarFile
 from islands.io.records.size_limits import check_samples
 from islands.io.records.validation import MIN_SAMPLES
 
@@ -70,7 +70,7 @@ class Variable:
     load: Callable[[], NDArray[Any]]
 
 
-def channels_of(variables: Iterable[Variable], file: str) -> Channels:
+def make_columns(variables: Iterable[Variable], file: str) -> ColumnarFile:
     """Offer the variables as columns: a vector by its name, a matrix of a few channels as ``x_1, x_2 ...``.
 
     A matrix is left whole, which is no channel, where one of the new names is taken.
@@ -96,7 +96,7 @@ def channels_of(variables: Iterable[Variable], file: str) -> Channels:
             names.append(variable.name)
     # A timeseries is often called ts, and states no sampling.
     single = [variable.name for variable in variables if not variable.kind and math.prod(variable.shape) == 1]
-    return Channels(file, tuple(names), lambda name: loads[name](), single)
+    return ColumnarFile(file, tuple(names), lambda name: loads[name](), single)
 
 
 def _listed(variables: Iterable[Variable], file: str) -> list[Variable]:

@@ -11,7 +11,7 @@ from islands.discrepancy.inference.confounders import Confounder, find_confounde
 from islands.discrepancy.inference.screening import screen_effects
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator
-from islands.systems.hysteresis_operators import played, slider
+from islands.systems.hysteresis_operators import play_from, slider
 from support.simulated_records import recorded
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ def test_slips_leave_a_play_of_half_the_breakaway_on_the_average() -> None:
         x = np.empty(u.size + 1)
         slider(np.concatenate([[u[0] - start], u]), breakaway, x)
         paths.append(x[1:])
-        plays.append(played(u, breakaway / 2))
+        plays.append(play_from(u, breakaway / 2))
     behind = slice(1500, None)  # the first reversal mixes where they are
     difference = np.mean(paths, axis=0)[behind] - np.mean(plays, axis=0)[behind]
     spread = np.std(np.array(paths)[:, behind] - np.array(plays)[:, behind])
@@ -72,7 +72,7 @@ def compared(fast: Array, moved: Array, noise: float, seed: int) -> Confounder:
 @pytest.mark.parametrize("seed", range(4))
 def test_slips_are_told_from_play_by_how_neighbours_go_together(fast: Array, seed: int) -> None:
     slips = compared(fast, slipped(fast, 0.4), 0.1, seed)
-    play = compared(fast, played(fast, 0.2), 0.1, seed)
+    play = compared(fast, play_from(fast, 0.2), 0.1, seed)
     assert (slips.effect.name, slips.times) == ("stiction", 2.0)
     assert slips.gained > 9.0
     assert play.gained < -9.0
@@ -81,7 +81,7 @@ def test_slips_are_told_from_play_by_how_neighbours_go_together(fast: Array, see
 
 @pytest.mark.parametrize("seed", range(4))
 def test_slips_that_noise_buries_say_nothing(fast: Array, seed: int) -> None:
-    for moved in (slipped(fast, 0.1), played(fast, 0.05)):
+    for moved in (slipped(fast, 0.1), play_from(fast, 0.05)):
         assert abs(compared(fast, moved, 0.5, seed).gained) < 4.0
 
 

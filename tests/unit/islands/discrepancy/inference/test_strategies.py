@@ -10,7 +10,7 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.strategies import assess_evidence, search_with_model_error
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.io.simulator_spec.factory import simulation
+from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.schema import PhysicalSpec
 from support.simulated_records import recorded
 
@@ -52,7 +52,7 @@ def overflowing(rim: float, beside: float, samples: int = 400, dt: float = 4.0) 
 @pytest.fixture(scope="module", params=RIVALS, ids=len)
 def weighed(request):
     record = overflowing(RIM, BESIDE)
-    core = simulation(PhysicalSpec(kind="cascaded-tanks"), record)
+    core = make_simulator(PhysicalSpec(kind="cascaded-tanks"), record)
     fitted = count_fitted_samples(record)
     alone = ExtendedSimulator(core, (), make_context(record, core, fitted))
     target = Target(record.y, np.arange(record.samples) < fitted, None, {})

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
-from islands.benchmark.compiled_c import compiled, compiler
+from islands.benchmark.compiled_c import compile_model, find_compiler
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.io.export import export
@@ -30,7 +30,7 @@ from support.programs import (
 )
 from support.strategies import models, part_of_the_examples
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler is called cc")
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-pedantic", "-Werror")
 
@@ -49,7 +49,7 @@ def simulated(exported, data, folder, y=None):
     y = data.y.copy() if y is None else y
     y[exported.maximum_lag :] = np.nan
     inputs = [np.ascontiguousarray(column) for column in data.u.T]
-    simulate = compiled(export(exported, "c"), FLAGS, folder).simulate
+    simulate = compile_model(export(exported, "c"), FLAGS, folder).simulate
     simulate.restype = None
     simulate(*map(pointer, inputs), pointer(y), ctypes.c_size_t(data.samples))
     return y
@@ -105,7 +105,7 @@ def test_an_input_at_rest_leaves_no_minus_zero(folder):
 @needs_compiler
 def test_predict_is_one_step_ahead_and_reads_nothing_but_its_past(folder):
     data, exported = record(), PUBLISHED["12"].model
-    predict = compiled(export(exported, "c"), FLAGS, folder).predict
+    predict = compile_model(export(exported, "c"), FLAGS, folder).predict
     predict.restype = ctypes.c_double
     predicted = []
     for k in range(3, SAMPLES):
@@ -121,7 +121,7 @@ def test_predict_is_one_step_ahead_and_reads_nothing_but_its_past(folder):
 def test_the_first_samples_and_what_lies_behind_the_last_are_left_as_they_are(samples, folder):
     exported = PUBLISHED["12"].model
     data, y = record(), np.arange(1.0, 9.0)
-    simulate = compiled(export(exported, "c"), FLAGS, folder).simulate
+    simulate = compile_model(export(exported, "c"), FLAGS, folder).simulate
     simulate.restype = None
     simulate(pointer(data.u[:, 0].copy()), pointer(y), ctypes.c_size_t(samples))
     written = slice(3, max(samples, 3))

@@ -11,7 +11,7 @@ import pytest
 from pyarrow import parquet
 
 from islands.errors import RecordError
-from islands.io.records import columns_of, read_record
+from islands.io.records import read_columns, read_record
 from islands.io.records.parquet import read_parquet
 from islands.io.records.size_limits import MOST_SAMPLES
 
@@ -43,7 +43,7 @@ def refusal(file, inputs=("u_V",), output="y_um", **options):
 )
 def test_columns_come_back_with_names_units_and_times(write, options):
     record = read_record(write(options), ["u_V"], "y_um", rows=slice(8, None))
-    assert columns_of(write()) == ("t_s", "u_V", "y_um")
+    assert read_columns(write()) == ("t_s", "u_V", "y_um")
     assert record.u[:, 0].tolist() == U[8:].tolist()
     assert record.y.tolist() == Y[8:].tolist()
     assert (record.dt, record.start) == (0.125, 1.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.io.records import READERS, columns_of, preview, read_record
+from islands.io.records import READERS, preview, read_columns, read_record
 
 SAMPLES = 60
 K = np.arange(SAMPLES)
@@ -266,7 +266,7 @@ def test_a_stated_sampling_time_is_told_and_held_against_the_time(tmp_path):
 
 def test_a_stated_sampling_time_that_is_none_is_a_warning(tmp_path):
     file = archive(tmp_path, u=U, y=Y, dt=0.0)
-    assert columns_of(file) == ("u", "y", "dt")
+    assert read_columns(file) == ("u", "y", "dt")
     assert preview(file).dt is None
     assert preview(file).warnings == (refusal(file, ["u"], "y"),)
 

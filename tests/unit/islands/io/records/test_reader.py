@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.io.records import READERS, columns_of, fingerprint, read_record
-from islands.io.records.column_names import looks_like_time, time_column, unit_of
+from islands.io.records import READERS, fingerprint, read_columns, read_record
+from islands.io.records.column_names import looks_like_time, parse_unit, time_column
 from support.bad_records import lines, refusal
 
 SAMPLES = 50
@@ -108,7 +108,7 @@ def test_what_numpy_savetxt_writes_is_read(tmp_path):
 def test_a_name_may_hold_a_mark_that_separates_elsewhere(tmp_path):
     file = written(tmp_path)
     file.write_text(file.read_text().replace("u_V", "u (a;b)"))
-    assert columns_of(file) == ("t_s", "u (a;b)", "y_um")
+    assert read_columns(file) == ("t_s", "u (a;b)", "y_um")
     assert read_record(file, ["u (a;b)"], "y_um").u[:, 0].tolist() == U.tolist()
 
 
@@ -188,7 +188,7 @@ def test_a_timestamp_beside_the_time_does_no_harm():
     ],
 )
 def test_a_unit_is_what_follows_the_last_underscore_or_stands_in_brackets(name, unit):
-    assert unit_of(name) == unit
+    assert parse_unit(name) == unit
 
 
 @pytest.mark.ci
@@ -322,8 +322,8 @@ def test_an_array_that_nobody_asked_for_does_no_harm(tmp_path):
 
 
 def test_columns_are_listed_in_the_files_order(tmp_path):
-    assert columns_of(written(tmp_path, ";")) == ("t_s", "u_V", "y_um")
-    assert columns_of(archive(tmp_path, fs=10.0)) == ("u", "y", "fs")
+    assert read_columns(written(tmp_path, ";")) == ("t_s", "u_V", "y_um")
+    assert read_columns(archive(tmp_path, fs=10.0)) == ("u", "y", "fs")
 
 
 def test_a_fingerprint_is_the_sha_256_of_the_bytes(tmp_path):

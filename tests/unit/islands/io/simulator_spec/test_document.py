@@ -17,9 +17,9 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, SettingsError
 from islands.io.export.extended import as_json
-from islands.io.simulator_spec.document import described, extended_document, extended_json
-from islands.io.simulator_spec.factory import simulated, simulation
-from islands.io.simulator_spec.schema import LocalExtendedSpec, ModelSpec, innermost, spec_of
+from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
+from islands.io.simulator_spec.factory import make_simulator, simulated
+from islands.io.simulator_spec.schema import LocalExtendedSpec, ModelSpec, innermost, parse_spec
 from support.simulated_records import Made, made
 
 KINDS = list(made())
@@ -126,17 +126,17 @@ def test_what_is_read_is_written_as_it_was(asked: Made) -> None:
     text = extended_json(extended(asked, chosen(asked)), asked.record)
     spec = LocalExtendedSpec.model_validate(json.loads(text))
     assert as_json(spec) == text
-    core = simulation(spec, asked.record, asked.columns)
+    core = make_simulator(spec, asked.record, asked.columns)
     assert isinstance(core, SavedExtension)
     values = np.array([parameter.nominal for parameter in core.parameters])
-    assert as_json(described(core, values, spec.inputs, spec.output)) == text
+    assert as_json(describe_extension(core, values, spec.inputs, spec.output)) == text
 
 
 def test_a_file_of_it_is_a_model_like_any_other(asked: Made, tmp_path) -> None:
     text = extended_json(extended(asked, chosen(asked)[:1]), asked.record)
     path = tmp_path / "extended.json"
     path.write_text(text)
-    assert as_json(spec_of(f"model:{path}")) == text
+    assert as_json(parse_spec(f"model:{path}")) == text
 
 
 def test_with_other_effects_in_it_it_is_extended_once_more(asked: Made) -> None:
@@ -169,7 +169,7 @@ def test_diagnosed_again_it_lacks_nothing(kind: str, name: str, point: tuple[flo
     found = diagnose(record, asked.core)
     assert [each.name for each in found.effects][:1] == [name]
     spec = LocalExtendedSpec.model_validate(extended_document(found.best, record))
-    second = diagnose(record, simulation(spec, record, asked.columns))
+    second = diagnose(record, make_simulator(spec, record, asked.columns))
     assert [each.name for each in second.effects if each.eta is not None] == []
     assert second.verdict in ("nothing", "named")
 

@@ -41,7 +41,7 @@ def watched(monkeypatch):
     """Do something after every epoch."""
 
     def by(watch):
-        monkeypatch.setattr(command, "course", lambda _tell: lambda state, _settings: watch(state))
+        monkeypatch.setattr(command, "search_progress", lambda _tell: lambda state, _settings: watch(state))
 
     return by
 

@@ -7,11 +7,11 @@ from math import inf
 
 import pytest
 
-from islands.evolution.archipelago import founded
+from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.history import Progress
-from islands.evolution.presets import settings_of
-from islands.evolution.search_state import State
+from islands.evolution.history import HistoryPoint
+from islands.evolution.presets import resolve_settings
+from islands.evolution.search_state import SearchState
 from islands.io.checkpoints import read_checkpoint, state_document, write_checkpoint
 from islands.io.records import write_record
 from islands_api.cli import identify_run as command
@@ -86,11 +86,11 @@ def test_an_epoch_that_cannot_be_shown_is_kept(run, watched, tmp_path):
 def test_an_island_without_a_model_is_kept_as_none_and_comes_back(tmp_path):
     """JSON knows no infinity."""
     history = (
-        Progress(0, 20, {}, (inf, inf)),
-        Progress(1, 40, {2: 0.1 + 0.2}, (0.1 + 0.2, inf)),
-        Progress(2, 60, {1: 0.0, 2: 5e-324}, (0.0, 5e-324)),
+        HistoryPoint(0, 20, {}, (inf, inf)),
+        HistoryPoint(1, 40, {2: 0.1 + 0.2}, (0.1 + 0.2, inf)),
+        HistoryPoint(2, 60, {1: 0.0, 2: 5e-324}, (0.0, 5e-324)),
     )
-    state = State(founded(2, 5), 60, 7, {"ok": 31, "diverged": 29}, history)
+    state = SearchState(empty_archipelago(2, 5), 60, 7, {"ok": 31, "diverged": 29}, history)
     about = {"job": {"seed": 5}, "wall_s": 12.5, **state_document(state)}
     assert [least for *_, least in about["history"]] == [[None, None], [0.1 + 0.2, None], [0.0, 5e-324]]
     path = tmp_path / command.CHECKPOINT
@@ -219,7 +219,7 @@ def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
     assert "cannot read the checkpoint nowhere/checkpoint.json" in refused(run("--resume", "nowhere"))
     (tmp_path / "out").mkdir()
     path = tmp_path / "out/checkpoint.json"
-    write_checkpoint(founded(1, 0), path, {})
+    write_checkpoint(empty_archipelago(1, 0), path, {})
     assert "no checkpoint of islands identify: KeyError('job')" in refused(run("--resume", "out"))
 
 
@@ -271,7 +271,7 @@ def test_ray_carries_out_what_it_is_of_use_for_or_asked_for(run, engines, number
 
 
 def test_islands_that_a_preset_brings_count_as_well(run, engines, monkeypatch):
-    several = {"several": settings_of("hysteresis", {"islands": 2})}
+    several = {"several": resolve_settings("hysteresis", {"islands": 2})}
     monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
     asked = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--out", "out")[0] == 0

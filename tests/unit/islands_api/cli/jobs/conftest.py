@@ -12,7 +12,7 @@ import pytest
 from islands.evolution.engine import SerialEngine
 from islands_api.cli import jobs as command
 from islands_service.coordinator.identification_job import identification
-from islands_service.domain.jobs import Outcome, Submission
+from islands_service.domain.jobs import JobOutcome, Submission
 from islands_service.store.blobs import Blobs
 from support.service import FIGURES, Service, ahead, csv
 from support.stores import LONG, taken
@@ -60,7 +60,7 @@ def beside() -> Iterator[Callable[..., None]]:
 
 
 @pytest.fixture(scope="module")
-def found(service: Service) -> Outcome:
+def found(service: Service) -> JobOutcome:
     """What a small search finds: carried out by the coordinator's own function, without Ray."""
     dataset = service.upload(csv(400)).json()["id"]
     spec = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "settings": SMALL}
@@ -71,7 +71,7 @@ def found(service: Service) -> Outcome:
 
 
 @pytest.fixture
-def done(service: Service, owner: str, found: Outcome) -> str:
+def done(service: Service, owner: str, found: JobOutcome) -> str:
     """A job that has succeeded, with its figures drawn."""
     job = ahead(service, owner)
     service.store.leases.finish(taken(service.store, job), found)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from islands_api.cli import jobs as command
-from islands_service.domain.jobs import Outcome
+from islands_service.domain.jobs import JobOutcome
 from support.command_line import COLUMNS, ISLANDS
 from support.processes import eventually
 from support.service import FIGURES, Service, ahead, kept, queued
@@ -62,7 +62,7 @@ def test_a_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner:
     assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
 
 
-def test_a_job_that_succeeded_shows_its_equation(run: Run, done: str, found: Outcome) -> None:
+def test_a_job_that_succeeded_shows_its_equation(run: Run, done: str, found: JobOutcome) -> None:
     assert found.summary is not None
     out = run("show", done)[1]
     assert out.splitlines()[0] == f"job {done}: succeeded"
@@ -73,7 +73,7 @@ def test_a_job_that_succeeded_shows_its_equation(run: Run, done: str, found: Out
 
 
 def test_a_job_is_submitted_watched_and_shown(
-    run: Run, service: Service, owner: str, found: Outcome, beside: Callable[..., None]
+    run: Run, service: Service, owner: str, found: JobOutcome, beside: Callable[..., None]
 ) -> None:
     def carry_out() -> None:
         waiting = eventually(lambda: service.store.jobs.page(owner).jobs)
@@ -134,7 +134,7 @@ def test_an_interrupted_watcher_leaves_the_job_running(service: Service, owner: 
 # Results.
 
 
-def test_a_result_is_shown_and_downloaded(run: Run, done: str, found: Outcome) -> None:
+def test_a_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) -> None:
     code, out, err = run("result", done, "--out", "out")
     assert code == 0, err
     assert out.splitlines()[-1] == "out/: result.json, models/, figures/"

@@ -12,7 +12,7 @@ from islands_api.cli import jobs as command
 from islands_api.cli.identify import identify
 from islands_api.cli.search_options import SETTINGS
 from islands_service.domain.job_spec import Identification
-from islands_service.domain.jobs import DISCREPANCY, EXTENDED, REPORT, JobState, Outcome, Submission
+from islands_service.domain.jobs import DISCREPANCY, EXTENDED, REPORT, JobOutcome, JobState, Submission
 from islands_service.store.blobs import Blobs
 from support.command_line import COLUMNS
 from support.service import Service, csv, held
@@ -137,7 +137,7 @@ def diagnosed(service: Service, owner: str) -> str:
     }
     document = {"verdict": "named", "extended_model": "extended.json", "wall_s": 1.5}
     artefacts = {REPORT: blobs.write(b"<!DOCTYPE html>"), EXTENDED: blobs.write(b'{"effects": []}')}
-    found = Outcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
+    found = JobOutcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
     service.store.leases.finish(taken(service.store, job), found)
     return job
 

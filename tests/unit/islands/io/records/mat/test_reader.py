@@ -10,7 +10,7 @@ import scipy.io
 from scipy.sparse import csc_array
 
 from islands.errors import RecordError
-from islands.io.records import columns_of, read_record
+from islands.io.records import read_columns, read_record
 from islands.io.records.mat.reader import read_matlab
 from islands.io.records.mat.workspace import ADVICE, MOST_CHANNELS
 
@@ -34,7 +34,7 @@ def refusal(file, inputs=("u",), output="y", **options):
 def test_a_vector_is_a_column_whichever_way_it_lies(save, version, shape):
     file = save(version, u=U.reshape(shape), y=Y.reshape(shape), t=T.reshape(shape))
     record = read_record(file, ["u"], "y")
-    assert sorted(columns_of(file)) == ["t", "u", "y"]
+    assert sorted(read_columns(file)) == ["t", "u", "y"]
     assert record.u[:, 0].tolist() == U.tolist()
     assert record.y.tolist() == Y.tolist()
     assert (record.dt, record.start) == (pytest.approx(0.01), 0.0)
@@ -88,7 +88,7 @@ def test_a_nan_that_signals_is_a_missing_value(save):
 def test_a_matrix_of_a_few_channels_offers_each_of_them(save, version, turned):
     data = np.column_stack([T, U, Y])
     file = save(version, data=data.T if turned else data, Ts=0.01)
-    assert sorted(columns_of(file)) == ["Ts", "data_1", "data_2", "data_3"]
+    assert sorted(read_columns(file)) == ["Ts", "data_1", "data_2", "data_3"]
     record = read_record(file, ["data_2"], "data_3")
     assert record.u[:, 0].tolist() == U.tolist()
     assert record.y.tolist() == Y.tolist()
@@ -112,7 +112,7 @@ def test_a_cube_is_refused_with_its_shape(save):
 
 def test_a_matrix_beside_its_columns_leaves_them_their_names(save):
     file = save("7", u=np.column_stack([U, Y]), u_1=Y, u_2=U, y=Y, Ts=0.1)
-    assert columns_of(file) == ("u", "u_1", "u_2", "y", "Ts")
+    assert read_columns(file) == ("u", "u_1", "u_2", "y", "Ts")
     assert read_record(file, ["u_1"], "u_2").u[:, 0].tolist() == Y.tolist()
 
 
@@ -124,7 +124,7 @@ def test_the_fields_of_a_structure_are_columns(save, version):
     file = save(
         version, run={"u_V": U, "y_um": Y[None, :], "inner": {"w": U, "m": np.column_stack([U, Y])}}, Ts=1.0
     )
-    assert {"run.u_V", "run.y_um", "run.inner.w", "run.inner.m_2", "Ts"} <= set(columns_of(file))
+    assert {"run.u_V", "run.y_um", "run.inner.w", "run.inner.m_2", "Ts"} <= set(read_columns(file))
     record = read_record(file, ["run.u_V", "run.inner.m_2"], "run.y_um")
     assert record.u.tolist() == np.column_stack([U, Y]).tolist()
     assert record.y.tolist() == Y.tolist()
@@ -191,7 +191,7 @@ def test_what_is_no_channel_does_no_harm_and_is_refused_with_advice_when_asked_f
         version, u=U, y=Y, Ts=0.1, **({"odd": odd} if place == "odd" else {"run": {"odd": odd, "v": U}})
     )
     assert read_record(file, ["u"], "y").samples == SAMPLES
-    assert place in columns_of(file)
+    assert place in read_columns(file)
     assert refusal(file, [place]) == (
         f"r.mat: column {place} holds {kind} where real numbers are expected: {ADVICE[kind].format(x=place)}"
     )

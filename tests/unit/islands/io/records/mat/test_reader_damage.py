@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from islands.errors import RecordError
-from islands.io.records import columns_of, read_record
+from islands.io.records import read_columns, read_record
 from islands.io.records.mat.workspace import ADVICE
 from islands.io.records.size_limits import MOST_SAMPLES
 
@@ -65,7 +65,7 @@ def write(tmp_path):
 
 def test_the_sound_file_of_these_tests_is_read(write):
     file = write(numbers("x", U), packed(numbers("z", Y)), packed(structure("s", a=numbers("", U))))
-    assert columns_of(file) == ("u", "y", "Ts", "x", "z", "s.a")
+    assert read_columns(file) == ("u", "y", "Ts", "x", "z", "s.a")
     record = read_record(file, ["x", "z", "s.a"], "y")
     assert record.u.tolist() == np.column_stack([U, Y, U]).tolist()
 
@@ -84,7 +84,7 @@ def test_an_object_does_no_harm_even_if_it_is_called_ts_and_is_refused_with_advi
 
 def test_what_matlab_keeps_for_itself_is_no_column(write):
     file = write(numbers("", U), numbers("__function_workspace__", U))
-    assert columns_of(file) == ("u", "y", "Ts")
+    assert read_columns(file) == ("u", "y", "Ts")
 
 
 def test_a_function_handle_is_refused_with_advice(write, refusal):
@@ -191,7 +191,7 @@ def test_structures_in_structures_end_somewhere(write, refusal):
 def test_a_file_of_too_many_variables_is_refused(write, monkeypatch, refusal):
     monkeypatch.setattr("islands.io.records.mat.workspace.MOST_VARIABLES", 50)
     many = [numbers(f"v{index}", U) for index in range(48)]
-    assert len(columns_of(write(*many[:47]))) == 50
+    assert len(read_columns(write(*many[:47]))) == 50
     assert "bad.mat holds more than 50 variables" in refusal(write(*many))
 
 

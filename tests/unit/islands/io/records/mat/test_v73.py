@@ -4,9 +4,9 @@ import h5py
 import numpy as np
 import pytest
 
-from islands.io.records import columns_of, read_record
+from islands.io.records import read_columns, read_record
 from islands.io.records.mat.reader import read_matlab
-from islands.io.records.mat.v73 import variables_of
+from islands.io.records.mat.v73 import read_variables
 from islands.io.records.mat.workspace import ADVICE
 
 K = np.arange(60)
@@ -79,7 +79,7 @@ def test_nothing_outside_of_the_file_is_ever_read(hdf5, tmp_path, refusal):
 
     file = hdf5(ways_out)
     assert read_record(file, ["u"], "y").samples == 60
-    assert set(columns_of(file)) == {"u", "y", "Ts", "run.w", "external", "group", "soft", "raw", "virtual"}
+    assert set(read_columns(file)) == {"u", "y", "Ts", "run.w", "external", "group", "soft", "raw", "virtual"}
     for name in ("external", "group", "soft", "raw", "virtual"):
         assert refusal(file, [name]) == (
             f"r.mat: column {name} holds link where real numbers are expected: it points to another place, "
@@ -89,7 +89,7 @@ def test_nothing_outside_of_the_file_is_ever_read(hdf5, tmp_path, refusal):
 
 def test_shapes_are_those_that_matlab_shows(hdf5):
     file = hdf5(lambda file: file.create_dataset("x", data=np.ones((2, 3, 4))))
-    assert next(variable.shape for variable in variables_of(file) if variable.name == "x") == (4, 3, 2)
+    assert next(variable.shape for variable in read_variables(file) if variable.name == "x") == (4, 3, 2)
 
 
 def test_rings_of_groups_end_somewhere(hdf5, refusal):
@@ -139,5 +139,5 @@ def test_an_array_of_structures_of_version_7_3_is_one_column_that_is_refused(hdf
         runs.create_dataset("u", data=[[file["u"].ref], [file["y"].ref]], dtype=h5py.ref_dtype)
 
     file = hdf5(store)
-    assert "runs" in columns_of(file)
+    assert "runs" in read_columns(file)
     assert "run1 = runs(1)" in refusal(file, ["runs"])
