@@ -35,7 +35,7 @@ import numpy as np
 def simulate(u, dt, *, gain=0.8, pole=0.9):
     y = np.zeros(len(u))
     for k in range(1, len(u)):
-        y[k] = pole * y[k - 1] + (1 - pole) * gain * u[k - 1, 0]
+        y[k] = pole * y[k - 1] + (1 - pole) * gain * u[k - 1]
     return y
 """
 
@@ -155,10 +155,15 @@ class Checkout:
         return {f"{out}/{path.relative_to(root)}": hash_file(path) for path in paths}
 
 
-def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
-    """Searches of three presets, serial, on Ray and resumed; a fit; a simulation."""
+def prepare(checkout: Checkout) -> None:
+    """Make the records of simulated systems, and a model."""
     checkout.run("systems", "make", "bouc-wen-piezo", "--out", "piezo.csv")
     checkout.run("systems", "make", "s1", "--out", "s1.csv")
+    checkout.run("fit", "piezo.csv", *COLUMNS, "--out", "fit")
+
+
+def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
+    """Searches of three presets, serial and on Ray; a resumed search; a fit and its simulation."""
     s1 = (checkout.folder / "s1.csv").read_text().splitlines()[0].split(",")
     of_s1 = ("--input", s1[1], "--output", s1[-1])
     jobs = {
@@ -226,7 +231,6 @@ def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
         return {key: value for key, value in found.items() if "/models/" in key or "hall" in key}
 
     def fitted() -> Hashes:
-        checkout.run("fit", "piezo.csv", *COLUMNS, "--out", "fit")
         checkout.run(
             "simulate", "fit/models/01.json", "piezo.csv", "--mode", "free-run", "--out", "free-run.csv"
         )
@@ -239,16 +243,16 @@ def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
 
 def diagnoses(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
     """A diagnosis by every simulator, among them a model that a fit found, and a self-test."""
-    lag = ("lag.csv", *COLUMNS, "--channel", "T_K")
+    lag = ("lag.csv", *COLUMNS, "--channel", "T_K", "--rows", "600:1800")
     jobs = {
-        "bouc-wen-piezo": ("piezo.csv", *COLUMNS, "--tolerance", "A=0.02", "--rows", "0:3000"),
-        "second-order": ("oscillator.csv", "--input", "u_N", "--output", "y_m", "--rows", "0:2000"),
-        "rigid-axis": ("axis.csv", "--input", "u_N", "--output", "y_m", "--rows", "0:1000"),
-        "cascaded-tanks": ("tanks.csv", "--input", "u_V", "--output", "y_V"),
+        "bouc-wen-piezo": ("piezo.csv", *COLUMNS, "--tolerance", "A=0.02", "--rows", "0:1000"),
+        "second-order": ("oscillator.csv", "--input", "u_N", "--output", "y_m", "--rows", "0:1000"),
+        "rigid-axis": ("axis.csv", "--input", "u_N", "--output", "y_m", "--rows", "0:800"),
+        "cascaded-tanks": ("tanks.csv", "--input", "u_V", "--output", "y_V", "--rows", "0:700"),
         "linear:1": lag,
         "column:theirs_um": lag,
         "python:program.py:simulate": lag,
-        "model:fit/models/01.json": ("piezo.csv", *COLUMNS, "--rows", "0:3000"),
+        "model:fit/models/01.json": ("piezo.csv", *COLUMNS, "--rows", "0:1000"),
     }
     for simulation, job in jobs.items():
         name = f"diagnosis-{simulation.split(':')[0]}"
@@ -400,6 +404,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         make_records(Path(folder))
         checkout = Checkout(asked.checkout.resolve(), Path(folder))
+        prepare(checkout)
         for group in (searches, diagnoses, trials, interfaces):
             if asked.only and group.__name__ not in asked.only.split(","):
                 continue
