@@ -160,6 +160,7 @@ def prepare(checkout: Checkout) -> None:
     checkout.run("systems", "make", "bouc-wen-piezo", "--out", "piezo.csv")
     checkout.run("systems", "make", "s1", "--out", "s1.csv")
     checkout.run("fit", "piezo.csv", *COLUMNS, "--out", "fit")
+    checkout.run("fit", "piezo.csv", *COLUMNS, "--max-terms", "2", "--out", "small")
 
 
 def searches(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
@@ -252,7 +253,7 @@ def diagnoses(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
         "linear:1": lag,
         "column:theirs_um": lag,
         "python:program.py:simulate": lag,
-        "model:fit/models/01.json": ("piezo.csv", *COLUMNS, "--rows", "0:1000"),
+        "model:small/models/01.json": ("piezo.csv", *COLUMNS, "--rows", "0:400"),
     }
     for simulation, job in jobs.items():
         name = f"diagnosis-{simulation.split(':')[0]}"
@@ -412,12 +413,12 @@ def main() -> None:
                 began = time.perf_counter()
                 found = job()
                 hashes |= found
+                asked.out.write_text(json.dumps(hashes, indent=1, sort_keys=True))
                 print(
                     f"{time.perf_counter() - began:6.1f} s  {len(found):3} hashes  {next(iter(found))}",
                     flush=True,
                 )
         print(f"import of the command line: {import_seconds(checkout):.3f} s")
-    asked.out.write_text(json.dumps(hashes, indent=1, sort_keys=True))
     if asked.against:
         before = json.loads(asked.against.read_text())
         different = sorted(key for key in before.keys() | hashes.keys() if before.get(key) != hashes.get(key))
