@@ -41,7 +41,17 @@ def simulate(u, dt, *, gain=0.8, pole=0.9):
 
 #: JSON keys whose values are times, process ids or versions.
 VOLATILE = frozenset(
-    {"wall_s", "seconds", "created", "version", "timings", "started", "finished", "elapsed_s"}
+    {
+        "wall_s",
+        "evaluations_per_second",
+        "seconds",
+        "created",
+        "version",
+        "timings",
+        "started",
+        "finished",
+        "elapsed_s",
+    }
 )
 
 
@@ -108,6 +118,14 @@ def strip_volatile(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: strip_volatile(item) for key, item in value.items() if key not in VOLATILE}
     return [strip_volatile(item) for item in value] if isinstance(value, list) else value
+
+
+def strip_prose(value: Any) -> Any:
+    """Return an OpenAPI document without descriptions, which are free to change."""
+    if isinstance(value, dict):
+        prose = [key for key in ("description", "summary") if isinstance(value.get(key), str)]
+        return {key: strip_prose(item) for key, item in value.items() if key not in prose}
+    return [strip_prose(item) for item in value] if isinstance(value, list) else value
 
 
 def digest(data: bytes) -> str:
@@ -365,7 +383,7 @@ def interfaces(checkout: Checkout) -> Iterator[Callable[[], Hashes]]:
         finally:
             server.terminate()
             server.wait(60)
-        document["info"].pop("version", None)
+        document = strip_prose(document)
         paths = {
             f"openapi {path}": digest(json.dumps(value, sort_keys=True).encode())
             for path, value in document["paths"].items()

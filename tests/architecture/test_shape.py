@@ -1,9 +1,12 @@
 """The shape of the repository: imports, packages, sizes, and documentation of what can be added to."""
 
+import ast
 import subprocess
 import sys
 import sysconfig
+from collections import defaultdict
 from pathlib import Path
+from statistics import median
 
 import pytest
 
@@ -27,6 +30,9 @@ from support.repository import ROOT
 FOLDERS = ("src", "services", "api")
 SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 
+#: Class names that two modules use: the client and the OpenAPI document name them like the core does.
+SHARED_CLASS_NAMES = {"Event", "HistoryPoint", "Preview"}
+
 
 def test_imports_keep_the_contracts() -> None:
     """Layers point down, siblings do not see each other, the core knows no clock and no environment."""
@@ -49,6 +55,23 @@ def test_every_module_says_why_it_exists() -> None:
 def test_files_stay_small_enough_to_read() -> None:
     long = {str(path): count for path in SOURCES if (count := len(path.read_text().splitlines())) > 300}
     assert not long
+
+
+def test_most_files_are_long_enough_to_hold_a_subject() -> None:
+    lengths = [len(path.read_text().splitlines()) for path in SOURCES if "migrations" not in path.parts]
+    lengths = [length for length in lengths if length > 5]
+    assert median(lengths) >= 105
+    assert sum(length < 40 for length in lengths) <= 30
+
+
+def test_a_class_name_is_unique() -> None:
+    """A name that stands for two things cannot be searched for."""
+    places: dict[str, set[Path]] = defaultdict(set)
+    for path in SOURCES:
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].add(path)
+    assert {name for name, found in places.items() if len(found) > 1} == SHARED_CLASS_NAMES
 
 
 def test_no_room_is_an_attic() -> None:

@@ -14,7 +14,7 @@ from islands_api.web.auth import KeyCache
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.dependencies import DRAWINGS, INSPECTIONS, AppState
 from islands_api.web.event_hub import JobEventHub
-from islands_api.web.metrics import Metrics
+from islands_api.web.metrics import ServiceMetrics
 from islands_api.web.middleware import BodyLimit, RequestLogging, SameOrigin
 from islands_api.web.problems import ProblemDocument
 from islands_api.web.rate_limit import RateLimiter
@@ -58,7 +58,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             Blobs(settings.blobs),
             hub,
             RateLimiter(settings.rate, settings.burst),
-            Metrics(opened),
+            ServiceMetrics(opened),
             asyncio.Semaphore(INSPECTIONS),
             asyncio.Semaphore(DRAWINGS),
             threads,

@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
-from islands_api.web.metrics import Metrics
+from islands_api.web.metrics import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -31,7 +31,7 @@ class AppState:
     blobs: Blobs
     hub: JobEventHub
     rate: RateLimiter
-    measures: Metrics
+    measures: ServiceMetrics
     inspections: asyncio.Semaphore
     drawings: asyncio.Semaphore
     threads: BlockingExecutor

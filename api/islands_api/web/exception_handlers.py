@@ -20,7 +20,7 @@ from islands_api.web.problems import (
     MalformedBodyError,
     MethodNotAllowedError,
     PayloadTooLargeError,
-    Problem,
+    ProblemKind,
     RateLimitError,
     ResourceNotFoundError,
     UnsupportedMediaTypeError,
@@ -56,7 +56,7 @@ _ERRORS = 20
 
 def problem_response(
     request: Request,
-    problem: Problem,
+    problem: ProblemKind,
     detail: str,
     errors: Sequence[Mapping[str, str]] | None = None,
     headers: Mapping[str, str] | None = None,
@@ -143,7 +143,7 @@ async def _http(request: Request, error: Exception) -> JSONResponse:
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
         headers["Allow"] = ", ".join(_allowed(request))
         detail = f"{request.url.path} does not take {request.method}: it takes {headers['Allow']}"
-    problem = _FRAMEWORK.get(status) or Problem(
+    problem = _FRAMEWORK.get(status) or ProblemKind(
         status, status.phrase.lower().replace(" ", "-"), status.phrase
     )
     return problem_response(request, problem, detail, headers=headers)

@@ -9,7 +9,7 @@ from prometheus_client.registry import Collector
 from islands_service.store import Store
 
 
-class Metrics:
+class ServiceMetrics:
     """The metrics of one application.
 
     Parameters

@@ -79,7 +79,7 @@ class ResultNotReadyError(IslandsError):
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class ProblemKind:
     """What HTTP says of an error: the status, the type's name, and a title for people."""
 
     status: HTTPStatus
@@ -88,52 +88,62 @@ class Problem:
 
 
 #: By class; of a class that is not listed, its nearest listed parent.
-PROBLEMS: Mapping[type[Exception], Problem] = MappingProxyType(
+PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
     {
-        RecordError: Problem(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-record", "The record cannot be used"),
-        SettingsError: Problem(
+        RecordError: ProblemKind(
+            HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-record", "The record cannot be used"
+        ),
+        SettingsError: ProblemKind(
             HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-settings", "A setting cannot be used"
         ),
-        ModelError: Problem(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-model", "A model cannot be used"),
-        RequestValidationError: Problem(
+        ModelError: ProblemKind(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-model", "A model cannot be used"),
+        RequestValidationError: ProblemKind(
             HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "The request is not valid"
         ),
-        IdempotencyError: Problem(
+        IdempotencyError: ProblemKind(
             HTTPStatus.UNPROCESSABLE_ENTITY, "idempotency-conflict", "The idempotency key was used before"
         ),
-        AuthenticationError: Problem(HTTPStatus.UNAUTHORIZED, "no-key", "A valid key is needed"),
-        InsufficientScopeError: Problem(HTTPStatus.FORBIDDEN, "scope-missing", "The key does not allow this"),
-        CrossOriginError: Problem(
+        AuthenticationError: ProblemKind(HTTPStatus.UNAUTHORIZED, "no-key", "A valid key is needed"),
+        InsufficientScopeError: ProblemKind(
+            HTTPStatus.FORBIDDEN, "scope-missing", "The key does not allow this"
+        ),
+        CrossOriginError: ProblemKind(
             HTTPStatus.FORBIDDEN, "cross-origin", "Requests of other sites are refused"
         ),
-        JobNotFoundError: Problem(HTTPStatus.NOT_FOUND, "no-such-job", "There is no such job"),
-        DatasetNotFoundError: Problem(HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"),
-        ResourceNotFoundError: Problem(HTTPStatus.NOT_FOUND, "not-found", "There is no such thing"),
-        MalformedBodyError: Problem(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
-        MethodNotAllowedError: Problem(
+        JobNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-job", "There is no such job"),
+        DatasetNotFoundError: ProblemKind(
+            HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"
+        ),
+        ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such thing"),
+        MalformedBodyError: ProblemKind(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
+        MethodNotAllowedError: ProblemKind(
             HTTPStatus.METHOD_NOT_ALLOWED, "method-not-allowed", "The method is not allowed here"
         ),
-        UnsupportedMediaTypeError: Problem(
+        UnsupportedMediaTypeError: ProblemKind(
             HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "The body has another type"
         ),
-        ResultNotReadyError: Problem(HTTPStatus.CONFLICT, "not-finished", "The job has no result"),
-        JobStateError: Problem(HTTPStatus.CONFLICT, "wrong-state", "The job's state does not allow this"),
-        DatasetInUseError: Problem(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
-        PayloadTooLargeError: Problem(
+        ResultNotReadyError: ProblemKind(HTTPStatus.CONFLICT, "not-finished", "The job has no result"),
+        JobStateError: ProblemKind(HTTPStatus.CONFLICT, "wrong-state", "The job's state does not allow this"),
+        DatasetInUseError: ProblemKind(HTTPStatus.CONFLICT, "dataset-in-use", "A job needs the data set"),
+        PayloadTooLargeError: ProblemKind(
             HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large"
         ),
-        QuotaError: Problem(HTTPStatus.TOO_MANY_REQUESTS, "quota-exceeded", "The quota is used up"),
-        RateLimitError: Problem(HTTPStatus.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests"),
-        BlobNotFoundError: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "no-such-blob", "Stored data is lost"),
-        StoreUnavailableError: Problem(
+        QuotaError: ProblemKind(HTTPStatus.TOO_MANY_REQUESTS, "quota-exceeded", "The quota is used up"),
+        RateLimitError: ProblemKind(HTTPStatus.TOO_MANY_REQUESTS, "too-many-requests", "Too many requests"),
+        BlobNotFoundError: ProblemKind(
+            HTTPStatus.INTERNAL_SERVER_ERROR, "no-such-blob", "Stored data is lost"
+        ),
+        StoreUnavailableError: ProblemKind(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
         ),
-        CommitUnknownError: Problem(
+        CommitUnknownError: ProblemKind(
             HTTPStatus.GATEWAY_TIMEOUT, "store-in-doubt", "Nobody knows whether it was done"
         ),
-        StorageFullError: Problem(HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "There is no room left"),
-        IslandsError: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "failed", "The service failed"),
-        Exception: Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "The service met a defect"),
+        StorageFullError: ProblemKind(
+            HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "There is no room left"
+        ),
+        IslandsError: ProblemKind(HTTPStatus.INTERNAL_SERVER_ERROR, "failed", "The service failed"),
+        Exception: ProblemKind(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "The service met a defect"),
     }
 )
 
@@ -180,6 +190,6 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 }
 
 
-def problem_of(error: Exception) -> Problem:
+def problem_of(error: Exception) -> ProblemKind:
     """Return what HTTP says of an error."""
     return next(PROBLEMS[kind] for kind in type(error).__mro__ if kind in PROBLEMS)

@@ -9,7 +9,7 @@ from statistics import median
 from islands.benchmark import compiled_c, kernel_evaluator, plain_numpy
 from islands.benchmark.clock import milliseconds
 from islands.benchmark.compiled_c import find_compiler
-from islands.benchmark.workload import CASE1, INTERVAL, WARM_UP, Candidate
+from islands.benchmark.workload import CASE1, INTERVAL, WARM_UP, WorkloadModel
 from islands.errors import ModelError
 
 #: Part by which the errors of two sides may differ: they add in different orders.
@@ -52,7 +52,7 @@ class Comparison:
 
 
 def compare(
-    candidates: Sequence[Candidate],
+    candidates: Sequence[WorkloadModel],
     state: kernel_evaluator.Prepared,
     rounds: int,
     folder: Path,
@@ -102,7 +102,7 @@ def compare(
 
 
 def _times(
-    candidate: Candidate, state: kernel_evaluator.Prepared, compiled: Sequence[Callable[[], float]]
+    candidate: WorkloadModel, state: kernel_evaluator.Prepared, compiled: Sequence[Callable[[], float]]
 ) -> _Times:
     regressors, theta, record = candidate.regressors, candidate.theta, state.record
     times = {
@@ -129,7 +129,9 @@ def _evaluation(time: Callable[[bool], float]) -> float:
     return CASE1.prune * time(True) + (1.0 - CASE1.prune) * time(False)
 
 
-def _compiled(candidate: Candidate, rows: compiled_c.RowsPointer, folder: Path) -> list[Callable[[], float]]:
+def _compiled(
+    candidate: WorkloadModel, rows: compiled_c.RowsPointer, folder: Path
+) -> list[Callable[[], float]]:
     return [
         compiled_c.simulation(candidate.regressors, candidate.theta, rows, flags, folder)
         for flags in compiled_c.FLAGS
@@ -137,7 +139,7 @@ def _compiled(candidate: Candidate, rows: compiled_c.RowsPointer, folder: Path) 
 
 
 def _check(
-    candidate: Candidate, state: kernel_evaluator.Prepared, compiled: Sequence[Callable[[], float]]
+    candidate: WorkloadModel, state: kernel_evaluator.Prepared, compiled: Sequence[Callable[[], float]]
 ) -> None:
     own = kernel_evaluator.squared_error(state, candidate)
     plain = plain_numpy.simulate(candidate.regressors, candidate.theta, state.record, WARM_UP, INTERVAL)

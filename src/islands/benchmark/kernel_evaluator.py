@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.benchmark.clock import milliseconds
-from islands.benchmark.workload import INTERVAL, WARM_UP, Candidate
+from islands.benchmark.workload import INTERVAL, WARM_UP, WorkloadModel
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.estimation.parameter_constraints import CONSTRAINTS
@@ -65,30 +65,30 @@ def prepared(record: Dataset) -> Prepared:
     )
 
 
-def uncached_ms(state: Prepared, candidate: Candidate, pruned: bool) -> float:
+def uncached_ms(state: Prepared, candidate: WorkloadModel, pruned: bool) -> float:
     """Time an evaluation to which nothing is known: inner products, selection, estimate, simulation."""
     return milliseconds(_evaluation(state, candidate, pruned, cached=False))
 
 
-def cached_ms(state: Prepared, candidate: Candidate, pruned: bool) -> float:
+def cached_ms(state: Prepared, candidate: WorkloadModel, pruned: bool) -> float:
     """Time an evaluation to which every inner product is known."""
     return milliseconds(_evaluation(state, candidate, pruned, cached=True))
 
 
-def simulation_ms(state: Prepared, candidate: Candidate) -> float:
+def simulation_ms(state: Prepared, candidate: WorkloadModel) -> float:
     """Time the simulation alone, the individual linked already."""
     program, theta = link(candidate.regressors), np.array(candidate.theta)
     return milliseconds(lambda: _squared_errors(state, program, theta))
 
 
-def gram_ms(state: Prepared, candidate: Candidate) -> float:
+def gram_ms(state: Prepared, candidate: WorkloadModel) -> float:
     """Time the inner products of all terms and the target, columns made in the same call."""
     program = link([*candidate.regressors, Lagged(0, 0)])
     numbers = np.empty((program.degree.size, program.degree.size))
     return milliseconds(lambda: gram(program, state.rows, numbers))
 
 
-def squared_error(state: Prepared, candidate: Candidate) -> float:
+def squared_error(state: Prepared, candidate: WorkloadModel) -> float:
     """Return the squared error of a simulation, summed over all whole intervals."""
     squared = _squared_errors(state, link(candidate.regressors), np.array(candidate.theta))
     return float(squared[state.cut.length == INTERVAL].sum())
@@ -99,7 +99,7 @@ def cache_statistics(evaluator: Evaluator) -> Mapping[str, int]:
     return {f"{name}_bytes": taken for name, (taken, _) in evaluator.memory.items()}
 
 
-def _evaluation(state: Prepared, candidate: Candidate, pruned: bool, cached: bool) -> Callable[[], None]:
+def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached: bool) -> Callable[[], None]:
     """Return a call that evaluates an individual, but simulates with the parameters given.
 
     Those that least squares finds may diverge, and what selection drops is not simulated: either would make

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from islands.benchmark import kernel_evaluator
 from islands.benchmark.full_runs import Run
-from islands.benchmark.workload import Candidate, full_tree, monomial, random_workload
+from islands.benchmark.workload import WorkloadModel, full_tree, monomial, random_workload
 from islands.data.dataset import Dataset
 from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style, save
 from islands.model.expression import walk
@@ -114,7 +114,7 @@ def against_islands(runs: Mapping[int, Sequence[Run]]) -> Scaling:
     )
 
 
-def _cost(state: kernel_evaluator.Prepared, candidates: Sequence[Candidate]) -> dict[str, float]:
+def _cost(state: kernel_evaluator.Prepared, candidates: Sequence[WorkloadModel]) -> dict[str, float]:
     """Return the median milliseconds of evaluations with pruning, by what is known."""
     return {
         "nothing cached": median(
@@ -131,7 +131,7 @@ def _evaluation(name: str, x_label: str, costs: Sequence[tuple[float, Mapping[st
     return Scaling(name, x_label, "CPU time of an evaluation (ms)", curves)
 
 
-def _nodes(candidates: Sequence[Candidate]) -> float:
+def _nodes(candidates: Sequence[WorkloadModel]) -> float:
     return fmean(sum(1 for item in each.regressors for _ in walk(item.expression)) for each in candidates)
 
 

@@ -41,7 +41,7 @@ ISLAND = replace(CASE1, population=CASE1.population // ISLANDS)
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class WorkloadModel:
     """A model to evaluate.
 
     Attributes
@@ -69,7 +69,7 @@ def benchmark_record(samples: int = SAMPLES) -> Dataset:
     return scaled[:samples]
 
 
-def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple[Candidate, ...]]:
+def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple[WorkloadModel, ...]]:
     """Return so many individuals of every kind: ``poly``, ``general``, and ``gp`` of a run with settings."""
     return {
         "poly": random_workload(monomial, count),
@@ -78,7 +78,7 @@ def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple
     }
 
 
-def candidate_text(individuals: Mapping[str, Sequence[Candidate]]) -> str:
+def candidate_text(individuals: Mapping[str, Sequence[WorkloadModel]]) -> str:
     """Return a workload as text: a line for the record's length, a kind, an individual, or a term."""
     lines = [f"{SAMPLES} samples"]
     for kind, candidates in individuals.items():
@@ -88,7 +88,7 @@ def candidate_text(individuals: Mapping[str, Sequence[Candidate]]) -> str:
     return "\n".join(lines)
 
 
-def fingerprint(individuals: Mapping[str, Sequence[Candidate]]) -> str:
+def fingerprint(individuals: Mapping[str, Sequence[WorkloadModel]]) -> str:
     """Return the SHA-256 of a workload's text, in hexadecimal."""
     return hashlib.sha256(candidate_text(individuals).encode()).hexdigest()
 
@@ -127,10 +127,10 @@ def _leaf(draw: random.Random) -> Lagged:
 
 def random_workload(
     make: Callable[[random.Random], Expression], count: int, terms: int = TERMS
-) -> tuple[Candidate, ...]:
+) -> tuple[WorkloadModel, ...]:
     """Draw individuals: y(k-1) and others, so many different regressors each, with small parameters."""
     draw, weigh = random.Random(1), random.Random(2)
-    candidates: list[Candidate] = []
+    candidates: list[WorkloadModel] = []
     while len(candidates) < count:
         chosen = [regressor(Lagged(0, 1))[1]]
         while len(chosen) < terms:
@@ -140,11 +140,11 @@ def random_workload(
         regressors = tuple(canonical_order(item for item in chosen if item is not None))
         # y(k-1) comes first in canonical order: with this weight the rest can't let it grow.
         theta = (0.97, *((weigh.random() - 0.5) * 0.004 for _ in regressors[1:]))
-        candidates.append(Candidate(regressors, theta, "none"))
+        candidates.append(WorkloadModel(regressors, theta, "none"))
     return tuple(candidates)
 
 
-def evolved_workload(record: Dataset, count: int, settings: Settings) -> tuple[Candidate, ...]:
+def evolved_workload(record: Dataset, count: int, settings: Settings) -> tuple[WorkloadModel, ...]:
     """Return individuals whose structure is new to a run, evenly spread over its course: island 0, seed 0.
 
     They have every gene that they were bred with: pruning is a part of their evaluation.
@@ -177,10 +177,10 @@ class _Logging(Evaluator):
         return super().evaluate(population, bars)
 
 
-def _bounded(individuals: Sequence[Individual], evaluator: Evaluator) -> Candidate:
+def _bounded(individuals: Sequence[Individual], evaluator: Evaluator) -> WorkloadModel:
     """Return the first individual whose whole model, unpruned, stays bounded."""
     for individual in individuals:
         ((evaluated,), _) = evaluator.evaluate([(individual, False)])
         if isfinite(evaluated.fitness):
-            return Candidate(evaluated.regressors, evaluated.theta, evaluator.settings.constraints)
+            return WorkloadModel(evaluated.regressors, evaluated.theta, evaluator.settings.constraints)
     raise ModelError("every individual of the search diverges on the record: something is broken")

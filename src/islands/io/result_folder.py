@@ -18,7 +18,7 @@ from islands.validation.assessment import PARTS
 from islands.validation.physics import PhysicsChecks
 from islands.validation.residual_tests import ResidualTests
 
-SCHEMA = "islands._result/1"
+SCHEMA = "islands.result/1"
 
 
 def result_json(findings: SearchResult) -> str:

@@ -18,7 +18,7 @@ from islands.model.model import Model
 from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import Regressor, regressor
 from islands.simulation.outcome import EvaluationOutcome
-from islands.trials.injection.measurement import SEEN, Injection
+from islands.trials.injection.measurement import SEEN, FaultyRecord
 from islands.trials.injection.oscillator import OSCILLATOR
 from islands.trials.injection.piezo import PIEZO
 from islands.trials.injection.rig import Rig
@@ -85,7 +85,7 @@ class SimulatedCase:
     """
 
     system: Rig
-    made: Callable[[Injection], Simulator]
+    made: Callable[[FaultyRecord], Simulator]
     goals: Targets
     tolerance: Mapping[str, float]
     apart: bool = True
@@ -103,14 +103,14 @@ class SimulatedCase:
         return (*self.system.unknown, *sorted(self.without))
 
 
-def _narx(hiding: Injection) -> Simulator:
+def _narx(hiding: FaultyRecord) -> Simulator:
     record = hiding.record
     alone = replace(record, u=record.u[:, :1], input_names=record.input_names[:1], input_units=("V",))
     model = identify_actuator(alone[: int(SEEN * record.samples)])
     return NarxSimulator(model, "narx", record.y[: model.maximum_lag])
 
 
-def _estimated(name: str) -> Callable[[Injection], Simulator]:
+def _estimated(name: str) -> Callable[[FaultyRecord], Simulator]:
     """Return what makes a physical system whose parameters are estimated from the record."""
     return lambda hiding: make_simulator(name, hiding.record)
 

@@ -30,7 +30,7 @@ _BELOW, _ABOVE, _TRIES, _DRAWS, _RECORDS = 3.0, 1.5, 14, 5, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Injection:
+class FaultyRecord:
     """A record with something hidden in it.
 
     Attributes
@@ -63,7 +63,7 @@ def inject(
     system: Rig = PIEZO,
     apart: bool = True,
     free: bool = False,
-) -> Injection:
+) -> FaultyRecord:
     """Hide effects, or nothing, in a record.
 
     Parameters
@@ -119,7 +119,7 @@ def inject(
         output_unit=system.output[1],
     )
     misfit = seen.left if names and (free or (apart and set(names) & set(SCALE))) else seen.misfit
-    return Injection(record, misfit(y), seen.sigma, seen.nominal)
+    return FaultyRecord(record, misfit(y), seen.sigma, seen.nominal)
 
 
 class _Seen:

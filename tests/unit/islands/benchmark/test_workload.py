@@ -11,7 +11,7 @@ from islands.benchmark.workload import (
     INTERVAL,
     ISLAND,
     WARM_UP,
-    Candidate,
+    WorkloadModel,
     benchmark_record,
     candidate_text,
     evolved_workload,
@@ -43,7 +43,7 @@ def test_a_hash_is_the_same_twice_and_pinned():
 def test_a_hash_knows_every_kind_every_individual_and_every_term():
     one = kinds()
     first = one["poly"][0]
-    fewer = Candidate(first.regressors[:-1], first.theta[:-1], first.constraints)
+    fewer = WorkloadModel(first.regressors[:-1], first.theta[:-1], first.constraints)
     others = [
         {"poly": one["general"], "general": one["poly"]},
         {**one, "poly": one["poly"][:1]},

@@ -54,7 +54,7 @@ def with_best(findings, **changes):
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
     assert list(result) == ["schema", "record", "seed", "settings", "search", "models"]
-    assert result["schema"] == "islands._result/1"
+    assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
     assert list(result["search"])[:5] == contract

@@ -7,7 +7,7 @@ import pytest
 import scipy
 
 from islands.trials.injection import force_faults, measurement
-from islands.trials.injection.measurement import SCALE, Injection, inject
+from islands.trials.injection.measurement import SCALE, FaultyRecord, inject
 from islands.trials.injection.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
 from islands.trials.injection.piezo import PIEZO, Piezo
 from islands.trials.injection.plant import Force, simulate_plant
@@ -18,7 +18,7 @@ from islands.trials.injection.tanks import TANKS, Tanks
 SYSTEMS = {"piezo": (PIEZO, 5.0), "oscillator": (OSCILLATOR, 4.0), "tanks": (TANKS, 2048.0)}
 
 
-def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> Injection:
+def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> FaultyRecord:
     which, seconds = SYSTEMS[system]
     return inject(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
 
@@ -157,7 +157,7 @@ def test_a_misfit_that_no_strength_has_is_refused(monkeypatch: pytest.MonkeyPatc
 def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
 
-    def hidden_peak() -> Injection:
+    def hidden_peak() -> FaultyRecord:
         return inject(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))
 
     assert 0.3 <= hidden_peak().misfit <= 2.0

@@ -16,23 +16,23 @@ from islands.io.simulator_spec.factory import simulated
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
 from islands.trials.cases import CORES
-from islands.trials.injection.measurement import Injection, inject
+from islands.trials.injection.measurement import FaultyRecord, inject
 
 
 @pytest.fixture(scope="module")
-def hiding() -> Injection:
+def hiding() -> FaultyRecord:
     return inject([], np.random.default_rng(804), 20.0)
 
 
 @pytest.fixture(scope="module")
-def extended(hiding: Injection) -> ExtendedSimulator:
+def extended(hiding: FaultyRecord) -> ExtendedSimulator:
     """Return an identified model with the terms that it lacks."""
     core = CORES["narx"].made(hiding)
     scene = make_context(hiding.record, core, 1500)
     return ExtendedSimulator(core, core.effects, scene)
 
 
-def started(extended: ExtendedSimulator, hiding: Injection) -> np.ndarray:
+def started(extended: ExtendedSimulator, hiding: FaultyRecord) -> np.ndarray:
     """Return where a search for the terms begins."""
     (effect,) = extended.effects
     values = extended.nominal
@@ -61,7 +61,7 @@ def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: ExtendedSi
     assert names[-1] == SLOPE
 
 
-def test_what_is_found_is_closer_to_the_record(extended: ExtendedSimulator, hiding: Injection) -> None:
+def test_what_is_found_is_closer_to_the_record(extended: ExtendedSimulator, hiding: FaultyRecord) -> None:
     alone = extended.with_effects(())
     target = Target(hiding.record.y, np.arange(2000) < 1500, None, {})
     before = calibrate(alone, target, alone.nominal)
@@ -78,7 +78,7 @@ def test_where_the_search_begins_no_locked_sample_tells(extended: ExtendedSimula
 
 
 def test_what_holds_still_at_a_constant_input_still_does(
-    extended: ExtendedSimulator, hiding: Injection
+    extended: ExtendedSimulator, hiding: FaultyRecord
 ) -> None:
     values = started(extended, hiding)
     resting = np.where(np.arange(2000) < 1000, extended.scene.u, extended.scene.u[999])
@@ -89,7 +89,7 @@ def test_what_holds_still_at_a_constant_input_still_does(
 
 
 def test_a_model_is_extended_by_writing_the_terms_into_it(
-    extended: ExtendedSimulator, hiding: Injection
+    extended: ExtendedSimulator, hiding: FaultyRecord
 ) -> None:
     record, values = hiding.record, started(extended, hiding)
     target = Target(record.y, np.arange(record.samples) < 1500, None, {})
