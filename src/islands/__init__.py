@@ -7,6 +7,7 @@
 """
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from islands.data.dataset import Dataset, join
     from islands.data.split import Split, split
     from islands.discrepancy.diagnosis import Diagnosis
+    from islands.discrepancy.effects import EFFECTS
+    from islands.discrepancy.interfaces.context import Parameter
+    from islands.discrepancy.interfaces.effect import Effect, Site
     from islands.errors import IslandsError, ModelError, RecordError, SettingsError
     from islands.io.models import read_model, write_model
     from islands.io.records import read_record, write_record
@@ -26,16 +30,20 @@ if TYPE_CHECKING:
     from islands.model.primitives import PRIMITIVES, primitive
 
 __all__ = [
+    "EFFECTS",
     "PRIMITIVES",
     "Dataset",
     "Diagnosis",
+    "Effect",
     "FittedModel",
     "IslandsError",
     "Model",
     "ModelError",
+    "Parameter",
     "RecordError",
     "Result",
     "SettingsError",
+    "Site",
     "Split",
     "diagnose",
     "fit",
@@ -60,6 +68,9 @@ _HOMES = {
     "data.split": ("Split", "split"),
     "_diagnose": ("diagnose",),
     "discrepancy.diagnosis": ("Diagnosis",),
+    "discrepancy.effects": ("EFFECTS",),
+    "discrepancy.interfaces.context": ("Parameter",),
+    "discrepancy.interfaces.effect": ("Effect", "Site"),
     "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
     "_fit": ("fit",),
     "_identify": ("identify",),
@@ -74,6 +85,8 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("islands")
     for home, names in _HOMES.items():
         if name in names:
             value = globals()[name] = getattr(import_module(f"islands.{home}"), name)

@@ -1,12 +1,13 @@
 """Diagnose: hold a simulation against a record, by its name or by what a file says of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as diagnosed
+from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.inference.stepwise_search import Tell, ignore_progress
-from islands.discrepancy.interfaces.effect import Signal
+from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.simulator_spec.factory import make_simulator as made
 from islands.io.simulator_spec.schema import LocalSpec, SimulationSpec
@@ -19,6 +20,7 @@ def diagnose(
     *,
     tolerance: Mapping[str, float] | None = None,
     columns: Mapping[str, Signal] | None = None,
+    effects: Sequence[Effect] = EFFECTS,
     seed: int = 0,
     progress: Tell = ignore_progress,
     spread: ParallelMap = map,
@@ -36,6 +38,9 @@ def diagnose(
         Relative standard deviations of its parameters about their nominal values; who is not named is free.
     columns : mapping, optional
         Outputs of simulations elsewhere, ``(samples,)`` each: ``column:NAME`` takes one.
+    effects : sequence of Effect
+        The effects that are searched for. Add one with ``(*islands.EFFECTS, mine)``: maps of a user act after
+        those of the catalogue.
     seed : int
         The same record, simulation and seed give the same diagnosis, bit for bit.
     progress : callable
@@ -48,9 +53,10 @@ def diagnose(
     RecordError
         The record cannot be used, or the simulation diverges on it.
     SettingsError, ModelError
-        There is no such simulation, or a tolerance is of none of its parameters.
+        There is no such simulation, a tolerance is of none of its parameters, two effects have one name, or
+        an effect is broken.
     """
     # What is asked for has a kind; what is made has sites for effects.
     asked_for = isinstance(simulation, str) or hasattr(simulation, "kind")
     core = made(simulation, record, columns) if asked_for else simulation  # type: ignore[arg-type]
-    return diagnosed(record, core, tolerance, seed, progress, spread)  # type: ignore[arg-type]
+    return diagnosed(record, core, tolerance, seed, progress, spread, effects)  # type: ignore[arg-type]

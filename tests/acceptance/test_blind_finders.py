@@ -12,8 +12,8 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from acceptance import test_hidden as checks
-from islands.discrepancy.calibration import preparation
 from islands.discrepancy.effects import CATALOGUE
+from islands.trials import trial as trials_module
 from islands.trials.injection.piezo import PIEZO
 from islands.trials.trial import Trial, TrialOutcome
 
@@ -174,12 +174,14 @@ def test_with_names_exchanged_in_the_catalogue_the_true_finder_fails(
     wrong = dict(CATALOGUE)
     for one, other in zip(EXCHANGED, EXCHANGED[1:] + EXCHANGED[:1], strict=True):
         wrong[one] = replace(CATALOGUE[other], name=one)
-    monkeypatch.setattr(preparation, "CATALOGUE", wrong)
+    monkeypatch.setattr(
+        trials_module, "diagnose", partial(trials_module.diagnose, catalogue=tuple(wrong.values()))
+    )
     with pytest.raises(AssertionError):
         checks.test_a_hidden_effect_is_found_in_a_short_record(name)
 
 
 def test_without_effects_in_the_catalogue_the_true_finder_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(preparation, "CATALOGUE", {})
+    monkeypatch.setattr(trials_module, "diagnose", partial(trials_module.diagnose, catalogue=()))
     with pytest.raises(AssertionError):
         checks.test_a_hidden_effect_is_found_in_a_short_record("jump")

@@ -14,6 +14,7 @@ from islands.discrepancy.calibration.preparation import (
     select_effects,
     validate_prior,
 )
+from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
 from islands.discrepancy.inference.noise_detectors import DETECTORS
@@ -109,6 +110,7 @@ def diagnose(
     seed: int = 0,
     tell: Tell = ignore_progress,
     spread: ParallelMap = map,
+    catalogue: Sequence[Effect] = EFFECTS,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record.
 
@@ -126,14 +128,17 @@ def diagnose(
     tell : callable
         Told what is being done.
     spread : ParallelMap
-        Fits the effects of a ladder, side by side perhaps; the result is the same.
+        Applies a function to every effect, in parallel or not; the result is the same.
+    catalogue : sequence of Effect
+        The effects that are searched for.
 
     Raises
     ------
     RecordError
         The record is too short, has gaps or a signal that does not move, or the simulation diverges on it.
     SettingsError
-        A tolerance is not positive, or of a parameter that the simulation does not have.
+        A tolerance is not positive or belongs to no parameter of the simulation, two effects have one
+        name, or an effect is broken.
     """
     known = validate_prior(tolerance or {}, core)
     fitted = count_fitted_samples(record)
@@ -144,7 +149,7 @@ def diagnose(
     tell("calibrating the simulation")
     plain = calibrate(simulation, target, simulation.nominal)
     core = select_intersample(plain, target)
-    effects = select_effects(core, scene, known)
+    effects = select_effects(core, scene, known, catalogue)
     for _ in range(ROUNDS):
         plain = calibrate(replace(simulation, core=core), target, plain.values)
         tell(f"looking for each of {len(effects)} effects")

@@ -1,5 +1,7 @@
 """The public names of the package, and what its docstring says."""
 
+from importlib.metadata import version
+
 import islands
 from islands._fit import fit
 from islands._identify import identify
@@ -27,3 +29,7 @@ def test_the_package_says_how_it_is_used():
 def test_the_facades_are_among_the_public_names():
     assert islands.identify is identify
     assert islands.fit is fit
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert islands.__version__ == version("islands")

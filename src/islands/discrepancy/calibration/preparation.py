@@ -1,12 +1,12 @@
 """Preparation: whether a record can be analysed, which part of it, at which scales, and for which effects."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.effects import CATALOGUE
+from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.effects.scale import wrong_parameter
 from islands.discrepancy.interfaces.effect import Effect, SimulationContext, Site
 from islands.discrepancy.interfaces.simulator import Simulator
@@ -21,12 +21,28 @@ LOCKED = 0.25
 FEWEST = 200
 
 
-def select_effects(core: Simulator, scene: SimulationContext, tolerance: Mapping[str, float]) -> list[Effect]:
-    """Return the effects that can enter a simulation and that a record could show."""
+def select_effects(
+    core: Simulator,
+    scene: SimulationContext,
+    tolerance: Mapping[str, float],
+    catalogue: Sequence[Effect] = EFFECTS,
+) -> list[Effect]:
+    """Return the effects of a catalogue that can enter a simulation and that a record could show.
+
+    Raises
+    ------
+    SettingsError
+        Two effects of the catalogue have the same name.
+    """
+    names = [effect.name for effect in catalogue]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise SettingsError(
+            f"effects need different names, and {', '.join(twice)} is given twice: rename one"
+        )
     trusted = {each.name for each in core.parameters if not each.initial} <= tolerance.keys()
     effects = [
         effect
-        for effect in CATALOGUE.values()
+        for effect in catalogue
         if effect.site in core.sites
         and (effect.site != Site.CORE or effect.name in core.understood)
         and effect.name not in core.has

@@ -91,6 +91,13 @@ def summary_of(name: str) -> str:
 
 
 def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Return effects in the order of the catalogue."""
+    """Return effects in the order in which they act: the catalogue's order, then other maps by name."""
     places = {name: place for place, name in enumerate(CATALOGUE)}
-    return tuple(sorted(effects, key=lambda effect: places.get(effect.name, -1)))
+
+    def place(effect: Effect) -> tuple[int, str]:
+        if effect.name in places:
+            return places[effect.name], ""
+        # Effects of parameters and states are part of the equation: their order has no meaning.
+        return (-1, "") if effect.form is None else (len(places), effect.name)
+
+    return tuple(sorted(effects, key=place))

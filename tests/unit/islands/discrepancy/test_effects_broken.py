@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.discrepancy.calibration import preparation
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.effect import Effect
@@ -51,15 +50,19 @@ BROKEN: dict[str, tuple[Effect, str]] = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_broken_effect_is_named(record: Dataset, monkeypatch: pytest.MonkeyPatch, case: str) -> None:
+def test_a_broken_effect_is_named(record: Dataset, case: str) -> None:
     effect, why = BROKEN[case]
-    monkeypatch.setattr(preparation, "CATALOGUE", {effect.name: effect, "jump": CATALOGUE["jump"]})
     with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {why}") as refused:
-        diagnose(record, BoucWenPiezoSimulator())
+        diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
     assert str(refused.value).endswith(".py or take it out of the catalogue")
 
 
-def test_a_grid_without_points_leaves_an_effect_out(record: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_grid_without_points_leaves_an_effect_out(record: Dataset) -> None:
     effect = replace(GOOD, grid=lambda _scene, _residual: ())
-    monkeypatch.setattr(preparation, "CATALOGUE", {effect.name: effect, "jump": CATALOGUE["jump"]})
-    assert {each.name for each in diagnose(record, BoucWenPiezoSimulator()).candidates} <= {"jump"}
+    found = diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
+    assert {each.name for each in found.candidates} <= {"jump"}
+
+
+def test_effects_of_one_name_are_refused(record: Dataset) -> None:
+    with pytest.raises(SettingsError, match="offset is given twice: rename one"):
+        diagnose(record, BoucWenPiezoSimulator(), catalogue=(GOOD, CATALOGUE["jump"], GOOD))

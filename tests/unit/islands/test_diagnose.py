@@ -1,0 +1,61 @@
+"""`islands.diagnose`: effects of the user's own."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.discrepancy.interfaces.effect import Signal, SimulationContext
+
+PITCH = 2.0
+
+
+def _error(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
+    return y + values[0] * np.sin(2 * np.pi * y / PITCH)
+
+
+def _amplitude(context: SimulationContext) -> tuple[islands.Parameter, ...]:
+    return (islands.Parameter("a", context.output_unit, 0.0, 0.01),)
+
+
+def _start(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.1,),)
+
+
+ENCODER_ERROR = islands.Effect(
+    name="encoder-error",
+    summary="The encoder errs periodically: y + a sin(2 pi y / p)",
+    family="sensor",
+    site=islands.Site.OUTPUT,
+    parameters=_amplitude,
+    grid=_start,
+    form=_error,
+    source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
+)
+
+
+@pytest.fixture(scope="module")
+def record() -> tuple[islands.Dataset, Signal]:
+    """A record of an encoder with a periodic error, and the simulation without it."""
+    rng = np.random.default_rng(3)
+    time = 0.01 * np.arange(800)
+    u = 6 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.17 * time + 1)
+    simulated = 0.8 * u
+    y = simulated + 0.15 * np.sin(2 * np.pi * simulated / PITCH) + 0.02 * rng.standard_normal(time.size)
+    return islands.Dataset(u, y, 0.01, ("u_V",), "y_um"), simulated
+
+
+def test_an_effect_of_the_user_is_named(record: tuple[islands.Dataset, Signal]) -> None:
+    data, simulated = record
+    found = islands.diagnose(
+        data, "column:theirs", columns={"theirs": simulated}, effects=(*islands.EFFECTS, ENCODER_ERROR)
+    )
+    (finding,) = found.effects
+    assert finding.name == "encoder-error"
+    assert finding.parameters["a"].value == pytest.approx(0.15, rel=0.05)
+
+
+def test_the_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Dataset, Signal]) -> None:
+    data, simulated = record
+    found = islands.diagnose(data, "column:theirs", columns={"theirs": simulated})
+    assert "encoder-error" not in {each.name for each in found.candidates}
+    assert len(islands.EFFECTS) == len({effect.name for effect in islands.EFFECTS})
