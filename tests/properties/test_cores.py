@@ -78,7 +78,7 @@ def test_it_is_what_it_says(name: str, core: Simulator) -> None:
     assert isinstance(core, KINDS[name])
     assert core.name
     assert set(core.sites) <= set(Site)
-    assert isinstance(core.integrates, bool)
+    assert isinstance(core.is_continuous_time, bool)
 
 
 def test_a_simulation_has_a_value_for_every_sample(

@@ -112,7 +112,7 @@ def test_an_effect_says_where_it_comes_from(extended: ExtendedSimulator) -> None
         assert parameter.scale > 0.0
         assert parameter.lower < parameter.upper
     assert (effect.form is None) == (effect.site == Site.CORE)
-    assert effect.site != Site.CORE or effect.name in extended.core.understood
+    assert effect.site != Site.CORE or effect.name in extended.core.supported_effects
 
 
 def test_a_memory_of_simulations_changes_none(alone: ExtendedSimulator) -> None:

@@ -23,7 +23,7 @@ BETTER = 10.0
 def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     """Return the core of a fit, solved as the record asks for it."""
     core = fit.simulation.core
-    if not core.integrates:
+    if not core.is_continuous_time:
         return core
     inner, now = (core.core, core.hold) if isinstance(core, ResampledSimulator) else (core, InterSample.FIRST)
     held = {}

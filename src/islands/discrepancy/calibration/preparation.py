@@ -44,8 +44,8 @@ def select_effects(
         effect
         for effect in catalogue
         if effect.site in core.sites
-        and (effect.site != Site.CORE or effect.name in core.understood)
-        and effect.name not in core.has
+        and (effect.site != Site.CORE or effect.name in core.supported_effects)
+        and effect.name not in core.built_in_effects
         and (trusted or not effect.gain)
         and effect.applies(scene)
     ]

@@ -108,7 +108,7 @@ JUMP = Effect(
     grid=_jump_grid,
     form=_jump_form,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
-    searched=1,
+    extra_degrees_of_freedom=1,
 )
 
 

@@ -76,5 +76,5 @@ PERIODIC_DISTURBANCE = Effect(
     form=_periodic_disturbance_form,
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
     linear=2,
-    searched=2,
+    extra_degrees_of_freedom=2,
 )

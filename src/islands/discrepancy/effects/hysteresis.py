@@ -62,7 +62,7 @@ BACKLASH = Effect(
     grid=_backlash_grid,
     form=_backlash_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
-    alike=(STICTION, 2.0),
+    confounded_with=(STICTION, 2.0),
 )
 
 

@@ -174,7 +174,7 @@ def model_form(core: Simulator, model: Model, terms: Sequence[MissingTerm]) -> E
         source="Ikhouane and Rodellar, Systems with Hysteresis, section 2; Billings, Nonlinear System "
         "Identification, section 2",
         linear=len(terms),
-        searched=_PRICE - len(terms) - 1,
+        extra_degrees_of_freedom=_PRICE - len(terms) - 1,
     )
 
 

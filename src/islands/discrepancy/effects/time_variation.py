@@ -60,7 +60,7 @@ GAIN_STEP = Effect(
     grid=_gain_step_grid,
     form=None,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
-    searched=1,
+    extra_degrees_of_freedom=1,
 )
 
 

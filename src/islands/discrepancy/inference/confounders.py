@@ -50,9 +50,9 @@ class Confounder:
 def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> Confounder | None:
     """Return what an effect of a fit is like on the average, if there is such."""
     simulation = fit.simulation
-    if effect.alike is None or effect.alike[0] in simulation.effects:
+    if effect.confounded_with is None or effect.confounded_with[0] in simulation.effects:
         return None
-    other, times = effect.alike
+    other, times = effect.confounded_with
     rest = (each for each in simulation.effects if each is not effect)
     there = simulation.with_effects(catalogue_order((*rest, other)))
     values = transfer_parameters(fit.values, simulation, there)

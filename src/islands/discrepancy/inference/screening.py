@@ -54,7 +54,7 @@ class ScreenedEffect:
 
 def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     """Return what an effect's values have to gain, as BIC has it: log n for each."""
-    values = len(effect.parameters(base.simulation.scene)) + effect.searched
+    values = len(effect.parameters(base.simulation.scene)) + effect.extra_degrees_of_freedom
     return values * float(np.log(base.noise.samples))
 
 

@@ -1,4 +1,4 @@
-"""A scene: what drives a simulation, and the scales of the record that it is held against."""
+"""Simulation context: the input of a simulation, and the scales of its record."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ Signal = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ForceCoordinate:
-    """The coordinate that forces act on.
+    """Coordinate that forces act on.
 
     Attributes
     ----------
@@ -23,12 +23,12 @@ class ForceCoordinate:
     force_unit, force : str, float
         Unit and size of what acts on it.
     sense : float
-        With which friction enters an output beside the simulation: -1 where the output follows the
-        coordinate, 1 where it is the force itself.
+        Sign of friction that is added to an output: -1 if the output follows the coordinate, 1 if the output
+        is the force.
     dissipates : bool
-        Friction and hysteresis take energy: their strengths are not negative.
+        Whether strengths of friction and hysteresis are bounded below by zero.
     sharp : float
-        Part of the usual rate within which dry friction turns: a step would have no derivative.
+        Width of the transition of dry friction relative to the usual rate; a step has no derivative.
     """
 
     unit: str
@@ -42,13 +42,13 @@ class ForceCoordinate:
 
     @property
     def least(self) -> float:
-        """The lower bound of what can only dissipate."""
+        """Lower bound of a strength that can only dissipate."""
         return 0.0 if self.dissipates else -np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulationContext:
-    """What a simulation is driven by, and the scales of the record that it is held against.
+    """Input of a simulation, and the scales of the record that it is compared with.
 
     Attributes
     ----------
@@ -64,14 +64,14 @@ class SimulationContext:
         Largest absolute values; of the output as the nominal simulation has it.
     input_unit, output_unit : str
     fitted : float
-        Seconds, from the first sample on, that estimation sees.
+        End of the estimation part, in seconds after the first sample.
     midway : ndarray, shape (2, samples), or None
-        The input half a step and a whole one behind each sample, before it may jump; None: it runs straight
-        from sample to sample.
+        The input half a step and a full step after each sample, before a jump; None if it is linear between
+        samples.
     lasts : float or None
-        Seconds that strengths over the whole record refer to; None takes those of the input.
+        Reference duration in seconds for strengths over the whole record; None for the duration of the input.
     frame : ForceCoordinate
-        The coordinate that forces act on. Left out, it is the input, and forces add to the output.
+        Coordinate that forces act on; by default the input, and forces are added to the output.
     """
 
     u: Signal
@@ -101,7 +101,7 @@ class SimulationContext:
         return self.dt * np.arange(self.u.size, dtype=np.float64)
 
     def midway_of(self, x: Signal) -> Signal:
-        """Return ``midway``, where it is not known as the straight line through the input ``x``."""
+        """Return ``midway``, or linear interpolation of the input ``x`` if that is None."""
         if self.midway is not None:
             return self.midway
         end = np.append(x[1:], x[-1])
@@ -109,7 +109,7 @@ class SimulationContext:
 
     @property
     def duration(self) -> float:
-        """Seconds of the whole record."""
+        """Duration of the record in seconds."""
         return self.dt * self.u.size if self.lasts is None else self.lasts
 
 
@@ -121,15 +121,15 @@ class Parameter:
     ----------
     name : str
     unit : str
-        "" where it has none.
+        Empty if dimensionless.
     nominal : float
-        A simulation's: where nothing else is known. An effect's: at which it does nothing.
+        Starting value of a parameter of a simulator; value at which an effect vanishes.
     scale : float
-        A change that matters: steps of derivatives are a hundredth of it.
+        Typical change; finite differences take a hundredth of it.
     lower, upper : float
         Bounds.
     initial : bool
-        It is a state at the first sample, and belongs to the record more than to the simulation.
+        Whether it is an initial state, which belongs to the record and not to the simulator.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""An effect: something that a simulation may lack, with its form, its place and its strengths."""
+"""Effects: physics that a simulation may lack."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ __all__ = ["Effect", "EffectTemplate", "ForceLaw", "Signal", "SimulationContext"
 
 
 class Site(StrEnum):
-    """Where an effect enters."""
+    """Part of the simulation that an effect changes."""
 
     INPUT = "input map"
     FORCE = "coordinate and rate"
@@ -20,7 +20,7 @@ class Site(StrEnum):
     OUTPUT = "output map"
 
 
-#: What a map does: ``(signal, values, scene) -> signal``.
+#: A map: ``(signal, values, context) -> signal``, both signals of shape (samples,).
 Map = Callable[[Signal, Signal, SimulationContext], Signal]
 
 
@@ -32,30 +32,32 @@ class Effect:
     ----------
     name : str
     summary : str
-        What it is, in one sentence with its form.
+        One sentence with the form of the effect, without a period.
     family : str
     site : Site
     parameters : callable
-        ``scene -> tuple of Parameter``: strength first, then shape.
+        ``context -> tuple of Parameter``: the strength first, then the shape. The effect vanishes at the
+        nominal strength.
     grid : callable
-        ``(scene, residual) -> points``: values that a search begins from; the residual is that of the
-        simulation as it stands.
+        ``(context, residual) -> points``: starting points of the calibration, a value for each parameter; the
+        residual is that of the current simulation, shape (samples,).
     form : callable, ForceLaw or None
-        What it does: a map, or the element that it puts on the coordinate. None: the simulation's own
-        equation has its parameters, by their names.
+        A map of a signal, or a force law on the coordinate. None if the equation of the simulator has the
+        parameters of the effect, by name.
     source : str
-        Where its form is described.
+        Publication that describes the form.
     applies : callable
-        ``scene -> bool``: whether the record could show it at all.
+        ``context -> bool``: whether the record can show the effect.
     linear : int
-        How many of its parameters, from the first on, its response is proportional to, as long as it is weak.
+        Number of leading parameters to which the response of a weak effect is proportional.
     gain : bool
-        It is a gain: calibration takes it up, unless every parameter has a tolerance.
-    searched : int
-        What it costs beside its values, in values: an instant or a frequency is known to a sample, and was
-        looked for among all of them.
-    alike : tuple or None
-        Another effect that does the same on the average, with so many times its values.
+        Whether the effect is a gain. Gains are searched for only if every parameter has a tolerance, since
+        calibration absorbs them otherwise.
+    extra_degrees_of_freedom : int
+        Degrees of freedom added to the number of parameters in the information criterion, for an instant or a
+        frequency that was searched for among all samples.
+    confounded_with : tuple or None
+        Another effect with the same mean response, and the factor between the values of both.
     """
 
     name: str
@@ -69,12 +71,12 @@ class Effect:
     applies: Callable[[SimulationContext], bool] = lambda _: True
     linear: int = 1
     gain: bool = False
-    searched: int = 0
-    alike: "tuple[Effect, float] | None" = None
+    extra_degrees_of_freedom: int = 0
+    confounded_with: "tuple[Effect, float] | None" = None
 
     @property
     def cause(self) -> str:
-        """Its name in the catalogue: without the state or the parameter that it is about."""
+        """Name in the catalogue, without a state or a parameter."""
         return self.name.partition(":")[0]
 
 

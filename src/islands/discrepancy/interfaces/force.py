@@ -1,4 +1,4 @@
-"""An element: a force between a coordinate and the ground, by its rate and what it remembers."""
+"""Force laws: forces on a coordinate that depend on its position, its rate and an internal state."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ Law = Callable[[float, float, float, Any], float]
 
 @dataclass(frozen=True, slots=True)
 class ForceLaw:
-    """What acts on a coordinate, written as what resists its motion.
+    """A force on a coordinate, positive if it resists the motion.
 
     Attributes
     ----------
     force : callable
-        ``(x, rate, z, numbers) -> force``; the numbers are the effect's values, then the constants.
+        ``(x, rate, z, numbers) -> force``; the numbers are the values of the effect, then the constants.
     memory : callable or None
-        ``(x, rate, z, numbers) -> z'``, of the element's own state.
+        ``(x, rate, z, numbers) -> z'``: derivative of the internal state.
     constants : callable
-        ``scene -> numbers`` that are no values.
+        ``context -> numbers`` that are not calibrated.
     dissipative : bool
-        It resists the motion itself: friction, drag.
+        Whether it dissipates energy, like friction and drag.
     begins : int or None
-        Which of the effect's values is the element's state at the first sample; None: it begins at zero.
+        Index of the value that is the initial internal state; None if that is zero.
     """
 
     force: Law
@@ -41,13 +41,13 @@ class ForceLaw:
 def pack_force_laws(
     parts: Sequence[tuple[ForceLaw, Signal]], scene: SimulationContext, balance: bool
 ) -> Elements:
-    """Return elements with their values as the kernels take them.
+    """Return force laws and their values as arrays for the kernels.
 
     Parameters
     ----------
     balance : bool
-        In a balance of forces all of them resist; beside an output stiffness adds to it, and friction as the
-        coordinate's frame has it.
+        True if they enter a balance of forces, in which all of them resist; false if they are added to an
+        output, where friction has the sign of the force coordinate.
     """
     numbers = np.zeros((len(parts), WIDTH))
     for row, (element, values) in zip(numbers, parts, strict=True):
@@ -70,7 +70,7 @@ def pack_force_laws(
 def add_output_forces(
     x: Signal, scene: SimulationContext, parts: Sequence[tuple[ForceLaw, Signal]]
 ) -> Signal:
-    """Return what elements add to an output whose coordinate is ``x``: without inertia it answers at once."""
+    """Return the sum of force laws on the coordinate ``x``, for a simulator without inertia."""
     total = np.zeros(x.size)
     if not parts:
         return total

@@ -1,4 +1,4 @@
-"""A core: the simulation that is held against a record, before anything is added to it."""
+"""Interface of the simulators that are compared with a record."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -6,62 +6,62 @@ from typing import Protocol
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
 
-#: Elements that act on a core's coordinate, and the values of each.
+#: Force laws on the coordinate of a simulator, and the values of each.
 Forces = Sequence[tuple[ForceLaw, Signal]]
 
 
 class Simulator(Protocol):
-    """What every simulation declares: its parameters, and where effects can enter it."""
+    """A simulator: its parameters, and the sites at which effects can enter."""
 
     @property
     def name(self) -> str:
-        """How it is asked for."""
+        """Name on the command line."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Its own parameters."""
+        """Parameters of the simulator."""
 
     @property
     def sites(self) -> frozenset[Site]:
-        """Where effects can enter."""
+        """Sites at which effects can enter."""
 
     @property
-    def understood(self) -> frozenset[str]:
-        """Names of the effects on its state equation that it knows itself."""
+    def supported_effects(self) -> frozenset[str]:
+        """Names of catalogue effects that its state equation supports."""
 
     @property
-    def has(self) -> frozenset[str]:
-        """Names of the effects that are in its equation already: nobody looks for them."""
+    def built_in_effects(self) -> frozenset[str]:
+        """Names of effects already modelled by the simulator; excluded from the search."""
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects of its own: those of each of its states."""
+        """Effects on its states, in addition to the catalogue."""
 
     @property
-    def integrates(self) -> bool:
-        """Whether it solves an equation in steps, so that what its input does between samples matters."""
+    def is_continuous_time(self) -> bool:
+        """Whether it integrates an equation, so that the input between samples matters."""
 
     def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
-        """Return the coordinate that forces act on; ``output`` is that of the nominal simulation."""
+        """Return the coordinate that forces act on; ``output`` is the nominal output, shape (samples,)."""
 
     def simulate(
         self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
-        """Simulate.
+        """Simulate the output.
 
         Parameters
         ----------
         values : ndarray, shape (parameters,)
         x : ndarray, shape (samples,)
-            The input behind its map.
+            The input after the input maps.
         scene : SimulationContext
         own : mapping
-            Parameters of effects that it understands, by name; what is not named is zero.
+            Parameters of supported effects by name; a missing one is zero.
         forces : sequence
-            Elements on its coordinate.
+            Force laws on the coordinate.
 
         Returns
         -------
         ndarray, shape (samples,)
-            The output before its map.
+            The output before the output maps.
         """

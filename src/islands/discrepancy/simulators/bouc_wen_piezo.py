@@ -28,12 +28,12 @@ class BoucWenPiezoSimulator:
     piezo: BoucWenPiezo = field(default_factory=BoucWenPiezo)
     name: str = "bouc-wen-piezo"
     sites: frozenset[Site] = frozenset(Site)
-    understood: frozenset[str] = frozenset(
+    supported_effects: frozenset[str] = frozenset(
         ("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing")
     )
-    has: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset()
     effects: tuple[Effect, ...] = ()
-    integrates: bool = True
+    is_continuous_time: bool = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -48,14 +48,14 @@ class CascadedTanksSimulator:
     units: tuple[str, str]
     name: str = "cascaded-tanks"
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.CORE, Site.PARAMETER, Site.OUTPUT))
-    understood: frozenset[str] = frozenset(("gain-step", "ageing"))
-    has: frozenset[str] = frozenset()
+    supported_effects: frozenset[str] = frozenset(("gain-step", "ageing"))
+    built_in_effects: frozenset[str] = frozenset()
     effects: tuple[Effect, ...] = field(
         default=tuple(
             make(state) for make in (state_clip, input_offset, outflow_law) for state in (UPPER, LOWER)
         )
     )
-    integrates: bool = True
+    is_continuous_time: bool = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -35,14 +35,14 @@ class SimulatorWrapper:
         return self.core.sites
 
     @property
-    def understood(self) -> frozenset[str]:
+    def supported_effects(self) -> frozenset[str]:
         """As the core's."""
-        return self.core.understood
+        return self.core.supported_effects
 
     @property
-    def has(self) -> frozenset[str]:
+    def built_in_effects(self) -> frozenset[str]:
         """As the core's."""
-        return self.core.has
+        return self.core.built_in_effects
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -50,9 +50,9 @@ class SimulatorWrapper:
         return self.core.effects
 
     @property
-    def integrates(self) -> bool:
+    def is_continuous_time(self) -> bool:
         """As the core's."""
-        return self.core.integrates
+        return self.core.is_continuous_time
 
     def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""

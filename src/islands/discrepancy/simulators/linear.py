@@ -42,10 +42,10 @@ class LinearSimulator:
     unit: str
     name: str = "linear"
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
-    understood: frozenset[str] = frozenset()
-    has: frozenset[str] = frozenset(("offset",))
+    supported_effects: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset(("offset",))
     effects: tuple[Effect, ...] = ()
-    integrates: bool = False
+    is_continuous_time: bool = False
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -41,10 +41,10 @@ class NarxSimulator:
     name: str
     start: Signal
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
-    understood: frozenset[str] = frozenset()
-    has: frozenset[str] = frozenset()
+    supported_effects: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset()
     effects: tuple[Effect, ...] = field(init=False)
-    integrates: bool = False
+    is_continuous_time: bool = False
     _moving: NDArray[np.int64] = field(init=False, repr=False)
     _theta: Signal = field(init=False, repr=False)
     _linked: LinkedModel = field(init=False, repr=False)

@@ -35,10 +35,10 @@ class PythonFunctionSimulator:
     source: str
     given: Mapping[str, float] = field(default_factory=dict)
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.PARAMETER, Site.OUTPUT))
-    understood: frozenset[str] = frozenset()
-    has: frozenset[str] = frozenset()
+    supported_effects: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset()
     effects: tuple[Effect, ...] = ()
-    integrates: bool = False
+    is_continuous_time: bool = False
 
     def __post_init__(self) -> None:
         try:

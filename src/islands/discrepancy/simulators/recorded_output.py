@@ -29,10 +29,10 @@ class RecordedOutput:
     simulated: Signal
     parameters: tuple[Parameter, ...] = ()
     sites: frozenset[Site] = frozenset((Site.FORCE, Site.OUTPUT))
-    understood: frozenset[str] = frozenset()
-    has: frozenset[str] = frozenset()
+    supported_effects: frozenset[str] = frozenset()
+    built_in_effects: frozenset[str] = frozenset()
     effects: tuple[Effect, ...] = ()
-    integrates: bool = False
+    is_continuous_time: bool = False
 
     @property
     def name(self) -> str:

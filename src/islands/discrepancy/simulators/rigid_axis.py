@@ -58,10 +58,10 @@ class RigidAxisSimulator:
     units: tuple[str, str]
     name: str = "rigid-axis"
     sites: frozenset[Site] = frozenset(Site)
-    understood: frozenset[str] = frozenset(("gain-step", "ageing"))
-    has: frozenset[str] = frozenset(("viscous", "coulomb-friction", "offset", "linear-drift"))
+    supported_effects: frozenset[str] = frozenset(("gain-step", "ageing"))
+    built_in_effects: frozenset[str] = frozenset(("viscous", "coulomb-friction", "offset", "linear-drift"))
     effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
-    integrates: bool = True
+    is_continuous_time: bool = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

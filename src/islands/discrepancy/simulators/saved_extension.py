@@ -49,14 +49,14 @@ class SavedExtension(SimulatorWrapper):
         return tuple(found)
 
     @property
-    def integrates(self) -> bool:
+    def is_continuous_time(self) -> bool:
         """It is solved already as its record asked for."""
         return False
 
     @property
-    def has(self) -> frozenset[str]:
+    def built_in_effects(self) -> frozenset[str]:
         """What the core has, and what was added."""
-        return self.core.has | {effect.name for effect in self.added}
+        return self.core.built_in_effects | {effect.name for effect in self.added}
 
     def simulate(
         self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces

@@ -39,10 +39,10 @@ class SecondOrderSimulator:
     size: float
     name: str = "second-order"
     sites: frozenset[Site] = frozenset(Site)
-    understood: frozenset[str] = frozenset(("gain-step", "ageing"))
-    has: frozenset[str] = frozenset(("viscous",))
+    supported_effects: frozenset[str] = frozenset(("gain-step", "ageing"))
+    built_in_effects: frozenset[str] = frozenset(("viscous",))
     effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
-    integrates: bool = True
+    is_continuous_time: bool = True
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

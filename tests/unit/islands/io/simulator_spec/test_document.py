@@ -145,7 +145,7 @@ def test_with_other_effects_in_it_it_is_extended_once_more(asked: Made) -> None:
     spec = LocalExtendedSpec.model_validate(json.loads(extended_json(extended(asked, [first]), asked.record)))
     outer = Made(spec, asked.record, asked.columns)
     core = outer.core
-    assert first.name in core.has
+    assert first.name in core.built_in_effects
     further = [each for each in fixed(outer, known(outer)) if each.name != first.name][:1]
     simulates_the_same(outer, extended(outer, further))
 
