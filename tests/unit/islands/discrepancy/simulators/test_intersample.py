@@ -67,7 +67,14 @@ def test_one_step_a_sample_and_straight_is_the_core_itself() -> None:
 
 def test_what_it_is_apart_from_its_steps_is_the_core() -> None:
     core, between = oscillator(), ResampledSimulator(oscillator(), InterSample.ZERO, 4)
-    for name in ("name", "parameters", "sites", "supported_effects", "built_in_effects", "is_continuous_time"):
+    for name in (
+        "name",
+        "parameters",
+        "sites",
+        "supported_effects",
+        "built_in_effects",
+        "is_continuous_time",
+    ):
         assert getattr(between, name) == getattr(core, name)
     assert [each.name for each in between.effects] == [each.name for each in core.effects]
 
