@@ -31,15 +31,15 @@ _COUNTING = 7_241_564
 
 
 def lock_migration(connection: Connection) -> None:
-    """Wait until nobody else migrates the database; keep others waiting until the transaction ends."""
+    """Hold the lock of migrations until the transaction ends."""
     _lock(connection, _MIGRATING, "")
 
 
 def lock_owner(connection: Connection, owner: str) -> None:
-    """Wait until nobody else adds to what an owner has; keep others waiting until the transaction ends.
+    """Hold the lock of an owner until the transaction ends.
 
-    Who counts before it adds would else count without what another transaction is adding just now: quotas
-    would be exceeded, and an idempotency key be found free twice.
+    Without it two transactions that count before they insert would not see each other: quotas would be
+    exceeded, and an idempotency key would be used twice.
     """
     _lock(connection, _COUNTING, owner)
 

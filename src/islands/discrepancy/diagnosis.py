@@ -249,7 +249,7 @@ class ResidualFormula:
         Of the residual, measured minus simulated, in free run: it reads its own past, the input and the
         simulated output.
     explains : float
-        Share of the remainder's mean square that it foretells over the locked samples.
+        Fraction of the remainder's mean square that the formula predicts over the locked samples.
     """
 
     formula: str

@@ -32,7 +32,7 @@ OFFSET = Effect(
 
 def input_offset(state: str) -> Effect:
     """Return the effect on one state, in the unit of the input."""
-    label = f"input-offset:{state}"
+    label = f"{INPUT_OFFSET.name}:{state}"
 
     def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, scene.input_unit, 0.0, 0.01 * scene.input_peak),)
@@ -56,7 +56,6 @@ def input_offset(state: str) -> Effect:
 INPUT_OFFSET = EffectTemplate(
     "input-offset",
     "Something flows in, or pushes, beside the input: + c in the balance of one state",
-    input_offset,
 )
 
 

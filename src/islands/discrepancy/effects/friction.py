@@ -75,17 +75,13 @@ def _viscous_asymmetry_parameters(scene: SimulationContext) -> tuple[Parameter, 
     return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
 
 
-def _viscous_asymmetry_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.frame.force / scene.frame.rate,),)
-
-
 VISCOUS_ASYMMETRY = Effect(
     name="viscous-asymmetry",
     summary="Friction that differs between the directions: - c |x'|",
     family="memory",
     site=Site.FORCE,
     parameters=_viscous_asymmetry_parameters,
-    grid=_viscous_asymmetry_grid,
+    grid=_viscous_grid,
     form=ForceLaw(_viscous_asymmetry_force, dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )

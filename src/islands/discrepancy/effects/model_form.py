@@ -191,5 +191,4 @@ def _at(expression: Expression, slope: float) -> Expression:
 MODEL_FORM = EffectTemplate(
     CORE_SHAPE,
     "The model's own form is wrong: it lacks psi |y - c u|, |psi| (y - c u), psi(k-1), psi its regressors",
-    model_form,
 )

@@ -90,7 +90,7 @@ def _dead_zone_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[
 
 
 def _dead_zone_crossed(scene: SimulationContext) -> bool:
-    # Of an input that is never near zero nobody can say more than that it is smaller.
+    # A dead zone cannot be told from an offset if the input never comes near zero.
     return float(np.min(np.abs(scene.u))) < _DEAD_ZONE_NEAR * scene.input_peak
 
 
@@ -112,7 +112,7 @@ def _input_saturation_form(u: Signal, values: Signal, scene: SimulationContext) 
     return np.clip(u, -level, level)
 
 
-def _input_saturation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
+def _saturation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
 
 
@@ -125,7 +125,7 @@ INPUT_SATURATION = Effect(
     summary="The amplifier saturates: u is cut off a part of its peak below it",
     family="shape",
     site=Site.INPUT,
-    parameters=_input_saturation_parameters,
+    parameters=_saturation_parameters,
     grid=_input_saturation_grid,
     form=_input_saturation_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
@@ -138,10 +138,6 @@ def _output_saturation_form(y: Signal, values: Signal, scene: SimulationContext)
     return np.clip(y, -level, level) if values[0] > 0.0 else y
 
 
-def _output_saturation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("cut", "", 0.0, 0.02, 0.0, 0.8),)
-
-
 def _output_saturation_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((cut,) for cut in (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5))
 
@@ -151,7 +147,7 @@ OUTPUT_SATURATION = Effect(
     summary="The sensor ends a part of the output's peak below it",
     family="shape",
     site=Site.OUTPUT,
-    parameters=_output_saturation_parameters,
+    parameters=_saturation_parameters,
     grid=_output_saturation_grid,
     form=_output_saturation_form,
     source="Doebelin, Measurement Systems, section 3",
@@ -187,7 +183,7 @@ ABSOLUTE_VALUE_SENSOR = Effect(
 
 def outflow_law(state: str) -> Effect:
     """Return the effect on one state, in 1/s."""
-    label = f"outflow-law:{state}"
+    label = f"{OUTFLOW_LAW.name}:{state}"
 
     def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, "1/s", 0.0, 1.0 / scene.fitted),)
@@ -211,7 +207,6 @@ def outflow_law(state: str) -> Effect:
 OUTFLOW_LAW = EffectTemplate(
     "outflow-law",
     "The outflow has a linear part beside that of Bernoulli's law: + l x in the flow out of one state",
-    outflow_law,
 )
 
 
@@ -225,7 +220,7 @@ _FAR = 4.0
 
 def state_clip(state: str) -> Effect:
     """Return the effect on one state; the last one of a chain spills nowhere."""
-    label = f"state-clip:{state}"
+    label = f"{STATE_CLIP.name}:{state}"
 
     def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
         peak = scene.output_peak
@@ -252,5 +247,4 @@ def state_clip(state: str) -> Effect:
 STATE_CLIP = EffectTemplate(
     "state-clip",
     "A state stops at a level, as a tank's at its rim: what is above it is lost, or spills on in part",
-    state_clip,
 )

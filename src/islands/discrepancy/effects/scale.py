@@ -55,8 +55,8 @@ SENSOR_GAIN = Effect(
 
 
 def wrong_parameter(parameter: Parameter) -> Effect:
-    """Return the effect of one parameter of a simulation: it is (1 + r) times what it is taken for."""
-    label = f"wrong-parameter:{parameter.name}"
+    """Return the effect of one wrong parameter: its true value is (1 + r) times the nominal one."""
+    label = f"{WRONG_PARAMETER.name}:{parameter.name}"
 
     def parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, "", 0.0, 0.02, -0.8, 4.0),)
@@ -80,5 +80,4 @@ def wrong_parameter(parameter: Parameter) -> Effect:
 WRONG_PARAMETER = EffectTemplate(
     "wrong-parameter",
     "A parameter of the simulation is off: it is another one than its tolerance allows",
-    wrong_parameter,
 )

@@ -51,14 +51,19 @@ class NoiseDetector:
     excluded_by: tuple[str, ...] = ()
 
 
-#: A lattice is coarse enough to matter where its step is this part of what is left, and known as one where
-#: there are this many samples for each of its levels.
-_QUANTISATION_COARSE, _QUANTISATION_CROWDED = 0.5, 3.0
+#: Samples for each level from which on the levels are a lattice.
+_CROWDED = 3.0
+
+#: Median absolute deviation of normal noise in standard deviations.
+_MAD = 0.6745
+
+#: Least step of a lattice that matters, relative to the standard deviation of the residual.
+_QUANTISATION_COARSE = 0.5
 
 
 def _detect_quantisation(y: Signal, residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
     levels = np.unique(y)
-    if levels.size < 3 or y.size < _QUANTISATION_CROWDED * levels.size:
+    if levels.size < 3 or y.size < _CROWDED * levels.size:
         return None
     step = float(np.min(np.diff(levels)))
     places = (y - levels[0]) / step
@@ -80,12 +85,9 @@ QUANTISATION = NoiseDetector(
 #: Equal neighbours that make a burst, and bursts that are no chance.
 _HELD_SAMPLES_RUN, _HELD_SAMPLES_BURSTS = 3, 2
 
-#: Levels of a lattice repeat by themselves: so many samples a level are none.
-_HELD_SAMPLES_CROWDED = 3.0
-
 
 def _detect_held_samples(y: Signal, _residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
-    if y.size >= _HELD_SAMPLES_CROWDED * np.unique(y).size:
+    if y.size >= _CROWDED * np.unique(y).size:
         return None
     same = np.concatenate([[False], np.diff(y) == 0.0, [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
@@ -112,13 +114,10 @@ HELD_SAMPLES = NoiseDetector(
 #: Scaled median deviations beyond which a sample is none of the others, and the least number of them.
 _OUTLIERS_FAR, _OUTLIERS_LEAST = 5.5, 3
 
-#: A median absolute deviation of normal noise in standard deviations.
-_OUTLIERS_MAD = 0.6745
-
 
 def _detect_outliers(_y: Signal, residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
     left = fit_ar_noise(residual).whiten(residual)
-    scale = float(np.median(np.abs(left - np.median(left)))) / _OUTLIERS_MAD
+    scale = float(np.median(np.abs(left - np.median(left)))) / _MAD
     if scale == 0.0:
         return None
     far = np.abs(left) / scale
@@ -153,8 +152,8 @@ def _detect_heteroscedastic_noise(
     left = noise.whiten(residual)
     size = np.abs(y) / np.max(np.abs(y))
     n = left.size
-    # A few outliers at large outputs would look the same: nobody weighs more than four deviations.
-    scale = float(np.median(np.abs(left))) / 0.6745
+    # A few outliers at large outputs look the same: squares are limited to four deviations.
+    scale = float(np.median(np.abs(left))) / _MAD
     if scale == 0.0:  # most of it is no noise at all
         return None
     squares = np.minimum(left**2, (4 * scale * (1.0 + size)) ** 2)

@@ -88,10 +88,7 @@ class EffectTemplate:
     ----------
     name, summary : str
         As in `Effect`; the name of an effect is followed by a colon and the name of its state or parameter.
-    make : callable
-        Makes the effect.
     """
 
     name: str
     summary: str
-    make: Callable[..., Effect]
