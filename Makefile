@@ -11,7 +11,7 @@ setup: .venv/ready
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/pip install --disable-pip-version-check --no-build-isolation --no-deps -e .
-	$(BIN)/python -c 'from islands._warm_up import warm_up; warm_up()'
+	$(BIN)/python -c 'from islands.facade.warm_up import warm_up; warm_up()'
 	touch $@
 
 demo: setup

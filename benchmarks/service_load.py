@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from service_table import Figure, percentile, run
 
-from islands_service.domain.jobs import ProgressReport, Submission
+from islands_service.domain.job import ProgressReport, Submission
 from islands_service.store import Store
 from support.service_processes import SPEC, Service, serving
 

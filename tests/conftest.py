@@ -34,7 +34,7 @@ def pytest_collection_modifyitems(items):
 def pytest_configure(config):
     # Before the workers start: each of them would compile all kernels for itself.
     if not hasattr(config, "workerinput"):
-        from islands._warm_up import warm_up
+        from islands.facade.warm_up import warm_up
 
         warm_up()
 

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, PRIORITIES, JobState
 from islands_service.domain.job_spec import Discrepancy, Identification
-from islands_service.domain.jobs import DISCREPANCY, IDENTIFICATION, PRIORITIES, JobState
 
 _JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
 _DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"

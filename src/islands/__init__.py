@@ -11,10 +11,6 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from islands._diagnose import diagnose
-    from islands._fit import fit
-    from islands._identify import identify
-    from islands._result import FittedModel, Result, simulate
     from islands.data.dataset import Dataset, join
     from islands.data.split import Split, split
     from islands.discrepancy.diagnosis import Diagnosis
@@ -22,6 +18,10 @@ if TYPE_CHECKING:
     from islands.discrepancy.interfaces.context import Parameter
     from islands.discrepancy.interfaces.effect import Effect, Site
     from islands.errors import IslandsError, ModelError, RecordError, SettingsError
+    from islands.facade.diagnose import diagnose
+    from islands.facade.fit import fit
+    from islands.facade.identify import identify
+    from islands.facade.result import FittedModel, Result, simulate
     from islands.io.models import read_model, write_model
     from islands.io.records import read_record, write_record
     from islands.io.simulator_spec.factory import simulated
@@ -66,21 +66,21 @@ __all__ = [
 _HOMES = {
     "data.dataset": ("Dataset", "join"),
     "data.split": ("Split", "split"),
-    "_diagnose": ("diagnose",),
+    "facade.diagnose": ("diagnose",),
     "discrepancy.diagnosis": ("Diagnosis",),
     "discrepancy.effects": ("EFFECTS",),
     "discrepancy.interfaces.context": ("Parameter",),
     "discrepancy.interfaces.effect": ("Effect", "Site"),
     "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
-    "_fit": ("fit",),
-    "_identify": ("identify",),
+    "facade.fit": ("fit",),
+    "facade.identify": ("identify",),
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
     "io.simulator_spec.factory": ("simulated",),
     "model.model": ("Model", "model_of"),
     "model.parsing": ("parse",),
     "model.primitives": ("PRIMITIVES", "primitive"),
-    "_result": ("FittedModel", "Result", "simulate"),
+    "facade.result": ("FittedModel", "Result", "simulate"),
 }
 
 

@@ -13,9 +13,9 @@ from _pytest.mark import ParameterSet
 
 from acceptance import test_hidden as checks
 from islands.discrepancy.effects import CATALOGUE
-from islands.trials import trial as trials_module
-from islands.trials.injection.piezo import PIEZO
-from islands.trials.trial import Trial, TrialOutcome
+from islands.performance.trials import trial as trials_module
+from islands.performance.trials.injection.piezo import PIEZO
+from islands.performance.trials.trial import Trial, TrialOutcome
 
 Finder = Callable[[Trial], TrialOutcome]
 

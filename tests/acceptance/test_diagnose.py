@@ -12,11 +12,11 @@ import pytest
 
 from islands.discrepancy.detectability import NOTHING, SelfTest, SurrogateOutcome, self_test
 from islands.discrepancy.diagnosis import Diagnosis
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.surrogates import SurrogateCase
 from islands.io.records import write_record
-from islands.parallel import ParallelMap
-from islands.trials.injection.measurement import inject
+from islands.performance.trials.injection.measurement import inject
 from support.command_line import fail, succeed, write_offset
 from support.undrawn import undrawn_figures
 
@@ -120,7 +120,7 @@ def test_a_self_test_says_what_the_record_could_show(
     beside: Path, clean: int, effects: tuple[str, ...] | None, quick: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tested = partial(quick_self_test if quick else self_test, effects=effects, clean=clean)
-    monkeypatch.setattr("islands_api.cli.diagnose.self_test", tested)
+    monkeypatch.setattr("islands_api.cli.commands.diagnose.self_test", tested)
     out = f"self-test-{clean}-{quick}"
     said, document = self_tested(beside, out, "--workers", 1)
     assert [effect["name"] for effect in document["effects"]] == ["offset"]

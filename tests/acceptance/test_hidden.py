@@ -7,8 +7,8 @@ from collections.abc import Container
 
 import pytest
 
-from islands.trials.injection.piezo import PIEZO
-from islands.trials.trial import Trial, TrialOutcome, run_trial
+from islands.performance.trials.injection.piezo import PIEZO
+from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
 
 #: Seconds of a record at the levels ci and nightly, and of one that is diagnosed in less than a second.
 SECONDS, SHORT = 30.0, 5.0

@@ -5,7 +5,7 @@ The model is identified on the record that something is hidden in.
 
 import pytest
 
-from islands.trials.trial import Trial, TrialOutcome, run_trial
+from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
 
 #: Seconds of a record at the nightly level, and of a short one.
 SECONDS, SHORT = 15.0, 6.0

@@ -27,7 +27,8 @@ def test_impossible_trials_are_refused() -> None:
 @pytest.mark.ci
 def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In this process, one after the other."""
-    monkeypatch.setattr("islands_api.cli.trials.ray_pool", lambda _workers, _address: nullcontext(map))
+    pool = "islands_api.cli.commands.trials.ray_pool"
+    monkeypatch.setattr(pool, lambda _workers, _address: nullcontext(map))
     asked = ("trials", "--core", "column", "--effects", "offset", "--count", 1, "--clean", 1)
     more = ("--open-set", 0, "--seconds", 10, "--seed", 8, "--json", tmp_path / "trials.json")
     with undrawn_figures():

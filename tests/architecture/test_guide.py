@@ -9,7 +9,7 @@ from islands.discrepancy.effects import CATALOGUE, OF_EACH, summary_of
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import SimulationContext
-from islands.io.simulator_spec.schema import KINDS
+from islands.io.simulator_spec.specification import KINDS
 from support.repository import DOCS
 
 GUIDE = (DOCS / "discrepancy.md").read_text()

@@ -11,12 +11,12 @@ from statistics import median
 import pytest
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.fitness import FITNESSES
-from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.gp.fitness import FITNESSES
+from islands.evolution.gp.gene_structure import STRUCTURES
+from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESETS
-from islands.evolution.topology import TOPOLOGIES
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import EXTENDED, REPORT, JobOutcome, JobState, ProgressReport
+from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, ProgressReport
 from islands_service.store.blobs import Blobs
 from support.played import stored
 from support.screen import Screen

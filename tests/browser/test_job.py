@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobOutcome, JobState
+from islands_service.domain.job import JobOutcome, JobState
 from support.played import advance, squared_error, stored
 from support.processes import eventually
 from support.screen import Screen

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobOutcome, JobState
+from islands_service.domain.job import JobOutcome, JobState
 from support.played import advance, stored
 from support.screen import Screen
 from support.service_processes import Service

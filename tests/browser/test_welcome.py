@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from islands_service.domain.jobs import JobOutcome, JobState
+from islands_service.domain.job import JobOutcome, JobState
 from support.command_line import ISLANDS, write_hysteresis
 from support.played import stored
 from support.processes import eventually

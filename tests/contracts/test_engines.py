@@ -14,7 +14,7 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.epoch import run_epoch, select_migrants
-from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import problem
 from islands.evolution.settings import Settings

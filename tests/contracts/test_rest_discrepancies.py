@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from islands_service.domain.jobs import DISCREPANCY, JobOutcome, JobState, ProgressReport
+from islands_service.domain.job import DISCREPANCY, JobOutcome, JobState, ProgressReport
 from support.service import HIDDEN, diagnosed, held, hidden, identified, kept, parsed, problem_of, served
 from support.stores import LONG, claimed
 

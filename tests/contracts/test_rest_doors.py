@@ -5,7 +5,7 @@ import json
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from islands_service.domain.jobs import JobState, ProgressReport
+from islands_service.domain.job import JobState, ProgressReport
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, claimed
 

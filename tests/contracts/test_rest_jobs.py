@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from islands_api.web.auth import LOCAL
-from islands_service.domain.jobs import JobState, ProgressReport, Submission
+from islands_service.domain.job import JobState, ProgressReport, Submission
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
 

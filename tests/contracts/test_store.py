@@ -9,7 +9,7 @@ from functools import partial
 
 import pytest
 
-from islands_service.domain.jobs import (
+from islands_service.domain.job import (
     ACTIVE,
     TERMINAL,
     IdempotencyError,

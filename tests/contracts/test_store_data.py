@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import update
 
 from islands.errors import SettingsError
-from islands_service.domain.jobs import TERMINAL, JobState, QuotaError
+from islands_service.domain.job import TERMINAL, JobState, QuotaError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError, dataset_id
 from islands_service.store.keys import PREFIX, SCOPES, KeyNotFoundError
 from islands_service.store.tables import datasets, jobs

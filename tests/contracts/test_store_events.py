@@ -5,7 +5,7 @@ import threading
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.jobs import JobState, JobStateError
+from islands_service.domain.job import JobState, JobStateError
 from islands_service.store.leases import ATTEMPTS
 from islands_service.store.tables import jobs
 from support.stores import (

@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from islands_service.domain.jobs import JobState, LeaseLostError, ProgressReport
+from islands_service.domain.job import JobState, LeaseLostError, ProgressReport
 from support.stores import (
     ALICE,
     CANCELLED,

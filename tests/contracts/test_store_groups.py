@@ -6,7 +6,7 @@ from contextlib import suppress
 import pytest
 from sqlalchemy import insert, select, text
 
-from islands_service.domain.jobs import JobNotFoundError
+from islands_service.domain.job import JobNotFoundError
 from islands_service.store import Store
 from islands_service.store import database as database_module
 from islands_service.store.database import GROUP, StoreError

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from islands_service.domain.jobs import TERMINAL, JobState, ProgressReport
+from islands_service.domain.job import TERMINAL, JobState, ProgressReport
 from islands_service.store.leases import ATTEMPTS
 from support.stores import (
     ALICE,

@@ -5,7 +5,7 @@ import time
 import pytest
 from sqlalchemy import update
 
-from islands_service.domain.jobs import JobNotFoundError, JobState, JobStateError
+from islands_service.domain.job import JobNotFoundError, JobState, JobStateError
 from islands_service.store.datasets import DatasetNotFoundError
 from islands_service.store.jobs import PAGE
 from islands_service.store.tables import jobs as jobs_table

@@ -5,7 +5,7 @@ import threading
 import pytest
 from sqlalchemy import event
 
-from islands_service.domain.jobs import JobNotFoundError, JobOutcome, JobState, LeaseLostError, ProgressReport
+from islands_service.domain.job import JobNotFoundError, JobOutcome, JobState, LeaseLostError, ProgressReport
 from islands_service.store import leases as leases_module
 from support.stores import (
     ALICE,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from islands._identify import identify
 from islands.evolution.engine import SerialEngine
+from islands.facade.identify import identify
 from islands.io.records import read_record
 from islands.io.result_folder import result_document
 from support.processes import alive, descendants, eventually, kill

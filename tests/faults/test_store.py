@@ -6,7 +6,7 @@ from contextlib import closing
 
 import pytest
 
-from islands_service.domain.jobs import ProgressReport
+from islands_service.domain.job import ProgressReport
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StorageFullError
@@ -29,7 +29,7 @@ from support.stores import (
 SUBMIT = """
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from islands_service.domain.jobs import Submission
+from islands_service.domain.job import Submission
 from islands_service.store import Store
 store = Store(sys.argv[1])
 def submit(thread):
@@ -45,7 +45,7 @@ with ThreadPoolExecutor(4) as pool:
 
 REPORT = """
 import sys
-from islands_service.domain.jobs import ProgressReport
+from islands_service.domain.job import ProgressReport
 from islands_service.store import Store
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", 3600.0)
@@ -61,7 +61,7 @@ while True:
 #: May write no file larger than so many bytes: what a quota of a file system does, for whoever is not root.
 NARROW = """
 import resource, sys
-from islands_service.domain.jobs import Submission
+from islands_service.domain.job import Submission
 from islands_service.store import Store
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
 with Store(sys.argv[1]) as store:

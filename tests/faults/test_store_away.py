@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from islands_service.domain.jobs import JobState, LeaseLostError
+from islands_service.domain.job import JobState, LeaseLostError
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
 from islands_service.store.job_events import append_event, update_job

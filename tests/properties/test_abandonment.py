@@ -7,9 +7,9 @@ from math import inf
 
 import pytest
 
-from islands.evolution.evaluation import Evaluator, Limits
+from islands.evolution.generation.evaluation import Evaluator, Limits
+from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import DEPTH
-from islands.evolution.individual import Individual
 from islands.evolution.island import _bar, _bars, first_generation, step
 from islands.evolution.problem import problem
 from islands.simulation.outcome import Status

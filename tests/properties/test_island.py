@@ -13,9 +13,9 @@ import pytest
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
-from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.island import first_generation, select_elite, step
 from islands.evolution.problem import problem
 from islands.io.checkpoints import write_checkpoint

@@ -20,7 +20,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from islands_service.domain.jobs import (
+from islands_service.domain.job import (
     ACTIVE,
     RESUMABLE,
     TERMINAL,

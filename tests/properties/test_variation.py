@@ -6,14 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.evaluation import Evaluator
-from islands.evolution.gene_structure import phi
-from islands.evolution.individual import Individual, make_regressor
-from islands.evolution.island import first_generation, step
-from islands.evolution.problem import problem
-from islands.evolution.rng import Purpose, Stream
-from islands.evolution.settings import Settings
-from islands.evolution.variation import (
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.variation import (
     high_level_crossover,
     inner_mutation,
     legal,
@@ -23,6 +17,12 @@ from islands.evolution.variation import (
     random_genes,
     with_linear_output,
 )
+from islands.evolution.gp.gene_structure import phi
+from islands.evolution.gp.individual import Individual, make_regressor
+from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.island import first_generation, step
+from islands.evolution.problem import problem
+from islands.evolution.settings import Settings
 from islands.model.expression import Apply, Lagged, Shift, children, walk
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES

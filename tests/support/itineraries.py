@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.individual import Individual
+from islands.evolution.gp.individual import Individual
+from islands.evolution.migration.schedule import Schedule
+from islands.evolution.migration.topology import topology
 from islands.evolution.problem import Problem
-from islands.evolution.schedule import Schedule
-from islands.evolution.topology import topology
 from islands_service.runtime.epoch_scheduler import AHEAD, EpochScheduler, EpochTask
 from support.searches import SMALL, record
 from support.strategies import layouts, schedule_text, schedules

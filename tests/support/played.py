@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from math import sqrt
 from typing import Any
 
-from islands_service.domain.jobs import Lease, ProgressReport
+from islands_service.domain.job import Lease, ProgressReport
 from islands_service.store import Store
 from support.service_processes import Service
 

@@ -24,7 +24,7 @@ from sqlalchemy import Connection
 from islands.io.records import write_record
 from islands_api.web.app import create_app
 from islands_api.web.auth import LOCAL
-from islands_service.domain.jobs import Job, Submission
+from islands_service.domain.job import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -213,7 +213,7 @@ HIDDEN, KNOWN = "thermal-drift", {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 
 
 def hidden(folder: Path, seconds: float = 4.0) -> bytes:
     """A record of a piezo actuator whose sensor follows a temperature, which its simulation does not know."""
-    from islands.trials.injection.measurement import inject
+    from islands.performance.trials.injection.measurement import inject
 
     found = inject([HIDDEN], np.random.default_rng(4), seconds=seconds, band=(1.0, 4.0))
     write_record(found.record, folder / "hidden.csv")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.schema import (
+from islands.io.simulator_spec.specification import (
     ColumnSpec,
     LinearSpec,
     LocalExtendedSpec,

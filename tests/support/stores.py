@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from sqlalchemy import event, select
 
-from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, ProgressReport, Submission
+from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport, Submission
 from islands_service.store import Store
 from islands_service.store.tables import metadata
 from support.processes import eventually

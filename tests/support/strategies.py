@@ -13,7 +13,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
-from islands.evolution.topology import TOPOLOGIES, WITH_DEGREE
+from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.model.expression import Apply, Constant, Lagged, Shift, value
 from islands.model.model import model_of
 from islands.model.primitives import ADD, MUL, PRIMITIVES

@@ -45,7 +45,7 @@ def progress(title: str) -> Iterator[Tell]:
 def compile_kernels() -> None:
     """Compile the kernels where that has not been done, and show that it goes on."""
     # Most of the core: a command that needs no kernels must not wait for it.
-    from islands._warm_up import warm_up  # noqa: PLC0415
+    from islands.facade.warm_up import warm_up  # noqa: PLC0415
 
     with ExitStack() as stack:
 

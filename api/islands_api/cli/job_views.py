@@ -14,7 +14,7 @@ from rich.table import Table
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
-from islands_service.domain.jobs import DISCREPANCY, TERMINAL
+from islands_service.domain.job import DISCREPANCY, TERMINAL
 
 #: Islands of a running job that are shown one by one.
 _SHOWN = 16

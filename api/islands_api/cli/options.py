@@ -10,7 +10,7 @@ from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.records import read_record
 from islands.io.records.row_range import overlap, parse_rows
-from islands.io.simulator_spec.schema import KINDS, LocalExtendedSpec, is_extended, parse_spec
+from islands.io.simulator_spec.specification import KINDS, LocalExtendedSpec, is_extended, parse_spec
 from islands.model.model import Model
 from islands.systems.published_models import published
 

@@ -5,10 +5,10 @@ from typing import Annotated
 import typer
 
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESETS
-from islands.evolution.topology import TOPOLOGIES
 from islands.model.primitives import PRIMITIVES
 
 #: Options that are settings, and have their names.

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
-from islands.io.simulator_spec.schema import parse_spec
+from islands.io.simulator_spec.specification import parse_spec
 from islands_api.client.calls import DatasetRef, RequestSpec, id_of, names_of, submission
 from islands_api.schemas import JobView
 

@@ -25,7 +25,7 @@ from islands_api.client.transport import (
     ssl_context,
 )
 from islands_api.schemas import DatasetPage, DatasetView, HistoryPage, JobPage, JobView, ModelView
-from islands_service.domain.jobs import TERMINAL, JobState
+from islands_service.domain.job import TERMINAL, JobState
 
 T = TypeVar("T")
 

@@ -14,9 +14,9 @@ from islands_api.web.auth import KeyCache
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.dependencies import DRAWINGS, INSPECTIONS, AppState
 from islands_api.web.event_hub import JobEventHub
-from islands_api.web.metrics import ServiceMetrics
 from islands_api.web.middleware import BodyLimit, RequestLogging, SameOrigin
 from islands_api.web.problems import ProblemDocument
+from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
 from islands_api.web.routes import ROUTERS
 from islands_service.liveness import EVERY, send_heartbeat

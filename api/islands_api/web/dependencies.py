@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 
 from islands_api.web.concurrency import BlockingExecutor
 from islands_api.web.event_hub import JobEventHub
-from islands_api.web.metrics import ServiceMetrics
+from islands_api.web.prometheus import ServiceMetrics
 from islands_api.web.rate_limit import RateLimiter
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import structlog
 
 from islands_api.web.concurrency import BlockingExecutor
-from islands_service.domain.jobs import TERMINAL, Event
+from islands_service.domain.job import TERMINAL, Event
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 

@@ -26,7 +26,7 @@ from islands_api.web.problems import (
     UnsupportedMediaTypeError,
     problem_of,
 )
-from islands_service.domain.jobs import QuotaError
+from islands_service.domain.job import QuotaError
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreError
 

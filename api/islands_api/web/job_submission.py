@@ -10,7 +10,7 @@ from islands_api.web.auth import Principal
 from islands_api.web.dependencies import AppState
 from islands_api.web.problems import ResourceNotFoundError, ResultNotReadyError
 from islands_api.web.responses import JSONDocument, job_document
-from islands_service.domain.jobs import Job, JobState, Submission
+from islands_service.domain.job import Job, JobState, Submission
 from islands_service.intake.file_inspection import inspect_file
 from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.job_validation import PendingInspection, validate_job

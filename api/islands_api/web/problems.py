@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from islands.errors import IslandsError, ModelError, RecordError, SettingsError
-from islands_service.domain.jobs import IdempotencyError, JobNotFoundError, JobStateError, QuotaError
+from islands_service.domain.job import IdempotencyError, JobNotFoundError, JobStateError, QuotaError
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import CommitUnknownError, StorageFullError, StoreUnavailableError
 from islands_service.store.datasets import DatasetInUseError, DatasetNotFoundError

@@ -3,17 +3,22 @@
 JSON is read strictly: of a name that stands twice the framework would take the last, and NaN for a number.
 """
 
+import base64
+import binascii
 import json
+import re
 from collections import Counter
 from collections.abc import Callable, Coroutine
 from http import HTTPStatus
+from math import isfinite
 from operator import itemgetter
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from fastapi import Request, Response
+from fastapi import Query, Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 
+from islands.errors import SettingsError
 from islands_api.web.auth import authenticate
 from islands_api.web.problems import MalformedBodyError, UnsupportedMediaTypeError
 
@@ -114,3 +119,34 @@ def _whole(text: str) -> int:
 
 def _no_number(text: str) -> Any:
     raise ValueError(f"{text} is no number there: leave the entry out")
+
+
+#: What a route that lists asks for.
+Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the page before.")]
+Limit = Annotated[int, Query(ge=1, le=200, description="The most entries of a page.")]
+
+
+def encode_cursor(place: tuple[float, str] | None) -> str | None:
+    """Write the place behind which the next page begins."""
+    if place is None:
+        return None
+    return base64.urlsafe_b64encode(json.dumps(place).encode()).decode().rstrip("=")
+
+
+def decode_cursor(cursor: str | None) -> tuple[float, str] | None:
+    """Read a cursor.
+
+    Raises
+    ------
+    SettingsError
+        It is none of ours.
+    """
+    if cursor is None:
+        return None
+    try:
+        created, identity = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
+        if not (isfinite(float(created)) and re.fullmatch(r"[\w-]{1,64}", identity, re.ASCII)):
+            raise ValueError(cursor)
+        return float(created), identity
+    except (ValueError, TypeError, OverflowError, binascii.Error):
+        raise SettingsError(f"{cursor!r} is no cursor: give `next` of the page before as it is") from None

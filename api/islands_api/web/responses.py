@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
-from islands_service.domain.jobs import Job
+from islands_service.domain.job import Job
 from islands_service.store.datasets import StoredDataset
 
 

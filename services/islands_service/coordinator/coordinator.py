@@ -12,7 +12,7 @@ import structlog
 
 from islands.errors import IslandsError
 from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
-from islands_service.domain.jobs import (
+from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
     JobOutcome,
@@ -239,7 +239,7 @@ class Coordinator:
             return None
 
     def _connect(self) -> None:
-        from islands._warm_up import warm_up  # noqa: PLC0415
+        from islands.facade.warm_up import warm_up  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
         self._ray.enter_context(cluster(self._address()))

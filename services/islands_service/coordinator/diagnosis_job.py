@@ -5,15 +5,15 @@ from time import monotonic
 
 import structlog
 
-from islands._explain_residual import explain_residual
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula, diagnose
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.evolution.engine import Engine
+from islands.facade.explain_residual import explain_residual
 from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
-from islands.parallel import ParallelMap
+from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import discrepancy_of
-from islands_service.domain.jobs import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.intake.job_inputs import record_and_columns
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise
 from islands_service.runtime.parallel_map import ray_map

@@ -10,7 +10,7 @@ from types import TracebackType
 import structlog
 
 from islands.errors import IslandsError
-from islands_service.domain.jobs import JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.liveness import StopRequest
 from islands_service.store import Store
 from islands_service.store.database import StoreError

@@ -9,10 +9,11 @@ from typing import Any
 
 import structlog
 
-from islands._identify import identify
 from islands.evolution.engine import Engine
+from islands.evolution.search_result import SearchResult
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
+from islands.facade.identify import identify
 from islands.io.checkpoints import (
     archipelago_from_document,
     checkpoint_text,
@@ -23,9 +24,8 @@ from islands.io.checkpoints import (
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.model.equations import equation
-from islands.search_result import SearchResult
+from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import identification_of
-from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.intake.job_inputs import record_and_validation
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

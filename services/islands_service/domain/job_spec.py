@@ -21,7 +21,7 @@ from pydantic import (
 from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.settings import Settings
-from islands.io.simulator_spec.schema import ColumnSpec, SimulationSpec, innermost
+from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
 from islands.model.candidate_library import candidates
 
 S = TypeVar("S", bound=BaseModel)

@@ -12,7 +12,7 @@ from islands.io.models import model_from_json
 from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
-from islands.io.simulator_spec.schema import PARAMETERS, ModelSpec, PhysicalSpec, innermost
+from islands.io.simulator_spec.specification import PARAMETERS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_spec import (
     LIMITS,
     SHIFT,

@@ -18,15 +18,15 @@ import numpy as np
 from islands.data.split import split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import resolve_settings
+from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, search_figures
 from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.models import model_from_json
-from islands.search_result import RankedModel, SearchResult, SearchStatistics
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
+from islands_service.domain.job import REPORT, Job
 from islands_service.domain.job_spec import identification_of
-from islands_service.domain.jobs import REPORT, Job
 from islands_service.intake.job_inputs import record_and_validation
 from islands_service.reports.identification_report import identification_report
 from islands_service.settings import ServiceSettings, service_settings

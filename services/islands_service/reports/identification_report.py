@@ -7,9 +7,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup
 
+from islands.evolution.search_result import SearchResult
 from islands.io.result_folder import COLUMNS, row
 from islands.model.equations import mathml_equation
-from islands.search_result import SearchResult
 
 #: Pages that are files of their own.
 TEMPLATES = Environment(

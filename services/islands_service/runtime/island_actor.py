@@ -8,12 +8,12 @@ from threading import Event
 
 import ray
 
-from islands._warm_up import warm_up
 from islands.evolution.epoch import run_epoch
-from islands.evolution.evaluation import Evaluator
-from islands.evolution.individual import Population
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.gp.individual import Population
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
+from islands.facade.warm_up import warm_up
 from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_island
 
 

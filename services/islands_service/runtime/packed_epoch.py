@@ -11,7 +11,7 @@ from typing import overload
 
 from islands.evolution.engine import Caches
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.individual import Population
+from islands.evolution.gp.individual import Population
 from islands.evolution.island import Island, StepInfo
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import Connection, Row, delete, func, insert, select, tuple_
 
 from islands.errors import IslandsError
-from islands_service.domain.jobs import ACTIVE, QuotaError
+from islands_service.domain.job import ACTIVE, QuotaError
 from islands_service.store import dialect
 from islands_service.store.database import Database
 from islands_service.store.dialect import now

@@ -5,7 +5,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, insert, update
 
-from islands_service.domain.jobs import Job, JobState
+from islands_service.domain.job import Job, JobState
 from islands_service.store.dialect import now
 from islands_service.store.tables import events, jobs
 

@@ -8,7 +8,7 @@ from uuid import uuid4
 
 from sqlalchemy import Connection, Row, Select, delete, func, insert, select, tuple_
 
-from islands_service.domain.jobs import (
+from islands_service.domain.job import (
     RESUMABLE,
     TERMINAL,
     Event,

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, and_, case, delete, func, insert, or_, select, update
 
-from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
+from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError, ProgressReport
 from islands_service.store.database import Database
 from islands_service.store.dialect import now
 from islands_service.store.job_events import append_event, job_from_row, update_job

@@ -7,7 +7,7 @@ from typing import Any
 
 from sqlalchemy import Connection, delete, insert, select
 
-from islands_service.domain.jobs import JobNotFoundError
+from islands_service.domain.job import JobNotFoundError
 from islands_service.store.database import Database
 from islands_service.store.tables import artefacts, jobs, models, points, results
 

@@ -2,7 +2,7 @@
 
 from sqlalchemy import Connection, delete, select, union
 
-from islands_service.domain.jobs import TERMINAL
+from islands_service.domain.job import TERMINAL
 from islands_service.store.database import Database
 from islands_service.store.dialect import now
 from islands_service.store.tables import artefacts, datasets, jobs

@@ -4,7 +4,7 @@ import hashlib
 
 from sqlalchemy import Connection, func, select
 
-from islands_service.domain.jobs import ACTIVE, IdempotencyError, Job, QuotaError, Submission
+from islands_service.domain.job import ACTIVE, IdempotencyError, Job, QuotaError, Submission
 from islands_service.store.job_events import job_from_row
 from islands_service.store.tables import jobs
 

@@ -15,6 +15,7 @@ from scipy.special import betaincinv
 
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.discrepancy.inference.verdict import Verdict
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.surrogates import (
     Injection,
@@ -23,7 +24,6 @@ from islands.discrepancy.surrogates import (
     injection_strengths,
     make_surrogates,
 )
-from islands.parallel import ParallelMap
 
 #: Clean surrogates.
 CLEAN = 40

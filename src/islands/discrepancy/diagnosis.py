@@ -36,9 +36,9 @@ from islands.discrepancy.inference.verdict import (
     explained_fraction,
 )
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
-from islands.parallel import ParallelMap
 
 #: Times that causes are looked for anew because with them the record asks for another hold or step.
 ROUNDS = 3

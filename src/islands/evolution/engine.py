@@ -6,10 +6,10 @@ from typing import Protocol
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
-from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.island import StepInfo
+from islands.evolution.migration.topology import Topology, topology
 from islands.evolution.problem import Problem
-from islands.evolution.topology import Topology, topology
 
 #: Answers with true once the search is to end.
 Stop = Callable[[], bool]

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 
-from islands.evolution.individual import Individual
+from islands.evolution.gp.individual import Individual
 
 #: Models that are kept of every size: validation chooses among them.
 DEPTH = 8

@@ -5,13 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 
-from islands.evolution.evaluation import Evaluator
-from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.individual import Individual, Population, unique_structures
-from islands.evolution.rng import Purpose, Stream
-from islands.evolution.selection import tournaments
-from islands.evolution.settings import Settings
-from islands.evolution.variation import (
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.selection import tournaments
+from islands.evolution.generation.variation import (
     Genes,
     high_level_crossover,
     inner_mutation,
@@ -21,6 +17,10 @@ from islands.evolution.variation import (
     random_genes,
     with_linear_output,
 )
+from islands.evolution.gp.individual import Individual, Population, unique_structures
+from islands.evolution.gp.rng import Purpose, Stream
+from islands.evolution.hall_of_fame import HallOfFame, with_entries
+from islands.evolution.settings import Settings
 from islands.model.expression import Expression
 
 #: Share of the parents that are better than the bar.

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
-from islands.evolution.gene_structure import with_phi
-from islands.evolution.island_profiles import ISLAND_PROFILES
+from islands.evolution.generation.variation import Genes
+from islands.evolution.gp.gene_structure import with_phi
+from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.settings import Settings
-from islands.evolution.variation import Genes
 from islands.model.candidate_library import candidates
 from islands.model.expression import Expression, height
 from islands.simulation.outcome import EvaluationOutcome

@@ -5,12 +5,12 @@ from math import inf
 
 from islands.errors import SettingsError, lookup
 from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.fitness import FITNESSES
-from islands.evolution.gene_structure import STRUCTURES
-from islands.evolution.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.schedule import Schedule, schedule
-from islands.evolution.topology import topology
+from islands.evolution.gp.fitness import FITNESSES
+from islands.evolution.gp.gene_structure import STRUCTURES
+from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.migration.schedule import Schedule, schedule
+from islands.evolution.migration.topology import topology
 from islands.model.candidate_library import library_named
 from islands.model.primitives import PRIMITIVES
 

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 
+from islands.evolution.search_result import SearchResult
 from islands.figures.style import MEASURED, SIMULATED, blank, finish, house_style
-from islands.search_result import SearchResult
 
 #: Sizes in a column of a legend that is as high as its figure.
 _COLUMN = 15

@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.data.split import Split
+from islands.evolution.search_result import RankedModel, SearchResult
 from islands.figures.convergence import draw_convergence, draw_front, draw_islands
 from islands.figures.free_run import draw_free_run
 from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
-from islands.search_result import RankedModel, SearchResult
 from islands.simulation.predictors import free_run
 
 FigureOf = Callable[[RankedModel, Split], Figure]

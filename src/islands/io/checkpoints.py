@@ -12,9 +12,9 @@ from typing import Any
 
 from islands.errors import ModelError
 from islands.evolution.archipelago import Archipelago
+from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.history import HistoryPoint
-from islands.evolution.individual import Individual
 from islands.evolution.island import Island
 from islands.evolution.search_state import SearchState
 from islands.model.expression import Primitive

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.models import terms_document, write_model
 from islands.model.equations import equation, latex_equation
-from islands.search_result import RankedModel, SearchResult
 from islands.validation.assessment import PARTS
 from islands.validation.physics import PhysicsChecks
 from islands.validation.residual_tests import ResidualTests

@@ -3,8 +3,8 @@
 from importlib.metadata import version
 
 import islands
-from islands._fit import fit
-from islands._identify import identify
+from islands.facade.fit import fit
+from islands.facade.identify import identify
 from support.repository import ROOT
 
 

@@ -10,9 +10,8 @@ from pydantic import FiniteFloat
 from islands_api.schemas import DatasetPage, DatasetView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
-from islands_api.web.pagination import Cursor, Limit, decode_cursor, encode_cursor
 from islands_api.web.problems import RESPONSES
-from islands_api.web.requests import FormRoute
+from islands_api.web.requests import Cursor, FormRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument, dataset_document
 from islands_api.web.uploads import name_of, receive
 from islands_service.domain.job_spec import Name

@@ -18,7 +18,7 @@ from islands_api.web.job_submission import (
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.requests import JSONRoute
 from islands_api.web.routes.jobs import Id
-from islands_service.domain.jobs import DISCREPANCY, EXTENDED
+from islands_service.domain.job import DISCREPANCY, EXTENDED
 
 router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)
 

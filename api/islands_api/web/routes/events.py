@@ -13,7 +13,7 @@ from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.responses import json_text
 from islands_api.web.routes.jobs import Id
-from islands_service.domain.jobs import TERMINAL, Event, Job
+from islands_service.domain.job import TERMINAL, Event, Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 

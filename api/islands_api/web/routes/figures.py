@@ -18,8 +18,8 @@ from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, stored
+from islands_service.domain.job import IDENTIFICATION, REPORT
 from islands_service.domain.job_spec import identification_of
-from islands_service.domain.jobs import IDENTIFICATION, REPORT
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import StorageFullError, StoreUnavailableError
 

@@ -8,11 +8,10 @@ from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import ACCEPTED, ETAG, IdempotencyKey, etag, get_job_of_kind, submit_job
-from islands_api.web.pagination import Cursor, Limit, decode_cursor, encode_cursor
 from islands_api.web.problems import RESPONSES
-from islands_api.web.requests import JSONRoute
+from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument, JSONItems, job_document
-from islands_service.domain.jobs import IDENTIFICATION, TERMINAL, Job, JobState
+from islands_service.domain.job import IDENTIFICATION, TERMINAL, Job, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 

@@ -13,7 +13,7 @@ from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.responses import JSONDocument, JSONItems
 from islands_api.web.routes.jobs import Id
-from islands_service.domain.jobs import IDENTIFICATION
+from islands_service.domain.job import IDENTIFICATION
 from islands_service.store.results import StoredModel
 
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)

@@ -1,4 +1,4 @@
-"""What Alembic runs: the migrations in the transaction that `islands_service.store.schema` has opened."""
+"""Alembic environment: runs the migrations in the transaction opened by `store.schema_upgrade`."""
 
 from alembic import context
 

@@ -15,7 +15,7 @@ from islands.discrepancy.inference.screening import (
     transfer_parameters,
 )
 from islands.discrepancy.interfaces.effect import Effect
-from islands.parallel import ParallelMap
+from islands.discrepancy.interfaces.parallel import ParallelMap
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,8 +16,8 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
 )
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.interfaces.effect import Effect, Signal
+from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
-from islands.parallel import ParallelMap
 
 #: Points of a grid that a fit begins from, the steps that each may take before one is chosen, and how far a
 #: strength is carried from its grid's value.

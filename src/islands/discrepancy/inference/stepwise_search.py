@@ -19,7 +19,7 @@ from islands.discrepancy.inference.hypothesis import (
 )
 from islands.discrepancy.inference.screening import EQUAL, ScreenedEffect, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
-from islands.parallel import ParallelMap
+from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: The least that an effect has to gain, in minus twice the log-likelihood: six is one to twenty.
 LEAST = 6.0

@@ -30,7 +30,7 @@ from islands.discrepancy.inference.verdict import (
     validate_out_of_sample,
 )
 from islands.discrepancy.interfaces.effect import Effect
-from islands.parallel import ParallelMap, memoised_map
+from islands.discrepancy.interfaces.parallel import ParallelMap, memoised_map
 
 #: Share of the misfit that a single effect has to explain for pairs to be looked for: of noise none does.
 WORTHWHILE = 0.1

@@ -23,7 +23,7 @@ from islands.discrepancy.inference.hypothesis import (
 from islands.discrepancy.inference.screening import ScreenedEffect
 from islands.discrepancy.inference.stepwise_search import LEAST
 from islands.discrepancy.interfaces.effect import Effect, Signal
-from islands.parallel import ParallelMap
+from islands.discrepancy.interfaces.parallel import ParallelMap
 
 #: Share of the explainable misfit that names have to explain, and from which on a remainder is no more than
 #: one.

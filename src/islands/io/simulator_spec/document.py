@@ -18,7 +18,7 @@ from islands.discrepancy.simulators.python_function import PythonFunctionSimulat
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.io.models import model_json
-from islands.io.simulator_spec.schema import (
+from islands.io.simulator_spec.specification import (
     ColumnSpec,
     EffectSpec,
     FrameSpec,

@@ -30,7 +30,7 @@ from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.discrepancy.simulators.second_order import make_second_order
 from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
-from islands.io.simulator_spec.schema import (
+from islands.io.simulator_spec.specification import (
     PARAMETERS,
     ColumnSpec,
     ExtendedSpec,

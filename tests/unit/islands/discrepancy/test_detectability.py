@@ -30,8 +30,8 @@ from islands.discrepancy.surrogates import (
     injection_strengths,
     make_surrogates,
 )
-from islands.trials.injection.measurement import inject
-from islands.trials.trial import TOLERANCE
+from islands.performance.trials.injection.measurement import inject
+from islands.performance.trials.trial import TOLERANCE
 
 CORE = BoucWenPiezoSimulator()
 FEW = ("offset", "jump")

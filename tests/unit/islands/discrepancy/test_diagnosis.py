@@ -13,9 +13,9 @@ from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.errors import RecordError, SettingsError
 from islands.io.diagnosis_json import as_json, diagnosis_document
+from islands.performance.trials.injection.measurement import inject
+from islands.performance.trials.trial import TOLERANCE
 from islands.systems.bouc_wen import BoucWenPiezo
-from islands.trials.injection.measurement import inject
-from islands.trials.trial import TOLERANCE
 
 
 @pytest.fixture(scope="module")

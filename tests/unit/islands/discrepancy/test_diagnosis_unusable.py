@@ -12,7 +12,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.verdict import Verdict
 from islands.errors import IslandsError, RecordError, SettingsError
-from islands.io.simulator_spec.schema import LocalSpec, PhysicalSpec
+from islands.io.simulator_spec.specification import LocalSpec, PhysicalSpec
 from support.simulated_records import made, recorded, wave
 
 #: Simulations that take what is not given from the record, and those that are what they are.

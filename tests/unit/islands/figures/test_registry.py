@@ -5,10 +5,10 @@ import re
 import pytest
 
 from islands.data.split import Split
+from islands.evolution.search_result import RankedModel
 from islands.figures.registry import FIGURES
 from islands.model.model import model_of
 from islands.model.parsing import parse
-from islands.search_result import RankedModel
 from islands.validation.assessment import assess
 from support.searches import record
 

@@ -10,8 +10,8 @@ import pytest
 
 from islands.errors import ModelError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import HallOfFame, merge, with_entries
-from islands.evolution.individual import Individual, make_regressor
 from islands.evolution.island import Island
 from islands.io.checkpoints import HALL_SCHEMA, SCHEMA, read_checkpoint, write_checkpoint, write_hall
 from islands.model.expression import Apply

@@ -10,9 +10,9 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.evolution.search_result import RankedModel
 from islands.io.models import read_model, terms_document
 from islands.io.result_folder import content_sha256, number, result_json, summary, table, write_result
-from islands.search_result import RankedModel
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")

@@ -250,7 +250,7 @@ def test_what_stops_a_command_stops_it_with_a_message(run, monkeypatch, error, c
     def stop(*_):
         raise error
 
-    monkeypatch.setattr("islands_api.cli.show.export", stop)
+    monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
     found, _, err = run("show", "published:12")
     assert found == code
     assert err.strip() == said
@@ -260,7 +260,7 @@ def test_a_programming_error_is_not_hidden(run, monkeypatch):
     def stop(*_):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("islands_api.cli.show.export", stop)
+    monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
     with pytest.raises(ZeroDivisionError):
         run("show", "published:12")
 
@@ -269,7 +269,7 @@ def test_an_interrupt_is_not_an_error_message(run, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("islands_api.cli.show.export", stop)
+    monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
     code, _, err = run("show", "published:12")
     assert code == 130
     assert "Traceback" not in err

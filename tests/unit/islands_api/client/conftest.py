@@ -19,7 +19,7 @@ from uuid import uuid4
 import pytest
 
 from islands_api.client import AsyncClient, Client, asynchronous, synchronous, transport
-from islands_service.domain.jobs import Lease
+from islands_service.domain.job import Lease
 from support.service import Service, kept
 from support.stores import LONG
 

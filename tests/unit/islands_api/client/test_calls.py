@@ -17,7 +17,7 @@ from islands_api.client import AsyncClient, Client, ServiceError, calls, diagnos
 from islands_api.client.calls import RequestSpec
 from islands_api.schemas import DatasetView, JobPage, JobRequest, JobView
 from islands_api.web.responses import job_document
-from islands_service.domain.jobs import JobState
+from islands_service.domain.job import JobState
 from support.service import Service, csv, kept, queued
 from support.stores import FAILED, FOUND
 

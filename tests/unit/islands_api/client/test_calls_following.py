@@ -16,7 +16,7 @@ from islands_api.client import (
     transport,
 )
 from islands_api.client.response_parsing import EventLines
-from islands_service.domain.jobs import JobOutcome, JobState
+from islands_service.domain.job import JobOutcome, JobState
 from support.service import Service
 from support.stores import CANCELLED, FAILED, FOUND, brought_on
 

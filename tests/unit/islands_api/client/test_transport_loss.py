@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from islands_api.client import ServiceError, ServiceUnreachableError, calls, transport
-from islands_service.domain.jobs import JobState
+from islands_service.domain.job import JobState
 from islands_service.store.database import CommitUnknownError
 from support.service import Service, served
 

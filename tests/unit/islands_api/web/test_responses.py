@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from islands_api.schemas import DatasetView, JobRequest, JobView
 from islands_api.web.responses import JSONDocument, dataset_document, job_document, json_text
-from islands_service.domain.jobs import ProgressReport
+from islands_service.domain.job import ProgressReport
 from support.service import kept, queued
 
 FLOATS = st.recursive(

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from islands._identify import identify
 from islands.evolution.engine import SerialEngine
+from islands.facade.identify import identify
 from islands.io.checkpoints import history_document
 from islands.io.records import read_record
 from islands.io.records.preview import preview
 from islands.io.result_folder import result_document
-from islands_service.domain.jobs import Job, Submission
+from islands_service.domain.job import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs

@@ -15,7 +15,7 @@ from islands.errors import IslandsError, RecordError
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import coordinator as coordinator_module
 from islands_service.coordinator.coordinator import Coordinator
-from islands_service.domain.jobs import (
+from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
     Job,

@@ -15,7 +15,7 @@ from islands.io.records.preview import preview
 from islands_service.coordinator.coordinator import problem_of
 from islands_service.coordinator.diagnosis_job import discrepancy
 from islands_service.coordinator.heartbeat import JobCancelled
-from islands_service.domain.jobs import (
+from islands_service.domain.job import (
     DISCREPANCY,
     EXTENDED,
     REPORT,

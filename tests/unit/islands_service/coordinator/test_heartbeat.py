@@ -7,7 +7,7 @@ import pytest
 
 from islands_service.coordinator import heartbeat as heartbeats
 from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
-from islands_service.domain.jobs import JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.domain.job import JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.liveness import StopRequest
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError

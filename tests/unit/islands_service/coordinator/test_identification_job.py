@@ -12,7 +12,7 @@ from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.identification_job import identification
-from islands_service.domain.jobs import Job, JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError

@@ -7,7 +7,7 @@ import pytest
 
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch
-from islands.evolution.evaluation import Evaluator
+from islands.evolution.generation.evaluation import Evaluator
 from islands_service.runtime import packed_epoch as reports
 from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_island
 from support.searches import SMALL, exactly, islands_of, record

@@ -10,10 +10,10 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import MetaData, create_engine, inspect, select, text
 
-from islands_service.domain.jobs import JobState
+from islands_service.domain.job import JobState
 from islands_service.store import Store
 from islands_service.store.database import Database, StoreError
-from islands_service.store.schema import HEAD, configuration, prepare, revision, upgrade
+from islands_service.store.schema_upgrade import HEAD, configuration, prepare, revision, upgrade
 from islands_service.store.tables import metadata
 from support.stores import ALICE, BOB, asked, child, contents, kinds, submitted
 

@@ -6,7 +6,7 @@ import random
 import pytest
 from sqlalchemy import event, insert, text
 
-from islands_service.domain.jobs import JobState
+from islands_service.domain.job import JobState
 from islands_service.store import Store
 from islands_service.store.tables import jobs
 from support.stores import ALICE, BOB, EXPIRED, LONG, asked

@@ -1,1 +1,1 @@
-"""The revisions, in the order of their numbers; ``HEAD`` in `islands_service.store.schema` names the last."""
+"""Schema revisions in the order of their numbers; `schema_upgrade.HEAD` names the last one."""

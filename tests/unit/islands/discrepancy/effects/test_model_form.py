@@ -15,8 +15,8 @@ from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulated
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
-from islands.trials.cases import CORES
-from islands.trials.injection.measurement import FaultyRecord, inject
+from islands.performance.trials.cases import CORES
+from islands.performance.trials.injection.measurement import FaultyRecord, inject
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from islands.discrepancy.inference.strategies import assess_evidence, search_wit
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.io.simulator_spec.factory import make_simulator
-from islands.io.simulator_spec.schema import PhysicalSpec
+from islands.io.simulator_spec.specification import PhysicalSpec
 from support.simulated_records import recorded
 
 #: Level at which the upper tank overflows, and what the pump brings beside what it is told.

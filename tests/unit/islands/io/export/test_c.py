@@ -9,12 +9,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import islands
-from islands.benchmark.compiled_c import compile_model, find_compiler
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.io.export import export
 from islands.io.export.parts import functions
 from islands.model.primitives import PRIMITIVES, primitive
+from islands.performance.benchmark.compiled_c import compile_model, find_compiler
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from support.programs import (

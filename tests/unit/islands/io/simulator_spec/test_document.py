@@ -16,10 +16,10 @@ from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, SettingsError
-from islands.io.export.extended import as_json
+from islands.io.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulated
-from islands.io.simulator_spec.schema import LocalExtendedSpec, ModelSpec, innermost, parse_spec
+from islands.io.simulator_spec.specification import LocalExtendedSpec, ModelSpec, innermost, parse_spec
 from support.simulated_records import Made, made
 
 KINDS = list(made())

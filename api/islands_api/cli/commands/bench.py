@@ -1,0 +1,127 @@
+"""``islands bench``: how fast this machine evaluates, beside plain numpy and compiled C."""
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from islands.errors import IslandsError
+from islands.performance.benchmark.report import BenchmarkReport, check_goals, to_document
+from islands.performance.benchmark.run import measure
+from islands.performance.benchmark.scaling import save_scalings
+from islands_api.cli.app import THREADS
+from islands_api.cli.console import compile_kernels, output, progress
+from islands_api.cli.output_folder import check_folder
+
+
+def bench(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Within a minute: fewer individuals, no whole run of case 1.")
+    ] = False,
+    json_file: Annotated[Path | None, typer.Option("--json", help="JSON file to write.")] = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the figures.")] = Path("bench-out"),
+) -> None:
+    """Measure evaluations, kernels and whole searches on this machine. Leave it alone meanwhile."""
+    check_folder(out, force=True)
+    if json_file is not None:
+        check_folder(json_file.parent, force=True)
+    compile_kernels()
+    with progress("bench") as tell:
+        report = _measured(quick, tell)
+        tell("figures", 1.0)
+        figures = save_scalings(report.scalings, out)
+    if json_file is not None:
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        json_file.write_text(json.dumps(to_document(report), indent=2) + "\n", encoding="utf-8")
+    _show(report)
+    for path in (*figures, *([json_file] if json_file else [])):
+        output.print(str(path), markup=False)
+
+
+def _measured(quick: bool, tell: Callable[[str, float], None]) -> BenchmarkReport:
+    """Measure in a process of its own: a linear algebra library reads its threads when it is loaded.
+
+    They wait in a loop, and their waiting would be counted as CPU time of plain numpy.
+    """
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    context = get_context("spawn")
+    receiving, sending = context.Pipe(duplex=False)
+    process = context.Process(target=_measure, args=(quick, sending))
+    process.start()
+    sending.close()
+    try:
+        return _followed(receiving, tell)
+    finally:
+        process.terminate()  # without effect on one that is done
+        process.join()
+
+
+def _followed(receiving: Connection, tell: Callable[[str, float], None]) -> BenchmarkReport:
+    """Pass on what the measuring process tells, until it sends the report or its error."""
+    while True:
+        try:
+            message = receiving.recv()
+        except EOFError as error:
+            raise ChildProcessError(
+                "the process that measures ended before it was done: see what it wrote above, or whether "
+                "the system stopped it for want of memory"
+            ) from error
+        match message:
+            case str(text), float(share):
+                tell(text, share)
+            case BenchmarkReport():
+                return message
+            case _:
+                raise message
+
+
+def _measure(quick: bool, sending: Connection) -> None:
+    try:
+        sending.send(measure(quick, lambda text, share: sending.send((text, float(share)))))
+    except IslandsError as error:
+        sending.send(error)
+    except KeyboardInterrupt:
+        pass  # whoever pressed the key stopped the command as well, which says so
+
+
+def _show(report: BenchmarkReport) -> None:
+    table = Table("ms of CPU per individual", *report.kinds, title=f"{report.samples} samples, medians")
+    kinds = report.kinds
+    rows: dict[str, Sequence[float | None]] = {
+        "plain numpy": [each.numpy_ms for each in kinds.values()],
+        "nothing cached": [each.uncached_ms for each in kinds.values()],
+        "inner products cached": [each.cached_ms for each in kinds.values()],
+        "amortised over a search": [report.amortised_ms(kind) if kind == "gp" else None for kind in kinds],
+        "simulation, plain numpy": [each.numpy_simulation_ms for each in kinds.values()],
+        "simulation": [each.simulation_ms for each in kinds.values()],
+        "simulation, C for each individual": [each.c_simulation_ms for each in kinds.values()],
+        "Gram matrix": [each.gram_ms for each in kinds.values()],
+        "Gram matrix, share of peak": [report.gram_fraction_of_peak(kind) for kind in kinds],
+    }
+    for name, values in rows.items():
+        table.add_row(name, *("-" if value is None else f"{value:.3f}" for value in values))
+    output.print(table)
+    runs = report.runs.values()
+    table = Table("search of one island", *report.runs)
+    table.add_row("individuals per second and core", *(f"{run.per_cpu_second:.0f}" for run in runs))
+    known = (100.0 * run.duplicates / run.evaluations for run in runs)
+    table.add_row("of them known structures, %", *(f"{share:.1f}" for share in known))
+    for name in next(iter(runs)).caches:
+        table.add_row(name.replace("_", " "), *(str(run.caches[name]) for run in runs))
+    output.print(table)
+    table = Table("goal", "wanted", "measured", "met")
+    for goal in check_goals(report):
+        met = {True: "[green]yes[/]", False: "[red]no[/]", None: "-"}[goal.met]
+        table.add_row(goal.text, goal.wanted, goal.measured, met)
+    output.print(table)
+    output.print(
+        f"workload {report.workload[:12]}, {report.machine.processor}, {report.machine.cores} cores, "
+        f"C: {report.machine.compiler or 'no compiler called cc'}",
+        markup=False,
+    )

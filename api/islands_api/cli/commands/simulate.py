@@ -1,0 +1,93 @@
+"""``islands simulate``: predict a record with a model."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.errors import ModelError, SettingsError
+from islands.facade.fit import SHOOTING
+from islands.facade.result import simulate as run
+from islands.io.records import read_record, write_simulation
+from islands.io.records.row_range import parse_rows
+from islands.io.simulator_spec.factory import simulated
+from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
+from islands.validation.metrics import metrics
+from islands_api.cli import options
+from islands_api.cli.console import compile_kernels, output
+
+
+def simulate(
+    model: options.ModelFile,
+    record: options.Record,
+    mode: Annotated[str, typer.Option("--mode", help="one-step, shooting or free-run.")] = "free-run",
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file for time and y_sim.")] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", help="Input column; by default what the model was fitted to."),
+    ] = None,
+    output_column: Annotated[str | None, typer.Option("--output", help="Output column; likewise.")] = None,
+    dt: options.SamplingTime = None,
+    rows: options.Rows = None,
+    shooting: Annotated[int, typer.Option("--shooting", help="Samples of an interval.")] = SHOOTING,
+) -> None:
+    """Simulate a model on a record; a free run needs the output in its first samples alone."""
+    extended = options.extended(model)
+    if extended is not None:
+        _extended(extended, record, mode, out, inputs, output_column, dt, rows)
+        return
+    chosen = options.model(model)
+    data = read_record(
+        record,
+        options.columns(inputs or list(chosen.input_names)),
+        output_column or chosen.output_name,
+        dt,
+        parse_rows(rows),
+        missing_output=True,
+    )
+    if chosen.dt is not None and abs(data.dt - chosen.dt) > 0.01 * chosen.dt:
+        raise ModelError(
+            f"the model holds for a sampling time of {chosen.dt:g} s, the record has {data.dt:g} s"
+        )
+    compile_kernels()
+    simulation = run(chosen, data, mode, shooting)
+    _show(data, simulation.y, f"{mode}: {simulation.outcome}", out)
+
+
+def _extended(
+    asked: LocalExtendedSpec,
+    record: Path,
+    mode: str,
+    out: Path | None,
+    inputs: list[str] | None,
+    output_column: str | None,
+    dt: float | None,
+    rows: str | None,
+) -> None:
+    """Simulate what a diagnosis has extended: from the record's first samples on."""
+    if mode != "free-run":
+        raise SettingsError(f"an extended simulation runs free: --mode {mode} is for models")
+    core = innermost(asked)
+    beside = (core.column,) if isinstance(core, ColumnSpec) else ()
+    driving = options.columns(inputs or list(asked.inputs))
+    whole = read_record(record, [*driving, *beside], output_column or asked.output, dt, parse_rows(rows))
+    data = whole.first_inputs(len(driving))
+    compile_kernels()
+    y = simulated(asked, data, dict.fromkeys(beside, whole.u[:, -1]))
+    _show(data, y, f"{mode}: {', '.join(effect.name for effect in asked.effects)} in it", out)
+
+
+def _show(data: Dataset, y: NDArray[np.float64], line: str, out: Path | None) -> None:
+    if out is not None:
+        write_simulation(data, y, out)
+        output.print(f"{out}: {data.samples} rows", markup=False)
+    errors = metrics(data.y, y)
+    output.print(line, markup=False)
+    output.print(
+        f"MAPE {errors.mape:.4f} %  R2 {errors.r2:.5f}  RMSE {errors.rmse:.6g} {data.output_unit}  "
+        f"fit {errors.fit_percent:.3f} %",
+        markup=False,
+    )

@@ -1,0 +1,1 @@
+"""Steps of one generation: selection, variation and evaluation."""

@@ -1,0 +1,1 @@
+"""Genetic programming: individuals, genes, fitnesses, random streams. Read `individual` first."""

@@ -1,0 +1,1 @@
+"""Migration between islands: topology, selection and replacement policies, schedule."""

@@ -1,0 +1,121 @@
+"""Fit: forward selection over a library, (constrained) least squares, assessment. The classical answer."""
+
+from collections import Counter
+from collections.abc import Callable
+
+from islands.data.dataset import Dataset
+from islands.data.split import split_data
+from islands.errors import SettingsError
+from islands.estimation.estimate import estimate
+from islands.estimation.forward_selection import forward_selection
+from islands.estimation.parameter_constraints import constraint
+from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
+from islands.facade.result import Result
+from islands.io.result_folder import record_document
+from islands.model.candidate_library import candidates, full_set, library_named
+from islands.simulation.outcome import EvaluationOutcome
+from islands.validation.assessment import assess
+
+#: Samples of a shooting interval, the paper's case 1; a short record takes a tenth of its own.
+SHOOTING = 500
+
+Progress = Callable[[str, float], None]
+
+
+def fit(
+    record: Dataset,
+    validation: Dataset | float = 0.25,
+    *,
+    library: str = "phi-polynomial",
+    degree: int | None = None,
+    lags: int | None = None,
+    max_terms: int = 10,
+    constraints: str | None = None,
+    shooting: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Result:
+    """Fit nested models to a record by forward selection and rank them on validation data.
+
+    Parameters
+    ----------
+    record : Dataset
+        Complete.
+    validation : Dataset or float
+        A record of its own, or the share of the record's end that validates.
+    library : str
+        An entry of ``LIBRARIES``: ``phi-polynomial`` for hysteresis, ``polynomial`` for anything smooth.
+    degree, lags : int, optional
+        Of the library; None takes what suits it.
+    max_terms : int
+        Size of the largest model.
+    constraints : str, optional
+        ``hysteresis`` or ``none``; None takes what suits the library.
+    shooting : int, optional
+        Samples of an interval of multiple shooting.
+    seed : int
+        Kept in the result; forward selection draws nothing at random.
+    progress : callable, optional
+        Called with a text and the share that is done.
+
+    Returns
+    -------
+    Result
+        ``result.best.equation``, ``result.best.metrics``, ``result.save(folder)``, ...
+
+    Raises
+    ------
+    SettingsError
+        A setting is unknown or out of range, or no model could be estimated.
+    RecordError
+        The record is too short or incomplete, or the validation data has other columns or sampling time.
+    """
+    entry = library_named(library)
+    degree = entry.degree if degree is None else degree
+    lags = entry.lags if lags is None else lags
+    constraints = entry.constraints if constraints is None else constraints
+    constraint(constraints)
+    if max_terms < 1:
+        raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
+    parts = split_data(record, validation)
+    shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
+    if shooting < 1:
+        raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
+    tell = progress or (lambda _text, _share: None)
+
+    pool = candidates(library, degree, lags, record.inputs)
+    warm_up = max(item.maximum_lag for item in pool)
+    tell(f"inner products of {len(pool)} candidates", 0.0)
+    structures = forward_selection(pool, parts.estimation, constraints, max_terms)
+    if isinstance(structures, EvaluationOutcome):
+        raise SettingsError(f"nothing can be fitted with these settings: {structures}")
+    outcomes: Counter[str] = Counter()
+    models = []
+    for done, structure in enumerate(structures, start=1):
+        estimated = estimate(structure, parts.estimation, constraints, warm_up)
+        if isinstance(estimated, EvaluationOutcome):
+            outcomes[estimated.verdict.name.lower()] += 1
+            continue
+        outcomes["ok"] += 1
+        models.append(RankedModel(estimated.model, assess(estimated.model, parts, shooting, warm_up)))
+        tell(f"model of {estimated.model.size} terms", done / len(structures))
+    if not models:
+        raise SettingsError(
+            f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
+        )
+    rows = sum(max(0, length - warm_up) for length in parts.estimation.segments)
+    count = full_set(degree, lags, lags, record.inputs)
+    search = SearchStatistics(
+        sum(outcomes.values()), dict(outcomes), {"candidates": count, "bytes": 8 * count * rows}
+    )
+    settings = {
+        "method": "fit",
+        "library": library,
+        "degree": degree,
+        "lags": lags,
+        "max_terms": max_terms,
+        "constraints": constraints,
+        "shooting": shooting,
+        "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
+    }
+    return Result(SearchResult(record, parts, seed, settings, search, rank_models(models)))

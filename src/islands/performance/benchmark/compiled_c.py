@@ -1,0 +1,185 @@
+"""The floor of a simulation: C written and compiled for one individual.
+
+It does what the kernel does and nothing else: shooting intervals side by side in rows, expressions inlined,
+every number of rows and lanes known to the compiler. Compiling takes far longer than simulating, so it is no
+way to search; it tells how much a general kernel loses.
+"""
+
+import ctypes
+import hashlib
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.errors import ModelError
+from islands.io.export.c import definition
+from islands.model.primitives import SIGN
+from islands.model.regressor import Regressor
+from islands.performance.benchmark.expression_source import infix
+
+
+def find_compiler() -> str | None:
+    """Return the C compiler's path, None where there is none."""
+    return shutil.which("cc")
+
+
+def compile_model(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDLL:
+    """Compile C and load it.
+
+    Parameters
+    ----------
+    folder : Path
+        Where source and library are written, under a name that their content gives them.
+
+    Raises
+    ------
+    ModelError
+        There is no compiler, or it refuses the source or a flag: the message is the compiler's.
+    """
+    command = find_compiler()
+    if command is None:
+        raise ModelError("no C compiler is called cc: install one, or leave C out of the comparison")
+    name = hashlib.sha256("\n".join((source, *flags)).encode()).hexdigest()
+    written, library = folder / f"{name}.c", folder / f"{name}.so"
+    written.write_text(source, encoding="ascii")
+    done = subprocess.run(
+        [command, *flags, "-shared", "-fPIC", "-o", str(library), str(written), "-lm"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise ModelError(f"{command} {' '.join(flags)} does not compile the benchmark: {done.stderr.strip()}")
+    return ctypes.CDLL(str(library))
+
+
+#: Intervals in a row.
+LANES = 104
+
+#: Ways to compile; the fastest counts. The first one rounds as our kernels do.
+FLAGS = (
+    ("-O3", "-march=native", "-ffp-contract=off"),
+    ("-O3", "-march=native"),
+)
+
+_TEMPLATE = """\
+#include <string.h>
+enum {{ LANES = {lanes}, WARM_UP = {warm_up}, STEPS = {steps} }};
+
+{sign}
+/* Rows [block][time][lane] of the input and of the measured output; y holds the rows of one block. */
+void simulate(const double *restrict input, const double *restrict measured, long blocks,
+              const double *restrict theta, double *restrict y, double *restrict squared)
+{{
+    {weights}
+    for (long block = 0; block < blocks; ++block) {{
+        const double *u = input + block * (WARM_UP + STEPS) * LANES;
+        const double *m = measured + block * (WARM_UP + STEPS) * LANES;
+        double *error = squared + block * LANES;
+        memcpy(y, m, sizeof(double) * WARM_UP * LANES);
+        memset(error, 0, sizeof(double) * LANES);
+        for (long k = WARM_UP; k < WARM_UP + STEPS; ++k) {{
+            /* A row is written and earlier ones are read: no two lanes meet. */
+            #pragma GCC ivdep
+            for (long lane = 0; lane < LANES; ++lane) {{
+                double value = 0.0;
+                {terms}
+                y[k * LANES + lane] = value;
+                double off = value - m[k * LANES + lane];
+                error[lane] += off * off;
+            }}
+        }}
+    }}
+}}
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowsPointer:
+    """A record of one input in rows, shape (blocks, warm_up + interval, `LANES`).
+
+    Lanes that the last block has too many repeat the first interval; whole intervals alone are simulated.
+    """
+
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    lanes: int
+    warm_up: int
+    interval: int
+
+
+def row_pointers(record: Dataset, warm_up: int, interval: int) -> RowsPointer:
+    """Lay out the whole intervals of a record."""
+    lanes = (record.samples - warm_up) // interval
+    blocks = -(-lanes // LANES)
+    start = np.zeros(blocks * LANES, np.int64)
+    start[:lanes] = interval * np.arange(lanes)
+    samples = start.reshape(blocks, 1, LANES) + np.arange(warm_up + interval)[:, None]
+    u, y = (_aligned(signal[samples]) for signal in (record.u[:, 0], record.y))
+    return RowsPointer(u, y, lanes, warm_up, interval)
+
+
+def c_source_of_model(regressors: Sequence[Regressor], warm_up: int, interval: int) -> str:
+    """Write the C of an individual's simulation."""
+
+    def sample(channel: int, lag: int) -> str:
+        return f"{'yu'[channel]}[(k - {lag}) * LANES + lane]"
+
+    terms = [
+        f"value += theta_{place} * {infix(item.expression, sample)};" for place, item in enumerate(regressors)
+    ]
+    weights = [f"const double theta_{place} = theta[{place}];" for place in range(len(regressors))]
+    return _TEMPLATE.format(
+        lanes=LANES,
+        warm_up=warm_up,
+        steps=interval,
+        sign=definition(SIGN, SIGN.name),
+        weights="\n    ".join(weights),
+        terms="\n                ".join(terms),
+    )
+
+
+def simulation(
+    regressors: Sequence[Regressor],
+    theta: Sequence[float],
+    rows: RowsPointer,
+    flags: Sequence[str],
+    folder: Path,
+) -> Callable[[], float]:
+    """Compile an individual's simulation; calling it returns the squared error, summed.
+
+    Raises
+    ------
+    ModelError
+        There is no compiler, or it refuses.
+    """
+    library = compile_model(c_source_of_model(regressors, rows.warm_up, rows.interval), flags, folder)
+    squared = _aligned(np.zeros((len(rows.u), LANES)))
+    arrays = (np.array(theta), _aligned(np.zeros(rows.u.shape[1:])), squared)
+    weights, y, error = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
+    u, measured = (array.ctypes.data_as(ctypes.c_void_p) for array in (rows.u, rows.y))
+    blocks = ctypes.c_long(len(rows.u))
+    simulate = library.simulate
+    simulate.restype = None
+
+    def call() -> float:
+        simulate(u, measured, blocks, weights, y, error)
+        # Named here, the arrays live as long as the function that writes into them.
+        return float(arrays[2].reshape(-1)[: rows.lanes].sum())
+
+    return call
+
+
+def _aligned(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Copy values to where a line of the cache begins: a vector across two lines costs two loads."""
+    room = np.empty(values.nbytes + 64, np.uint8)
+    begin = -room.ctypes.data % 64
+    copy = room[begin : begin + values.nbytes].view(np.float64).reshape(values.shape)
+    copy[:] = values
+    return copy

@@ -1,0 +1,104 @@
+"""The yardstick: what a good programmer writes in plain numpy, and no more.
+
+Stacked columns, forward selection by modified Gram-Schmidt as in the textbook, lstsq, and a Python loop over
+the steps of a shooting interval on vectors of all intervals. Expressions are Python functions, made once for
+an individual: walking trees in the loop would double its time and flatter whatever stands beside it.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.model.regressor import Regressor
+from islands.performance.benchmark.expression_source import infix
+
+Vector = NDArray[np.float64]
+
+#: Of forward selection: so small that nearly every regressor has its turn.
+TOLERANCE = 1e-9
+
+
+def evaluate(
+    regressors: Sequence[Regressor],
+    theta: Sequence[float],
+    record: Dataset,
+    warm_up: int,
+    interval: int,
+    pruned: bool,
+) -> tuple[NDArray[np.floating[Any]], float]:
+    """Evaluate an individual of one input.
+
+    What forward selection chooses and lstsq estimates is left aside, here as in our own side: so both
+    simulate the same model, with the parameters given.
+
+    Returns
+    -------
+    estimated : ndarray, shape (terms,)
+        By least squares.
+    squared_error : float
+        Summed over all whole intervals.
+    """
+    matrix, target = columns(regressors, record, warm_up), record.y[warm_up:]
+    if pruned:
+        select(matrix, target)
+    estimated = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    return estimated, simulate(regressors, theta, record, warm_up, interval)
+
+
+def columns(regressors: Sequence[Regressor], record: Dataset, warm_up: int) -> NDArray[np.float64]:
+    """Return the regressor matrix, shape (samples - warm_up, terms)."""
+    signals = {"y": record.y, "u": record.u[:, 0]}
+    first, end = warm_up, record.samples
+    parts = [
+        _function(item, "y, u", lambda name, lag: f"{name}[{first - lag}:{end - lag}]")(**signals)
+        for item in regressors
+    ]
+    return np.column_stack([np.broadcast_to(part, end - first) for part in parts])
+
+
+def select(matrix: NDArray[np.float64], target: Vector, tolerance: float = TOLERANCE) -> list[int]:
+    """Return the columns in the order of their error reduction ratio, by modified Gram-Schmidt."""
+    matrix, energy = matrix.copy(), target @ target
+    selected: list[int] = []
+    left = list(range(matrix.shape[1]))
+    while left:
+        ratios = [(matrix[:, j] @ target) ** 2 / (matrix[:, j] @ matrix[:, j]) / energy for j in left]
+        best = int(np.argmax(ratios))
+        if not ratios[best] > tolerance:
+            break
+        chosen = left.pop(best)
+        selected.append(chosen)
+        w = matrix[:, chosen]
+        norm = w @ w
+        for j in left:
+            matrix[:, j] -= (w @ matrix[:, j]) / norm * w
+    return selected
+
+
+def simulate(
+    regressors: Sequence[Regressor], theta: Sequence[float], record: Dataset, warm_up: int, interval: int
+) -> float:
+    """Simulate all whole intervals together; return the squared error, summed."""
+    terms = [
+        (weight, _function(item, "y, u, k", lambda name, lag: f"{name}[k-{lag}]"))
+        for weight, item in zip(theta, regressors, strict=True)
+    ]
+    lanes = (record.samples - warm_up) // interval
+    samples = (np.arange(lanes) * interval)[None, :] + np.arange(warm_up + interval)[:, None]
+    measured, u = record.y[samples], record.u[:, 0][samples]
+    y = measured.copy()
+    for k in range(warm_up, warm_up + interval):
+        total: Any = 0.0
+        for weight, term in terms:
+            total = total + weight * term(y, u, k)
+        y[k] = total
+    return float(np.sum((y[warm_up:] - measured[warm_up:]) ** 2))
+
+
+def _function(item: Regressor, arguments: str, sample: Callable[[str, int], str]) -> Callable[..., Vector]:
+    source = infix(item.expression, lambda channel, lag: sample("yu"[channel], lag))
+    made: Callable[..., Vector] = eval(f"lambda {arguments}: {source}", {"sign": np.sign})
+    return made

@@ -1,0 +1,132 @@
+"""The whole benchmark, from the record to the report."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from islands.data.dataset import Dataset
+from islands.performance.benchmark import kernel_evaluator
+from islands.performance.benchmark.clock import refuse_threads
+from islands.performance.benchmark.comparison import Comparison, compare
+from islands.performance.benchmark.full_runs import Run, run_in_processes, run_island
+from islands.performance.benchmark.machine import peak, this_machine
+from islands.performance.benchmark.report import BenchmarkReport
+from islands.performance.benchmark.scaling import (
+    against_islands,
+    against_samples,
+    against_terms,
+    against_tree_size,
+)
+from islands.performance.benchmark.workload import (
+    ISLAND,
+    ISLANDS,
+    SAMPLES,
+    benchmark_record,
+    fingerprint,
+    workload,
+)
+
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class BenchmarkSize:
+    """How much is measured.
+
+    Attributes
+    ----------
+    individuals, rounds : int
+        Of every kind, and how often each is measured.
+    scaling : int
+        Individuals at every point of a scaling.
+    generations : int
+        Of the searches that count individuals per second.
+    parallel : int
+        Generations of the searches that compare one process with two.
+    case1 : bool
+        Carry out the whole case 1.
+    """
+
+    individuals: int
+    rounds: int
+    scaling: int
+    generations: int
+    parallel: int
+    case1: bool
+
+
+FULL = BenchmarkSize(30, 3, 7, ISLAND.generations, 100, True)
+QUICK = BenchmarkSize(4, 1, 2, 10, 10, False)
+
+
+def measure(quick: bool, tell: Tell) -> BenchmarkReport:
+    """Carry out the benchmark.
+
+    Parameters
+    ----------
+    tell : callable
+        Is told what is measured, and which share of everything is done.
+
+    Raises
+    ------
+    SettingsError
+        The linear algebra runs in several threads.
+    ModelError
+        Two sides come to different results, or the compiler fails.
+    """
+    refuse_threads()
+    effort = QUICK if quick else FULL
+    tell("record and individuals", 0.0)
+    record = benchmark_record()
+    searched = replace(ISLAND, generations=effort.generations)
+    individuals = workload(record, effort.individuals, searched)
+    state = kernel_evaluator.prepared(record)
+    with TemporaryDirectory() as folder:
+        kinds: dict[str, Comparison] = {}
+        for kind, candidates in individuals.items():
+            told = _part(tell, f"evaluations: {kind}", 0.05 + 0.1 * len(kinds), 0.1)
+            kinds[kind] = compare(candidates, state, effort.rounds, Path(folder), told)
+        peak_flops = peak(Path(folder))
+    scalings = [
+        against_samples(record, effort.scaling, _part(tell, "cost against samples", 0.35, 0.04)),
+        against_terms(state, effort.scaling, _part(tell, "cost against terms", 0.39, 0.04)),
+        against_tree_size(state, effort.scaling, _part(tell, "cost against tree size", 0.43, 0.04)),
+    ]
+    runs = {}
+    for share, samples in ((0.47, SAMPLES), (0.65, SAMPLES // 10)):
+        told = _part(tell, f"search on {samples} samples", share, 0.15)
+        runs[f"n{samples}"] = run_island(record[:samples], searched, 0, told)
+    tell("search in one process, then in two", 0.8)
+    together = _processes(record, effort.parallel)
+    alone, pair = (sum(run.per_second for run in each) for each in together.values())
+    scalings.append(against_islands(together))
+    case1 = None
+    if effort.case1:
+        tell("the whole case 1, two islands in two processes", 0.85)
+        case1, _ = run_in_processes(record, ISLAND, range(ISLANDS))
+    return BenchmarkReport(
+        quick=quick,
+        workload=fingerprint(individuals),
+        samples=record.samples,
+        individuals=effort.individuals,
+        kinds=kinds,
+        peak_flops=peak_flops,
+        runs=runs,
+        case1_wall_s=case1,
+        parallel_efficiency_2=pair / (2.0 * alone),
+        scalings=tuple(scalings),
+        machine=this_machine(),
+    )
+
+
+def _processes(record: Dataset, generations: int) -> dict[int, tuple[Run, ...]]:
+    """Run the same island in one process, and in two at the same time: each has the same work."""
+    settings = replace(ISLAND, generations=generations)
+    return {count: run_in_processes(record, settings, [0] * count, warm=True)[1] for count in (1, 2)}
+
+
+def _part(tell: Tell, text: str, begin: float, share: float) -> Callable[[float], None]:
+    """Tell of a part of the benchmark; what is returned takes the share of the part that is done."""
+    tell(text, begin)
+    return lambda done: tell(text, begin + share * done)

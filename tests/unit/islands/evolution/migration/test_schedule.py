@@ -1,0 +1,144 @@
+"""Schedules: numbers that change over a run, and where epochs end."""
+
+import re
+from itertools import takewhile
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from islands.errors import SettingsError
+from islands.evolution.migration.schedule import Schedule, schedule
+from support.strategies import schedule_text, schedules
+
+END = 70
+
+
+def walked(pieces):
+    """Value and stop of every generation, counted on one's fingers."""
+    begins, since, values, stops = dict(pieces), 0, [], []
+    for generation in range(END):
+        since = 0 if generation in begins else since + 1
+        values.append(begins.get(generation, values[-1] if values else None))
+        if since == values[-1]:
+            since = 0
+        if since == 0 and generation > 0:
+            stops.append(generation)
+    return values, stops
+
+
+def stops_after(read, generation):
+    """The stops that a run meets that goes from one to the next."""
+    while True:
+        generation = read.next_stop(generation)
+        yield generation
+
+
+@given(schedules(least=0))
+def test_a_value_holds_from_where_its_piece_begins(pieces):
+    values, _ = walked(pieces)
+    assert [Schedule(pieces).at(generation) for generation in range(END)] == values
+
+
+@given(schedules())
+def test_a_piece_begins_with_a_stop_and_counts_from_there(pieces):
+    _, stops = walked(pieces)
+    read = Schedule(pieces)
+    assert [generation for generation in range(-1, END) if read.stops_at(generation)] == stops
+    for generation in range(stops[-1]):
+        assert read.next_stop(generation) == next(stop for stop in stops if stop > generation)
+
+
+@given(schedules(), st.integers(0, END))
+def test_stops_do_not_depend_on_where_a_run_was_interrupted(pieces, interrupted):
+    read = Schedule(pieces)
+    never = takewhile(lambda stop: stop < 2 * END, stops_after(read, 0))
+    resumed = takewhile(lambda stop: stop < 2 * END, stops_after(read, interrupted))
+    assert list(resumed) == [stop for stop in never if stop > interrupted]
+
+
+def test_five_and_twenty_from_generation_100_on():
+    read = schedule("5,100:20", 1, "migrate_every")
+    assert [read.at(generation) for generation in (0, 99, 100, 10_000)] == [5, 5, 20, 20]
+    assert list(takewhile(lambda stop: stop <= 140, stops_after(read, 90))) == [95, 100, 120, 140]
+    # An interval that does not end where a piece begins is cut there.
+    assert list(takewhile(lambda stop: stop < 12, stops_after(schedule("4,6:3", 1, "it"), 0))) == [4, 6, 9]
+
+
+@given(schedules(least=0))
+def test_the_text_of_a_schedule_is_read_back(pieces):
+    assert schedule(schedule_text(pieces), 0, "migrants") == Schedule(pieces)
+
+
+@pytest.mark.parametrize(
+    ("text", "pieces"),
+    [
+        (10, ((0, 10),)),
+        ("10", ((0, 10),)),
+        (" 10 ", ((0, 10),)),
+        ("5,100:20", ((0, 5), (100, 20))),
+        (" 5 , 100 : 20 ", ((0, 5), (100, 20))),
+        ("5,1:6,2:7", ((0, 5), (1, 6), (2, 7))),
+        ("7,10:7", ((0, 7), (10, 7))),
+        ("1", ((0, 1),)),
+        ("3,50:1", ((0, 3), (50, 1))),
+        ("999999999,000000100:000000020", ((0, 999_999_999), (100, 20))),
+    ],
+)
+def test_the_forms_of_a_schedule(text, pieces):
+    assert schedule(text, 1, "migrate_every").pieces == pieces
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        *(
+            (
+                text,
+                f"cannot read migrate_every {text!r}: write a whole number, or 5,100:20 for 5, and 20 from",
+            )
+            for text in (
+                *("", " ", "often", -1, "-1", 1.5, "1e2", "1 0", "²"),
+                *("1" * 10, "0" * 9 + "5", "1" * 5000, 10**9, "5,1000000000:2", "5,1:1000000000"),
+                *("5,", ",5", "5,100", "5,100:", "5,:20", "5,100:x", "5,-1:2", "5,10:20:30", "0:5", "5;9:1"),
+            )
+        ),
+        *(
+            (text, f"migrate_every {text!r}: its generations ascend, from 1 on")
+            for text in ("5,0:7", "5,100:20,100:30", "5,100:20,50:30")
+        ),
+        *((text, f"migrate_every is at least 1, got {text!r}") for text in (0, "0", "5,100:0", "0,100:5")),
+    ],
+)
+def test_a_bad_text_is_refused_by_name(text, message):
+    with pytest.raises(SettingsError) as refused:
+        schedule(text, 1, "migrate_every")
+    assert str(refused.value).startswith(message)
+
+
+@pytest.mark.parametrize(("known", "equal"), [(7, 7.0), (1, True), (7, np.float64(7.0))])
+def test_what_equals_a_number_that_was_read_before_is_refused_all_the_same(known, equal):
+    assert known == equal
+    for _ in range(2):
+        assert schedule(known, 1, "migrate_every").pieces == ((0, known),)
+        with pytest.raises(SettingsError, match=f"cannot read migrate_every {re.escape(repr(equal))}: write"):
+            schedule(equal, 1, "migrate_every")
+
+
+def test_the_least_value_is_the_caller_s():
+    assert schedule("0,5:2", 0, "migrants").at(3) == 0
+    with pytest.raises(SettingsError, match="migrants is at least 3, got '3,9:2'"):
+        schedule("3,9:2", 3, "migrants")
+
+
+@given(st.text("0123456789,: -x", max_size=12))
+def test_any_text_is_read_or_refused(text):
+    try:
+        read = schedule(text, 1, "migrate_every")
+    except SettingsError:
+        return
+    begins = [begin for begin, _ in read.pieces]
+    assert begins[0] == 0
+    assert begins == sorted(set(begins))
+    assert all(value >= 1 for _, value in read.pieces)

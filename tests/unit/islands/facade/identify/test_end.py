@@ -1,0 +1,180 @@
+"""How an identification ends: by one of its budgets, by a wish to stop, by an error."""
+
+from dataclasses import replace
+from math import inf, nextafter
+
+import pytest
+
+from islands.errors import SettingsError
+from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.engine import ArchipelagoEpoch
+from islands.evolution.history import HistoryPoint
+from islands.evolution.island import StepInfo
+from islands.evolution.presets import resolve_settings
+from islands.evolution.search_state import SearchState, advance, stop_reason
+from islands.facade.identify import identify
+from support.identifications import BUDGET, Telling, into
+
+
+def told(*best, evaluations=10):
+    return StepInfo(3, evaluations, 4, {"ok": evaluations - 1, "diverged": 1}, dict(best))
+
+
+def test_what_islands_did_in_a_generation_is_gathered():
+    before = SearchState(
+        empty_archipelago(2, 0), 100, 7, {"ok": 100}, (HistoryPoint(2, 100, {1: 9.0}, (9.0, inf)),)
+    )
+    steps = ((told((2, 0.5), (1, 4.0)), told((1, 2.0), (2, 0.5))), (told(), told((3, 1.0), (2, 0.25))))
+    state = advance(before, ArchipelagoEpoch(empty_archipelago(2, 1), steps, {"pairs": (1, 2)}))
+    assert state.archipelago == empty_archipelago(2, 1)
+    assert (state.evaluations, state.duplicates) == (140, 23)
+    assert state.outcomes == {"ok": 136, "diverged": 4}
+    assert state.history == (
+        *before.history,
+        HistoryPoint(3, 120, {1: 4.0, 2: 0.5}, (0.5, inf)),
+        HistoryPoint(3, 140, {1: 2.0, 2: 0.25, 3: 1.0}, (0.5, 0.25)),
+    )
+    assert [list(point.best) for point in state.history] == [[1], [1, 2], [1, 2, 3]]
+    assert state.caches == {"pairs": (1, 2)}
+    assert before.outcomes == {"ok": 100}
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, ""),
+        ({"generations": 7}, "generations"),
+        ({"generations": 6}, "generations"),
+        ({"generations": 8}, ""),
+        ({"max_evaluations": 400}, "evaluations"),
+        ({"max_evaluations": 399}, "evaluations"),
+        ({"max_evaluations": 401}, ""),
+        ({"target_error": 0.5}, "target error"),
+        ({"target_error": nextafter(0.5, 1.0)}, "target error"),
+        ({"target_error": nextafter(0.5, 0.0)}, ""),
+        # Squares of these are no numbers.
+        ({"target_error": 1e200}, "target error"),
+        ({"target_error": 1.7976931348623157e308}, "target error"),
+        ({"target_error": 1e-200}, ""),
+        ({"target_error": 0.5, "max_evaluations": 401}, "target error"),
+        ({"target_error": 0.4, "max_evaluations": 400}, "evaluations"),
+        ({"target_error": 0.5, "max_evaluations": 400, "generations": 7}, "generations"),
+    ],
+)
+def test_a_search_has_ended_when_one_of_its_budgets_is_used_up(changes, expected):
+    """The error is that of the best island, in the output's unit, as it is now."""
+    archipelago = Archipelago(
+        tuple(replace(island, generation=7) for island in empty_archipelago(2, 0).islands)
+    )
+    history = (HistoryPoint(6, 350, {3: 0.3}, (inf, 0.3)), HistoryPoint(7, 400, {3: 0.25}, (inf, 0.25)))
+    state = SearchState(archipelago, 400, history=history)
+    assert stop_reason(state, resolve_settings("narx", changes)) == expected
+
+
+@pytest.mark.parametrize("target", [0.0, 1.0, 1.7976931348623157e308])
+def test_a_search_has_not_ended_before_anybody_has_a_model(target):
+    settings = resolve_settings("narx", {"target_error": target, "max_evaluations": 1, "generations": 0})
+    assert stop_reason(SearchState(empty_archipelago(2, 0)), settings) == ""
+    waiting = SearchState(empty_archipelago(2, 0), history=(HistoryPoint(0, 0, {}, (inf, inf)),))
+    assert stop_reason(waiting, replace(settings, generations=1)) == ""
+
+
+def test_an_exact_model_meets_every_target_and_without_a_target_none():
+    exact = SearchState(empty_archipelago(1, 0), history=(HistoryPoint(0, 0, {1: 0.0}, (0.0,)),))
+    assert stop_reason(exact, resolve_settings("narx", {"target_error": 1e-9})) == "target error"
+    assert stop_reason(exact, resolve_settings("narx", {"target_error": 0.0})) == ""
+
+
+@pytest.mark.parametrize(
+    "budget", [*(pytest.param(each, marks=pytest.mark.ci) for each in (1, 30, 151)), 31, 91]
+)
+def test_a_search_ends_with_the_first_epoch_that_reaches_its_evaluations(data, states, budget):
+    seen = []
+    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, progress=into(seen))
+    last = next((place for place, state in enumerate(states) if state.evaluations >= budget), 4)
+    assert seen == states[: last + 1]
+    search = found.findings.search
+    assert search.evaluations == states[last].evaluations
+    assert search.ended_by == ("generations" if last == 4 else "evaluations")
+    assert found.findings.settings["max_evaluations"] == budget
+
+
+@pytest.mark.parametrize("place", [0, 2, 4])
+def test_a_search_ends_with_the_first_epoch_that_reaches_its_error(data, states, place):
+    seen = []
+    target = nextafter(min(states[place].history[-1].islands) ** 0.5, inf)
+    found = identify(data, **BUDGET, target_error=target, seed=5, progress=into(seen))
+    last = next(at for at, state in enumerate(states) if min(state.history[-1].islands) <= target**2)
+    assert last <= place
+    assert seen == states[: last + 1]
+    assert found.findings.search.ended_by == ("generations" if last == 4 else "target error")
+    assert found.findings.search.history == states[last].history
+
+
+def test_a_budget_that_is_reached_within_an_epoch_ends_with_it(data, states):
+    """Every epoch is one that a longer run has too: nobody is cut off in the middle."""
+    seen = []
+    changes = {**BUDGET, "migrate_every": 3, "max_evaluations": 31}
+    found = identify(data, **changes, seed=5, progress=into(seen))
+    assert [state.evaluations for state in seen] == [30, 120]
+    assert seen[-1].history == states[3].history
+    assert (found.findings.search.generations, found.findings.search.ended_by) == (3, "evaluations")
+
+
+def test_a_search_that_ends_early_leaves_its_engine(data):
+    engine = Telling()
+    identify(data, **BUDGET, max_evaluations=60, seed=5, engine=engine)
+    assert (len(engine.epochs), engine.left) == (2, True)
+
+
+def test_a_search_that_fails_leaves_its_engine(data):
+    def broken(_state, _settings):
+        raise ZeroDivisionError
+
+    engine = Telling()
+    with pytest.raises(ZeroDivisionError) as failed:
+        identify(data, **BUDGET, seed=5, engine=engine, progress=broken)
+    # At once, and not when the error's trace is forgotten.
+    assert (len(engine.epochs), engine.left) == (1, True), failed
+
+
+def test_a_search_that_is_stopped_keeps_its_last_epoch(data, states):
+    seen = []
+    found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 2)
+    assert seen == states[:2]
+    assert found.findings.search.ended_by == "stopped"
+    assert found.findings.search.generations == 1
+    assert found.findings.search.history == states[1].history
+
+
+def test_a_search_that_is_stopped_within_an_epoch_keeps_the_one_before(data, states):
+    asked = []
+
+    def stop():
+        asked.append(True)
+        return len(asked) > 6
+
+    seen = []
+    found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, progress=into(seen), stop=stop)
+    assert seen == states[:1]
+    assert (found.findings.search.generations, found.findings.search.ended_by) == (0, "stopped")
+    # It goes on from there as if never stopped.
+    go_on = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, start=seen[-1])
+    assert go_on.findings.search.history == states[-1].history
+
+
+def test_a_search_that_is_stopped_after_its_last_epoch_has_ended(data, states):
+    seen = []
+    found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 5)
+    assert seen == states
+    assert found.findings.search.ended_by == "generations"
+
+
+def test_a_search_that_is_stopped_before_its_first_population_is_refused(data):
+    with pytest.raises(SettingsError, match="stopped before the first populations were evaluated"):
+        identify(data, **BUDGET, progress=pytest.fail, stop=lambda: True)
+
+
+def test_a_state_is_that_of_an_archipelago():
+    with pytest.raises(TypeError, match="archipelago"):
+        SearchState()

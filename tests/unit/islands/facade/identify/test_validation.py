@@ -1,0 +1,182 @@
+"""What an identification takes and refuses: validation data, presets, constraints, settings."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.data.split import split
+from islands.errors import RecordError, SettingsError
+from islands.estimation.estimate import estimate
+from islands.evolution.presets import PRESETS, resolve_settings
+from islands.evolution.problem import problem
+from islands.facade.identify import identify
+from islands.simulation.predictors import free_run
+from islands.validation.metrics import metrics
+from islands.validation.physics import check_physics
+from support.identifications import BUDGET, parameters, record, two_inputs
+from support.searches import distinct_genes
+
+
+def test_validation_may_be_a_record_of_its_own(data, result):
+    parts = split(data, 0.25)
+    own = identify(parts.estimation, parts.validation, **BUDGET, seed=5)
+    assert parameters(own) == parameters(result)
+    assert own.findings.split.validation is parts.validation
+    elsewhere = identify(parts.estimation, record(seed=9), **BUDGET, seed=5)
+    assert own.findings.settings["validation"] != elsewhere.findings.settings["validation"]
+    assert elsewhere.findings.search.history == result.findings.search.history
+
+
+def test_validation_data_never_reaches_the_search(data, result):
+    """Only which models are kept, and in which order, may depend on it."""
+    parts = split(data, 0.25)
+    spoilt = replace(parts.validation, y=parts.validation.y[::-1].copy())
+    other = identify(parts.estimation, spoilt, **BUDGET, seed=5)
+    assert other.findings.search.history == result.findings.search.history
+    assert other.findings.search.outcomes == result.findings.search.outcomes
+    assert parameters(other) != parameters(result)
+
+
+@pytest.mark.parametrize(
+    ("seed", "changes"),
+    # Pruned as hard as that, hardly a seed outlives the first generation: it is a candidate all the same.
+    [(0, {}), (1, {}), (1, {"prune": 1.0, "tolerance": 0.05})],
+)
+def test_a_result_is_never_worse_than_the_forward_selection_that_seeds_it(seed, changes):
+    """On the validation data, size for size, whatever the budget."""
+    data = record(seed=seed)
+    parts = split(data, 0.25)
+    budget = {**BUDGET, "population": 8, "generations": 1, **changes}
+    settings = resolve_settings("hysteresis", budget)
+    found = identify(data, **budget, seed=seed)
+    errors = {fitted.model.size: fitted.metrics["validation"]["free_run"].rmse for fitted in found.models}
+    compared = 0
+    for genes in problem(parts.estimation, settings).seeds:
+        seeded = estimate(distinct_genes(genes), parts.estimation, "hysteresis", settings.maximum_lag).model
+        simulated = free_run(seeded, parts.validation, settings.maximum_lag)
+        if simulated.outcome and check_physics(seeded, parts.estimation).property_1:
+            compared += 1
+            assert errors[seeded.size] <= metrics(parts.validation.y, simulated.y).rmse * (1 + 1e-12)
+    assert compared >= 3
+
+
+def test_refinement_takes_nothing_away(data):
+    """Refined models stand beside those that were estimated: validation chooses."""
+    plain, refined = (identify(data, **BUDGET, seed=5, refine=refine) for refine in (False, True))
+    assert plain.findings.search.history == refined.findings.search.history
+    errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in refined.models}
+    for fitted in plain.models:
+        assert errors[fitted.model.size] <= fitted.metrics["validation"]["free_run"].rmse
+    assert min(errors.values()) < 0.999 * plain.best.metrics["validation"]["free_run"].rmse
+
+
+def test_without_a_constraint_models_need_no_property_1(data):
+    found = identify(data, **BUDGET, constraints="none", structure="free")
+    assert any(not fitted.physics.property_1 for fitted in found.models)
+
+
+def test_two_inputs_and_segments_are_identified():
+    one, other = record(1200, seed=1), record(1200, seed=2)
+    rng = np.random.default_rng(3)
+    u2 = np.cumsum(rng.normal(size=2400)) / 50
+    y = np.concatenate([one.y, other.y])
+    data = Dataset(
+        np.column_stack([np.concatenate([one.u, other.u])[:, 0], u2]), y, 1e-2, segments=(1200, 1200)
+    )
+    found = identify(data, two_inputs(seed=4), **{**BUDGET, "generations": 2})
+    assert found.best.model.inputs == 2
+    assert found.findings.record.segments == (1200, 1200)
+    assert found.best.metrics["validation"]["free_run"].mape < 2.0
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_runs_on_a_small_budget(data, preset):
+    found = identify(data[:1500], preset=preset, population=12, generations=1, max_terms=4)
+    assert found.findings.settings["preset"] == preset
+    search = found.findings.search
+    assert search.evaluations == 24
+    assert search.feasible_share == sum(search.outcomes.get(name, 0) for name in ("ok", "abandoned")) / 24
+    assert all(fitted.model.size <= 4 for fitted in found.models)
+
+
+# Messages before the search, not after it.
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"preset": "hystersis"}, "unknown preset 'hystersis': take one of paper-case1"),
+        ({"populatoin": 3}, "unknown setting 'populatoin': take one of population, generations"),
+        ({"population": 0}, "population is at least 1, got 0"),
+        ({"generations": -1}, "generations is at least 0, got -1"),
+        ({"max_terms": 0}, "max_terms is at least 1, got 0"),
+        ({"max_height": -1}, "max_height is at least 0, got -1"),
+        ({"shooting": 0}, "shooting is at least 1, got 0"),
+        ({"primitives": ["mul", "gamma"]}, "unknown primitive 'gamma': take one of mul, sub"),
+        ({"constraints": "physics"}, "unknown constraints 'physics': take one of none, hysteresis"),
+        ({"islands": 0}, "islands is at least 1, got 0"),
+        ({"topology": "rong"}, "unknown topology 'rong': take one of isolated, ring"),
+        ({"characters": ["plain", "lazy"]}, "unknown character 'lazy': take one of plain, explorer"),
+        ({"migrate_every": "5,3:2,3:1"}, "its generations ascend, from 1 on"),
+        ({"islands": 4, "migrants": 301}, "301 individuals would arrive on an island of 300"),
+        ({"target_error": -1.0}, "target_error is a number and not negative, got -1.0"),
+        ({"seed": -1}, "a seed is not negative, got -1"),
+        ({"validation": 1.5}, "the validation fraction lies between 0 and 1, got 1.5"),
+    ],
+)
+def test_a_bad_budget_is_refused_by_name(data, changes, message):
+    with pytest.raises(SettingsError, match=message):
+        identify(data, progress=pytest.fail, **changes)
+
+
+def test_records_that_are_too_short_are_refused_before_the_search(data):
+    with pytest.raises(RecordError, match="the validation data has 20 samples: with lags down to"):
+        identify(data, data[:20], progress=pytest.fail, **BUDGET)
+    with pytest.raises(RecordError, match="the validation data has 25 samples"):
+        identify(data[:100], progress=pytest.fail, **BUDGET)
+    with pytest.raises(RecordError, match="take a longer recording"):
+        identify(data[:20], data, progress=pytest.fail, **BUDGET)
+
+
+def test_validation_data_of_another_system_is_refused(data):
+    with pytest.raises(RecordError, match="the validation data 2"):
+        identify(data, two_inputs(seed=1), progress=pytest.fail)
+    with pytest.raises(RecordError, match="resample one of them"):
+        identify(data, replace(data, dt=0.5), progress=pytest.fail)
+
+
+def test_where_no_model_is_found_the_outcomes_say_why():
+    """What grows by 5 % a sample while it is measured runs out of all bounds on a longer record."""
+    u = np.random.default_rng(0).normal(size=1000)
+    growing = Dataset(u[:150], 1.05 ** np.arange(150.0), 0.1)
+    with pytest.raises(SettingsError, match=r"no model was found: \{'ok': 1\}; take another preset, more"):
+        identify(
+            growing,
+            Dataset(u, np.sin(np.arange(1000.0)), 0.1),
+            preset="narx",
+            population=1,
+            generations=0,
+            max_terms=3,
+            library_degree=1,
+            library_lags=1,
+        )
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"max_terms": 1}, {"initial_terms": (1, 1)}),
+        ({"max_terms": 3}, {"initial_terms": (1, 3)}),
+        ({"max_terms": 100}, {"initial_terms": (1, 10)}),
+        ({"max_terms": 3, "initial_terms": (2, 2)}, {"initial_terms": (2, 2)}),
+        ({"max_height": 1}, {"initial_height": 1}),
+        ({"max_height": 0}, {"initial_height": 0}),
+        ({"max_height": 9}, {"initial_height": 3}),
+    ],
+)
+def test_smaller_models_begin_smaller(changes, expected):
+    made = asdict(resolve_settings("paper-case1", changes))
+    assert {name: made[name] for name in expected} == expected
+    assert {name: made[name] for name in changes} == changes

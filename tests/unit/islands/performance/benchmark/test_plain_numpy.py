@@ -1,0 +1,70 @@
+"""The yardstick does the same work as ours: same columns, same selection, same estimate, same error."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from islands.estimation.froe import froe
+from islands.model.expression import Lagged
+from islands.model.model import Model
+from islands.performance.benchmark import plain_numpy
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix
+from islands.simulation.predictors import multiple_shooting
+
+WARM_UP, INTERVAL = 26, 20
+
+
+def test_columns_are_those_of_the_regressor_matrix(record, candidates):
+    for each in candidates:
+        matrix = plain_numpy.columns(each.regressors, record, WARM_UP)
+        assert_allclose(matrix, regressor_matrix(each.regressors, record, WARM_UP).T, rtol=1e-12, atol=1e-300)
+
+
+def test_the_simulation_is_that_of_multiple_shooting(record, candidates):
+    predicted = record.samples - WARM_UP
+    for each in candidates:
+        model = Model(each.regressors, each.theta)
+        expected = multiple_shooting(model, record, INTERVAL, WARM_UP).mean_squared_error * predicted
+        error = plain_numpy.simulate(each.regressors, each.theta, record, WARM_UP, INTERVAL)
+        assert error == pytest.approx(expected, rel=1e-10)
+
+
+def test_an_interval_that_is_not_whole_is_left_out(record, candidates):
+    one = candidates[0]
+    whole = plain_numpy.simulate(
+        one.regressors, one.theta, record[: WARM_UP + 2 * INTERVAL], WARM_UP, INTERVAL
+    )
+    cut = plain_numpy.simulate(
+        one.regressors, one.theta, record[: WARM_UP + 3 * INTERVAL - 1], WARM_UP, INTERVAL
+    )
+    assert cut == whole
+
+
+def test_the_selection_is_that_of_froe(record, candidates):
+    for each in candidates[:3]:
+        matrix = plain_numpy.columns(each.regressors, record, WARM_UP)
+        gram = gram_matrix([*each.regressors, Lagged(0, 0)], record, WARM_UP)
+        for tolerance in (0.0, 1e-7, 1e-3):
+            selected = plain_numpy.select(matrix, record.y[WARM_UP:], tolerance)
+            assert tuple(selected) == froe(gram, tolerance).order
+        assert 0 < len(selected) < len(each.regressors)
+
+
+def test_selection_leaves_the_matrix_as_it_was(record, candidates):
+    matrix = plain_numpy.columns(candidates[0].regressors, record, WARM_UP)
+    before = matrix.copy()
+    plain_numpy.select(matrix, record.y[WARM_UP:])
+    assert (matrix == before).all()
+
+
+@pytest.mark.parametrize("pruned", [False, True])
+def test_an_evaluation_estimates_by_least_squares_and_simulates_the_parameters_given(
+    record, candidates, pruned
+):
+    one = candidates[0]
+    estimated, error = plain_numpy.evaluate(one.regressors, one.theta, record, WARM_UP, INTERVAL, pruned)
+    psi = regressor_matrix(one.regressors, record, WARM_UP)
+    residual = record.y[WARM_UP:] - estimated @ psi
+    # The residual is orthogonal to every regressor.
+    assert np.abs(psi @ residual).max() < 1e-8 * np.linalg.norm(record.y) * np.linalg.norm(psi, axis=1).max()
+    assert error == plain_numpy.simulate(one.regressors, one.theta, record, WARM_UP, INTERVAL)

@@ -1,0 +1,73 @@
+"""The simulations in trials: what each can name, the model that is identified, and the oracle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.discrepancy.diagnosis import Diagnosis, diagnose
+from islands.performance.trials.cases import CORES, identify_actuator
+from islands.performance.trials.injection.measurement import inject
+from islands.performance.trials.injection.piezo import PIEZO
+from islands.performance.trials.oracle import share_of_gain
+from islands.simulation.predictors import free_run
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_what_is_hidden_is_what_a_simulation_can_name(name: str) -> None:
+    simulated = CORES[name]
+    system = simulated.system
+    hiding = inject([], np.random.default_rng(4), system.seconds / 3, system=system, apart=simulated.apart)
+    core = simulated.made(hiding)
+    scene = make_context(hiding.record, core, count_fitted_samples(hiding.record))
+    found = {effect.name.partition(":")[0] for effect in select_effects(core, scene, simulated.tolerance)}
+    assert set(simulated.nameable) == found & set(system.known)
+    assert set(simulated.nameless) == (set(system.known) - found) | set(system.unknown)
+
+
+def test_an_identified_model_follows_a_clean_record() -> None:
+    """It is another model than the truth: what it lacks is within the size of the noise."""
+    hiding = inject([], np.random.default_rng(4), 40.0)
+    record = hiding.record
+    alone = type(record)(u=record.u[:, :1], y=record.y, dt=record.dt)
+    model = identify_actuator(alone[:3000])
+    missed = (free_run(model, alone).y - record.y)[model.maximum_lag :]
+    assert np.std(missed[:3000]) < 1.5 * hiding.sigma
+    assert np.std(missed[3000:]) < 2.5 * hiding.sigma
+    assert model.size == 8
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    hiding = inject(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), apart=False)
+    return diagnose(hiding.record, CORES["column"].made(hiding))
+
+
+def test_who_finds_the_name_gains_what_the_oracle_gains(found: Diagnosis) -> None:
+    assert [effect.name for effect in found.effects] == ["even-nonlinearity"]
+    assert share_of_gain(found, ["even-nonlinearity"], {}) == pytest.approx(1.0, abs=0.02)
+
+
+def test_who_finds_nothing_gains_nothing(found: Diagnosis) -> None:
+    silent = replace(found, best=found.base)
+    assert share_of_gain(silent, ["even-nonlinearity"], {}) == 0.0
+
+
+def test_an_oracle_without_a_name_or_without_a_gain_is_none(found: Diagnosis) -> None:
+    assert share_of_gain(found, ["delay"], {}) is None
+    assert share_of_gain(found, ["periodic-disturbance"], {}) is None
+
+
+@pytest.mark.ci
+def test_two_names_are_told_one_after_the_other() -> None:
+    hiding = inject(
+        ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), apart=False
+    )
+    found = diagnose(hiding.record, CORES["column"].made(hiding))
+    share = share_of_gain(found, ["offset", "even-nonlinearity"], {})
+    assert share == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_piezos_core_is_given_what_is_stated() -> None:
+    assert CORES["bouc-wen-piezo"].tolerance == {name: 2 * far for name, far in PIEZO.spread.items()}

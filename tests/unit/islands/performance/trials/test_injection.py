@@ -1,0 +1,166 @@
+"""What hides effects: solved right, hidden in the band that was asked for, and the same each time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy
+
+from islands.performance.trials.injection import force_faults, measurement
+from islands.performance.trials.injection.measurement import SCALE, FaultyRecord, inject
+from islands.performance.trials.injection.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
+from islands.performance.trials.injection.piezo import PIEZO, Piezo
+from islands.performance.trials.injection.plant import Force, simulate_plant
+from islands.performance.trials.injection.rig import Rig
+from islands.performance.trials.injection.tanks import TANKS, Tanks
+
+#: Every system, with a record that is quickly made.
+SYSTEMS = {"piezo": (PIEZO, 5.0), "oscillator": (OSCILLATOR, 4.0), "tanks": (TANKS, 2048.0)}
+
+
+def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> FaultyRecord:
+    which, seconds = SYSTEMS[system]
+    return inject(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("variant", [False, True], ids=["usual", "variant"])
+@pytest.mark.parametrize("system", ["piezo", "tanks", "oscillator"])
+def test_every_effect_can_be_hidden_in_a_band(system: str, variant: bool) -> None:
+    for name in SYSTEMS[system][0].known:
+        found = hidden(system, name, band=(0.3, 2.0), variant=variant)
+        assert 0.3 <= found.misfit <= 2.0, name
+        assert np.isfinite(found.record.y).all(), name
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_causes_without_a_name_are_seen(system: str) -> None:
+    for name in SYSTEMS[system][0].unknown:
+        assert hidden(system, name).misfit > 0.5, name
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_the_same_seed_hides_the_same(system: str) -> None:
+    first, again, other = (hidden(system, "jump", "delay", seed=seed) for seed in (5, 5, 6))
+    assert np.array_equal(first.record.y, again.record.y)
+    assert not np.array_equal(first.record.u, other.record.u)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_where_nothing_is_hidden_there_is_noise_alone(system: str) -> None:
+    found = hidden(system, apart=False)
+    left = found.record.y - found.nominal
+    assert found.misfit == 0.0
+    assert np.std(left) == pytest.approx(found.sigma, rel=0.1)
+    assert np.std(hidden(system).record.y - found.nominal) > 1.1 * found.sigma
+
+
+def test_what_tolerances_allow_is_no_misfit() -> None:
+    """Of a gain only what no admissible parameters can take up is left."""
+    gain = PIEZO.known["sensor-gain"]
+    small, large = (
+        replace(PIEZO, known={"sensor-gain": replace(gain, least=k, most=k)}) for k in (0.015, 0.08)
+    )
+    allowed, off, in_full = (
+        inject(["sensor-gain"], np.random.default_rng(3), 12.0, system=system, apart=apart)
+        for system, apart in ((small, True), (large, True), (small, False))
+    )
+    assert allowed.misfit < 0.05
+    assert off.misfit > 1.0
+    assert in_full.misfit > 1.0
+
+
+def test_what_is_hidden_beside_a_gain_keeps_its_misfit() -> None:
+    assert hidden("piezo", "sensor-gain", "periodic-disturbance", band=(2.0, 3.0)).misfit > 2.0
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        *(pytest.param(each, marks=pytest.mark.ci) for each in (force_faults.cube, force_faults.drag)),
+        force_faults.hysteresis,
+        None,
+    ],
+)
+def test_the_oscillator_is_solved(force: object) -> None:
+    rng = np.random.default_rng(2)
+    made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
+    truth = Oscillator(beside=made)
+    drive = OSCILLATOR.drive(rng, 2.0)
+    y = simulate_plant(truth, drive)
+
+    def slope(t: float, state: np.ndarray) -> list[float]:
+        x, v, z = state
+        strength, change = made[0](x / OUTPUT, v / SPEED, z) if made else (0.0, 0.0)
+        u = np.interp(t, drive.time, drive.u)
+        total = u + truth.k * OUTPUT * strength - truth.c * v - truth.k * x
+        return [v, total / truth.m, change * v / OUTPUT]
+
+    ideal = scipy.integrate.solve_ivp(
+        slope, (0.0, drive.time[-1]), [0.0, 0.0, 0.0], t_eval=drive.time, max_step=5e-4, rtol=1e-6
+    ).y[0]
+    assert np.max(np.abs(y - ideal)) < 2e-3 * np.max(np.abs(y))
+
+
+def test_the_tanks_are_solved() -> None:
+    drive = TANKS.drive(np.random.default_rng(2), 800.0)
+    truth = Tanks(leaks=(0.002, 0.001), inflows=(0.01, -0.005))
+
+    def slope(t: float, x: np.ndarray) -> list[float]:
+        fallen = truth.k1 * np.sqrt(x[0]) + 0.002 * x[0]
+        filled = truth.k4 * np.interp(t, drive.time, drive.u)
+        return [filled + 0.01 - fallen, fallen - 0.005 - truth.k3 * np.sqrt(x[1]) - 0.001 * x[1]]
+
+    ideal = scipy.integrate.solve_ivp(
+        slope, (0.0, drive.time[-1]), truth.start, t_eval=drive.time, max_step=1.0, rtol=1e-8
+    ).y[1]
+    assert np.max(np.abs(simulate_plant(truth, drive) - ideal)) < 1e-3
+
+
+def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
+    drive = TANKS.drive(np.random.default_rng(2), 4096.0)
+    free = simulate_plant(Tanks(), drive)
+    lower = simulate_plant(Tanks(below=(0.0, 0.2)), drive)
+    lost, caught = (simulate_plant(Tanks(below=(0.3, 0.0), spilled=part), drive) for part in (0.0, 1.0))
+    assert lower.max() == pytest.approx(0.8 * free.max())
+    assert lost.max() < free.max()
+    assert caught.mean() > lost.mean()
+
+
+def test_a_gain_that_changes_shows_behind_its_instant() -> None:
+    for system, truth in ((PIEZO, Piezo()), (OSCILLATOR, Oscillator()), (TANKS, Tanks())):
+        drive = system.drive(np.random.default_rng(2), 0.3 * system.seconds)
+        half = float(drive.time[-1]) / 2
+        changed = simulate_plant(
+            replace(truth, gain=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive
+        )
+        moved = np.abs(changed - simulate_plant(truth, drive)) > 1e-9
+        assert not moved[: moved.size // 2].any()
+        assert moved[moved.size // 2 + 10 :].mean() > 0.9
+
+
+def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
+    def scales(system: Rig) -> set[str]:
+        return set(system.known) & set(SCALE)
+
+    assert scales(PIEZO) == set(SCALE)
+    assert not scales(OSCILLATOR) | scales(TANKS)
+
+
+def test_a_misfit_that_no_strength_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measurement, "_RECORDS", 2)
+    with pytest.raises(ValueError, match=r"delay cannot be hidden with a misfit within"):
+        inject(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
+
+
+@pytest.mark.ci
+def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
+
+    def hidden_peak() -> FaultyRecord:
+        return inject(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))
+
+    assert 0.3 <= hidden_peak().misfit <= 2.0
+    monkeypatch.setattr(measurement, "_RECORDS", 1)
+    with pytest.raises(ValueError, match="cannot be hidden"):
+        hidden_peak()

@@ -1,0 +1,172 @@
+"""The tally of trials: what is counted, and its bounds."""
+
+import pytest
+
+from islands.performance.trials.scoring import (
+    Proportion,
+    Statistic,
+    calibration_error,
+    confusion,
+    reliability,
+    score,
+)
+from islands.performance.trials.targets import EXACT, IDENTIFIED
+from islands.performance.trials.trial import Trial, TrialOutcome
+
+
+def outcome(
+    hidden: tuple[str, ...], named: tuple[str, ...], misfit: float = 1.5, **said: object
+) -> TrialOutcome:
+    verdict = said.pop("verdict", "named" if named else "nothing")
+    sets = said.pop("equivalents", ((),) * len(named))
+    sure, gain = said.pop("confidence", 0.9), said.pop("gain_share", None)
+    form = said.pop("form", False)
+    assert not said
+    return TrialOutcome(Trial(hidden, 1), misfit, str(verdict), named, (), sets, named[:1], sure, gain, form)  # type: ignore[arg-type]
+
+
+def counted(*outcomes: TrialOutcome) -> dict[str, tuple[int, int]]:
+    rows = score(outcomes, ["ripple"])
+    return {row.name: (row.count, row.of) for row in rows if isinstance(row, Proportion)}
+
+
+def measured(*outcomes: TrialOutcome) -> dict[str, Statistic]:
+    return {row.name: row for row in score(outcomes, ["ripple"]) if isinstance(row, Statistic)}
+
+
+def test_everything_is_counted_where_it_belongs() -> None:
+    found = counted(
+        outcome(("delay",), ("delay",)),
+        outcome(("delay",), ("jump",), equivalents=(("delay",),)),
+        outcome(("jump",), ()),
+        outcome(("jump",), (), misfit=0.5),
+        outcome(("jump",), ("jump",), misfit=0.5),
+        outcome(("jump",), (), misfit=0.1),
+        outcome(("jump",), ("offset",), misfit=0.1),
+        outcome(("jump",), (), misfit=0.01),
+        outcome((), ()),
+        outcome((), ("offset",)),
+        outcome(("delay", "jump"), ("jump", "delay")),
+        outcome(("delay", "jump"), ("jump",)),
+        outcome(("ripple",), ("jump",)),
+        outcome(("ripple",), (), verdict="unknown"),
+        outcome(("ripple", "jump"), ("jump",)),
+    )
+    assert found == {
+        "detected, misfit 0.05 to 0.2 sigma": (1, 2),
+        "detected, misfit 0.2 to 1 sigma": (1, 2),
+        "detected, misfit > 1 sigma": (2, 3),
+        "named first, where detected": (2, 3),
+        "among the first three, where detected": (2, 3),
+        "family, where detected": (2, 3),
+        "truth within the reported set": (3, 3),
+        "false names on clean records": (1, 2),
+        "pairs exact": (1, 2),
+        "triples exact": (0, 0),
+        "unknown causes silently misnamed": (2, 3),
+    }
+
+
+def test_that_the_form_of_a_model_is_wrong_is_neither_a_name_nor_a_detection() -> None:
+    found = counted(
+        outcome((), (), verdict="named", form=True),
+        outcome(("jump",), (), verdict="named", form=True),
+        outcome(("jump",), ("jump",), form=True),
+        outcome(("delay", "jump"), ("jump", "delay"), form=True),
+        outcome(("ripple",), (), verdict="named", form=True),
+    )
+    assert found["false names on clean records"] == (0, 1)
+    assert found["detected, misfit > 1 sigma"] == (1, 2)
+    assert found["named first, where detected"] == (1, 1)
+    assert found["pairs exact"] == (1, 1)
+    assert found["unknown causes silently misnamed"] == (0, 1)
+
+
+def test_a_reported_set_has_a_size_where_there_is_a_name() -> None:
+    found = measured(
+        outcome(("delay",), ("delay",)),
+        outcome(("delay",), ("jump",), equivalents=(("delay", "viscous"),)),
+        outcome(("jump",), (), verdict="unknown"),
+    )["names in the reported set, mean"]
+    assert (found.value, found.of) == (2.0, 2)
+
+
+def test_shares_of_the_oracles_gain_are_those_of_what_was_detected() -> None:
+    found = measured(
+        *(outcome(("delay",), ("delay",), gain_share=share / 10) for share in range(11)),
+        outcome(("delay",), ("delay",)),
+        outcome(("delay",), (), gain_share=0.0),
+        outcome(("delay",), ("delay",), misfit=0.1, gain_share=0.0),
+    )
+    median, tenth = (
+        found["share of the oracle's gain, median"],
+        found["share of the oracle's gain, 10th percentile"],
+    )
+    assert (median.value, median.of, tenth.value) == (0.5, 11, pytest.approx(0.1))
+    assert median.kept is False
+
+
+def test_confidences_are_held_against_frequencies() -> None:
+    """Of four names said with 0.95 three are right, of two with 0.55 one; a name for nothing is wrong."""
+    outcomes = [
+        *[outcome(("delay",), ("delay",), confidence=0.95)] * 3,
+        outcome((), ("offset",), confidence=0.95),
+        outcome(("delay",), ("delay",), confidence=0.55),
+        outcome(("delay",), ("jump",), confidence=0.55),
+        outcome(("delay",), (), verdict="unknown"),
+        outcome(("ripple",), ("jump",), confidence=1.0),
+    ]
+    bins = reliability(outcomes[:-1])
+    assert [(each.low, each.count, each.right) for each in bins] == [(0.5, 2, 0.5), (0.9, 4, 0.75)]
+    assert [each.said for each in bins] == pytest.approx([0.55, 0.95])
+    assert calibration_error(bins) == pytest.approx((2 * 0.05 + 4 * 0.2) / 6)
+    row = measured(*outcomes)["calibration error of the confidence"]
+    assert (row.value, row.of) == (pytest.approx(0.15), 6)
+    assert row.kept is False
+
+
+def test_whoever_is_sure_is_in_the_last_bin() -> None:
+    (only,) = reliability([outcome(("delay",), ("delay",), confidence=1.0)])
+    assert (only.low, only.high, only.right) == (0.9, 1.0, 1.0)
+
+
+def test_goals_are_those_of_the_simulation() -> None:
+    said = [outcome(("delay",), (name,)) for name in ["delay"] * 9 + ["jump"]]
+    kept = [
+        {row.name: row.kept for row in score(said, [], goals)}["named first, where detected"]
+        for goals in (EXACT, IDENTIFIED)
+    ]
+    assert kept == [False, True]
+
+
+def test_without_trials_nothing_is_kept_or_missed() -> None:
+    assert {row.kept for row in score([], [])} == {None}
+
+
+def test_bounds_are_those_of_clopper_and_pearson() -> None:
+    """0 of 300 allows 1.2 %, 97 of 100 stands for 91.5 to 99.4 %."""
+    assert Proportion("", 0, 300).bounds == pytest.approx((0.0, 1.2221), abs=1e-3)
+    assert Proportion("", 97, 100).bounds == pytest.approx((91.482, 99.377), abs=1e-2)
+    assert Proportion("", 5, 5).bounds[1] == 100.0
+
+
+@pytest.mark.parametrize(
+    ("count", "goal", "most", "kept"),
+    [(97, 97.0, False, True), (96, 97.0, False, False), (1, 1.0, True, True), (2, 1.0, True, False)],
+)
+def test_a_goal_is_kept_or_missed(count: int, goal: float, most: bool, kept: bool) -> None:
+    assert Proportion("", count, 100, goal, most).kept is kept
+    assert Statistic("", count, 100, goal, most).kept is kept
+
+
+def test_a_confusion_says_what_was_taken_for_what() -> None:
+    found = confusion(
+        [
+            outcome(("delay",), ("jump",)),
+            outcome(("delay",), ("jump",)),
+            outcome((), ()),
+            outcome(("ripple",), (), verdict="unknown"),
+            outcome(("delay", "jump"), ("jump",)),
+        ]
+    )
+    assert found == {("delay", "jump"): 2, ("", ""): 1, ("ripple", "unknown"): 1}

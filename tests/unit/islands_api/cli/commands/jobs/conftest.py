@@ -1,0 +1,81 @@
+"""A service, and ``islands jobs`` in this process as its command line."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from islands.evolution.engine import SerialEngine
+from islands_api.cli.commands import jobs as command
+from islands_service.coordinator.identification_job import identification
+from islands_service.domain.job import JobOutcome, Submission
+from islands_service.store.blobs import Blobs
+from support.service import FIGURES, Service, ahead, csv
+from support.stores import LONG, taken
+
+Run = Callable[..., tuple[int, str, str]]
+
+#: A search of a blink.
+SMALL = {"population": 10, "generations": 3, "max_terms": 3, "shooting": 50, "max_height": 3, "islands": 2}
+
+
+@pytest.fixture(scope="module")
+def service(serve: Any) -> Iterator[Service]:
+    with serve(rate=0) as running:
+        yield running
+
+
+@pytest.fixture
+def owner(service: Service, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Whose test it is: the command line has the service's address and the owner's key."""
+    key, secret = service.store.keys.create("test", frozenset({"read", "write"}))
+    monkeypatch.setenv("ISLANDS_URL", service.url)
+    monkeypatch.setenv("ISLANDS_KEY", secret)
+    return key.owner
+
+
+@pytest.fixture
+def run(owner: str, monkeypatch: pytest.MonkeyPatch, command_line: Run, tmp_path: Path) -> Run:
+    """Run ``islands jobs`` in a folder that holds ``r.csv``; return exit code, standard output and error."""
+    monkeypatch.setattr(command, "PATIENCE", 0.2)
+    (tmp_path / "r.csv").write_bytes(csv())
+    return partial(command_line, "jobs")
+
+
+@pytest.fixture
+def beside() -> Iterator[Callable[..., None]]:
+    """What does something beside the test, which ends with it."""
+    with ExitStack() as stack:
+
+        def start(action: Callable[..., Any], *arguments: Any) -> None:
+            thread = threading.Thread(target=action, args=arguments)
+            thread.start()
+            stack.callback(thread.join)
+
+        yield start
+
+
+@pytest.fixture(scope="module")
+def found(service: Service) -> JobOutcome:
+    """What a small search finds: carried out by the coordinator's own function, without Ray."""
+    dataset = service.upload(csv(400)).json()["id"]
+    spec = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "settings": SMALL}
+    job, _ = service.store.jobs.submit(Submission("local", spec, priority=100))
+    blobs = Blobs(service.settings.blobs)
+    lease = taken(service.store, job.id)
+    return identification(lease, service.store, blobs, SerialEngine(), lambda: None, LONG)
+
+
+@pytest.fixture
+def done(service: Service, owner: str, found: JobOutcome) -> str:
+    """A job that has succeeded, with its figures drawn."""
+    job = ahead(service, owner)
+    service.store.leases.finish(taken(service.store, job), found)
+    blob = Blobs(service.settings.blobs).write(b"<svg/>")
+    names = {f"{name}.svg": blob for name in FIGURES[:4]} | {f"1/{name}.svg": blob for name in FIGURES[4:]}
+    service.store.results.keep(job, names)
+    return job

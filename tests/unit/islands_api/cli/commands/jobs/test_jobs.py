@@ -1,0 +1,236 @@
+"""``islands jobs`` from inside, against a real server: what is shown, watched and downloaded."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from islands_api.cli.commands import jobs as command
+from islands_service.domain.job import JobOutcome
+from support.command_line import COLUMNS, ISLANDS
+from support.processes import eventually
+from support.service import FIGURES, Service, ahead, kept, queued
+from support.stores import FAILED, at_once, brought_on, taken
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+# Look.
+
+
+def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) -> None:
+    first = ahead(service, owner, name="[/b] one")
+    service.store.leases.report(taken(service.store, first), brought_on(3))
+    time.sleep(0.005)  # a store may count milliseconds, and of those of one no job is the newer
+    second = ahead(service, owner, name="two")
+    code, out, _ = run("list")
+    assert code == 0
+    _, one, other = (line.split() for line in out.splitlines())
+    assert (one[:4], one[-1]) == ([second, "queued", "-/-", "-"], "two")
+    assert (other[:4], other[-2:]) == ([first, "running", "3/-", "-"], ["[/b]", "one"])
+    listed = [job["id"] for job in json.loads(run("list", "--json")[1])["items"]]
+    assert listed == [second, first]
+    assert [job["id"] for job in json.loads(run("list", "--state", "running", "--json")[1])["items"]] == [
+        first
+    ]
+    assert [job["id"] for job in json.loads(run("list", "--limit", 1, "--json")[1])["items"]] == [second]
+
+
+def test_more_jobs_than_a_page_are_listed(run: Run, service: Service, owner: str) -> None:
+    made = [job.id for job in at_once([partial(queued, service.store, owner)] * 202)]
+    listed = [job["id"] for job in json.loads(run("list", "--limit", 201, "--json")[1])["items"]]
+    assert len(set(listed)) == 201
+    assert set(listed) < set(made)
+
+
+def test_a_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: str) -> None:
+    job = ahead(service, owner)
+    assert run("show", job)[:2] == (0, f"job {job}: queued\n")
+    assert run("cancel", job)[:2] == (0, f"job {job}: cancelled\n")
+    assert run("resume", job)[:2] == (0, f"job {job}: queued\n")
+    for name in ("show", "cancel", "resume"):
+        printed = json.loads(run(name, job, "--json")[1])
+        assert printed["id"] == job
+    service.store.leases.finish(taken(service.store, job), FAILED)
+    assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
+
+
+def test_a_job_that_succeeded_shows_its_equation(run: Run, done: str, found: JobOutcome) -> None:
+    assert found.summary is not None
+    out = run("show", done)[1]
+    assert out.splitlines()[0] == f"job {done}: succeeded"
+    assert found.summary["equation"] in out
+
+
+# Watch.
+
+
+def test_a_job_is_submitted_watched_and_shown(
+    run: Run, service: Service, owner: str, found: JobOutcome, beside: Callable[..., None]
+) -> None:
+    def carry_out() -> None:
+        waiting = eventually(lambda: service.store.jobs.page(owner).jobs)
+        lease = taken(service.store, waiting[0].id)  # type: ignore[index]
+        service.store.leases.report(lease, brought_on(2))
+        time.sleep(0.3)
+        service.store.leases.finish(lease, found)
+
+    beside(carry_out)
+    code, out, err = run("submit", "r.csv", *COLUMNS, "--priority", 100, "--watch")
+    assert code == 0, err
+    assert err.splitlines()[0] == f"job {service.store.jobs.page(owner).jobs[0].id}"
+    for document, _ in found.models:
+        assert document["equation"] in out
+    assert "Property 1" in out
+
+
+def test_watching_prints_the_ended_job_as_json(run: Run, done: str) -> None:
+    code, out, _ = run("watch", done, "--json")
+    assert code == 0
+    assert json.loads(out)["state"] == "succeeded"
+
+
+def test_watching_a_job_that_fails_says_why(run: Run, service: Service, owner: str) -> None:
+    job = ahead(service, owner)
+    service.store.leases.finish(taken(service.store, job), FAILED)
+    code, out, err = run("watch", job)
+    assert (code, out) == (2, "")
+    assert err.splitlines() == [f"job {job}", f"error: job {job} failed: it broke"]
+    code, out, _ = run("watch", job, "--json")
+    assert code == 2
+    assert json.loads(out)["problem"]["detail"] == "it broke"
+
+
+def test_an_interrupted_watcher_leaves_the_job_running(service: Service, owner: str) -> None:
+    job = ahead(service, owner)
+    taken(service.store, job)
+    with subprocess.Popen(
+        [ISLANDS, "jobs", "watch", job],
+        env={**os.environ},
+        stderr=subprocess.PIPE,
+        text=True,
+        # Whoever runs the tests in the background of a shell ignores it, and so would this one.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no thread yet
+    ) as process:
+        # It has been answered once, and waits for a change.
+        eventually(lambda: any(each.get("path") == f"/v1/jobs/{job}" for each in service.logs))
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert f"the job goes on: 'islands jobs watch {job}' follows it again" in err
+    assert "Traceback" not in err
+    now = service.store.jobs.get(owner, job)
+    assert (now.state, now.cancel_requested) == ("running", False)
+
+
+# Results.
+
+
+def test_a_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) -> None:
+    code, out, err = run("result", done, "--out", "out")
+    assert code == 0, err
+    assert out.splitlines()[-1] == "out/: result.json, models/, figures/"
+    for document, _ in found.models:
+        assert document["equation"] in out
+    assert found.document is not None
+    result = json.loads(Path("out/result.json").read_text())
+    models = [dict(document) for document, _ in found.models]
+    assert result == json.loads(json.dumps({**found.document, "models": models}))
+    files = {path.name: path.read_text() for path in Path("out/models").iterdir()}
+    assert files == {f"{rank:02d}.json": file for rank, (_, file) in enumerate(found.models, start=1)}
+    assert {path.name for path in Path("out/figures").iterdir()} == {f"{name}.svg" for name in FIGURES}
+    assert json.loads(run("result", done, "--json")[1]) == result
+
+
+def test_a_result_is_asked_for_once(run: Run, service: Service, done: str) -> None:
+    service.logs.clear()
+    assert run("result", done)[0] == 0
+    assert [each["path"] for each in service.logs if "path" in each] == [f"/v1/jobs/{done}/result"]
+
+
+def test_a_result_is_replaced_by_force_alone_and_without_leftovers(run: Run, done: str) -> None:
+    assert run("result", done, "--out", "out")[0] == 0
+    Path("out/models/99.json").write_text("of another job")
+    Path("out/figures/old.svg").write_text("of another job")
+    Path("out/notes.txt").write_text("of mine")
+    code, _, err = run("result", done, "--out", "out")
+    assert code == 2
+    assert "holds a result already" in err
+    assert Path("out/models/99.json").exists()
+    assert run("result", done, "--out", "out", "--force")[0] == 0
+    assert not Path("out/models/99.json").exists()
+    assert not Path("out/figures/old.svg").exists()
+    assert Path("out/notes.txt").read_text() == "of mine"
+
+
+# Refusals: one line, exit code 2.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("show", "nobody"), "there is no job 'nobody'"),
+        (("list", "--state", "lost"), "state"),
+        (("submit", "nowhere.csv", *COLUMNS), "No such file or directory: 'nowhere.csv'"),
+        (("submit", "r.csv", "--input", "u_mV", "--output", "y_um"), "u_mV"),
+        (("submit", "r.csv", *COLUMNS, "--preset", "magic"), "unknown preset 'magic'"),
+        (
+            ("submit", "r.csv", *COLUMNS, "--validation", "often"),
+            "--validation often: give a file that exists",
+        ),
+        (("submit", "r.csv", *COLUMNS, "--key", "no key"), "give it as 'islands keys create' printed it"),
+        (("list", "--url", "here"), "'here' is no address of a service"),
+        (("list", "--url", "http://127.0.0.1:9"), "the service at http://127.0.0.1:9 does not answer"),
+        (
+            ("watch", "x", "--url", "http://127.0.0.1:9"),
+            "does not answer (Connection refused): is it running",
+        ),
+        (("list", "--key", "islands_wrong"), "the key is unknown"),
+    ],
+)
+def test_a_refusal_is_one_line(run: Run, service: Service, owner: str, arguments: Any, told: str) -> None:
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert told in err
+    assert len(err.splitlines()) == 1
+    assert service.store.jobs.page(owner).jobs == ()
+
+
+@pytest.mark.parametrize("name", ["result", "cancel", "resume"])
+def test_what_a_job_s_state_does_not_allow_is_refused(
+    run: Run, service: Service, owner: str, done: str, name: str
+) -> None:
+    job = ahead(service, owner) if name == "result" else done
+    code, _, err = run(name, job)
+    assert code == 2
+    assert "job " + job in err
+    assert len(err.splitlines()) == 1
+
+
+def test_options_name_another_service_and_another_key(
+    run: Run, service: Service, owner: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    secret = os.environ["ISLANDS_KEY"]
+    job = ahead(service, owner)
+    monkeypatch.setenv("ISLANDS_URL", "http://127.0.0.1:9")
+    monkeypatch.setenv("ISLANDS_KEY", "islands_wrong")
+    assert run("show", job, "--url", service.url, "--key", secret)[:2] == (0, f"job {job}: queued\n")
+    code, _, err = run("show", job, "--url", service.url)
+    assert code == 2
+    assert "islands_wrong" not in err
+    monkeypatch.delenv("ISLANDS_KEY")
+    kept(service.store)
+    assert run("list", "--url", service.url, "--json")[0] == 0  # on this machine nobody needs one
+
+
+def test_a_service_that_is_away_is_not_waited_for_long() -> None:
+    assert command.PATIENCE <= 5.0

@@ -1,0 +1,201 @@
+"""``islands jobs submit`` and ``diagnose`` from inside: what is sent, and what is refused."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from islands_api.cli.commands import jobs as command
+from islands_api.cli.commands.identify import identify
+from islands_api.cli.search_options import SETTINGS
+from islands_service.domain.job import DISCREPANCY, EXTENDED, REPORT, JobOutcome, JobState, Submission
+from islands_service.domain.job_spec import Identification
+from islands_service.store.blobs import Blobs
+from support.command_line import COLUMNS
+from support.service import Service, csv, held
+from support.stores import taken
+
+Run = Callable[..., tuple[int, str, str]]
+
+#: A value for every option that is a setting: what is written, and what the job has to say then.
+VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
+    "population": (("40",), 40),
+    "generations": (("7",), 7),
+    "max_terms": (("6",), 6),
+    "max_height": (("4",), 4),
+    "shooting": (("50",), 50),
+    "primitives": (("mul", "phi1"), ["mul", "phi1"]),
+    "constraints": (("none",), "none"),
+    "islands": (("3",), 3),
+    "topology": (("ring",), "ring"),
+    "migrate_every": (("2,5:3",), "2,5:3"),
+    "migrants": (("2",), "2"),
+    "emigrants": (("front",), "front"),
+    "replaced": (("random",), "random"),
+    "characters": (("plain", "explorer"), ["plain", "explorer"]),
+    "max_evaluations": (("100000",), 100_000),
+    "target_error": (("0.001",), 0.001),
+}
+
+
+def option(name: str) -> str:
+    """The option that is a parameter of ``submit``."""
+    made = typer.main.get_command(command.jobs)
+    return next(each.opts[0] for each in made.commands["submit"].params if each.name == name)  # type: ignore[attr-defined]
+
+
+# Submit.
+
+
+def test_a_submitted_job_is_printed_as_json_and_is_there(run: Run, service: Service, owner: str) -> None:
+    code, out, err = run("submit", "r.csv", *COLUMNS, "--preset", "narx", "--json")
+    assert (code, err) == (0, "")
+    printed = json.loads(out)
+    assert printed["state"] == "queued"
+    job = service.store.jobs.get(owner, printed["id"])
+    assert (job.name, job.spec["preset"], job.spec["inputs"], job.spec["output"]) == (
+        *("r.csv", "narx"),
+        *(["u_V"], "y_um"),
+    )
+    assert service.store.datasets.get(owner, job.spec["dataset"]).name == "r.csv"
+    assert set(job.spec) == {"dataset", "inputs", "output", "preset", "seed"}  # no option speaks unasked
+
+
+def test_every_setting_reaches_the_job(run: Run, service: Service, owner: str) -> None:
+    assert set(VALUES) == set(SETTINGS)
+    given = [word for name, (texts, _) in VALUES.items() for text in texts for word in (option(name), text)]
+    words = ("--seed", 9, "--dt", 0.01, "--rows", "0:150", "--json")
+    code, out, err = run("submit", "r.csv", *COLUMNS, *given, *words)
+    assert code == 0, err
+    spec = json.loads(out)["spec"]
+    assert {name: spec[name] for name in ("seed", "dt", "rows")} == {"seed": 9, "dt": 0.01, "rows": "0:150"}
+    assert spec["settings"] == {name: value for name, (_, value) in VALUES.items()}
+    assert Identification.model_validate(spec).changes.keys() == set(SETTINGS)
+
+
+def test_identify_and_submit_take_the_same_settings_in_the_same_words() -> None:
+    alone = typer.Typer()
+    alone.command()(identify)
+    ours = {each.name: each.opts for each in typer.main.get_command(command.jobs).commands["submit"].params}  # type: ignore[attr-defined]
+    theirs = {each.name: each.opts for each in typer.main.get_command(alone).params}
+    assert {name: ours[name] for name in (*SETTINGS, "preset", "seed", "dt", "rows")} == {
+        name: theirs[name] for name in (*SETTINGS, "preset", "seed", "dt", "rows")
+    }
+
+
+def test_what_else_is_said_of_a_job_reaches_it(run: Run, service: Service, owner: str) -> None:
+    words = ("--name", "[red] one", "--priority", 5, "--idempotency-key", "k-1")
+    job = json.loads(run("submit", "r.csv", *COLUMNS, *words, "--json")[1])
+    assert (job["name"], job["priority"]) == ("[red] one", 5)
+    assert run("submit", "r.csv", *COLUMNS, *words)[1] == f"job {job['id']}: queued\n"
+
+
+def test_a_record_lends_its_name_as_far_as_it_goes(run: Run, tmp_path: Path) -> None:
+    long = tmp_path / ("x\n" + "y" * 240 + ".csv")
+    long.write_bytes(csv())
+    code, out, err = run("submit", long, *COLUMNS, "--validation", "0.4", "--json")
+    assert code == 0, err
+    assert json.loads(out)["name"] == "x" + "y" * 199
+    assert json.loads(out)["spec"]["validation"] == 0.4
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--rows", "0:100", "--validation", "100:"), {"dataset": "r.csv", "rows": "100:"}),
+        (("--validation", "v.csv"), {"dataset": "v.csv"}),
+    ],
+    ids=["rows", "file"],
+)
+def test_validation_is_rows_or_a_file(
+    run: Run, service: Service, owner: str, tmp_path: Path, words: tuple[str, ...], expected: Any
+) -> None:
+    (tmp_path / "v.csv").write_bytes(csv(120))
+    code, out, err = run("submit", "r.csv", *COLUMNS, *words, "--json")
+    assert code == 0, err
+    found = json.loads(out)["spec"]["validation"]
+    found["dataset"] = service.store.datasets.get(owner, found["dataset"]).name
+    assert found == expected
+
+
+# Discrepancy jobs.
+
+
+@pytest.fixture
+def diagnosed(service: Service, owner: str) -> str:
+    """A discrepancy job that has succeeded."""
+    spec = held("0-csv")
+    job = service.store.jobs.submit(Submission(owner, spec, DISCREPANCY, "piezo", priority=100))[0].id
+    blobs = Blobs(service.settings.blobs)
+    summary = {
+        "verdict": "named",
+        "effects": ["thermal-drift"],
+        "words": "It lacks something.\n  thermal-drift",
+    }
+    document = {"verdict": "named", "extended_model": "extended.json", "wall_s": 1.5}
+    artefacts = {REPORT: blobs.write(b"<!DOCTYPE html>"), EXTENDED: blobs.write(b'{"effects": []}')}
+    found = JobOutcome(JobState.SUCCEEDED, document, summary=summary, artefacts=artefacts)
+    service.store.leases.finish(taken(service.store, job), found)
+    return job
+
+
+def test_a_discrepancy_job_is_submitted_as_it_is_said(run: Run, service: Service, owner: str) -> None:
+    words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--priority", 5)
+    code, out, err = run("diagnose", "r.csv", *COLUMNS, *words, "--rows", "0:150", "--json")
+    assert (code, err) == (0, "")
+    job = json.loads(out)
+    assert (job["kind"], job["name"], job["priority"]) == (DISCREPANCY, "r.csv", 5)
+    wanted = {"tolerance": {"dp": 0.01}, "seed": 3, "rows": "0:150"}
+    assert job["spec"] == {
+        **held(job["spec"]["dataset"], **wanted),
+        "simulation": {"kind": "bouc-wen-piezo", "parameters": {}},
+    }
+    code, out, err = run("show", job["id"])
+    assert out == f"job {job['id']}: queued\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("--simulation", "pendulum"), "unknown simulation 'pendulum'"),
+        (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
+        (("--simulation", "bouc-wen-piezo", "--input", "t_s"), "is driven by one input, got u_V, t_s"),
+        (("--simulation", "column:y_sim"), "has no column y_sim"),
+        (("--simulation", "python:a.py:run"), "a service runs no code of others"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused_in_a_line(run: Run, arguments: Any, why: str) -> None:
+    code, out, err = run("diagnose", "r.csv", *COLUMNS, *arguments)
+    assert (code, out) == (2, "")
+    assert why in err
+    assert "Traceback" not in err
+
+
+def test_a_diagnosis_is_watched_listed_and_shown_in_words(run: Run, diagnosed: str) -> None:
+    words = "It lacks something.\n  thermal-drift\n"
+    assert run("watch", diagnosed)[1] == words
+    assert run("show", diagnosed)[1] == f"job {diagnosed}: succeeded\n{words}"
+    assert run("result", diagnosed)[1] == words
+    line = run("list")[1].splitlines()[1]
+    assert line.startswith(diagnosed)
+    assert line.endswith("piezo (named: thermal-drift)")
+
+
+def test_a_diagnosis_is_downloaded_as_the_command_line_writes_it(run: Run, diagnosed: str) -> None:
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("of mine")
+    code, out, err = run("result", diagnosed, "--out", "out")
+    assert code == 0, err
+    assert out.splitlines()[-1].startswith("out/: discrepancy.json, report.html, extended.json")
+    names = {"discrepancy.json", "report.html", "extended.json", "notes.txt"}
+    assert {path.name for path in Path("out").iterdir()} == names
+    document = json.loads(Path("out/discrepancy.json").read_text())
+    assert document == json.loads(run("result", diagnosed, "--json")[1])
+    assert Path("out/extended.json").read_bytes() == b'{"effects": []}'
+    code, _, err = run("result", diagnosed, "--out", "out")
+    assert code == 2
+    assert "holds a result already" in err
+    assert run("result", diagnosed, "--out", "out", "--force")[0] == 0
