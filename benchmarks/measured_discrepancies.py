@@ -191,7 +191,7 @@ def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> d
     """
     core = make_simulator(case.simulation, found.record)
     source = make_surrogates(found, core, {})
-    called = [diagnose_surrogate(source, SurrogateCase(None, seed)).called for seed in range(clean)]
+    called = [diagnose_surrogate(source, SurrogateCase(None, seed)).named for seed in range(clean)]
     rng, told = np.random.default_rng(1), []
     names = rng.permutation(sorted(source.effects)).tolist()
     while names and len(told) < injected:
@@ -202,7 +202,7 @@ def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> d
         ]
         if strong:
             answer = diagnose_surrogate(source, SurrogateCase(strong[0], len(told)))
-            told.append((strong[0].cause, answer.called, answer.recognised))
+            told.append((strong[0].cause, answer.named, answer.recognised))
     return {"clean": called, "injected": told}
 
 
@@ -216,8 +216,10 @@ def measured(case: Case, clean: int = 0, injected: int = 0) -> dict:
         "samples": record.samples,
         "simulation": case.simulation,
         "verdict": str(found.verdict),
-        "names": [each.name for each in found.effects if each.eta is not None],
-        "equivalents": [list(each.equivalents) for each in found.effects if each.eta is not None],
+        "names": [each.name for each in found.effects if each.explained_fraction is not None],
+        "equivalents": [
+            list(each.equivalents) for each in found.effects if each.explained_fraction is not None
+        ],
         "candidates": [each.name for each in found.candidates[:3]],
         "locked": None
         if gain is None

@@ -46,7 +46,7 @@ def error(preset: str, islands: int, samples: int, way: str, seed: int) -> tuple
     settings = replace(settings, population=everybody // settings.islands)
     posed = problem(make_record("bouc-wen-piezo", "authors", "estimation")[:samples], settings)
     *_, last = SerialEngine().run(posed, empty_archipelago(settings.islands, seed), lambda: False)
-    best = last.archipelago.hall.best()
+    best = last.archipelago.hall_of_fame.best()
     found = [min(entry.fitness for size, entry in best.items() if size <= most) ** 0.5 for most in (6, 99)]
     return found[1], found[0]
 

@@ -46,28 +46,28 @@ class StopRequest:
     """
 
     def __init__(self) -> None:
-        self._made = False
+        self._requested = False
         self._bell: SimpleQueue[None] = SimpleQueue()
 
-    def make(self) -> None:
+    def request(self) -> None:
         """Make the wish; again and at any moment, also from a signal handler."""
-        self._made = True
+        self._requested = True
         self._bell.put(None)
 
     @property
-    def made(self) -> bool:
+    def requested(self) -> bool:
         """Whether it has been made: it is not taken back."""
-        return self._made
+        return self._requested
 
     def wait(self, seconds: float) -> bool:
         """Wait until it is made, or for so long; whether it is."""
-        if not self._made:
+        if not self._requested:
             with suppress(Empty):
                 self._bell.get(timeout=seconds)
-        return self._made
+        return self._requested
 
 
 def stop_on_signals(stopping: StopRequest) -> None:
     """Turn SIGTERM and Ctrl-C into a wish to stop. Ray takes SIGTERM for itself: call it again after Ray."""
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stopping.make())
+        signal.signal(number, lambda *_: stopping.request())

@@ -31,7 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     core = asked.core
     simulation = ExtendedSimulator(core, (effect,), make_context(record, core, count_fitted_samples(record)))
     values = simulation.nominal
-    values[simulation.part(effect)] = STRENGTH
+    values[simulation.get_slice(effect)] = STRENGTH
     measured = replace(record, y=simulation.simulate(values))
     target = Target(measured.y, np.ones(record.samples, dtype=bool), None, {})
     write_record(measured, base / "record.csv")

@@ -26,7 +26,7 @@ def diagnosed(name: str) -> Diagnosis:
 
 def causes(found: Diagnosis) -> tuple[Finding, ...]:
     """Return what was named beside the noise."""
-    return tuple(each for each in found.effects if each.eta is not None)
+    return tuple(each for each in found.effects if each.explained_fraction is not None)
 
 
 def names(found: Diagnosis) -> list[str]:
@@ -63,7 +63,7 @@ def test_the_bouc_wen_benchmark_is_what_its_authors_have_made() -> None:
     """Noel and Schoukens 2016: mass 2, alpha 5e4, beta gamma 800, beta delta -1100."""
     found = diagnosed("bouc-wen")
     element = found.effects[0].parameters
-    own = [parameter.name for parameter in found.best.simulation.core.parameters]
+    own = [parameter.name for parameter in found.best.simulation.simulator.parameters]
     mass = float(found.best.values[own.index("m")])
     official = {"k": 5e4, "chi": 800.0, "g": -1100.0}
     for name, value in official.items():

@@ -149,7 +149,7 @@ def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, cour
     stored, _ = read_checkpoint(paths[2])
     assert stored == course[1].archipelago
     # What the islands abandon next hangs on their bars.
-    assert all(island.bar < inf for island in stored.islands)
+    assert all(island.abandon_threshold < inf for island in stored.islands)
     *_, last = engine.run(posed, stored, never)
     write_checkpoint(course[-1].archipelago, paths[0], {})
     write_checkpoint(last.archipelago, paths[1], {})
@@ -208,7 +208,7 @@ def test_every_step_is_told(course):
             assert all(info.evaluations == SETTINGS.population for info in steps)
             assert all(sum(info.outcomes.values()) == info.evaluations for info in steps)
             assert all(0 <= info.duplicates <= info.evaluations for info in steps)
-            assert steps[-1].best == {size: each.fitness for size, each in island.hall.best().items()}
+            assert steps[-1].best == {size: each.fitness for size, each in island.hall_of_fame.best().items()}
             assert steps[-1].outcomes == Counter(
                 each.outcome.verdict.name.lower() for each in island.population
             )
@@ -223,12 +223,16 @@ def test_an_epoch_says_what_the_caches_take_and_what_they_may(course):
 
 def test_the_hall_of_an_archipelago_is_gathered_from_its_islands(course):
     last = course[-1].archipelago
-    assert exactly(last.hall) == exactly(merge(*(island.hall for island in reversed(last.islands))))
-    for size, entry in last.hall.best().items():
+    assert exactly(last.hall_of_fame) == exactly(
+        merge(*(island.hall_of_fame for island in reversed(last.islands)))
+    )
+    for size, entry in last.hall_of_fame.best().items():
         assert entry.fitness == min(
-            island.hall.best()[size].fitness for island in last.islands if size in island.hall.best()
+            island.hall_of_fame.best()[size].fitness
+            for island in last.islands
+            if size in island.hall_of_fame.best()
         )
-    assert Archipelago().hall.entries == ()
+    assert Archipelago().hall_of_fame.entries == ()
 
 
 @elsewhere(pytest.mark.ci)

@@ -235,8 +235,8 @@ def test_what_was_finished_long_ago_is_forgotten_and_nothing_else(store):
         )
 
     store.database.write(age)
-    assert store.retention.forget(2 * LONG) == 0
-    assert store.retention.forget(LONG - 60) == 3
+    assert store.retention.delete_expired(2 * LONG) == 0
+    assert store.retention.delete_expired(LONG - 60) == 3
     left = {job.id for job in store.jobs.page(ALICE).jobs}
     assert left == {*fresh.values(), waiting.id}
     assert not {row[0] for row in contents(store)["models"]} & set(old.values())
@@ -247,7 +247,7 @@ def test_what_was_finished_long_ago_is_forgotten_and_nothing_else(store):
 def test_a_job_that_was_resumed_is_not_forgotten(store):
     job = job_in(store, JobState.FAILED)
     store.jobs.resume(ALICE, job.id)
-    assert store.retention.forget(-LONG) == 0
+    assert store.retention.delete_expired(-LONG) == 0
 
 
 def test_blobs_are_named_as_long_as_something_needs_them(store):

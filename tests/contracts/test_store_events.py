@@ -141,17 +141,17 @@ def test_a_reader_that_sees_a_version_finds_its_event(database):
 
 @pytest.mark.parametrize("waiting", [0, 3])
 def test_the_standing_of_all_jobs_is_told_without_names(store, waiting):
-    before = store.jobs.standing()
+    before = store.jobs.queue_statistics()
     assert before.counts == dict.fromkeys(JobState, 0)
     assert (before.oldest, before.running, before.leases) == (0.0, {}, 0)
     for state in (JobState.SUCCEEDED, JobState.FAILED, JobState.FAILED):
         job_in(store, state)
     running = job_in(store, JobState.RUNNING)
     store.leases.report(claimed_again := claimed_as(store, asked(priority=9)), brought_on(4))
-    store.leases.beat(claimed_again, EXPIRED)
+    store.leases.renew(claimed_again, EXPIRED)
     for _ in range(waiting):
         submitted(store, "bob")
-    standing = store.jobs.standing()
+    standing = store.jobs.queue_statistics()
     assert standing.counts == {
         JobState.QUEUED: waiting,
         JobState.RUNNING: 2,
@@ -177,7 +177,7 @@ def test_a_job_that_was_given_back_waits_since_then(store):
     aged = update(jobs).values(created=jobs.c.created - LONG, updated=jobs.c.updated - LONG)
     store.database.write(lambda connection: connection.execute(aged))
     store.leases.release(lease)
-    assert 0.0 < store.jobs.standing().oldest < LONG / 2
+    assert 0.0 < store.jobs.queue_statistics().oldest < LONG / 2
     store.database.write(lambda connection: connection.execute(aged))
     submitted(store)
-    assert LONG <= store.jobs.standing().oldest < 1.5 * LONG
+    assert LONG <= store.jobs.queue_statistics().oldest < 1.5 * LONG

@@ -23,7 +23,7 @@ from support.stores import (
 
 #: All that a coordinator may do under a lease.
 WRITES = {
-    "beat": lambda leases, lease: leases.beat(lease, LONG),
+    "beat": lambda leases, lease: leases.renew(lease, LONG),
     "report": lambda leases, lease: leases.report(lease, brought_on(9)),
     "progress alone": lambda leases, lease: leases.report(lease, ProgressReport({"phase": "search"})),
     "release": lambda leases, lease: leases.release(lease),
@@ -123,7 +123,7 @@ def test_a_lease_is_of_one_job(store):
     leases = claimed(store), claimed(store)
     assert [lease.epoch for lease in leases] == [1, 1]
     store.leases.finish(leases[0], FOUND)
-    assert store.leases.beat(leases[1], LONG) is False
+    assert store.leases.renew(leases[1], LONG) is False
 
 
 def test_epochs_rise_as_long_as_a_job_lives(store):

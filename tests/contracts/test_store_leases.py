@@ -169,13 +169,13 @@ def test_what_is_taken_over_stands_in_the_same_queue_as_what_waits(store):
 def test_a_beat_keeps_a_job(store):
     submitted(store)
     lease = claimed(store, EXPIRED, "first")
-    assert store.leases.beat(lease, LONG) is False
+    assert store.leases.renew(lease, LONG) is False
     assert store.leases.claim("second", LONG) is None
 
 
 def test_a_beat_can_let_a_lease_run_out(store):
     submitted(store)
-    store.leases.beat(claimed(store, LONG, "first"), EXPIRED)
+    store.leases.renew(claimed(store, LONG, "first"), EXPIRED)
     assert claimed(store, LONG, "second").epoch == 2
 
 
@@ -183,17 +183,17 @@ def test_a_beat_is_nothing_that_a_watcher_sees(store):
     job = submitted(store)
     lease = claimed(store)
     before = store.jobs.get(ALICE, job.id), store.jobs.events(job.id)
-    store.leases.beat(lease, 2 * LONG)
+    store.leases.renew(lease, 2 * LONG)
     assert (store.jobs.get(ALICE, job.id), store.jobs.events(job.id)) == before
 
 
 def test_a_beat_tells_that_a_job_is_to_be_cancelled(store):
     job = submitted(store)
     lease = claimed(store)
-    assert store.leases.beat(lease, LONG) is False
+    assert store.leases.renew(lease, LONG) is False
     store.jobs.cancel(ALICE, job.id)
-    assert store.leases.beat(lease, LONG) is True
-    assert store.leases.beat(lease, LONG) is True
+    assert store.leases.renew(lease, LONG) is True
+    assert store.leases.renew(lease, LONG) is True
 
 
 def test_whoever_takes_a_job_over_learns_that_it_is_to_be_cancelled(store):

@@ -108,7 +108,7 @@ def test_a_resumed_job_goes_on_from_its_checkpoint_as_if_nothing_had_happened(st
     assert resumed.progress == {"generation": 6}
     again = claimed(store)
     assert (again.job.id, again.job.cancel_requested, again.job.attempt) == (job.id, False, 2)
-    assert store.leases.beat(again, 1.0) is False
+    assert store.leases.renew(again, 1.0) is False
     assert kinds(store, job.id) == ["queued", "running", "progress", "failed", "queued", "running"]
 
 
@@ -122,7 +122,7 @@ def test_a_job_that_was_cancelled_and_resumed_is_not_cancelled_any_more(store, r
     assert store.jobs.resume(ALICE, job.id).cancel_requested is False
     again = claimed(store)
     assert again.job.cancel_requested is False
-    assert store.leases.beat(again, 1.0) is False
+    assert store.leases.renew(again, 1.0) is False
     store.leases.release(again)
     assert store.jobs.get(ALICE, job.id).state == QUEUED
 

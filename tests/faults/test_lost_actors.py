@@ -87,22 +87,22 @@ def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_repla
     found = actor_pool.IslandActorPool(posed, 3, told.append)
     try:
         everybody = min(3, len(os.sched_getaffinity(0))) + 1
-        eventually(lambda: found.tend(at_once=True) and len(found.places) == everybody)
-        regular = [found.home(island) for island in range(3)]
+        eventually(lambda: found.maintain(at_once=True) and len(found.places) == everybody)
+        regular = [found.actor_for(island) for island in range(3)]
         kill(min(actors()))
-        eventually(lambda: found.tend(at_once=True) and told)
+        eventually(lambda: found.maintain(at_once=True) and told)
         assert found.places[0] == actor_pool.STAND_IN
         assert len(found.places) == everybody - 1
         replaced = [
-            now for now, before in zip(map(found.home, range(3)), regular, strict=True) if now != before
+            now for now, before in zip(map(found.actor_for, range(3)), regular, strict=True) if now != before
         ]
         assert replaced
         assert all(now not in regular for now in replaced)
         ray.get([actor.prepare.remote() for actor in replaced])
-        eventually(lambda: found.tend(at_once=True) and len(found.places) == everybody)
-        assert not set(replaced) & {found.home(island) for island in range(3)}
+        eventually(lambda: found.maintain(at_once=True) and len(found.places) == everybody)
+        assert not set(replaced) & {found.actor_for(island) for island in range(3)}
     finally:
-        found.dismiss()
+        found.shutdown()
 
 
 @pytest.mark.nightly

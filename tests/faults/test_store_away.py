@@ -105,7 +105,7 @@ def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mort
         for ask in (
             lambda: store.jobs.get(ALICE, job.id),
             lambda: submitted(store),
-            lambda: store.leases.beat(lease, LONG),
+            lambda: store.leases.renew(lease, LONG),
             lambda: store.leases.claim("another", LONG),
         ):
             for _ in range(2):
@@ -174,11 +174,11 @@ def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebo
         lease = claimed(store, EXPIRED)
         mortal.stop(signal.SIGQUIT)
         mortal.start()
-        assert store.leases.beat(lease, EXPIRED) is False
+        assert store.leases.renew(lease, EXPIRED) is False
         taken = claimed(other)
         assert taken.job.id == lease.job.id
         with pytest.raises(LeaseLostError):
-            store.leases.beat(lease, LONG)
+            store.leases.renew(lease, LONG)
 
 
 @pytest.mark.nightly

@@ -70,7 +70,7 @@ def course(setting):
 def test_halls_elites_and_genes_are_those_of_a_search_that_abandons_nobody(setting, course):
     patient = islands_of(Evaluator(record(), setting, abandon=False), GENERATIONS)
     for one, other in zip(course, patient, strict=True):
-        assert repr(one.hall) == repr(other.hall)
+        assert repr(one.hall_of_fame) == repr(other.hall_of_fame)
         assert repr(one.elite) == repr(other.elite)
         assert [each.genes for each in one.population] == [each.genes for each in other.population]
         assert not abandoned(other)
@@ -78,7 +78,7 @@ def test_halls_elites_and_genes_are_those_of_a_search_that_abandons_nobody(setti
         for each, known in zip(one.population, other.population, strict=True):
             if each.outcome.verdict is Status.ABANDONED:
                 assert each == replace(known, theta=(), fitness=inf, outcome=each.outcome)
-                assert known.fitness > one.bar
+                assert known.fitness > one.abandon_threshold
             else:
                 assert repr(each) == repr(known)
     # The law says nothing where nobody is given up.
@@ -95,11 +95,11 @@ def test_whoever_is_abandoned_is_less_fit_than_the_island_s_bar_and_settles_to_t
         settled = seasoned.settled(given_up)
         exact, _ = fresh.evaluate([(Individual(each.genes), False) for each in given_up])
         assert repr(settled) == repr(exact)
-        assert all(each.fitness > island.bar for each in settled)
+        assert all(each.fitness > island.abandon_threshold for each in settled)
         assert all(each.outcome or "interval" in each.outcome.reason for each in settled)
         # Nobody is in an elite or a hall by less than its fitness.
         assert all(each.outcome.verdict is not Status.ABANDONED for each in island.elite)
-        assert all(each.fitness < inf for each in island.hall.entries)
+        assert all(each.fitness < inf for each in island.hall_of_fame.entries)
 
 
 def test_what_an_evaluator_has_seen_does_not_change_who_is_abandoned(setting, course):
@@ -128,7 +128,9 @@ def test_with_a_library_s_genes_it_is_the_same():
             island, info = step(island, evaluator, posed.pool)
             given_up += info.outcomes.get("abandoned", 0)
         assert (given_up > 10) == abandon
-        ends.append((repr(island.hall), repr(island.elite), [each.genes for each in island.population]))
+        ends.append(
+            (repr(island.hall_of_fame), repr(island.elite), [each.genes for each in island.population])
+        )
     assert ends[0] == ends[1]
 
 
@@ -136,10 +138,10 @@ def test_with_a_library_s_genes_it_is_the_same():
 
 
 def test_the_bar_follows_from_the_island_before_the_step(setting, course):
-    assert course[0].bar == inf
+    assert course[0].abandon_threshold == inf
     for before, after in pairwise(course):
-        assert after.bar == _bar(before, setting)
-    assert course[-1].bar < inf
+        assert after.abandon_threshold == _bar(before, setting)
+    assert course[-1].abandon_threshold < inf
 
 
 def test_the_bar_lets_pass_whoever_may_enter_the_elite_or_the_hall(setting, course):
@@ -147,10 +149,10 @@ def test_the_bar_lets_pass_whoever_may_enter_the_elite_or_the_hall(setting, cour
         bar = _bar(island, setting)
         full = len(island.elite) == setting.elites
         assert bar >= (island.elite[-1].fitness if full else inf)
-        bars = _bars(island.hall, bar, setting.max_terms)
+        bars = _bars(island.hall_of_fame, bar, setting.max_terms)
         assert len(bars) == setting.max_terms + 1
         for size, allowed in enumerate(bars):
-            known = [entry.fitness for entry in island.hall.entries if entry.size == size]
+            known = [entry.fitness for entry in island.hall_of_fame.entries if entry.size == size]
             assert allowed == (max(bar, known[-1]) if len(known) == DEPTH else inf)
 
 
@@ -197,4 +199,4 @@ def test_as_long_as_the_elite_is_not_full_everybody_enters_and_nobody_is_abandon
         assert len(island.elite) < setting.elites
         assert not abandoned(island)
     assert len(seen) > DEPTH
-    assert island.bar == inf
+    assert island.abandon_threshold == inf

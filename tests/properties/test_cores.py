@@ -132,12 +132,12 @@ def test_names_are_unique(core: Simulator, scene: SimulationContext) -> None:
 
 
 def test_the_frame_has_scales(core: Simulator, scene: SimulationContext) -> None:
-    frame = scene.frame
-    assert min(frame.peak, frame.rate, frame.force, frame.sharp) > 0.0
+    frame = scene.force_coordinate
+    assert min(frame.peak, frame.rate, frame.force, frame.friction_smoothing) > 0.0
     assert frame.unit
     assert frame.force_unit
-    assert frame.sense in (-1.0, 1.0)
-    assert frame.least == (0.0 if frame.dissipates else -np.inf)
+    assert frame.sign in (-1.0, 1.0)
+    assert frame.lower_bound == (0.0 if frame.is_dissipative else -np.inf)
 
 
 def test_an_effect_at_rest_does_nothing(
@@ -161,9 +161,9 @@ def test_an_effect_enters_where_the_core_lets_it(
         extended = alone.with_effects([effect])
         lower, upper = extended.bounds
         changes = []
-        for point in effect.grid(scene, residual):
+        for point in effect.starting_points(scene, residual):
             values = extended.nominal
-            values[extended.part(effect)] = point
+            values[extended.get_slice(effect)] = point
             assert (lower <= values).all(), effect.name
             assert (values <= upper).all(), effect.name
             changes.append(np.max(np.abs(extended.simulate(values) - at_rest)))

@@ -30,13 +30,13 @@ def extended(request: pytest.FixtureRequest, alone: ExtendedSimulator) -> Extend
 
 def at(extended: ExtendedSimulator, point: tuple[float, ...]) -> np.ndarray:
     values = extended.nominal
-    values[extended.part(extended.effects[0])] = point
+    values[extended.get_slice(extended.effects[0])] = point
     return values
 
 
 def grid(extended: ExtendedSimulator) -> tuple[tuple[float, ...], ...]:
-    residual = 0.1 * np.sin(2 * np.pi * 7.3 * extended.scene.time)
-    return tuple(extended.effects[0].grid(extended.scene, residual))
+    residual = 0.1 * np.sin(2 * np.pi * 7.3 * extended.context.time)
+    return tuple(extended.effects[0].starting_points(extended.context, residual))
 
 
 def test_at_rest_an_effect_does_nothing(extended: ExtendedSimulator, alone: ExtendedSimulator) -> None:
@@ -62,11 +62,11 @@ def test_every_point_that_a_search_begins_from_does_something_and_is_allowed(
 def test_what_is_called_linear_is(extended: ExtendedSimulator, alone: ExtendedSimulator) -> None:
     """Half a strength has half the response; a small one nearly, where a core lies between."""
     effect = extended.effects[0]
-    if effect.linear == 0:
+    if effect.linear_parameters == 0:
         pytest.skip("it has a threshold")
     at_rest = alone.simulate(alone.nominal)
     point = np.array(grid(extended)[0])
-    part = slice(0, effect.linear)
+    part = slice(0, effect.linear_parameters)
     exact = effect.site in (Site.FORCE, Site.OUTPUT) and effect.family != "timing"
     size = 1.0 if exact else 1e-3
     responses = []
@@ -86,7 +86,7 @@ def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: ExtendedSimulat
     base = at(extended, points[len(points) // 2])
     _, upper = extended.bounds
     there = extended.simulate(base)
-    for place in range(extended.part(extended.effects[0]).start, base.size):
+    for place in range(extended.get_slice(extended.effects[0]).start, base.size):
         slopes = []
         for part in (0.01, 0.02):
             step = (
@@ -104,7 +104,7 @@ def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: ExtendedSimulat
 
 def test_an_effect_says_where_it_comes_from(extended: ExtendedSimulator) -> None:
     effect = extended.effects[0]
-    parameters = effect.parameters(extended.scene)
+    parameters = effect.parameters(extended.context)
     assert parameters
     assert effect.source
     assert effect.family
@@ -112,7 +112,7 @@ def test_an_effect_says_where_it_comes_from(extended: ExtendedSimulator) -> None
         assert parameter.scale > 0.0
         assert parameter.lower < parameter.upper
     assert (effect.form is None) == (effect.site == Site.CORE)
-    assert effect.site != Site.CORE or effect.name in extended.core.supported_effects
+    assert effect.site != Site.CORE or effect.name in extended.simulator.supported_effects
 
 
 def test_a_memory_of_simulations_changes_none(alone: ExtendedSimulator) -> None:
@@ -120,6 +120,6 @@ def test_a_memory_of_simulations_changes_none(alone: ExtendedSimulator) -> None:
     first = alone.simulate(values).copy()
     for factor in (1.1, 0.9, 1.2, 0.8, 1.3, 1.0):
         moved = values * factor
-        fresh = ExtendedSimulator(alone.core, alone.effects, alone.scene).simulate(moved)
+        fresh = ExtendedSimulator(alone.simulator, alone.effects, alone.context).simulate(moved)
         assert np.array_equal(alone.simulate(moved), fresh)
     assert np.array_equal(alone.simulate(values), first)

@@ -45,7 +45,7 @@ def test_emigrants_are_members_with_a_known_fitness_each_structure_once(leave, i
 @given(islands())
 def test_nobody_leaves_but_at_a_stop(leave, island):
     setting = replace(SETTINGS, emigrants=leave, migrate_every="3,8:2", elite=1.0)
-    island = replace(island, elite=(models()[0],), hall=with_entries(HallOfFame(), models()[:1]))
+    island = replace(island, elite=(models()[0],), hall_of_fame=with_entries(HallOfFame(), models()[:1]))
     leaving = [
         len(select_migrants(replace(island, generation=generation), setting)) for generation in range(-1, 13)
     ]

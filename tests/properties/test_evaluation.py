@@ -292,7 +292,7 @@ def test_forgetting_empties_everything_and_changes_nothing():
     first = evaluator.evaluate(population)
     assert evaluator.evaluate(population)[1] == len(POOL)
     assert all(taken > 0 for taken, _ in evaluator.memory.values())
-    evaluator.forget()
+    evaluator.clear_caches()
     assert all(taken == 0 for taken, _ in evaluator.memory.values())
     assert repr(evaluator.evaluate(population)) == repr(first)
 

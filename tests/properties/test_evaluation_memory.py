@@ -93,7 +93,7 @@ def test_genes_take_what_a_vocabulary_says(traced, setting):
     vocabulary = GeneIndex(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
     draw = Stream(7, 0, 0, Purpose.INITIAL)
     for _ in range(400):
-        vocabulary.number(random_gene(setting, 2, draw))
+        vocabulary.index_of(random_gene(setting, 2, draw))
     taken = traced()
     assert vocabulary.bytes > 300_000
     assert vocabulary.bytes / 2.5 < taken < vocabulary.bytes * 2.5

@@ -176,7 +176,7 @@ def test_a_run_with_migration_is_that_of_one_that_abandons_nobody(replaced):
     assert len(hasty) == 5
     for one, other in zip(chain(*hasty), chain(*patient), strict=True):
         assert repr(one.emigrants) == repr(other.emigrants)
-        assert repr(one.island.hall) == repr(other.island.hall)
+        assert repr(one.island.hall_of_fame) == repr(other.island.hall_of_fame)
         assert repr(one.island.elite) == repr(other.island.elite)
         assert [each.genes for each in one.island.population] == [
             each.genes for each in other.island.population

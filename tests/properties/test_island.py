@@ -190,11 +190,11 @@ def test_the_hall_of_an_island_remembers_what_its_population_has_lost():
     island, _ = first_generation(0, 3, evaluator)
     expected = with_entries(HallOfFame(), island.population)
     for _ in range(4):
-        assert island.hall == expected
+        assert island.hall_of_fame == expected
         island, _ = step(island, evaluator)
         expected = with_entries(expected, island.population)
     alive = {each.key for each in island.population}
-    assert any(entry.key not in alive for entry in island.hall.entries)
+    assert any(entry.key not in alive for entry in island.hall_of_fame.entries)
 
 
 # Seeds, elites, failures.
@@ -279,5 +279,5 @@ def test_a_failure_never_enters_the_hall_of_fame_and_is_last_in_anelite_of():
     )
     island = evolved(1, setting, evaluator=Evaluator(record(), setting))
     assert {each.outcome.verdict.name for each in island.population} >= {"OK", "DIVERGED"}
-    assert all(isfinite(entry.fitness) for entry in island.hall.entries)
+    assert all(isfinite(entry.fitness) for entry in island.hall_of_fame.entries)
     assert isfinite(island.elite[0].fitness)

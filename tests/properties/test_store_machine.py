@@ -151,7 +151,7 @@ class Machine(RuleBasedStateMachine):
 
     @rule(lease=leases, seconds=lasting)
     def beat(self, lease, seconds):
-        told, known = self.held(lease, lambda: self.store.leases.beat(lease, seconds))
+        told, known = self.held(lease, lambda: self.store.leases.renew(lease, seconds))
         if known is not None:
             assert told == known.cancel
             known.expired = seconds == EXPIRED
@@ -231,7 +231,7 @@ class Machine(RuleBasedStateMachine):
     @rule()
     def forget(self):
         gone = [job for job, known in self.jobs.items() if known.state in TERMINAL]
-        assert self.store.retention.forget(-1.0) == len(gone)
+        assert self.store.retention.delete_expired(-1.0) == len(gone)
         for job in gone:
             del self.jobs[job]
 

@@ -53,9 +53,9 @@ def searches(draw):
 
 def carried(leg, before, arriving):
     """An epoch of a leg: what it is depends on where it began, and on who arrived from where."""
-    number = float(hash((leg.island, leg.begin, leg.end, before.bar, *arriving)) % 2**40)
+    number = float(hash((leg.island, leg.begin, leg.end, before.abandon_threshold, *arriving)) % 2**40)
     leaving = (Individual((), fitness=number),)
-    return IslandEpoch(replace(before, generation=leg.end, bar=number), leaving, ())
+    return IslandEpoch(replace(before, generation=leg.end, abandon_threshold=number), leaving, ())
 
 
 def bred(epoch):
@@ -103,12 +103,12 @@ class Voyage:
         return self.held.get((island, generation)) or self.plan.known[island].get(generation)
 
     def send(self):
-        legs = list(self.plan.due())
+        legs = list(self.plan.ready_tasks())
         for leg in legs:
             assert leg not in self.out
             place = self.ends.index(leg.begin)
             assert leg.end == self.ends[place + 1]
-            assert place < self.ends.index(self.plan.complete) + self.ahead
+            assert place < self.ends.index(self.plan.completed_generation) + self.ahead
             for needed in (leg.island, *self.sources[leg.island]):
                 on_its_way = any((each.island, each.end) == (needed, leg.begin) for each in self.out)
                 assert on_its_way or self.at(needed, leg.begin)
@@ -131,14 +131,16 @@ class Voyage:
 
     def report(self, leg):
         self.out.remove(leg)
-        self.plan.back(leg, self.held[leg.island, leg.end])
-        for epochs in self.plan.completed():
-            assert [epoch.island.generation for epoch in epochs] == [self.plan.complete] * len(epochs)
+        self.plan.complete(leg, self.held[leg.island, leg.end])
+        for epochs in self.plan.completed_epochs():
+            assert [epoch.island.generation for epoch in epochs] == [self.plan.completed_generation] * len(
+                epochs
+            )
             self.done.append(epochs)
 
     def lose(self, leg):
         """With a leg all that was sent of its island after it is gone, and what came of it."""
-        self.plan.lost(leg)
+        self.plan.reschedule(leg)
         self.out = [each for each in self.out if each.island != leg.island or each.end < leg.end]
         for island, generation in list(self.held):
             if island == leg.island and generation >= leg.end:

@@ -44,7 +44,7 @@ class Commands(TyperGroup):
         """Return a command, or None where there is none of that name."""
         if cmd_name not in COMMANDS:
             return None
-        found = getattr(import_module(f"islands_api.cli.{cmd_name}"), cmd_name)
+        found = getattr(import_module(f"islands_api.cli.commands.{cmd_name}"), cmd_name)
         if not isinstance(found, typer.Typer):
             alone = typer.Typer(pretty_exceptions_enable=False)
             alone.command(name=cmd_name)(found)

@@ -93,13 +93,13 @@ def run(
         result = result.with_wall_time(perf_counter() - began)
         tell("figures", 1.0)
         result.save(folder)
-    if result.findings.search.ended_by == "stopped":
+    if result.search_result.search.ended_by == "stopped":
         errors.print(f"stopped: the result is the best so far; go on with --resume {folder}", markup=False)
         if manner.wall_time is not None:
             errors.print("an end by --wall-time is not reproducible: how far a search gets by then differs")
     show_result(result, folder)
     if manner.verbose:
-        for name, (size, limit) in result.findings.search.caches.items():
+        for name, (size, limit) in result.search_result.search.caches.items():
             output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
     if tested is not None:
         _test(result, tested, folder)
@@ -179,7 +179,7 @@ class _Watch:
         if self._state is not None:
             now = monotonic()
             about = {"job": self._job, "wall_s": now - self._began, **state_document(self._state)}
-            write_hall(self._state.archipelago.hall, self._folder / HALL)
+            write_hall(self._state.archipelago.hall_of_fame, self._folder / HALL)
             write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, about)
             took = monotonic() - now
             self._next = now + took + max(CHECKPOINT_EVERY, took / CHECKPOINT_SHARE)

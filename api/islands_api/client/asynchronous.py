@@ -253,7 +253,7 @@ class AsyncClient:
                         refuse_problem(response)
                         tries.succeeded()
                         async for piece in response.aiter_bytes():
-                            for event in lines.take(piece):
+                            for event in lines.feed(piece):
                                 after = event.number
                                 yield event
                         # A service that ends lets its streams end; one whose job has ended says so, by 204.

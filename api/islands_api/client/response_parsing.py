@@ -37,7 +37,7 @@ class EventLines:
     def __init__(self) -> None:
         self._rest = b""
 
-    def take(self, piece: bytes) -> Iterator[Event]:
+    def feed(self, piece: bytes) -> Iterator[Event]:
         """Take what has come; yield the events that it completes."""
         # A line ends where a byte says so: the text of an event may hold what Unicode takes for a line's end.
         *blocks, self._rest = (self._rest + piece).split(b"\n\n")

@@ -269,7 +269,7 @@ class Client:
                         refuse_problem(response)
                         tries.succeeded()
                         for piece in response.iter_bytes():
-                            for event in lines.take(piece):
+                            for event in lines.feed(piece):
                                 after = event.number
                                 yield event
                         # A service that ends lets its streams end; one whose job has ended says so, by 204.

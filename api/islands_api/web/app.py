@@ -72,8 +72,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
                 task.cancel()
                 with suppress(asyncio.CancelledError):
                     await task
-            await doors.do(opened.close)
-            await doors.do(traces.close)
+            await doors.run_blocking(opened.close)
+            await doors.run_blocking(traces.close)
             threads.close()
 
     app = FastAPI(

@@ -53,7 +53,7 @@ class KeyCache:
     """
 
     def __init__(self, doors: AppState) -> None:
-        self._doors = doors
+        self._state = doors
         self._found: dict[str, tuple[float, Key | None]] = {}
 
     async def find(self, secret: str) -> Key | None:
@@ -61,7 +61,7 @@ class KeyCache:
         now = monotonic()
         at, key = self._found.get(secret, (-REMEMBERED, None))
         if now - at >= REMEMBERED:
-            key = await self._doors.do(self._doors.store.keys.find, secret)
+            key = await self._state.run_blocking(self._state.store.keys.find, secret)
             if key is not None:
                 self._found = {
                     each: entry for each, entry in self._found.items() if now - entry[0] < REMEMBERED
@@ -69,7 +69,7 @@ class KeyCache:
                 self._found[secret] = now, key
         return key
 
-    async def still_open(self, caller: Principal) -> bool:
+    async def is_still_valid(self, caller: Principal) -> bool:
         """Tell whether a caller who was let in a while ago would be let in now, as far as can be known."""
         if caller.secret is None:
             return True
@@ -99,7 +99,7 @@ async def _let_in(request: Request, doors: AppState, given: HTTPAuthorizationCre
     address = request.client.host if request.client is not None else "?"
     if given is None:
         if doors.settings.keys_needed:
-            doors.rate.take(f"address {address}")
+            doors.rate_limiter.acquire(f"address {address}")
             raise AuthenticationError(
                 "this service needs a key: send 'Authorization: Bearer islands_...'; whoever runs it makes "
                 "one with 'islands keys create'"
@@ -107,10 +107,10 @@ async def _let_in(request: Request, doors: AppState, given: HTTPAuthorizationCre
         return Principal(LOCAL, frozenset(SCOPES))
     key = await request.app.state.keys.find(given.credentials)
     if key is None or not key.valid:
-        doors.rate.take(f"address {address}", min(_WRONG, doors.settings.burst))
+        doors.rate_limiter.acquire(f"address {address}", min(_WRONG, doors.settings.burst))
         what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
         raise AuthenticationError(f"the key {what}: ask whoever runs this service for another one")
-    doors.rate.take(f"key {key.id}")
+    doors.rate_limiter.acquire(f"key {key.id}")
     return Principal(key.owner, key.scopes, given.credentials)
 
 

@@ -22,7 +22,7 @@ class BlockingExecutor:
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(COUNT, "doors")
 
-    async def do(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
+    async def run(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
         """Carry out an operation; what it returns or raises comes back here."""
         call = partial(copy_context().run, operation, *arguments, **named)
         done = asyncio.get_running_loop().run_in_executor(self._pool, call)

@@ -30,15 +30,15 @@ class AppState:
     store: Store
     blobs: Blobs
     hub: JobEventHub
-    rate: RateLimiter
-    measures: ServiceMetrics
-    inspections: asyncio.Semaphore
-    drawings: asyncio.Semaphore
-    threads: BlockingExecutor
+    rate_limiter: RateLimiter
+    metrics: ServiceMetrics
+    inspection_slots: asyncio.Semaphore
+    figure_slots: asyncio.Semaphore
+    executor: BlockingExecutor
 
-    async def do(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
+    async def run_blocking(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
         """Carry out what waits for the database or the disk, without holding up other requests."""
-        return await self.threads.do(operation, *arguments, **named)
+        return await self.executor.run(operation, *arguments, **named)
 
 
 async def _doors(request: Request) -> Any:

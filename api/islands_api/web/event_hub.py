@@ -27,12 +27,12 @@ class JobFeed:
     """What is known of a watched job."""
 
     version: int
-    watchers: int = 0
+    subscribers: int = 0
     gone: bool = False
     recent: deque[Event] = field(default_factory=lambda: deque(maxlen=_KEPT))
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Wake all who wait; the next change is another one."""
         self.changed.set()
         self.changed = asyncio.Event()
@@ -50,15 +50,15 @@ class JobEventHub:
     def __init__(self, store: Store, threads: BlockingExecutor) -> None:
         self._store, self._threads = store, threads
         self._feeds: dict[str, JobFeed] = {}
-        self._somebody = asyncio.Event()
+        self._has_subscribers = asyncio.Event()
         self.closed = False
 
     async def run(self) -> None:
         """Look for changes until cancelled."""
         while True:
-            await self._somebody.wait()
+            await self._has_subscribers.wait()
             try:
-                await self._look()
+                await self._poll()
                 await asyncio.sleep(LOOK)
             except StoreError as error:
                 log.warning("hub cannot look", reason=str(error))
@@ -72,22 +72,22 @@ class JobEventHub:
         """End all streams: their clients come back, and go on where they were."""
         self.closed = True
         for feed in self._feeds.values():
-            feed.tell()
+            feed.publish()
 
     @contextmanager
-    def watching(self, job: str, version: int) -> Iterator[JobFeed]:
+    def subscribe(self, job: str, version: int) -> Iterator[JobFeed]:
         """Have a job's feed kept up to date in the block, from a version on that is known."""
         feed = self._feeds.setdefault(job, JobFeed(version))
-        feed.watchers += 1
-        self._somebody.set()
+        feed.subscribers += 1
+        self._has_subscribers.set()
         try:
             yield feed
         finally:
-            feed.watchers -= 1
-            if feed.watchers == 0:
+            feed.subscribers -= 1
+            if feed.subscribers == 0:
                 del self._feeds[job]
                 if not self._feeds:
-                    self._somebody.clear()
+                    self._has_subscribers.clear()
 
     async def wait(self, feed: JobFeed, version: int, seconds: float) -> bool:
         """Wait until a job is past a version; return whether it is."""
@@ -99,7 +99,7 @@ class JobEventHub:
 
     async def events(self, job: str, version: int, after: int, alive: float) -> AsyncGenerator[Event | None]:
         """Yield a job's events after a number, until it has ended; None where nothing happens for a while."""
-        with self.watching(job, version) as feed:
+        with self.subscribe(job, version) as feed:
             last = after
             while not (feed.gone or self.closed):
                 found = await self._after(job, feed, last)
@@ -119,21 +119,21 @@ class JobEventHub:
             return [event for event in feed.recent if event.number > last]
         # These may be newer than what the feed knows; they reach it, and its other watchers, by its own look.
         try:
-            return list(await self._threads.do(self._store.jobs.events, job, last))
+            return list(await self._threads.run(self._store.jobs.events, job, last))
         except StoreError as error:
             log.warning("hub cannot read", job=job, reason=str(error))
             await asyncio.sleep(RETRY)
             return []
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         watched = dict(self._feeds)
-        versions = await self._threads.do(self._store.jobs.versions, list(watched))
+        versions = await self._threads.run(self._store.jobs.versions, list(watched))
         for job, feed in watched.items():
             if job not in versions:
                 feed.gone = True
-                feed.tell()
+                feed.publish()
             elif versions[job] > feed.version:
-                news = await self._threads.do(self._store.jobs.events, job, feed.version)
+                news = await self._threads.run(self._store.jobs.events, job, feed.version)
                 feed.recent.extend(news)
                 feed.version = max((versions[job], *(event.number for event in news)))
-                feed.tell()
+                feed.publish()

@@ -56,7 +56,7 @@ async def submit_job(
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
     job, new = await _submitted(doors, request, submission)
     if new:
-        doors.measures.accepted.inc()
+        doors.metrics.accepted.inc()
     headers = {"Location": f"{JOBS}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
     if not new:
         headers["Idempotent-Replayed"] = "true"
@@ -69,16 +69,16 @@ def etag(job: Job) -> str:
 
 
 async def _submitted(doors: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
-    before, doubts = await doors.do(_admitted, doors, request, submission)
+    before, doubts = await doors.run_blocking(_admitted, doors, request, submission)
     if before is not None:
         return before, False
     for doubt in doubts:
         with link_blob(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
-            async with doors.inspections:
+            async with doors.inspection_slots:
                 await inspect_file(
-                    path, doubt.asked, doors.settings.inspection_memory, doors.settings.inspection_seconds
+                    path, doubt.request, doors.settings.inspection_memory, doors.settings.inspection_seconds
                 )
-    return await doors.do(doors.store.jobs.submit, submission, doors.settings.max_active)
+    return await doors.run_blocking(doors.store.jobs.submit, submission, doors.settings.max_active)
 
 
 def _admitted(
@@ -92,10 +92,10 @@ def _admitted(
     try:
         doubts = validate_job(request, submission.owner, doors.store, doors.settings)
     except IslandsError:
-        if (before := doors.store.jobs.accepted(submission)) is not None:
+        if (before := doors.store.jobs.find_replay(submission)) is not None:
             return before, ()
         raise
-    return doors.store.jobs.accepted(submission) if doubts else None, doubts
+    return doors.store.jobs.find_replay(submission) if doubts else None, doubts
 
 
 async def get_job_of_kind(doors: AppState, caller: Principal, job: str, kind: str) -> Job:
@@ -107,7 +107,7 @@ async def get_job_of_kind(doors: AppState, caller: Principal, job: str, kind: st
     ResourceNotFoundError
         It is of another kind, and has nothing of what is asked for.
     """
-    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
     if found.kind != kind:
         raise ResourceNotFoundError(
             f"job {job} is of the kind {found.kind}, and only those of the kind {kind} have this: its "
@@ -123,7 +123,7 @@ async def get_result(doors: AppState, job: Job) -> dict[str, Any]:
     ------
     ResultNotReadyError
     """
-    document = await doors.do(doors.store.results.document, job.id)
+    document = await doors.run_blocking(doors.store.results.document, job.id)
     if document is None:
         hint = (
             "wait until it has succeeded"

@@ -81,7 +81,7 @@ class RequestLogging:
         doors: Any = getattr(scope["app"].state, "doors", None)
         if doors is not None:
             method = scope["method"] if scope["method"] in METHODS else "other"
-            doors.measures.latency.labels(method, route, status).observe(seconds)
+            doors.metrics.latency.labels(method, route, status).observe(seconds)
         # Those who look whether we live, and how we are, would fill the log.
         if route not in ("/healthz", "/readyz", "/metrics"):
             log.info(

@@ -53,7 +53,7 @@ class _Jobs(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Read how the jobs stand."""
-        standing = self._store.jobs.standing()
+        standing = self._store.jobs.queue_statistics()
         jobs = GaugeMetricFamily("islands_jobs", "Jobs by state.", labels=["state"])
         for state, count in standing.counts.items():
             jobs.add_metric([state], count)

@@ -24,7 +24,7 @@ class RateLimiter:
         self._rate, self._burst = rate, burst
         self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
-    def take(self, who: str, tokens: float = 1.0) -> None:
+    def acquire(self, who: str, tokens: float = 1.0) -> None:
         """Take tokens out of a bucket.
 
         Raises

@@ -97,7 +97,7 @@ class Coordinator:
         """
         log.info("coordinator started", name=self._name)
         with self._store, self._ray, closing(self._traces):
-            while not self._stopping.made:
+            while not self._stopping.requested:
                 if self._ready():
                     self._next()
 
@@ -263,7 +263,7 @@ class Coordinator:
 
     def _sweep(self) -> None:
         if self._settings.retention:
-            self._store.retention.forget(self._settings.retention)
+            self._store.retention.delete_expired(self._settings.retention)
         # The time first, then the names, then the files: what is named after this is younger than an hour.
         before = time() - ORPHAN
         removed = self._blobs.sweep(self._store.retention.named_blobs(), before)

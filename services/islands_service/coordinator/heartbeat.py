@@ -83,7 +83,7 @@ class Heartbeat:
             raise LeaseLostError(f"job {self._lease.job.id} is not ours any more")
         if self._cancelled:
             raise JobCancelled(f"job {self._lease.job.id} is cancelled")
-        if self._stopping.made:
+        if self._stopping.requested:
             raise CoordinatorStopping("the coordinator is to stop")
 
     @contextmanager
@@ -105,7 +105,7 @@ class Heartbeat:
             if self._lost:
                 continue
             try:
-                self._cancelled = self._store.leases.beat(self._lease, self._seconds) or self._cancelled
+                self._cancelled = self._store.leases.renew(self._lease, self._seconds) or self._cancelled
                 waited += self._seconds / BEATS if self._cancelled else 0.0
                 if waited > GRACE:
                     # Something long that asks nobody, a refinement perhaps: its result comes too late.

@@ -80,7 +80,7 @@ def identification(
         **spec.changes,
     )
     watch.flush()
-    return outcome_of(result.with_wall_time(watch.spent).findings)
+    return outcome_of(result.with_wall_time(watch.spent).search_result)
 
 
 def outcome_of(findings: SearchResult) -> JobOutcome:

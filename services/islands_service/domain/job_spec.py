@@ -172,14 +172,14 @@ class Discrepancy(BaseModel):
     seed: Seed = 0
 
     @property
-    def beside(self) -> tuple[str, ...]:
+    def recorded_columns(self) -> tuple[str, ...]:
         """The column that is the simulation, where one is."""
         return (core.column,) if isinstance(core := innermost(self.simulation), ColumnSpec) else ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The columns that are read beside the output, the one that drives the simulation first."""
-        return (self.input, *self.channels, *self.beside)
+        return (self.input, *self.channels, *self.recorded_columns)
 
 
 def identification_of(document: Mapping[str, Any]) -> Identification:

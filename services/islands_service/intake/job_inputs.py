@@ -69,4 +69,4 @@ def record_and_columns(
     with link_blob(blobs.path(stored.blob), stored.name) as path:
         whole = read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(spec.rows))
     kept = 1 + len(spec.channels)
-    return whole.first_inputs(kept), dict(zip(spec.beside, whole.u[:, kept:].T, strict=True))
+    return whole.first_inputs(kept), dict(zip(spec.recorded_columns, whole.u[:, kept:].T, strict=True))

@@ -36,7 +36,7 @@ class PendingInspection:
     """A data set that has to be read once more, as the job would, to know whether that works."""
 
     dataset: StoredDataset
-    asked: InspectionRequest
+    request: InspectionRequest
 
 
 def validate_job(
@@ -88,7 +88,7 @@ def _of_discrepancy(spec: Discrepancy) -> list[Part]:
     _check_simulation(spec)
     if spec.input in spec.channels:
         raise RecordError(f"channel {spec.input} is the input itself: leave it out")
-    for name in spec.beside:
+    for name in spec.recorded_columns:
         if name in (spec.input, spec.output, *spec.channels):
             raise RecordError(
                 f"column {name} is given as the simulation and as what it is held against: choose another "

@@ -40,7 +40,7 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
         lines.append(
-            f"  nearest: {nearest}; what is left depends on: {', '.join(found.remainder) or 'its own past'}"
+            f"  nearest: {nearest}; what is left depends on: {', '.join(found.residual_structure) or 'its own past'}"
         )
     if found.gain is not None:
         gain, unit = found.gain, found.record.output_unit
@@ -50,8 +50,8 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
             f"{gain.after.rmse:.3g} {unit}, by {gain.reduction_percent:.1f} % ({low:.1f} to {high:.1f}); "
             f"noise alone is {gain.noise_floor.rmse:.3g} {unit}, {_floor(found)}."
         )
-    if found.decisive_experiment:
-        lines.append(f"To tell apart what this record cannot: {found.decisive_experiment}.")
+    if found.suggested_experiment:
+        lines.append(f"To tell apart what this record cannot: {found.suggested_experiment}.")
     if proposal is not None:
         lines.append(
             f"What is left follows, to {100 * proposal.explains:.0f} % on such data: {proposal.formula}"
@@ -60,7 +60,9 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
 
 
 def _verdict(found: Diagnosis) -> str:
-    quiet = found.verdict == Verdict.NAMED and all(finding.eta is None for finding in found.effects)
+    quiet = found.verdict == Verdict.NAMED and all(
+        finding.explained_fraction is None for finding in found.effects
+    )
     return _NOISE if quiet else _VERDICTS[found.verdict]
 
 
@@ -68,7 +70,7 @@ def _floor(found: Diagnosis) -> str:
     """Say how well the noise is known."""
     return (
         "as repeated periods show"
-        if found.measured_floor
+        if found.is_noise_floor_measured
         else "at the most: how much of what is left is noise, a record without repeated periods cannot tell"
     )
 
@@ -79,7 +81,11 @@ def _finding(finding: Finding) -> str:
         + ("" if each.ci95 is None else f" ({each.ci95[0]:.4g} to {each.ci95[1]:.4g})")
         for name, each in finding.parameters.items()
     )
-    share = "" if finding.eta is None else f", {100 * finding.eta:.0f} % of the misfit"
+    share = (
+        ""
+        if finding.explained_fraction is None
+        else f", {100 * finding.explained_fraction:.0f} % of the misfit"
+    )
     or_else = f"; cannot be told from {', '.join(finding.equivalents)}" if finding.equivalents else ""
     return f"{finding.name}: {values}; confidence {finding.confidence:.2f}{share}{or_else}"
 
@@ -90,9 +96,9 @@ def summarise_self_test(tested: SelfTest) -> str:
     low, high = (100 * each for each in alarms.ci95)
     shown = sum(limit is not None for limit in limits.values())
     # So few records cannot show that it is rarer.
-    least = "at most " if tested.p_value * (alarms.of + 1) < 1.5 else ""
+    least = "at most " if tested.p_value * (alarms.trials + 1) < 1.5 else ""
     return (
-        f"Of {alarms.of} records like this one with nothing wrong in them {alarms.value * alarms.of:.0f} got "
+        f"Of {alarms.trials} records like this one with nothing wrong in them {alarms.value * alarms.trials:.0f} got "
         f"a name: {100 * alarms.value:.1f} % false alarms ({low:.1f} to {high:.1f}). Chance alone makes a "
         f"candidate as good as this record's best with a probability of {least}{tested.p_value:.2g}.\n"
         f"Of {len(limits)} effects this record could show {shown}, up to a misfit of {STRENGTHS[-1]:g} times "

@@ -54,19 +54,19 @@ class IslandActorPool:
 
     def __init__(self, problem: Problem, islands: int, tell: Tell, title: str = "") -> None:
         self._problem = ray.put(problem)
-        self._islands, self._tell, self._title, self._made = islands, tell, title, 0
+        self._islands, self._report, self._title, self._actor_count = islands, tell, title, 0
         self._size = 0
         # By place; with the reference that ends when the actor is prepared, or when it dies.
         self._joining: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
         self._members: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}
-        self._began = self._since = monotonic()
-        self._looked = self._measured = -_MEASURE
-        self._sailed = inf
+        self._created_at = self._waiting_since = monotonic()
+        self._updated_at = self._measured_at = -_MEASURE
+        self._started_at = inf
         self._vacant: set[int] = set()  # places whose actors were lost and are not replaced yet
-        self._told = ""
+        self._last_report = ""
         self._losses = 0
 
-    def tend(self, at_once: bool = False) -> bool:
+    def maintain(self, at_once: bool = False) -> bool:
         """Welcome who is ready, replace who is lost, grow with the cluster; tell whether anybody is there.
 
         Raises
@@ -75,19 +75,19 @@ class IslandActorPool:
             Actors die again and again, or cannot be made at all.
         """
         now = monotonic()
-        if at_once or now - self._looked > _LOOK:
-            self._looked = now
-            self._look(now)
-            if self._members and (not self._joining or now - self._began > PATIENCE):
-                self._sailed = min(self._sailed, now)
-        return self._sailed < inf and bool(self._members)
+        if at_once or now - self._updated_at > _LOOK:
+            self._updated_at = now
+            self._update_members(now)
+            if self._members and (not self._joining or now - self._created_at > PATIENCE):
+                self._started_at = min(self._started_at, now)
+        return self._started_at < inf and bool(self._members)
 
     @property
     def places(self) -> list[int]:
         """The places whose actors are ready, ascending."""
         return sorted(self._members)
 
-    def home(self, island: int) -> ActorHandle:
+    def actor_for(self, island: int) -> ActorHandle:
         """Return the actor for an island: the same one as long as that is there, for its warm caches."""
         place = island % self._size
         if place not in self._members:
@@ -98,25 +98,25 @@ class IslandActorPool:
                 place = sorted(regular)[island % len(regular)]
         return self._members[place][0]
 
-    def progressed(self) -> None:
+    def reset_losses(self) -> None:
         """Forget the losses so far: work gets done in spite of them."""
         self._losses = 0
 
-    def dismiss(self) -> None:
+    def shutdown(self) -> None:
         """End all actors."""
         for actor, _ in (*self._joining.values(), *self._members.values()):
             ray.kill(actor)
 
-    def _look(self, now: float) -> None:
-        if now - self._measured > _MEASURE:
-            self._measured = now
+    def _update_members(self, now: float) -> None:
+        if now - self._measured_at > _MEASURE:
+            self._measured_at = now
             cpus = int(ray.cluster_resources().get("CPU", 0))
             self._size = max(self._size, min(self._islands, max(1, cpus)))
         for place in _ended(self._members):
-            self._lost(place, self._members.pop(place)[0])
-        if not self._members and self._sailed < inf:
+            self._handle_loss(place, self._members.pop(place)[0])
+        if not self._members and self._started_at < inf:
             # As at the beginning: the first that is back must not get everybody's work.
-            self._sailed, self._began = inf, now
+            self._started_at, self._created_at = inf, now
         for place in _ended(self._joining):
             actor, prepared = self._joining[place]
             try:
@@ -126,7 +126,7 @@ class IslandActorPool:
                     raise ClusterError(
                         f"an actor cannot be made; is islands installed on every machine? {error}"
                     ) from error
-                self._lost(place, actor)
+                self._handle_loss(place, actor)
             except RayTaskError as error:
                 raise error.cause from error
             else:
@@ -138,18 +138,18 @@ class IslandActorPool:
                 self._members[place] = (actor, actor.live.remote())
                 self._vacant.discard(place)
             del self._joining[place]
-        standing_in = [STAND_IN] if now - self._sailed > STAND_IN_AFTER else []
+        standing_in = [STAND_IN] if now - self._started_at > STAND_IN_AFTER else []
         for place in (*range(self._size), *standing_in):
             if place not in self._members and place not in self._joining:
-                self._made += 1
+                self._actor_count += 1
                 actor = _ACTOR.options(
-                    name=f"{self._title}.{self._made}" if self._title else None,
+                    name=f"{self._title}.{self._actor_count}" if self._title else None,
                     num_cpus=0 if place == STAND_IN else 1,
                 ).remote(self._problem)
                 self._joining[place] = (actor, actor.prepare.remote())
-        self._tell_of_waiting(now)
+        self._report_waiting(now)
 
-    def _lost(self, place: int, actor: ActorHandle) -> None:
+    def _handle_loss(self, place: int, actor: ActorHandle) -> None:
         # Perhaps it is only out of reach: it must not keep its CPU from who takes its place.
         ray.kill(actor)
         self._vacant |= {place} - {STAND_IN}
@@ -159,20 +159,20 @@ class IslandActorPool:
                 f"{self._losses} actors were lost and no epoch got done: is there enough memory for them? "
                 "Take fewer islands, or a larger machine"
             )
-        self._tell("an actor was lost: its islands go on from their last epoch")
+        self._report("an actor was lost: its islands go on from their last epoch")
 
-    def _tell_of_waiting(self, now: float) -> None:
+    def _report_waiting(self, now: float) -> None:
         waiting = sum(place != STAND_IN for place in self._joining)
         if not waiting:
-            self._since, self._told = now, ""
-        elif now - self._since > TELL_AFTER:
+            self._waiting_since, self._last_report = now, ""
+        elif now - self._waiting_since > TELL_AFTER:
             line = (
                 f"waiting for capacity: {self._size - waiting} of {self._size} island actors are ready, the "
                 "others need a CPU each"
             )
-            if line != self._told:
-                self._tell(line)
-            self._told = line
+            if line != self._last_report:
+                self._report(line)
+            self._last_report = line
 
 
 def _ended(actors: dict[int, tuple[ActorHandle, ray.ObjectRef]]) -> list[int]:

@@ -49,7 +49,7 @@ class EpochScheduler(Generic[T]):
     ) -> None:
         self._settings, self._ahead = problem.settings, ahead
         self.sources = make_topology(problem, start).sources
-        self.complete = start.generation
+        self.completed_generation = start.generation
         self._sent = [start.generation] * len(start.islands)
         #: What is known of every island by generation, from the last complete archipelago on.
         self.known: list[dict[int, T]] = []
@@ -60,11 +60,11 @@ class EpochScheduler(Generic[T]):
     @property
     def finished(self) -> bool:
         """Whether the last generation is complete."""
-        return self.complete >= self._settings.generations
+        return self.completed_generation >= self._settings.generations
 
-    def due(self) -> Iterator[EpochTask]:
+    def ready_tasks(self) -> Iterator[EpochTask]:
         """Yield the legs that may be sent off, and take each for sent; those of earlier epochs come first."""
-        begin, end = self.complete, self._after(self.complete)
+        begin, end = self.completed_generation, self._next_stop(self.completed_generation)
         for _ in range(self._ahead):
             for island, sent in enumerate(self._sent):
                 if sent == begin:
@@ -72,27 +72,27 @@ class EpochScheduler(Generic[T]):
                     yield EpochTask(island, begin, end)
             if end >= self._settings.generations:
                 return
-            begin, end = end, self._after(end)
+            begin, end = end, self._next_stop(end)
 
-    def lost(self, leg: EpochTask) -> None:
+    def reschedule(self, leg: EpochTask) -> None:
         """Take a leg, and what was sent of its island after it, for not sent."""
-        self._sent[leg.island] = max(self.complete, min(self._sent[leg.island], leg.begin))
+        self._sent[leg.island] = max(self.completed_generation, min(self._sent[leg.island], leg.begin))
 
-    def back(self, leg: EpochTask, epoch: T) -> None:
+    def complete(self, leg: EpochTask, epoch: T) -> None:
         """Take note of what a leg brought."""
-        if leg.end > self.complete:
+        if leg.end > self.completed_generation:
             self.known[leg.island][leg.end] = epoch
 
-    def completed(self) -> Iterator[tuple[T, ...]]:
+    def completed_epochs(self) -> Iterator[tuple[T, ...]]:
         """Yield what all islands brought, epoch by epoch as far as it is complete."""
         while not self.finished:
-            end = self._after(self.complete)
+            end = self._next_stop(self.completed_generation)
             if not all(end in known for known in self.known):
                 return
             for known in self.known:
-                del known[self.complete]
-            self.complete = end
+                del known[self.completed_generation]
+            self.completed_generation = end
             yield tuple(known[end] for known in self.known)
 
-    def _after(self, generation: int) -> int:
+    def _next_stop(self, generation: int) -> int:
         return next_stop(generation, self._settings)

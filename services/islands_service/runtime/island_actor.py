@@ -38,7 +38,7 @@ class IslandActor:
         return version("islands")
 
     @ray.method(concurrency_group="watch")
-    def live(self) -> None:
+    def wait_until_killed(self) -> None:
         """Never return: who waits for this learns of the actor's death."""
         Event().wait()
 

@@ -47,7 +47,7 @@ class RayEngine:
         except RayError as error:
             raise ClusterError(f"Ray failed in a way that nobody can go on from: {error}") from error
         finally:
-            crew.dismiss()
+            crew.shutdown()
 
 
 def _carried_out(
@@ -55,13 +55,13 @@ def _carried_out(
 ) -> Generator[ArchipelagoEpoch]:
     voyage = _Voyage(itinerary, crew)
     while not (itinerary.finished or stop()):
-        if crew.tend():
+        if crew.maintain():
             voyage.send()
         voyage.wait()
-        for reports in itinerary.completed():
+        for reports in itinerary.completed_epochs():
             if stop():
                 return
-            crew.progressed()
+            crew.reset_losses()
             voyage.forget()
             yield ArchipelagoEpoch(
                 Archipelago(PackedIslands(reports)),
@@ -93,10 +93,10 @@ class _Voyage:
 
     def send(self) -> None:
         """Send off all that may go. Ray hands the emigrants over when they are there."""
-        for leg in self._itinerary.due():
+        for leg in self._itinerary.ready_tasks():
             before, _ = self._at(leg.island, leg.begin)
             arriving = [self._at(source, leg.begin)[1] for source in self._itinerary.sources[leg.island]]
-            report, leaving = self._crew.home(leg.island).advance.remote(before, *arriving)
+            report, leaving = self._crew.actor_for(leg.island).advance.remote(before, *arriving)
             self._references[leg.island, leg.end] = report, leaving
             self._out[report] = leg
 
@@ -120,7 +120,7 @@ class _Voyage:
 
     def forget(self) -> None:
         """Let go of what lies behind the last complete epoch: nothing will stand on it."""
-        complete = self._itinerary.complete
+        complete = self._itinerary.completed_generation
         self._references = {key: kept for key, kept in self._references.items() if key[1] >= complete}
 
     def _taken(self, leg: EpochTask, reference: "ray.ObjectRef[PackedEpoch]") -> bool:
@@ -132,14 +132,14 @@ class _Voyage:
         except RayTaskError as error:
             raise error.cause from error
         self._caches[report.actor] = report.caches
-        self._itinerary.back(leg, report)
+        self._itinerary.complete(leg, report)
         return True
 
     def _lose(self, legs: list[EpochTask]) -> None:
         """Forget legs that were lost, and what was sent of their islands after them."""
         first: dict[int, int] = {}
         for leg in legs:
-            self._itinerary.lost(leg)
+            self._itinerary.reschedule(leg)
             first[leg.island] = min(leg.end, first.get(leg.island, leg.end))
         self._out = {
             reference: leg
@@ -154,4 +154,4 @@ class _Voyage:
             and generation < first.get(island, generation + 1)
         }
         self._caches.clear()  # whose they were may be gone; who is there tells anew
-        self._crew.tend(at_once=True)
+        self._crew.maintain(at_once=True)

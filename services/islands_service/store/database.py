@@ -125,7 +125,7 @@ class Database:
         return done.result()
 
     @contextmanager
-    def alone(self) -> Iterator[Connection]:
+    def exclusive(self) -> Iterator[Connection]:
         """Open a transaction that writes, outside of any group: for migrations."""
         with translate_db_errors(), self._writing.begin() as connection:
             yield connection

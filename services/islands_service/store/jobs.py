@@ -111,7 +111,7 @@ class Jobs:
 
         return self._database.write(operation)
 
-    def accepted(self, submission: Submission) -> Job | None:
+    def find_replay(self, submission: Submission) -> Job | None:
         """Return the job that a submission's idempotency key names already, None where it names none.
 
         Raises
@@ -252,7 +252,7 @@ class Jobs:
                 Event(row.job_id, row.number, row.kind, json.loads(row.data), row.at) for row in rows
             )
 
-    def standing(self) -> QueueStatistics:
+    def queue_statistics(self) -> QueueStatistics:
         """Return how all owners' jobs stand."""
         counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
         waits = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(

@@ -57,7 +57,7 @@ class Leases:
         """
         return self._database.write(lambda connection: _claim(connection, owner, seconds))
 
-    def beat(self, lease: Lease, seconds: float) -> bool:
+    def renew(self, lease: Lease, seconds: float) -> bool:
         """Prolong a lease; tell whether the job is to be cancelled.
 
         Raises

@@ -19,7 +19,7 @@ class Retention:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def forget(self, seconds: float) -> int:
+    def delete_expired(self, seconds: float) -> int:
         """Delete the jobs that were finished so long ago; return how many."""
 
         def operation(connection: Connection) -> int:

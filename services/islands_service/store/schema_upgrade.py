@@ -28,7 +28,7 @@ def prepare(database: Database) -> None:
     with database.read() as connection:
         if revision(connection) == HEAD:
             return
-    with database.alone() as connection:
+    with database.exclusive() as connection:
         dialect.lock_migration(connection)
         upgrade(connection)
 

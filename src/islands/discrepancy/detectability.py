@@ -41,7 +41,7 @@ class SurrogateOutcome:
 
     Attributes
     ----------
-    called : str
+    named : str
         The first name, "nothing" or "unknown".
     recognised : bool
         What was injected is among the names, or among those that cannot be told from them.
@@ -49,7 +49,7 @@ class SurrogateOutcome:
         Of the best candidate.
     """
 
-    called: str
+    named: str
     recognised: bool
     score: float
 
@@ -60,7 +60,7 @@ class DetectionRate:
 
     value: float
     ci95: tuple[float, float]
-    of: int
+    trials: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +87,7 @@ class SelfTest:
 
 def diagnose_surrogate(source: Surrogates, probe: SurrogateCase) -> SurrogateOutcome:
     """Draw a surrogate and diagnose it."""
-    found = diagnose(source.drawn(probe), source.core, source.tolerance, probe.seed)
+    found = diagnose(source.draw_record(probe), source.simulator, source.prior_std, probe.seed)
     # That the noise remembers is true of a surrogate whose noise does.
     named = [each for each in found.effects if each.name != "coloured-noise" or source.noise.order == 0]
     # Causes of a misfit stand before what is said of the noise.
@@ -155,7 +155,7 @@ def self_test(
             ended += 1
             tell(ended, most)
             hidden = probe.injection
-            confusion[hidden.cause if hidden else NOTHING, answer.called] += 1
+            confusion[hidden.cause if hidden else NOTHING, answer.named] += 1
             if hidden is None:
                 cleans.append(answer)
                 continue
@@ -169,7 +169,7 @@ def self_test(
             name: steps[high] if (high := between[name][1]) < len(steps) else None
             for name, steps in ladders.items()
         },
-        estimate_rate(sum(answer.called not in (NOTHING, UNKNOWN) for answer in cleans), len(cleans)),
+        estimate_rate(sum(answer.named not in (NOTHING, UNKNOWN) for answer in cleans), len(cleans)),
         (1 + as_good) / (1 + len(cleans)),
         dict(sorted(confusion.items())),
     )

@@ -54,7 +54,7 @@ class Candidate:
 
     name: str
     score: float
-    eta: float
+    explained_fraction: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,21 +70,21 @@ class Diagnosis:
         All effects beside the simulation, the best first.
     gain : HoldoutGain or None
         On data that nothing else has seen; None where nothing was added to the simulation.
-    remainder : mapping of str to float
+    residual_structure : mapping of str to float
         Maps in which what is left is no chance, with their distance in standard deviations.
-    decisive_experiment : str
+    suggested_experiment : str
         What would tell apart what this record cannot; "" where there is nothing to tell apart.
     record : Dataset
-    fitted : int
+    estimation_samples : int
         Samples, from the first on, that estimation has seen; the rest is locked.
     base, best : CalibrationResult
         The simulation calibrated without the effects, and with them.
     noise_floor : float
         RMSE that no simulation is expected to be below.
-    measured_floor : bool
+    is_noise_floor_measured : bool
         The floor is known, from periods that repeat; else it is an upper bound, by what a flexible fit of the
         record foretells: nobody can know it.
-    as_given : float
+    nominal_rmse : float
         RMSE of the simulation with its nominal values over the locked samples.
     """
 
@@ -92,15 +92,15 @@ class Diagnosis:
     effects: tuple[Finding, ...]
     candidates: tuple[Candidate, ...]
     gain: HoldoutGain | None
-    remainder: Mapping[str, float]
-    decisive_experiment: str
+    residual_structure: Mapping[str, float]
+    suggested_experiment: str
     record: Dataset
-    fitted: int
+    estimation_samples: int
     base: CalibrationResult
     best: CalibrationResult
     noise_floor: float
-    measured_floor: bool
-    as_given: float
+    is_noise_floor_measured: bool
+    nominal_rmse: float
 
 
 def diagnose(
@@ -151,13 +151,13 @@ def diagnose(
     core = select_intersample(plain, target)
     effects = select_effects(core, scene, known, catalogue)
     for _ in range(ROUNDS):
-        plain = calibrate(replace(simulation, core=core), target, plain.values)
+        plain = calibrate(replace(simulation, simulator=core), target, plain.values)
         tell(f"looking for each of {len(effects)} effects")
         rungs = screen_effects(plain, target, effects, spread)
         again = select_intersample(best_single(plain, rungs), target)
         if same_discretisation(again, core):
             evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
-            again = select_intersample(evidence.found.fit, evidence.target)
+            again = select_intersample(evidence.hypothesis.fit, evidence.target)
         if same_discretisation(again, core):
             break
         # With a cause in it another hold, or a finer step, fits better: it was the cause that hid that.
@@ -168,7 +168,7 @@ def diagnose(
     tell("what is left over")
     evidence = assess_evidence(evidence, fitted, rng)
     if evidence.verdict == Verdict.UNKNOWN or (
-        evidence.verdict == Verdict.NOTHING and evidence.found.fit.noise.order
+        evidence.verdict == Verdict.NOTHING and evidence.hypothesis.fit.noise.order
     ):
         second = assess_evidence(search_with_model_error(plain, target, effects, tell, spread), fitted, rng)
         evidence = second if second.verdict != Verdict.UNKNOWN else evidence
@@ -186,8 +186,8 @@ def _told(
     spread: ParallelMap,
 ) -> Diagnosis:
     """Say what the evidence comes to, and measure the gain: once, on the locked part."""
-    base, found, rungs, verdict = evidence.base, evidence.found, evidence.rungs, evidence.verdict
-    floor = evidence.floor
+    base, found, rungs, verdict = evidence.base, evidence.hypothesis, evidence.screened, evidence.verdict
+    floor = evidence.noise_floor
     locked = slice(fitted, record.samples)
     gain = None
     if verdict in (Verdict.NAMED, Verdict.REMAINDER):
@@ -201,7 +201,7 @@ def _told(
         tell("what else could be the cause")
         named, instead = describe_effects(found, base, rungs, evidence.target, effects, floor, spread)
     residual = (record.y - found.fit.output)[:fitted]
-    scene = found.fit.simulation.scene
+    scene = found.fit.simulation.context
     noise = _noise(record.y[:fitted], residual, scene) if verdict != Verdict.UNKNOWN else ()
     simulation = plain.simulation
     given = simulation.simulate(simulation.nominal)
@@ -210,17 +210,18 @@ def _told(
         Verdict.NAMED if noise and verdict == Verdict.NOTHING else verdict,
         (*named, *noise),
         tuple(
-            Candidate(r.effect.cause, r.gained(base), explained_fraction(base, r.fit, floor)) for r in rungs
+            Candidate(r.effect.cause, r.score_gain(base), explained_fraction(base, r.fit, floor))
+            for r in rungs
         ),
         gain,
-        evidence.remainder,
+        evidence.residual_structure,
         suggest_experiment(found.fit, instead),
         record,
         fitted,
         plain,
         best,
         floor**0.5,
-        evidence.measured_floor,
+        evidence.is_noise_floor_measured,
         float(np.sqrt(np.mean((record.y - given)[locked] ** 2))),
     )
 
@@ -232,10 +233,12 @@ def _noise(y: Signal, residual: Signal, scene: SimulationContext) -> tuple[Findi
         if any(each.name in detector.excluded_by for each in found):
             continue
         detection = detector.detect(y, residual, scene)
-        if detection is not None and detection.gained > LEAST:
+        if detection is not None and detection.score_gain > LEAST:
             values = {name: Value(value, unit, None) for name, (value, unit) in detection.parameters.items()}
-            sure = 1.0 / (1.0 + float(np.exp(-detection.gained / (2 * TEMPER))))
-            found.append(Finding(detector.name, detector.family, sure, (), values, detection.gained, None))
+            sure = 1.0 / (1.0 + float(np.exp(-detection.score_gain / (2 * TEMPER))))
+            found.append(
+                Finding(detector.name, detector.family, sure, (), values, detection.score_gain, None)
+            )
     return tuple(found)
 
 

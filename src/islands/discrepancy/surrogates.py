@@ -68,7 +68,7 @@ class Surrogates:
     Attributes
     ----------
     record : Dataset
-    core, tolerance : Simulator, mapping
+    simulator, prior_std : Simulator, mapping
         As they were diagnosed.
     simulation : ExtendedSimulator
         Without effects.
@@ -77,35 +77,35 @@ class Surrogates:
     noise : NoiseModel
     sigma : float
         The residual's standard deviation.
-    fitted : int
+    estimation_samples : int
         Samples that estimation sees.
     """
 
     record: Dataset
-    core: Simulator
-    tolerance: Mapping[str, float]
+    simulator: Simulator
+    prior_std: Mapping[str, float]
     simulation: ExtendedSimulator
     values: Signal
     noise: NoiseModel
     sigma: float
-    fitted: int
+    estimation_samples: int
 
-    def simulated(self, effect: Effect | None = None, values: Sequence[float] = ()) -> Signal:
+    def simulate(self, effect: Effect | None = None, values: Sequence[float] = ()) -> Signal:
         """Return the output without noise, with one effect in it or with none."""
         if effect is None:
             return self.simulation.simulate(self.values)
         extended = self.simulation.with_effects([effect])
         moved = transfer_parameters(self.values, self.simulation, extended)
-        moved[extended.part(effect)] = values
+        moved[extended.get_slice(effect)] = values
         return extended.simulate(moved)
 
     @property
     def effects(self) -> Mapping[str, Effect]:
         """What could enter the simulation, by name."""
-        offered = select_effects(self.simulation.core, self.simulation.scene, self.tolerance)
+        offered = select_effects(self.simulation.simulator, self.simulation.context, self.prior_std)
         return {effect.name: effect for effect in offered}
 
-    def murmur(self, seed: int) -> Signal:
+    def draw_noise(self, seed: int) -> Signal:
         """Draw the noise of a surrogate."""
         samples = self.record.samples
         # Apart from what the analysis draws by the same seed. The first half warms the memory up.
@@ -114,15 +114,15 @@ class Surrogates:
         drawn: Signal = np.sqrt(self.noise.variance) * filtered[samples:]
         return drawn
 
-    def drawn(self, probe: SurrogateCase) -> Dataset:
+    def draw_record(self, probe: SurrogateCase) -> Dataset:
         """Return the surrogate of a probe."""
         injection = probe.injection
         simulated = (
-            self.simulated()
+            self.simulate()
             if injection is None
-            else self.simulated(self.effects[injection.effect], injection.values)
+            else self.simulate(self.effects[injection.effect], injection.values)
         )
-        return replace(self.record, y=simulated + self.murmur(probe.seed))
+        return replace(self.record, y=simulated + self.draw_noise(probe.seed))
 
 
 def make_surrogates(diagnosis: Diagnosis, core: Simulator, tolerance: Mapping[str, float]) -> Surrogates:
@@ -134,7 +134,7 @@ def make_surrogates(diagnosis: Diagnosis, core: Simulator, tolerance: Mapping[st
     """
     best = diagnosis.best
     simulation = best.simulation.with_effects(())
-    left = (diagnosis.record.y - best.output)[: diagnosis.fitted]
+    left = (diagnosis.record.y - best.output)[: diagnosis.estimation_samples]
     return Surrogates(
         diagnosis.record,
         core,
@@ -143,7 +143,7 @@ def make_surrogates(diagnosis: Diagnosis, core: Simulator, tolerance: Mapping[st
         transfer_parameters(best.values, best.simulation, simulation),
         _fading(fit_ar_noise(left), diagnosis.record.samples),
         float(np.sqrt(np.mean(left**2))),
-        diagnosis.fitted,
+        diagnosis.estimation_samples,
     )
 
 
@@ -155,11 +155,11 @@ def injection_strengths(
     Its shape is a point of its grid, and its sign one of those that it may have, both by lot. Strengths are
     those at which the misfit first comes to each of `STRENGTHS`; who cannot do so ends earlier.
     """
-    scene = source.simulation.scene
+    scene = source.simulation.context
     parameters = effect.parameters(scene)
-    grid = effect.grid(scene, source.murmur(int(rng.integers(2**32))))
+    grid = effect.starting_points(scene, source.draw_noise(int(rng.integers(2**32))))
     point = np.array(grid[int(rng.integers(len(grid)))], dtype=np.float64)
-    sized = slice(0, max(effect.linear, 1))
+    sized = slice(0, max(effect.linear_parameters, 1))
     lower = np.array([parameter.lower for parameter in parameters[sized]])
     upper = np.array([parameter.upper for parameter in parameters[sized]])
     if rng.random() < 0.5 and (-point[sized] >= lower).all():
@@ -167,12 +167,12 @@ def injection_strengths(
     ends = np.where(point[sized] > 0.0, upper, lower)
     moving = point[sized] != 0.0
     farthest = min(2.0**_DOUBLINGS, float(np.min(ends[moving] / point[sized][moving], initial=inf)))
-    at_rest = source.simulated()
+    at_rest = source.simulate()
 
     def injected(factor: float) -> Injection:
         values = point.copy()
         values[sized] *= factor
-        changed = (source.simulated(effect, values.tolist()) - at_rest)[: source.fitted]
+        changed = (source.simulate(effect, values.tolist()) - at_rest)[: source.estimation_samples]
         with np.errstate(over="ignore", invalid="ignore"):  # what explodes is too much
             misfit = float(np.sqrt(np.mean(changed**2))) / max(source.sigma, np.finfo(float).tiny)
         size = float(np.linalg.norm(values[sized]))

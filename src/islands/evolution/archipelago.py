@@ -25,9 +25,9 @@ class Archipelago:
         return self.islands[0].generation if self.islands else -1
 
     @property
-    def hall(self) -> HallOfFame:
+    def hall_of_fame(self) -> HallOfFame:
         """The halls of fame of all islands, gathered."""
-        return merge(*(island.hall for island in self.islands))
+        return merge(*(island.hall_of_fame for island in self.islands))
 
 
 def empty_archipelago(islands: int, seed: int) -> Archipelago:

@@ -42,8 +42,8 @@ class Island:
         The offspring of the last step, evaluated.
     elite : tuple of Individual
         The best of all so far, fittest first.
-    hall : HallOfFame
-    bar : float
+    hall_of_fame : HallOfFame
+    abandon_threshold : float
         Whoever of the population was abandoned is less fit than this.
     """
 
@@ -52,8 +52,8 @@ class Island:
     generation: int
     population: Population
     elite: Population
-    hall: HallOfFame
-    bar: float = inf
+    hall_of_fame: HallOfFame
+    abandon_threshold: float = inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ def step(
         2 * pairs,
         settings.tournament,
         select,
-        island.bar,
+        island.abandon_threshold,
         evaluator.settled,
     )
     offspring: list[Genes] = []
@@ -156,11 +156,11 @@ def _evaluated(
     # Every individual draws, whether its structure is known or not: a cache never changes what is bred.
     decided = [(Individual(each), draw.chance(settings.prune)) for each in genes]
     bar = _bar(island, settings)
-    population, _ = evaluator.evaluate(decided, _bars(island.hall, bar, settings.max_terms))
+    population, _ = evaluator.evaluate(decided, _bars(island.hall_of_fame, bar, settings.max_terms))
     worst = _worst(island, settings)
     contenders = (each for each in (*island.elite, *population) if each.fitness <= worst)
     elite = select_elite(contenders, settings.elites, settings.distinct)
-    hall = with_entries(island.hall, population)
+    hall = with_entries(island.hall_of_fame, population)
     known = {each.key for each in (*island.elite, *island.population)}
     info = StepInfo(
         island.generation,
@@ -169,7 +169,7 @@ def _evaluated(
         dict(Counter(each.outcome.verdict.name.lower() for each in population)),
         {size: entry.fitness for size, entry in hall.best().items()},
     )
-    return replace(island, population=population, elite=elite, hall=hall, bar=bar), info
+    return replace(island, population=population, elite=elite, hall_of_fame=hall, abandon_threshold=bar), info
 
 
 def _worst(island: Island, settings: Settings) -> float:

@@ -45,12 +45,14 @@ def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = No
         output_name=LEFT,
         output_unit=record.output_unit,
     )
-    result = identify(remainder[: found.fitted], 0.25, preset="narx", seed=seed, engine=engine, **SEARCH)
+    result = identify(
+        remainder[: found.estimation_samples], 0.25, preset="narx", seed=seed, engine=engine, **SEARCH
+    )
     best, explains = None, WORTH
     for each in result.models:
         run = free_run(each.model, remainder)
-        missed = np.where(np.isfinite(run.y), left - run.y, left)[found.fitted :]
-        size = float(np.sum(left[found.fitted :] ** 2))
+        missed = np.where(np.isfinite(run.y), left - run.y, left)[found.estimation_samples :]
+        size = float(np.sum(left[found.estimation_samples :] ** 2))
         share = 1.0 - float(np.sum(missed**2)) / size if size else 0.0
         # The shortest one that is nearly as good: every term more has to be worth it.
         if share > explains + 0.02:

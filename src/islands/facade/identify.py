@@ -104,7 +104,7 @@ def identify(
                 progress(state, settings)
     if state.archipelago.generation < 0:
         raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
-    models = final_models(state.archipelago.hall, posed, split)
+    models = final_models(state.archipelago.hall_of_fame, posed, split)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
@@ -171,7 +171,7 @@ def _candidates(hall: HallOfFame, posed: Problem) -> list[Model]:
 
 
 def _search(state: SearchState, posed: Problem) -> SearchStatistics:
-    deepest, degree = _reach(state.archipelago.hall)
+    deepest, degree = _reach(state.archipelago.hall_of_fame)
     inputs = posed.record.inputs
     count = full_set(degree, deepest, deepest, inputs)
     rows = sum(max(0, length - posed.settings.maximum_lag) for length in posed.record.segments)

@@ -32,20 +32,20 @@ class FittedModel:
     ----------
     rank : int
         1 is the best.
-    assessed : RankedModel
+    ranked_model : RankedModel
         The model, and its errors, residual tests and physics.
-    findings : SearchResult
+    search_result : SearchResult
         The result that it belongs to.
     """
 
     rank: int
-    assessed: RankedModel
-    findings: SearchResult
+    ranked_model: RankedModel
+    search_result: SearchResult
 
     @property
     def model(self) -> Model:
         """The model itself: regressors, parameters, standard errors."""
-        return self.assessed.model
+        return self.ranked_model.model
 
     @property
     def equation(self) -> str:
@@ -60,28 +60,28 @@ class FittedModel:
     @property
     def metrics(self) -> Mapping[str, Mapping[str, Metrics]]:
         """``metrics["validation"]["free_run"].mape``, and so on."""
-        return self.assessed.assessment.metrics
+        return self.ranked_model.assessment.metrics
 
     @property
     def physics(self) -> PhysicsChecks:
         """Cluster sums, holds, minor loops, other amplitudes and rates."""
-        return self.assessed.assessment.physics
+        return self.ranked_model.assessment.physics
 
     @property
     def residual_tests(self) -> ResidualTests:
         """The correlation tests of the one-step-ahead residual."""
-        return self.assessed.assessment.residual_tests
+        return self.ranked_model.assessment.residual_tests
 
     def simulate(self, record: Dataset, mode: str = "free-run") -> Simulation:
         """Simulate the model on a record; ``mode`` is one-step, shooting or free-run."""
-        return simulate(self.model, record, mode, int(self.findings.settings["shooting"]))
+        return simulate(self.model, record, mode, int(self.search_result.settings["shooting"]))
 
     def plot(self, kind: str = "free-run") -> "Figure":
         """Draw a figure of the model on the validation data: one of ``islands.figures.registry.FIGURES``."""
         # Drawing takes half a second to import, and every process of a cluster would wait for it.
         from islands.figures.registry import FIGURES  # noqa: PLC0415
 
-        return lookup(FIGURES, kind, "figure")(self.assessed, self.findings.split)
+        return lookup(FIGURES, kind, "figure")(self.ranked_model, self.search_result.split)
 
     def export(self, kind: str = "python") -> str:
         """Return the model as text: plain, latex, mathml, python, c, matlab or json."""
@@ -95,14 +95,14 @@ class FittedModel:
 class Result:
     """What a search found; models come best first."""
 
-    findings: SearchResult
+    search_result: SearchResult
 
     @property
     def models(self) -> tuple[FittedModel, ...]:
         """All models, best first."""
         return tuple(
-            FittedModel(rank, entry, self.findings)
-            for rank, entry in enumerate(self.findings.models, start=1)
+            FittedModel(rank, entry, self.search_result)
+            for rank, entry in enumerate(self.search_result.models, start=1)
         )
 
     @property
@@ -112,7 +112,7 @@ class Result:
 
     def with_wall_time(self, seconds: float) -> "Result":
         """Return the result with the time that the search took, for whoever has a clock."""
-        return Result(replace(self.findings, search=replace(self.findings.search, wall_s=seconds)))
+        return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
 
     def save(self, folder: str | Path) -> Path:
         """Write ``result.json``, ``models/``, ``figures/`` (of the best model) and ``summary.txt``."""
@@ -124,13 +124,13 @@ class Result:
         figures.mkdir(parents=True, exist_ok=True)
         for kind in FIGURES:
             save(self.best.plot(kind), figures / f"{kind}.svg")
-        for name in search_figures(self.findings):
-            save(SEARCH_FIGURES[name](self.findings), figures / f"{name}.svg")
-        write_result(self.findings, folder)
+        for name in search_figures(self.search_result):
+            save(SEARCH_FIGURES[name](self.search_result), figures / f"{name}.svg")
+        write_result(self.search_result, folder)
         return folder
 
     def __str__(self) -> str:
-        return summary(self.findings)
+        return summary(self.search_result)
 
 
 def simulate(model: Model, record: Dataset, mode: str = "free-run", shooting: int = 500) -> Simulation:

@@ -134,7 +134,7 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     axes.axvline(0.0, color=FRAME, lw=0.6)
     for place, candidate in zip(places, shown, strict=True):
         axes.annotate(
-            f"{100 * candidate.eta:.0f} %",
+            f"{100 * candidate.explained_fraction:.0f} %",
             (max(candidate.score, 0.0), float(place)),
             xytext=(4, 0),
             textcoords="offset points",
@@ -182,7 +182,7 @@ def _over_time(above: Axes, below: Axes, diagnosis: Diagnosis, part: slice, weig
         for name, colour, line in lines:
             drawn = thin(time, line[part], most)
             panel.plot(*drawn, color=colour, lw=weight * SIMULATED_WIDTH, label=name)
-        first = max(float(record.time[diagnosis.fitted]), float(time[0]))
+        first = max(float(record.time[diagnosis.estimation_samples]), float(time[0]))
         if first < time[-1]:
             panel.axvspan(first, float(time[-1]), facecolor=SHADE, edgecolor="none", zorder=0.5)
         panel.set_xlim(float(time[0]), float(time[-1]))

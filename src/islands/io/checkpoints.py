@@ -103,8 +103,8 @@ def _island(island: Island) -> dict[str, Any]:
         "generation": island.generation,
         "population": [_individual(each) for each in island.population],
         "elite": [_individual(each) for each in island.elite],
-        "hall": [_individual(each) for each in island.hall.entries],
-        "bar": None if island.bar == inf else island.bar,
+        "hall": [_individual(each) for each in island.hall_of_fame.entries],
+        "bar": None if island.abandon_threshold == inf else island.abandon_threshold,
     }
 
 

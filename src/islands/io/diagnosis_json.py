@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from islands.discrepancy.detectability import SelfTest
-from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
+from islands.discrepancy.diagnosis import Candidate, Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Finding
 from islands.io.result_folder import record_document
 
@@ -32,17 +32,19 @@ def diagnosis_document(
     return {
         "schema": SCHEMA,
         "record": record_document(diagnosis.record),
-        "simulation": diagnosis.base.simulation.core.name,
+        "simulation": diagnosis.base.simulation.simulator.name,
         "verdict": str(diagnosis.verdict),
         "effects": [_effect(finding) for finding in diagnosis.effects],
         "gain": None if diagnosis.gain is None else asdict(diagnosis.gain),
-        "decisive_experiment": diagnosis.decisive_experiment or None,
-        "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
-        "remainder": dict(diagnosis.remainder),
+        "decisive_experiment": diagnosis.suggested_experiment or None,
+        "candidates": [_candidate(each) for each in diagnosis.candidates],
+        "remainder": dict(diagnosis.residual_structure),
         "proposal": None if proposal is None else asdict(proposal),
-        "as_given_rmse": diagnosis.as_given,
+        "as_given_rmse": diagnosis.nominal_rmse,
         "noise_floor_rmse": diagnosis.noise_floor,
-        "noise_floor_is": "measured by repeated periods" if diagnosis.measured_floor else "an upper bound",
+        "noise_floor_is": "measured by repeated periods"
+        if diagnosis.is_noise_floor_measured
+        else "an upper bound",
         "calibrated": _values(diagnosis),
         **_self_test(tested),
         "extended_model": None if diagnosis.gain is None else "extended.json",
@@ -57,7 +59,7 @@ def as_json(document: dict[str, Any]) -> str:
 
 def _values(diagnosis: Diagnosis) -> dict[str, float]:
     fit = diagnosis.best
-    own = fit.simulation.core.parameters
+    own = fit.simulation.simulator.parameters
     return {parameter.name: float(value) for parameter, value in zip(own, fit.values, strict=False)}
 
 
@@ -73,7 +75,7 @@ def _self_test(tested: SelfTest | None) -> dict[str, Any]:
             else {"strength": limit.strength, "unit": limit.unit, "misfit_sigma": limit.misfit}
             for name, limit in tested.detection_limits.items()
         },
-        "false_alarm_rate": {"value": alarms.value, "ci95": list(alarms.ci95), "of": alarms.of},
+        "false_alarm_rate": {"value": alarms.value, "ci95": list(alarms.ci95), "of": alarms.trials},
         "p_value": tested.p_value,
         "confusion": [
             {"hidden": hidden, "called": called, "times": times}
@@ -84,7 +86,9 @@ def _self_test(tested: SelfTest | None) -> dict[str, Any]:
 
 def _effect(finding: Finding) -> dict[str, Any]:
     return {
-        **asdict(finding),
+        "name": finding.name,
+        "family": finding.family,
+        "confidence": finding.confidence,
         "equivalents": list(finding.equivalents),
         "parameters": {
             name: {
@@ -94,4 +98,10 @@ def _effect(finding: Finding) -> dict[str, Any]:
             }
             for name, each in finding.parameters.items()
         },
+        "score": finding.score,
+        "eta": finding.explained_fraction,
     }
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    return {"name": candidate.name, "score": candidate.score, "eta": candidate.explained_fraction}

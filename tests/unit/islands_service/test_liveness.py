@@ -36,13 +36,13 @@ def test_a_signal_in_the_midst_of_a_look_is_not_waited_for_for_ever() -> None:
 def test_a_wish_ends_the_wait_at_once_and_stays() -> None:
     stopping = StopRequest()
     assert not stopping.wait(0.0)
-    assert not stopping.made
-    thread = Thread(target=lambda: (time.sleep(0.1), stopping.make()))
+    assert not stopping.requested
+    thread = Thread(target=lambda: (time.sleep(0.1), stopping.request()))
     began = time.monotonic()
     thread.start()
     assert stopping.wait(20.0)
     assert time.monotonic() - began < 19.0
     thread.join()
-    assert stopping.made
+    assert stopping.requested
     assert stopping.wait(20.0)
     assert time.monotonic() - began < 19.0

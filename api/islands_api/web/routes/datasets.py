@@ -63,7 +63,7 @@ async def upload(
     stored, new = await _stored(
         doors, caller.owner, file, name, compressed, InspectionRequest(tuple(inputs), output, dt)
     )
-    doors.measures.received.inc(stored.bytes if new else 0)
+    doors.metrics.received.inc(stored.bytes if new else 0)
     headers = {"Location": f"{router.prefix}/{stored.id}"}
     return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
 
@@ -74,17 +74,21 @@ async def _stored(
     settings = doors.settings
     with doors.blobs.receiving() as stream:
         # A few at a time: a small file may unpack to a thousand times its size.
-        async with doors.inspections:
-            size, blob = await doors.do(receive, file.file, stream, name, compressed, settings.max_unpacked)
+        async with doors.inspection_slots:
+            size, blob = await doors.run_blocking(
+                receive, file.file, stream, name, compressed, settings.max_unpacked
+            )
             with link_blob(Path(stream.name), name) as path:
                 preview = await inspect_file(
                     path, asked, settings.inspection_memory, settings.inspection_seconds
                 )
             suffix = Path(name).suffix.lower()
-            await doors.do(doors.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored)
+            await doors.run_blocking(
+                doors.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored
+            )
             # What was refused until here is gone with the block.
-            await doors.do(doors.blobs.keep, stream)
-    return await doors.do(
+            await doors.run_blocking(doors.blobs.keep, stream)
+    return await doors.run_blocking(
         doors.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored
     )
 
@@ -92,17 +96,21 @@ async def _stored(
 @router.get("", response_model=DatasetPage)
 async def datasets(caller: Reader, doors: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
     """List the data sets, newest first."""
-    found, after = await doors.do(doors.store.datasets.page, caller.owner, decode_cursor(cursor), limit)
+    found, after = await doors.run_blocking(
+        doors.store.datasets.page, caller.owner, decode_cursor(cursor), limit
+    )
     return JSONDocument({"items": [dataset_document(each) for each in found], "next": encode_cursor(after)})
 
 
 @router.get("/{dataset}", response_model=DatasetView)
 async def dataset(dataset: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Look at a data set: columns, units, statistics, sampling, warnings."""
-    return JSONDocument(dataset_document(await doors.do(doors.store.datasets.get, caller.owner, dataset)))
+    return JSONDocument(
+        dataset_document(await doors.run_blocking(doors.store.datasets.get, caller.owner, dataset))
+    )
 
 
 @router.delete("/{dataset}", status_code=204)
 async def delete(dataset: Id, caller: Writer, doors: AppStateDep) -> None:
     """Delete a data set that no unfinished job needs."""
-    await doors.do(doors.store.datasets.delete, caller.owner, dataset)
+    await doors.run_blocking(doors.store.datasets.delete, caller.owner, dataset)

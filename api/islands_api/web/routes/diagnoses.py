@@ -40,9 +40,9 @@ async def extended(job: Id, caller: Reader, doors: AppStateDep) -> Response:
     """Take the simulation with the effects that it lacked; there is none where nothing was named."""
     found = await get_job_of_kind(doors, caller, job, DISCREPANCY)
     document = await get_result(doors, found)
-    blob = await doors.do(doors.store.results.artefact, job, EXTENDED)
+    blob = await doors.run_blocking(doors.store.results.artefact, job, EXTENDED)
     if blob is None:
         raise ResourceNotFoundError(
             f"job {job} has nothing to extend the simulation by: it found {document['verdict']}"
         )
-    return Response(await doors.do(doors.blobs.read, blob), media_type="application/json")
+    return Response(await doors.run_blocking(doors.blobs.read, blob), media_type="application/json")

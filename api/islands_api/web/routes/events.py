@@ -57,7 +57,7 @@ async def events(
     ] = 0,
 ) -> Response:
     """Follow a job until it has ended; who is cut off comes back with `Last-Event-ID`."""
-    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
     if found.state in TERMINAL and last_event_id >= found.version:
         # A browser's event source comes back after every end but this one.
         return Response(status_code=204)
@@ -71,7 +71,7 @@ async def events(
 
 
 async def _stream(doors: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:
-    with doors.measures.streams.track_inprogress():
+    with doors.metrics.streams.track_inprogress():
         async with aclosing(doors.hub.events(job.id, job.version, last, _ALIVE)) as events:
             async for event in events:
                 yield b": alive\n\n" if event is None else _encoded(event)
@@ -84,7 +84,7 @@ async def _while_open(
     async with aclosing(stream):
         async for piece in stream:
             if monotonic() - let_in >= _ALIVE:
-                if not await keys.still_open(caller):
+                if not await keys.is_still_valid(caller):
                     return
                 let_in = monotonic()
             yield piece

@@ -142,7 +142,7 @@ async def simulation(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) ->
 @router.get("/{job}/report", response_class=Response, responses=_HTML)
 async def report(job: Id, caller: Reader, doors: AppStateDep) -> Response:
     """Take the report of a job: one HTML file with what it found and its figures, to be kept or sent."""
-    await get_result(doors, await doors.do(doors.store.jobs.get, caller.owner, job))
+    await get_result(doors, await doors.run_blocking(doors.store.jobs.get, caller.owner, job))
     answer = await _figure(doors, caller, job, REPORT, None, "text/html; charset=utf-8")
     answer.headers["Content-Security-Policy"] = _REPORT_POLICY
     return answer
@@ -162,17 +162,17 @@ def _known(figure: str, figures: tuple[str, ...]) -> None:
 async def _figure(
     doors: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
 ) -> Response:
-    blob = await doors.do(doors.store.results.artefact, job, name)
+    blob = await doors.run_blocking(doors.store.results.artefact, job, name)
     if blob is None:
-        async with doors.drawings:
+        async with doors.figure_slots:
             # Somebody else may have had it drawn while we waited for our turn.
-            blob = await doors.do(doors.store.results.artefact, job, name)
+            blob = await doors.run_blocking(doors.store.results.artefact, job, name)
             if blob is None:
                 await _draw(doors, caller, job, rank)
-                blob = await doors.do(doors.store.results.artefact, job, name)
+                blob = await doors.run_blocking(doors.store.results.artefact, job, name)
     if blob is None:
         raise ResourceNotFoundError(f"job {job} has no figure {name}")
-    data = await doors.do(doors.blobs.read, blob)
+    data = await doors.run_blocking(doors.blobs.read, blob)
     # A browser may have several keys, one after the other.
     headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization"}
     return Response(data, media_type=media, headers=headers)
@@ -181,7 +181,7 @@ async def _figure(
 async def _draw(doors: AppState, caller: Principal, job: str, rank: int | None) -> None:
     found = await get_job_of_kind(doors, caller, job, IDENTIFICATION)
     for dataset in identification_of(found.spec).datasets:
-        await doors.do(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
+        await doors.run_blocking(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
     _FAILURES.refuse(job, rank)
     try:
         await _drawn(doors, caller, job, rank)

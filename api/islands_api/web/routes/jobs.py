@@ -55,7 +55,7 @@ async def jobs(
     limit: Limit = 50,
 ) -> Any:
     """List the jobs of every kind, newest first."""
-    page = await doors.do(doors.store.jobs.page, caller.owner, state, decode_cursor(cursor), limit)
+    page = await doors.run_blocking(doors.store.jobs.page, caller.owner, state, decode_cursor(cursor), limit)
     return JSONDocument(
         {"items": [job_document(job) for job in page.jobs], "next": encode_cursor(page.after)}
     )
@@ -74,7 +74,7 @@ async def job(
     ] = None,
 ) -> Any:
     """Look at a job. With `If-None-Match` the answer is 304 as long as nothing has changed."""
-    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
     if wait and _known(if_none_match, found) and found.state not in TERMINAL:
         found = await _changed(doors, found, wait)
     headers = {"ETag": etag(found), "Cache-Control": "private, no-cache"}
@@ -88,20 +88,22 @@ async def job(
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
 async def cancel(job: Id, caller: Writer, doors: AppStateDep) -> Any:
     """Cancel a job: at once if it waits; if it runs, within a second or so."""
-    return JSONDocument(job_document(await doors.do(doors.store.jobs.cancel, caller.owner, job)), 202)
+    return JSONDocument(
+        job_document(await doors.run_blocking(doors.store.jobs.cancel, caller.owner, job)), 202
+    )
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
 async def resume(job: Id, caller: Writer, doors: AppStateDep) -> Any:
     """Have a job that failed or was cancelled go on from its last checkpoint."""
-    resumed = await doors.do(doors.store.jobs.resume, caller.owner, job, doors.settings.max_active)
+    resumed = await doors.run_blocking(doors.store.jobs.resume, caller.owner, job, doors.settings.max_active)
     return JSONDocument(job_document(resumed), 202)
 
 
 @router.delete("/{job}", status_code=204)
 async def delete(job: Id, caller: Writer, doors: AppStateDep) -> None:
     """Delete a finished job with its result."""
-    await doors.do(doors.store.jobs.delete, caller.owner, job)
+    await doors.run_blocking(doors.store.jobs.delete, caller.owner, job)
 
 
 @router.get("/{job}/history", response_model=HistoryPage)
@@ -118,7 +120,7 @@ async def history(
     It comes in pages: ask for what is behind the last generation of one, until a page is empty.
     """
     found = await get_job_of_kind(doors, caller, job, IDENTIFICATION)
-    return await doors.do(_course, doors, found, after)
+    return await doors.run_blocking(_course, doors, found, after)
 
 
 def _course(doors: AppState, job: Job, after: int) -> JSONItems:
@@ -130,9 +132,9 @@ def _course(doors: AppState, job: Job, after: int) -> JSONItems:
 
 
 async def _changed(doors: AppState, job: Job, seconds: float) -> Job:
-    with doors.hub.watching(job.id, job.version) as feed:
+    with doors.hub.subscribe(job.id, job.version) as feed:
         await doors.hub.wait(feed, job.version, seconds)
-    return await doors.do(doors.store.jobs.get, job.owner, job.id)
+    return await doors.run_blocking(doors.store.jobs.get, job.owner, job.id)
 
 
 def _known(given: str | None, job: Job) -> bool:

@@ -41,7 +41,9 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
 async def models(job: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Look at the models of a job, best first; there are none before it has succeeded."""
     await get_job_of_kind(doors, caller, job, IDENTIFICATION)
-    return await doors.do(lambda: JSONItems([model.document for model in doors.store.results.models(job)]))
+    return await doors.run_blocking(
+        lambda: JSONItems([model.document for model in doors.store.results.models(job)])
+    )
 
 
 @router.get("/{job}/models/{rank}", response_model=ModelView)
@@ -66,7 +68,7 @@ async def exported(
 ) -> Response:
     """Take a model with you: as Python, C, MATLAB, an equation, or a model file."""
     found = await stored(doors, caller, job, rank)
-    text = await doors.do(export, model_from_json(found.file, f"model {rank}"), form)
+    text = await doors.run_blocking(export, model_from_json(found.file, f"model {rank}"), form)
     name = f"model-{rank:02d}.{_ENDS.get(form, 'txt')}"
     return Response(
         text,
@@ -78,11 +80,11 @@ async def exported(
 @router.get("/{job}/result", response_model=dict[str, Any])
 async def result(job: Id, caller: Reader, doors: AppStateDep) -> Any:
     """Take the whole result, in the form of `result.json`, or of `discrepancy.json`."""
-    found = await doors.do(doors.store.jobs.get, caller.owner, job)
+    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
     document = await get_result(doors, found)
     if found.kind != IDENTIFICATION:
         return JSONDocument(document)
-    models = await doors.do(doors.store.results.models, job)
+    models = await doors.run_blocking(doors.store.results.models, job)
     return JSONDocument({**document, "models": [model.document for model in models]})
 
 
@@ -94,7 +96,7 @@ async def stored(doors: AppState, caller: Principal, job: str, rank: int) -> Sto
     ResultNotReadyError, ResourceNotFoundError
     """
     await get_result(doors, await get_job_of_kind(doors, caller, job, IDENTIFICATION))
-    found = await doors.do(doors.store.results.models, job, rank)
+    found = await doors.run_blocking(doors.store.results.models, job, rank)
     if not found:
         raise ResourceNotFoundError(f"job {job} has no model {rank}: look at its /models")
     return found[0]

@@ -22,7 +22,7 @@ async def healthz() -> Any:
 @router.get("/readyz", response_model=Health)
 async def readyz(doors: AppStateDep) -> Any:
     """Say that jobs are accepted: the database answers. Ray may still be starting."""
-    await doors.do(doors.store.jobs.versions, [])
+    await doors.run_blocking(doors.store.jobs.versions, [])
     return {"status": "ready"}
 
 
@@ -33,7 +33,7 @@ async def readyz(doors: AppStateDep) -> Any:
 )
 async def metrics(_operator: Operator, doors: AppStateDep) -> Response:
     """Measure, for Prometheus: queue, leases, evaluations a second, best error, latency."""
-    return Response(await doors.do(doors.measures.page), media_type=CONTENT_TYPE_LATEST)
+    return Response(await doors.run_blocking(doors.metrics.page), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/problems/{kind}", response_model=dict[str, Any])

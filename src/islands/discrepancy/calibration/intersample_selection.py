@@ -22,10 +22,14 @@ BETTER = 10.0
 
 def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     """Return the core of a fit, solved as the record asks for it."""
-    core = fit.simulation.core
+    core = fit.simulation.simulator
     if not core.is_continuous_time:
         return core
-    inner, now = (core.core, core.hold) if isinstance(core, ResampledSimulator) else (core, InterSample.FIRST)
+    inner, now = (
+        (core.simulator, core.intersample)
+        if isinstance(core, ResampledSimulator)
+        else (core, InterSample.FOH)
+    )
     held = {}
     for hold in (now, *(each for each in InterSample if each != now)):
         fine = _fine_enough(inner, hold, fit)
@@ -41,11 +45,15 @@ def same_discretisation(one: Simulator, other: Simulator) -> bool:
 
 
 def _way(core: Simulator) -> tuple[InterSample, int]:
-    return (core.hold, core.times) if isinstance(core, ResampledSimulator) else (InterSample.FIRST, 1)
+    return (
+        (core.intersample, core.oversampling)
+        if isinstance(core, ResampledSimulator)
+        else (InterSample.FOH, 1)
+    )
 
 
 def _solved(simulation: ExtendedSimulator, core: Simulator) -> ExtendedSimulator:
-    return replace(simulation, core=core)
+    return replace(simulation, simulator=core)
 
 
 def _fine_enough(inner: Simulator, hold: InterSample, fit: CalibrationResult) -> Simulator:
@@ -60,4 +68,4 @@ def _fine_enough(inner: Simulator, hold: InterSample, fit: CalibrationResult) ->
         if change < seen:
             break
         times, coarse = 2 * times, finer
-    return inner if times == 1 and hold == InterSample.FIRST else ResampledSimulator(inner, hold, times)
+    return inner if times == 1 and hold == InterSample.FOH else ResampledSimulator(inner, hold, times)

@@ -25,31 +25,31 @@ class Target:
     ----------
     y : ndarray, shape (samples,)
         The measured output.
-    seen : ndarray of bool, shape (samples,)
+    estimation_part : ndarray of bool, shape (samples,)
         What estimation may see.
     noise : NoiseModel or None
         What residuals are whitened by; None takes them as they are.
-    tolerance : mapping
+    prior_std : mapping
         Relative standard deviations of the core's parameters about their nominal values; who is not named is
         free.
-    effective : float or None
-        How many samples that know nothing of each other the ones seen are worth, where what is left is the
+    effective_samples : float or None
+        How many samples that know nothing of each other the ones estimation_part are worth, where what is left is the
         simulation's misfit and no noise; None takes it as noise that may remember.
     """
 
     y: Signal
-    seen: NDArray[np.bool_]
+    estimation_part: NDArray[np.bool_]
     noise: NoiseModel | None
-    tolerance: Mapping[str, float]
-    effective: float | None = None
+    prior_std: Mapping[str, float]
+    effective_samples: float | None = None
 
-    def observed(self, signal: Signal) -> Signal:
+    def select(self, signal: Signal) -> Signal:
         """Return the samples of a signal that are seen, whitened."""
-        return (signal if self.noise is None else self.noise.whiten(signal))[self.seen]
+        return (signal if self.noise is None else self.noise.whiten(signal))[self.estimation_part]
 
     def residual(self, simulated: Signal) -> Signal:
         """Return what is left of the samples that are seen, whitened."""
-        return self.observed(self.y - simulated)
+        return self.select(self.y - simulated)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +88,7 @@ def calibrate(
 ) -> CalibrationResult:
     """Fit a simulation's values from a start."""
     lower, upper = simulation.bounds
-    pull, nominal = prior_precision(simulation, target.tolerance)
+    pull, nominal = prior_precision(simulation, target.prior_std)
     scales = simulation.scales
     values = np.clip(start, lower, upper)
     output = simulation.simulate(values)
@@ -126,22 +126,26 @@ def calibrate(
 def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) -> CalibrationResult:
     """Hold a simulation against a record with values as they are."""
     output = simulation.simulate(values)
-    residual = (target.y - output)[target.seen]
-    pull, nominal = prior_precision(simulation, target.tolerance)
+    residual = (target.y - output)[target.estimation_part]
+    pull, nominal = prior_precision(simulation, target.prior_std)
     penalty = float(np.sum((pull * (values - nominal)) ** 2))
     mean_square = float(np.mean(residual**2))
-    noise = fit_ar_noise(residual) if target.effective is None else white_noise(mean_square, target.effective)
+    noise = (
+        fit_ar_noise(residual)
+        if target.effective_samples is None
+        else white_noise(mean_square, target.effective_samples)
+    )
     return CalibrationResult(simulation, values, output, mean_square, noise, penalty)
 
 
 def covariance(fit: CalibrationResult, target: Target) -> NDArray[np.float64]:
     """Return the covariance of a fit's values, shape (parameters, parameters): the noise's memory counts."""
     simulation = fit.simulation
-    whitened = Target(target.y, target.seen, fit.noise, target.tolerance)
+    whitened = Target(target.y, target.estimation_part, fit.noise, target.prior_std)
     scales = simulation.scales
     jacobian = _jacobian(simulation, whitened, fit.values, fit.output)
-    pull, _ = prior_precision(simulation, target.tolerance)
-    worth = fit.noise.samples / np.count_nonzero(target.seen)
+    pull, _ = prior_precision(simulation, target.prior_std)
+    worth = fit.noise.effective_samples / np.count_nonzero(target.estimation_part)
     information = worth * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((pull * scales) ** 2)
     inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
     return inverse
@@ -151,7 +155,7 @@ def prior_precision(simulation: ExtendedSimulator, tolerance: Mapping[str, float
     """Return one over each value's standard deviation, 0 where it is free; and where it is pulled to."""
     nominal = simulation.nominal
     pull = np.zeros(nominal.size)
-    for place, parameter in enumerate(simulation.core.parameters):
+    for place, parameter in enumerate(simulation.simulator.parameters):
         if parameter.name in tolerance:
             pull[place] = 1.0 / (tolerance[parameter.name] * abs(parameter.nominal))
     return pull, nominal
@@ -162,12 +166,12 @@ def _jacobian(
 ) -> NDArray[np.float64]:
     """Return how the samples seen change with each scaled value, whitened, shape (seen, parameters)."""
     _, upper = simulation.bounds
-    columns = np.empty((int(np.count_nonzero(target.seen)), values.size))
+    columns = np.empty((int(np.count_nonzero(target.estimation_part)), values.size))
     for place, scale in enumerate(simulation.scales):
         step = STEP if values[place] + STEP * scale <= upper[place] else -STEP
         moved = values.copy()
         moved[place] += step * scale
-        columns[:, place] = target.observed((simulation.simulate(moved) - output) / step)
+        columns[:, place] = target.select((simulation.simulate(moved) - output) / step)
     # Where a step explodes nothing is known of that direction.
     return np.nan_to_num(columns, nan=0.0)
 

@@ -20,13 +20,13 @@ class NoiseModel:
     coefficients : ndarray, shape (order,)
     variance : float
         Of ``e``.
-    samples : float
+    effective_samples : float
         Of the residual, as many as know nothing of each other.
     """
 
     coefficients: Signal
     variance: float
-    samples: float
+    effective_samples: float
 
     @property
     def order(self) -> int:
@@ -36,7 +36,9 @@ class NoiseModel:
     @property
     def minus_twice_log_likelihood(self) -> float:
         """Its fit, punished for its order as BIC does; up to a constant of the record."""
-        return self.samples * float(np.log(self.variance)) + self.order * float(np.log(self.samples))
+        return self.effective_samples * float(np.log(self.variance)) + self.order * float(
+            np.log(self.effective_samples)
+        )
 
     def whiten(self, signal: Signal) -> Signal:
         """Take out of a signal what this noise remembers."""

@@ -46,10 +46,10 @@ def select_effects(
         if effect.site in core.sites
         and (effect.site != Site.CORE or effect.name in core.supported_effects)
         and effect.name not in core.built_in_effects
-        and (trusted or not effect.gain)
-        and effect.applies(scene)
+        and (trusted or not effect.is_gain)
+        and effect.is_applicable(scene)
     ]
-    effects += core.effects
+    effects += core.state_effects
     return effects + [wrong_parameter(each) for each in core.parameters if each.name in tolerance]
 
 
@@ -104,7 +104,7 @@ def make_context(record: Dataset, core: Simulator, fitted: int) -> SimulationCon
         output_peak=1.0,
         input_unit=units[0] or "1",
         output_unit=record.output_unit or "1",
-        fitted=fitted * record.dt,
+        fit_end_time=fitted * record.dt,
     )
     simulation = ExtendedSimulator(core, (), scene)
     nominal = simulation.simulate(simulation.nominal)
@@ -114,4 +114,4 @@ def make_context(record: Dataset, core: Simulator, fitted: int) -> SimulationCon
             "sampling time"
         )
     scaled = replace(scene, output_peak=peak_amplitude(nominal))
-    return replace(scaled, frame=core.frame(scaled, nominal))
+    return replace(scaled, force_coordinate=core.make_force_coordinate(scaled, nominal))

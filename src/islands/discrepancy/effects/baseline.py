@@ -24,7 +24,7 @@ OFFSET = Effect(
     family="baseline",
     site=Site.OUTPUT,
     parameters=_offset_parameters,
-    grid=_offset_grid,
+    starting_points=_offset_grid,
     form=_offset_form,
     source="Doebelin, Measurement Systems, section 3",
 )
@@ -46,7 +46,7 @@ def input_offset(state: str) -> Effect:
         family="baseline",
         site=Site.CORE,
         parameters=parameters,
-        grid=grid,
+        starting_points=grid,
         form=None,
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
     )
@@ -77,7 +77,7 @@ LINEAR_DRIFT = Effect(
     family="baseline",
     site=Site.OUTPUT,
     parameters=_linear_drift_parameters,
-    grid=_linear_drift_grid,
+    starting_points=_linear_drift_grid,
     form=_linear_drift_form,
     source="Doebelin, Measurement Systems, section 3",
 )
@@ -90,7 +90,7 @@ def _jump_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
 def _jump_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),
-        Parameter("instant", "s", 0.0, 0.3 * scene.fitted / 45, *instant_bounds(scene)),
+        Parameter("instant", "s", 0.0, 0.3 * scene.fit_end_time / 45, *instant_bounds(scene)),
     )
 
 
@@ -104,7 +104,7 @@ JUMP = Effect(
     family="baseline",
     site=Site.OUTPUT,
     parameters=_jump_parameters,
-    grid=_jump_grid,
+    starting_points=_jump_grid,
     form=_jump_form,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
@@ -136,8 +136,8 @@ THERMAL_DRIFT = Effect(
     family="baseline",
     site=Site.OUTPUT,
     parameters=_thermal_drift_parameters,
-    grid=_thermal_drift_grid,
+    starting_points=_thermal_drift_grid,
     form=_thermal_drift_form,
     source="Doebelin, Measurement Systems, section 2",
-    applies=lambda scene: has_channel(scene, True),
+    is_applicable=lambda scene: has_channel(scene, True),
 )

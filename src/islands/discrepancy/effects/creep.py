@@ -14,12 +14,12 @@ def _exponential_creep_form(y: Signal, values: Signal, scene: SimulationContext)
 def _exponential_creep_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("kappa", "", 0.0, 0.02, -0.5, 1.0),
-        Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * scene.dt), np.log(1.5 * scene.fitted)),
+        Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * scene.dt), np.log(1.5 * scene.fit_end_time)),
     )
 
 
 def _exponential_creep_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    taus = (max(part * scene.fitted, 6 * scene.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
+    taus = (max(part * scene.fit_end_time, 6 * scene.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
     return tuple((0.03, float(np.log(tau))) for tau in taus)
 
 
@@ -29,7 +29,7 @@ EXPONENTIAL_CREEP = Effect(
     family="memory",
     site=Site.OUTPUT,
     parameters=_exponential_creep_parameters,
-    grid=_exponential_creep_grid,
+    starting_points=_exponential_creep_grid,
     form=_exponential_creep_form,
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
 )
@@ -58,7 +58,7 @@ LOGARITHMIC_CREEP = Effect(
     family="memory",
     site=Site.OUTPUT,
     parameters=_logarithmic_creep_parameters,
-    grid=_logarithmic_creep_grid,
+    starting_points=_logarithmic_creep_grid,
     form=_logarithmic_creep_form,
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
 )

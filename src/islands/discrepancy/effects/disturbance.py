@@ -32,10 +32,10 @@ CROSS_COUPLING = Effect(
     family="disturbance",
     site=Site.OUTPUT,
     parameters=_cross_coupling_parameters,
-    grid=_cross_coupling_grid,
+    starting_points=_cross_coupling_grid,
     form=_cross_coupling_form,
     source="Ljung, System Identification, 2nd ed., section 13",
-    applies=lambda scene: has_channel(scene, False),
+    is_applicable=lambda scene: has_channel(scene, False),
 )
 
 
@@ -48,17 +48,19 @@ def _periodic_disturbance_parameters(scene: SimulationContext) -> tuple[Paramete
     return (
         Parameter("cosine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
         Parameter("sine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
-        Parameter("frequency", "Hz", 0.0, 0.1 / scene.fitted, 2.0 / scene.fitted, 0.499 / scene.dt),
+        Parameter(
+            "frequency", "Hz", 0.0, 0.1 / scene.fit_end_time, 2.0 / scene.fit_end_time, 0.499 / scene.dt
+        ),
     )
 
 
 def _periodic_disturbance_grid(scene: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
     # The strongest line of what is left, between the samples of its spectrum.
-    fitted = int(scene.fitted / scene.dt)
+    fitted = int(scene.fit_end_time / scene.dt)
     seen = residual[:fitted] * np.hanning(fitted)
     spectrum = np.abs(np.fft.rfft(seen, 4 * fitted))
     frequencies = np.fft.rfftfreq(4 * fitted, scene.dt)
-    spectrum[frequencies < 2.0 / scene.fitted] = 0.0
+    spectrum[frequencies < 2.0 / scene.fit_end_time] = 0.0
     strongest = float(frequencies[np.argmax(spectrum)])
     angle = 2 * np.pi * strongest * scene.time[:fitted]
     waves = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -72,9 +74,9 @@ PERIODIC_DISTURBANCE = Effect(
     family="disturbance",
     site=Site.OUTPUT,
     parameters=_periodic_disturbance_parameters,
-    grid=_periodic_disturbance_grid,
+    starting_points=_periodic_disturbance_grid,
     form=_periodic_disturbance_form,
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
-    linear=2,
+    linear_parameters=2,
     extra_degrees_of_freedom=2,
 )

@@ -13,16 +13,16 @@ def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> 
 
 
 def _coulomb_friction_turning(scene: SimulationContext) -> tuple[float, ...]:
-    return (scene.frame.sharp * scene.frame.rate,)
+    return (scene.force_coordinate.friction_smoothing * scene.force_coordinate.rate,)
 
 
 def _coulomb_friction_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
-    return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.least),)
+    frame = scene.force_coordinate
+    return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.lower_bound),)
 
 
 def _coulomb_friction_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * scene.frame.force,),)
+    return ((0.01 * scene.force_coordinate.force,),)
 
 
 COULOMB_FRICTION = Effect(
@@ -31,8 +31,8 @@ COULOMB_FRICTION = Effect(
     family="memory",
     site=Site.FORCE,
     parameters=_coulomb_friction_parameters,
-    grid=_coulomb_friction_grid,
-    form=ForceLaw(_coulomb_friction_force, constants=_coulomb_friction_turning, dissipative=True),
+    starting_points=_coulomb_friction_grid,
+    form=ForceLaw(_coulomb_friction_force, constants=_coulomb_friction_turning, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )
 
@@ -42,16 +42,16 @@ def _viscous_force(_x: float, rate: float, _z: float, c: Any) -> float:
 
 
 def _viscous_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     return (
         Parameter(
-            "c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate, frame.least
+            "c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate, frame.lower_bound
         ),
     )
 
 
 def _viscous_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.frame.force / scene.frame.rate,),)
+    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.rate,),)
 
 
 VISCOUS = Effect(
@@ -60,8 +60,8 @@ VISCOUS = Effect(
     family="timing",
     site=Site.FORCE,
     parameters=_viscous_parameters,
-    grid=_viscous_grid,
-    form=ForceLaw(_viscous_force, dissipative=True),
+    starting_points=_viscous_grid,
+    form=ForceLaw(_viscous_force, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )
 
@@ -71,7 +71,7 @@ def _viscous_asymmetry_force(_x: float, rate: float, _z: float, c: Any) -> float
 
 
 def _viscous_asymmetry_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
 
 
@@ -81,8 +81,8 @@ VISCOUS_ASYMMETRY = Effect(
     family="memory",
     site=Site.FORCE,
     parameters=_viscous_asymmetry_parameters,
-    grid=_viscous_grid,
-    form=ForceLaw(_viscous_asymmetry_force, dissipative=True),
+    starting_points=_viscous_grid,
+    form=ForceLaw(_viscous_asymmetry_force, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
 )
 
@@ -92,13 +92,13 @@ def _quadratic_drag_force(_x: float, rate: float, _z: float, c: Any) -> float:
 
 
 def _quadratic_drag_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     unit = f"{frame.force_unit} s^2/{frame.unit}^2"
-    return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.least),)
+    return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.lower_bound),)
 
 
 def _quadratic_drag_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.frame.force / scene.frame.rate**2,),)
+    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.rate**2,),)
 
 
 QUADRATIC_DRAG = Effect(
@@ -107,7 +107,7 @@ QUADRATIC_DRAG = Effect(
     family="shape",
     site=Site.FORCE,
     parameters=_quadratic_drag_parameters,
-    grid=_quadratic_drag_grid,
-    form=ForceLaw(_quadratic_drag_force, dissipative=True),
+    starting_points=_quadratic_drag_grid,
+    form=ForceLaw(_quadratic_drag_force, is_dissipative=True),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )

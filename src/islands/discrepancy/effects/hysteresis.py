@@ -34,10 +34,10 @@ STICTION = Effect(
     family="memory",
     site=Site.INPUT,
     parameters=_stiction_parameters,
-    grid=_stiction_grid,
+    starting_points=_stiction_grid,
     form=_stiction_form,
     source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
-    linear=0,
+    linear_parameters=0,
 )
 
 
@@ -59,7 +59,7 @@ BACKLASH = Effect(
     family="memory",
     site=Site.INPUT,
     parameters=_backlash_parameters,
-    grid=_backlash_grid,
+    starting_points=_backlash_grid,
     form=_backlash_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),
@@ -80,7 +80,7 @@ RELAXATION = Effect(
     family="memory",
     site=Site.CORE,
     parameters=_relaxation_parameters,
-    grid=_relaxation_grid,
+    starting_points=_relaxation_grid,
     form=None,
     source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
 )
@@ -92,15 +92,15 @@ def _rate_dependent_loop_parameters(scene: SimulationContext) -> tuple[Parameter
             "rate-dependent-loop",
             f"s/{scene.input_unit}",
             0.0,
-            0.05 / scene.frame.rate,
-            -0.6 / scene.frame.rate,
-            5.0 / scene.frame.rate,
+            0.05 / scene.force_coordinate.rate,
+            -0.6 / scene.force_coordinate.rate,
+            5.0 / scene.force_coordinate.rate,
         ),
     )
 
 
 def _rate_dependent_loop_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.1 / scene.frame.rate,),)
+    return ((0.1 / scene.force_coordinate.rate,),)
 
 
 RATE_DEPENDENT_LOOP = Effect(
@@ -109,7 +109,7 @@ RATE_DEPENDENT_LOOP = Effect(
     family="memory",
     site=Site.CORE,
     parameters=_rate_dependent_loop_parameters,
-    grid=_rate_dependent_loop_grid,
+    starting_points=_rate_dependent_loop_grid,
     form=None,
     source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
 )
@@ -138,7 +138,7 @@ LOOP_ASYMMETRY = Effect(
     family="memory",
     site=Site.CORE,
     parameters=_loop_asymmetry_parameters,
-    grid=_loop_asymmetry_grid,
+    starting_points=_loop_asymmetry_grid,
     form=None,
     source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
 )
@@ -156,10 +156,10 @@ def _second_hysteresis_memory(_x: float, rate: float, z: float, numbers: Any) ->
 
 
 def _second_hysteresis_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     turn = 1.0 / frame.peak
     return (
-        Parameter("k", f"{frame.force_unit}/{frame.unit}", 0.0, 0.01 * frame.force * turn, frame.least),
+        Parameter("k", f"{frame.force_unit}/{frame.unit}", 0.0, 0.01 * frame.force * turn, frame.lower_bound),
         Parameter("chi", f"1/{frame.unit}", turn, 0.3 * turn, 0.0, 100.0 * turn),
         Parameter("g", f"1/{frame.unit}", 0.0, 0.3 * turn, -50.0 * turn, 50.0 * turn),
         Parameter(
@@ -169,7 +169,7 @@ def _second_hysteresis_parameters(scene: SimulationContext) -> tuple[Parameter, 
 
 
 def _second_hysteresis_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     return tuple(
         (0.03 * frame.force / frame.peak, quick / frame.peak, bent * quick / frame.peak, 0.0)
         for quick in _SECOND_HYSTERESIS_QUICK
@@ -183,7 +183,7 @@ SECOND_HYSTERESIS = Effect(
     family="memory",
     site=Site.FORCE,
     parameters=_second_hysteresis_parameters,
-    grid=_second_hysteresis_grid,
-    form=ForceLaw(_second_hysteresis_force, _second_hysteresis_memory, begins=3),
+    starting_points=_second_hysteresis_grid,
+    form=ForceLaw(_second_hysteresis_force, _second_hysteresis_memory, initial_state_index=3),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
 )

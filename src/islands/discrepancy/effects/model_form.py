@@ -134,7 +134,7 @@ def model_form(core: Simulator, model: Model, terms: Sequence[MissingTerm]) -> E
         return (*found, Parameter(SLOPE, unit, slope, 0.02 * slope, -_FAR * slope, _FAR * slope))
 
     def grid(scene: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
-        seen = round(scene.fitted / scene.dt)
+        seen = round(scene.fit_end_time / scene.dt)
         own, added = core.parameters, parameters(scene)[:-1]
         at = np.array([each.nominal for each in own])
 
@@ -169,11 +169,11 @@ def model_form(core: Simulator, model: Model, terms: Sequence[MissingTerm]) -> E
         family="shape",
         site=Site.CORE,
         parameters=parameters,
-        grid=grid,
+        starting_points=grid,
         form=None,
         source="Ikhouane and Rodellar, Systems with Hysteresis, section 2; Billings, Nonlinear System "
         "Identification, section 2",
-        linear=len(terms),
+        linear_parameters=len(terms),
         extra_degrees_of_freedom=_PRICE - len(terms) - 1,
     )
 

@@ -20,12 +20,12 @@ def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:
 
 
 def _cubic_stiffness_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^3", 0.0, 0.01 * frame.force / frame.peak**3),)
 
 
 def _cubic_stiffness_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.frame.force / scene.frame.peak**3,),)
+    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.peak**3,),)
 
 
 CUBIC_STIFFNESS = Effect(
@@ -34,7 +34,7 @@ CUBIC_STIFFNESS = Effect(
     family="shape",
     site=Site.FORCE,
     parameters=_cubic_stiffness_parameters,
-    grid=_cubic_stiffness_grid,
+    starting_points=_cubic_stiffness_grid,
     form=ForceLaw(_cubic_stiffness_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )
@@ -45,12 +45,12 @@ def _even_nonlinearity_force(x: float, _rate: float, _z: float, k: Any) -> float
 
 
 def _even_nonlinearity_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.frame
+    frame = scene.force_coordinate
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^2", 0.0, 0.01 * frame.force / frame.peak**2),)
 
 
 def _even_nonlinearity_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.frame.force / scene.frame.peak**2,),)
+    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.peak**2,),)
 
 
 EVEN_NONLINEARITY = Effect(
@@ -59,7 +59,7 @@ EVEN_NONLINEARITY = Effect(
     family="shape",
     site=Site.FORCE,
     parameters=_even_nonlinearity_parameters,
-    grid=_even_nonlinearity_grid,
+    starting_points=_even_nonlinearity_grid,
     form=ForceLaw(_even_nonlinearity_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
 )
@@ -100,9 +100,9 @@ DEAD_ZONE = Effect(
     family="shape",
     site=Site.INPUT,
     parameters=_dead_zone_parameters,
-    grid=_dead_zone_grid,
+    starting_points=_dead_zone_grid,
     form=_dead_zone_form,
-    applies=_dead_zone_crossed,
+    is_applicable=_dead_zone_crossed,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
 )
 
@@ -126,10 +126,10 @@ INPUT_SATURATION = Effect(
     family="shape",
     site=Site.INPUT,
     parameters=_saturation_parameters,
-    grid=_input_saturation_grid,
+    starting_points=_input_saturation_grid,
     form=_input_saturation_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
-    linear=0,
+    linear_parameters=0,
 )
 
 
@@ -148,10 +148,10 @@ OUTPUT_SATURATION = Effect(
     family="shape",
     site=Site.OUTPUT,
     parameters=_saturation_parameters,
-    grid=_output_saturation_grid,
+    starting_points=_output_saturation_grid,
     form=_output_saturation_form,
     source="Doebelin, Measurement Systems, section 3",
-    linear=0,
+    linear_parameters=0,
 )
 
 
@@ -175,7 +175,7 @@ ABSOLUTE_VALUE_SENSOR = Effect(
     family="shape",
     site=Site.OUTPUT,
     parameters=_absolute_value_sensor_parameters,
-    grid=_absolute_value_sensor_grid,
+    starting_points=_absolute_value_sensor_grid,
     form=_absolute_value_sensor_form,
     source="Doebelin, Measurement Systems, section 3",
 )
@@ -186,10 +186,10 @@ def outflow_law(state: str) -> Effect:
     label = f"{OUTFLOW_LAW.name}:{state}"
 
     def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, "1/s", 0.0, 1.0 / scene.fitted),)
+        return (Parameter(label, "1/s", 0.0, 1.0 / scene.fit_end_time),)
 
     def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return tuple((times / scene.fitted,) for times in (1.0, 5.0, 25.0))
+        return tuple((times / scene.fit_end_time,) for times in (1.0, 5.0, 25.0))
 
     return Effect(
         name=label,
@@ -197,7 +197,7 @@ def outflow_law(state: str) -> Effect:
         family="shape",
         site=Site.CORE,
         parameters=parameters,
-        grid=grid,
+        starting_points=grid,
         form=None,
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
     )
@@ -236,10 +236,10 @@ def state_clip(state: str) -> Effect:
         family="shape",
         site=Site.CORE,
         parameters=parameters,
-        grid=grid,
+        starting_points=grid,
         form=None,
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
-        linear=0,
+        linear_parameters=0,
     )
 
 

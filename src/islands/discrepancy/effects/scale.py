@@ -22,10 +22,10 @@ INPUT_GAIN = Effect(
     family="scale",
     site=Site.INPUT,
     parameters=_input_gain_parameters,
-    grid=_input_gain_grid,
+    starting_points=_input_gain_grid,
     form=_input_gain_form,
     source="Doebelin, Measurement Systems, section 3",
-    gain=True,
+    is_gain=True,
 )
 
 
@@ -47,10 +47,10 @@ SENSOR_GAIN = Effect(
     family="scale",
     site=Site.OUTPUT,
     parameters=_sensor_gain_parameters,
-    grid=_sensor_gain_grid,
+    starting_points=_sensor_gain_grid,
     form=_sensor_gain_form,
     source="Doebelin, Measurement Systems, section 3",
-    gain=True,
+    is_gain=True,
 )
 
 
@@ -70,7 +70,7 @@ def wrong_parameter(parameter: Parameter) -> Effect:
         family="scale",
         site=Site.PARAMETER,
         parameters=parameters,
-        grid=grid,
+        starting_points=grid,
         form=None,
         source="Ljung, System Identification, 2nd ed., section 7",
     )

@@ -21,7 +21,7 @@ def instant_grid(scene: SimulationContext) -> tuple[float, ...]:
 
 def instant_bounds(scene: SimulationContext) -> tuple[float, float]:
     """Return the first and the last time at which a change may be looked for."""
-    return MARGIN * scene.fitted, (1.0 - MARGIN) * scene.fitted
+    return MARGIN * scene.fit_end_time, (1.0 - MARGIN) * scene.fit_end_time
 
 
 def smooth_step(scene: SimulationContext, instant: float) -> Signal:
@@ -43,7 +43,7 @@ def gain_over_time(own: Mapping[str, float], scene: SimulationContext) -> Signal
 def _gain_step_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("gain-step", "", 0.0, 0.01, -0.9, 2.0),
-        Parameter("gain-step instant", "s", 0.0, 0.3 * scene.fitted / 45, *instant_bounds(scene)),
+        Parameter("gain-step instant", "s", 0.0, 0.3 * scene.fit_end_time / 45, *instant_bounds(scene)),
     )
 
 
@@ -57,7 +57,7 @@ GAIN_STEP = Effect(
     family="change",
     site=Site.CORE,
     parameters=_gain_step_parameters,
-    grid=_gain_step_grid,
+    starting_points=_gain_step_grid,
     form=None,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
@@ -78,7 +78,7 @@ AGEING = Effect(
     family="change",
     site=Site.CORE,
     parameters=_ageing_parameters,
-    grid=_ageing_grid,
+    starting_points=_ageing_grid,
     form=None,
     source="Doebelin, Measurement Systems, section 3",
 )

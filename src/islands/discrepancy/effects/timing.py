@@ -13,7 +13,9 @@ def _delay_form(u: Signal, values: Signal, scene: SimulationContext) -> Signal:
 
 
 def _delay_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("tau", "s", 0.0, scene.dt, -0.2 * scene.dt, min(30 * scene.dt, scene.fitted / 4)),)
+    return (
+        Parameter("tau", "s", 0.0, scene.dt, -0.2 * scene.dt, min(30 * scene.dt, scene.fit_end_time / 4)),
+    )
 
 
 def _delay_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
@@ -26,7 +28,7 @@ DELAY = Effect(
     family="timing",
     site=Site.INPUT,
     parameters=_delay_parameters,
-    grid=_delay_grid,
+    starting_points=_delay_grid,
     form=_delay_form,
     source="Ljung, System Identification, 2nd ed., section 16",
 )
@@ -37,11 +39,11 @@ def _clock_skew_form(u: Signal, values: Signal, _scene: SimulationContext) -> Si
 
 
 def _clock_skew_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("e", "", 0.0, 0.01 * scene.dt / scene.fitted, -0.02, 0.02),)
+    return (Parameter("e", "", 0.0, 0.01 * scene.dt / scene.fit_end_time, -0.02, 0.02),)
 
 
 def _clock_skew_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.5 * scene.dt / scene.fitted,), (-0.5 * scene.dt / scene.fitted,))
+    return ((0.5 * scene.dt / scene.fit_end_time,), (-0.5 * scene.dt / scene.fit_end_time,))
 
 
 CLOCK_SKEW = Effect(
@@ -50,7 +52,7 @@ CLOCK_SKEW = Effect(
     family="timing",
     site=Site.INPUT,
     parameters=_clock_skew_parameters,
-    grid=_clock_skew_grid,
+    starting_points=_clock_skew_grid,
     form=_clock_skew_form,
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
 )
@@ -61,7 +63,7 @@ def _sensor_lag_form(y: Signal, values: Signal, scene: SimulationContext) -> Sig
 
 
 def _sensor_lag_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("tau", "s", 0.0, scene.dt, 0.0, scene.fitted / 4),)
+    return (Parameter("tau", "s", 0.0, scene.dt, 0.0, scene.fit_end_time / 4),)
 
 
 def _sensor_lag_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
@@ -74,7 +76,7 @@ SENSOR_LAG = Effect(
     family="timing",
     site=Site.OUTPUT,
     parameters=_sensor_lag_parameters,
-    grid=_sensor_lag_grid,
+    starting_points=_sensor_lag_grid,
     form=_sensor_lag_form,
     source="Doebelin, Measurement Systems, section 3",
 )
@@ -101,7 +103,7 @@ def _resonance_form(y: Signal, values: Signal, scene: SimulationContext) -> Sign
 
 def _resonance_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("period", "s", 0.0, scene.dt, 0.0, scene.fitted / 8),
+        Parameter("period", "s", 0.0, scene.dt, 0.0, scene.fit_end_time / 8),
         Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
     )
 
@@ -118,7 +120,7 @@ RESONANCE = Effect(
     family="timing",
     site=Site.OUTPUT,
     parameters=_resonance_parameters,
-    grid=_resonance_grid,
+    starting_points=_resonance_grid,
     form=_resonance_form,
     source="Ljung, System Identification, 2nd ed., section 4",
 )

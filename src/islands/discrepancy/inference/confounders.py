@@ -33,7 +33,7 @@ class Confounder:
     ----------
     effect : Effect
         The other cause.
-    times : float
+    factor : float
         Its values are so many times the one's.
     gained : float
         What the residual says for it, in minus twice the log-likelihood; below zero against it.
@@ -42,7 +42,7 @@ class Confounder:
     """
 
     effect: Effect
-    times: float
+    factor: float
     gained: float
     beside: float
 
@@ -56,13 +56,13 @@ def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> C
     rest = (each for each in simulation.effects if each is not effect)
     there = simulation.with_effects(catalogue_order((*rest, other)))
     values = transfer_parameters(fit.values, simulation, there)
-    beside, together = 0.0, np.zeros(np.count_nonzero(target.seen) - 1)
+    beside, together = 0.0, np.zeros(np.count_nonzero(target.estimation_part) - 1)
     for part in INSTANTS:
-        values[there.part(other)] = part * times * fit.values[simulation.part(effect)]
-        left = (there.simulate(values) - fit.output)[target.seen]
+        values[there.get_slice(other)] = part * times * fit.values[simulation.get_slice(effect)]
+        left = (there.simulate(values) - fit.output)[target.estimation_part]
         beside += float(np.mean(left**2)) / len(INSTANTS)
         together += _neighbours(left) / len(INSTANTS)
-    seen = _neighbours((target.y - fit.output)[target.seen])
+    seen = _neighbours((target.y - fit.output)[target.estimation_part])
     return Confounder(other, times, _told(seen - seen.mean(), together - together.mean()), beside)
 
 

@@ -45,9 +45,9 @@ def _apart(one: CalibrationResult, other: CalibrationResult, times: int) -> floa
     """Return how many standard deviations of noise two simulations are apart when all happens faster."""
     signals = [
         ExtendedSimulator(
-            fit.simulation.core,
+            fit.simulation.simulator,
             fit.simulation.effects,
-            replace(fit.simulation.scene, dt=fit.simulation.scene.dt / times),
+            replace(fit.simulation.context, dt=fit.simulation.context.dt / times),
         ).simulate(fit.values)
         for fit in (one, other)
     ]

@@ -96,12 +96,14 @@ def measure_holdout_gain(
     gains = []
     for each in range(FOLDS):
         out = np.arange(1, BLOCKS)[fold == each]
-        cut = replace(target, noise=after.noise, seen=target.seen & ~np.isin(block, out))
+        cut = replace(
+            target, noise=after.noise, estimation_part=target.estimation_part & ~np.isin(block, out)
+        )
         old = before if as_given else calibrate(before.simulation, cut, before.values)
         new = calibrate(after.simulation, cut, after.values)
         missed = [after.noise.whiten(target.y - fit.output) ** 2 for fit in (old, new)]
         gains += [float(np.sum((missed[0] - missed[1])[block == number])) for number in out]
-    worth = after.noise.samples / np.count_nonzero(target.seen)
+    worth = after.noise.effective_samples / np.count_nonzero(target.estimation_part)
     return _low(worth * np.array(gains) / after.noise.variance, rng)
 
 

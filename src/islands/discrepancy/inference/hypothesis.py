@@ -29,14 +29,14 @@ class Hypothesis:
         Its score with every effect's values paid for: less is better.
     effects : tuple of Effect
         The most important first.
-    rivals : tuple of Alternatives
+    alternatives : tuple of Alternatives
         Of each effect; empty where they were not asked for.
     """
 
     fit: CalibrationResult
     cost: float
     effects: tuple[Effect, ...]
-    rivals: "tuple[Alternatives, ...]" = ()
+    alternatives: "tuple[Alternatives, ...]" = ()
 
     @property
     def rank(self) -> int:
@@ -52,17 +52,17 @@ class Alternatives:
     ----------
     without : Hypothesis
         All the others, fitted anew.
-    rungs : sequence of ScreenedEffect
+    screened : sequence of ScreenedEffect
         Each effect beside them, the best first.
     """
 
     without: Hypothesis
-    rungs: Sequence[ScreenedEffect]
+    screened: Sequence[ScreenedEffect]
 
 
 def with_effect(before: Hypothesis, rung: ScreenedEffect) -> Hypothesis:
     """Return an explanation with a rung's effect in it."""
-    cost = before.cost - rung.gained(before.fit)
+    cost = before.cost - rung.score_gain(before.fit)
     return Hypothesis(rung.fit, cost, (*before.effects, rung.effect))
 
 

@@ -17,12 +17,12 @@ class NoiseFinding:
     ----------
     parameters : mapping
         Values by name, each with its unit.
-    gained : float
+    score_gain : float
         Minus twice the log-likelihood that naming it is worth, paid for as BIC does.
     """
 
     parameters: Mapping[str, tuple[float, str]]
-    gained: float
+    score_gain: float
 
 
 @dataclass(frozen=True, slots=True)

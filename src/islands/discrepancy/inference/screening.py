@@ -47,15 +47,15 @@ class ScreenedEffect:
     effect: Effect
     fit: CalibrationResult
 
-    def gained(self, base: CalibrationResult) -> float:
+    def score_gain(self, base: CalibrationResult) -> float:
         """Return by how much it is better than without the effect, its values paid for."""
         return base.score - self.fit.score - bic_penalty(self.effect, base)
 
 
 def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
     """Return what an effect's values have to gain, as BIC has it: log n for each."""
-    values = len(effect.parameters(base.simulation.scene)) + effect.extra_degrees_of_freedom
-    return values * float(np.log(base.noise.samples))
+    values = len(effect.parameters(base.simulation.context)) + effect.extra_degrees_of_freedom
+    return values * float(np.log(base.noise.effective_samples))
 
 
 def screen_effects(
@@ -75,7 +75,7 @@ def screen_effects(
         starts = _starts(base, simulation, effect, target, space)
         if starts:
             screened.append((starts[0][0], effect, simulation, [values for _, values in starts]))
-    if base.simulation.effects and target.effective is None:
+    if base.simulation.effects and target.effective_samples is None:
         # Beside what is there already, the most promising ones alone are worth a fit.
         screened.sort(key=lambda each: each[0])
         screened = [
@@ -88,13 +88,13 @@ def screen_effects(
         ScreenedEffect(effect, min((evaluate_fit(simulation, target, values) for values in ends), key=_score))
         for (_, effect, simulation, _), ends in zip(screened, found, strict=True)
     ]
-    return sorted(rungs, key=lambda rung: -round(rung.gained(base) / EQUAL))
+    return sorted(rungs, key=lambda rung: -round(rung.score_gain(base) / EQUAL))
 
 
 def _fitted(target: Target, asked: Fit) -> list[Signal]:
     """Fit from every start a few steps far, and from the best one to the end; return the values."""
     simulation, starts = asked
-    if target.effective is not None:
+    if target.effective_samples is not None:
         # Where the form is wrong there are many minima, and the first steps do not tell which is the best.
         return [calibrate(simulation, target, start).values for start in starts]
     fits = [calibrate(simulation, target, start, steps=FIRST_STEPS) for start in starts]
@@ -114,11 +114,11 @@ def _score(fit: CalibrationResult) -> float:
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:
     """Return the values of a simulation for one with other effects; what is new does nothing yet."""
     moved = new.nominal
-    own = len(old.core.parameters)
+    own = len(old.simulator.parameters)
     moved[:own] = values[:own]
     for effect in new.effects:
         if effect in old.effects:
-            moved[new.part(effect)] = values[old.part(effect)]
+            moved[new.get_slice(effect)] = values[old.get_slice(effect)]
     return moved
 
 
@@ -129,7 +129,7 @@ class _Projection:
         simulation, values = base.simulation, base.values
         self._target, self._values = target, values.size
         self._sigma = float(np.std(target.residual(base.output))) or 1.0
-        pull, nominal = prior_precision(simulation, target.tolerance)
+        pull, nominal = prior_precision(simulation, target.prior_std)
         columns = []
         for place, scale in enumerate(simulation.scales):
             moved = values.copy()
@@ -141,7 +141,7 @@ class _Projection:
         self._basis = np.linalg.qr(np.column_stack(columns))[0] if columns else None
         # Of a value that a fit has moved from where its tolerance wants it, that is left to be explained.
         self.residual = self._left(self._observed(target.y - base.output, pull * (nominal - values)))
-        self._samples = base.noise.samples
+        self._samples = base.noise.effective_samples
 
     def gained(self, remains: float) -> float:
         """Return by how much minus twice the log-likelihood falls where so many squares remain."""
@@ -154,14 +154,14 @@ class _Projection:
         return seen if self._basis is None else seen - self._basis @ (self._basis.T @ seen)
 
     def _observed(self, response: Signal, held: Signal) -> Signal:
-        return np.concatenate([self._target.observed(response) / self._sigma, held])
+        return np.concatenate([self._target.select(response) / self._sigma, held])
 
 
 def _points(effect: Effect, simulation: ExtendedSimulator, residual: Signal) -> Sequence[tuple[float, ...]]:
     """Return where a search for an effect begins."""
-    part = simulation.part(effect)
+    part = simulation.get_slice(effect)
     try:
-        points = effect.grid(simulation.scene, residual)
+        points = effect.starting_points(simulation.context, residual)
     except Exception as error:
         raise invalid_effect_error(effect, f"its grid fails: {type(error).__name__}: {error}") from error
     if any(len(point) != part.stop - part.start for point in points):
@@ -178,7 +178,7 @@ def _starts(
 
     Each stands behind the squares that remain with it.
     """
-    part = simulation.part(effect)
+    part = simulation.get_slice(effect)
     lower, upper = simulation.bounds
     at_rest = transfer_parameters(base.values, base.simulation, simulation)
     tried = []
@@ -191,10 +191,10 @@ def _starts(
         if not np.isfinite(size) or size == 0.0:
             continue
         points = [(_squares(space.residual - response), values)]
-        if effect.linear:
+        if effect.linear_parameters:
             along = np.clip(float(response @ space.residual) / size, -FARTHEST, FARTHEST)
             values = values.copy()
-            values[part.start : part.start + effect.linear] *= along
+            values[part.start : part.start + effect.linear_parameters] *= along
             values = np.clip(values, lower, upper)
             response = space(simulation.simulate(values) - base.output)
             points.append((_squares(space.residual - response), values))

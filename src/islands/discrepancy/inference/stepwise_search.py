@@ -95,7 +95,7 @@ def _causes(found: Hypothesis) -> int:
 
 def _remembered(followed: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
     """Fit explanations anew, whitened by what the best of them has left."""
-    for _ in range(REFITS if followed and target.effective is None else 0):
+    for _ in range(REFITS if followed and target.effective_samples is None else 0):
         before = followed[0].cost
         target = replace(target, noise=followed[0].fit.noise)
         followed = sorted((refit(each, target) for each in followed), key=attrgetter("rank"))
@@ -131,7 +131,7 @@ def refine_by_swaps(
         if len(found.effects) > 1:
             tell("what else could be the cause")
             rivals = find_alternatives(found, target, effects, spread)
-            further = [with_effect(each.without, rung) for each in rivals for rung in each.rungs[:1]]
+            further = [with_effect(each.without, rung) for each in rivals for rung in each.screened[:1]]
         if len(found.effects) < len(complete) and _causes(found) < most:
             others = [effect for effect in effects if effect not in found.effects]
             beside = [
@@ -140,10 +140,10 @@ def refine_by_swaps(
             further += [each for each in beside if each.cost < found.cost - least]
         best = min(further, key=attrgetter("rank"), default=found)
         if best.cost > found.cost - EQUAL:
-            return replace(found, rivals=rivals), target
+            return replace(found, alternatives=rivals), target
         if set(best.effects) == set(found.effects) and best.cost > found.cost - LEAST:
             # The same with slightly better values: no other names would come of going round again.
-            return replace(found, fit=best.fit, cost=best.cost, rivals=rivals), target
+            return replace(found, fit=best.fit, cost=best.cost, alternatives=rivals), target
         complete = best.effects
         (found,), target = _remembered([_thinned(best, target, least)], target)
     return found, target
@@ -154,7 +154,7 @@ def _further(target: Target, effects: Sequence[Effect]) -> float:
 
     Where the form is wrong it is no chance, and pairs are found by less.
     """
-    return LEAST if target.effective is not None else LEAST + 2.0 * float(np.log(len(effects)))
+    return LEAST if target.effective_samples is not None else LEAST + 2.0 * float(np.log(len(effects)))
 
 
 def _thinned(found: Hypothesis, target: Target, least: float) -> Hypothesis:

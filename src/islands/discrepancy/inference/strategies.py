@@ -47,27 +47,27 @@ class SearchOutcome:
     ----------
     base : CalibrationResult
         The simulation alone.
-    rungs : tuple of ScreenedEffect
+    screened : tuple of ScreenedEffect
         Its ladder.
     target : Target
         What all was held against.
-    found : Hypothesis
-    floor : float
+    hypothesis : Hypothesis
+    noise_floor : float
         Mean square that no simulation is expected to be below.
-    measured_floor : bool
+    is_noise_floor_measured : bool
         It is known from periods that repeat; else it is an upper bound, by what a flexible fit foretells.
-    remainder : mapping of str to float
+    residual_structure : mapping of str to float
         Maps in which what is left is no chance.
     verdict : Verdict
     """
 
     base: CalibrationResult
-    rungs: Sequence[ScreenedEffect]
+    screened: Sequence[ScreenedEffect]
     target: Target
-    found: Hypothesis
-    floor: float
-    measured_floor: bool
-    remainder: Mapping[str, float]
+    hypothesis: Hypothesis
+    noise_floor: float
+    is_noise_floor_measured: bool
+    residual_structure: Mapping[str, float]
     verdict: Verdict
 
 
@@ -109,7 +109,7 @@ def search_with_model_error(
     )  # how many samples count changes what a fit is worth, and not the fit
     for _ in range(2):
         # Neighbours say less that is new the more misfit there is: counted anew with the best causes in.
-        target = replace(target, effective=effective_samples(target.residual(found.fit.output)))
+        target = replace(target, effective_samples=effective_samples(target.residual(found.fit.output)))
         base = evaluate_fit(base.simulation, target, base.values)
         rungs = screen_effects(base, target, effects, spread)
         if not any(explained_fraction(base, rung.fit, 0.0) > WORTHWHILE for rung in rungs):
@@ -123,8 +123,8 @@ def search_with_model_error(
 def assess_evidence(evidence: SearchOutcome, fitted: int, rng: np.random.Generator) -> SearchOutcome:
     """Drop what does not foretell samples that were not fitted, look at what is left, and decide."""
     base, target = evidence.base, evidence.target
-    found = validate_out_of_sample(evidence.found, base, target, fitted, rng)
-    scene, output = found.fit.simulation.scene, found.fit.output[:fitted]
+    found = validate_out_of_sample(evidence.hypothesis, base, target, fitted, rng)
+    scene, output = found.fit.simulation.context, found.fit.output[:fitted]
     residual = target.y[:fitted] - output
     left = explainable_variance(residual, scene.u[:fitted], output, rng)
     maps = describe_remainder(residual, output, scene, rng)
@@ -134,22 +134,22 @@ def assess_evidence(evidence: SearchOutcome, fitted: int, rng: np.random.Generat
     remains = bool(maps) or left > NOTICEABLE * mean_square
     # By misfit nobody knows which part of it is noise: half of all of it has to be explained.
     explained_share = explained_fraction(
-        reference_variance(found, base, target), found.fit, floor if target.effective is None else 0.0
+        reference_variance(found, base, target), found.fit, floor if target.effective_samples is None else 0.0
     )
-    verdict = classify(explained_share, bool(found.effects), remains, target.effective is not None)
+    verdict = classify(explained_share, bool(found.effects), remains, target.effective_samples is not None)
     return replace(
         evidence,
-        found=found,
-        floor=floor,
-        measured_floor=repeated is not None,
-        remainder=maps,
+        hypothesis=found,
+        noise_floor=floor,
+        is_noise_floor_measured=repeated is not None,
+        residual_structure=maps,
         verdict=verdict,
     )
 
 
 def best_single(base: CalibrationResult, rungs: Sequence[ScreenedEffect]) -> CalibrationResult:
     """Return the first rung's simulation where it pays, else the one without."""
-    return rungs[0].fit if rungs and rungs[0].gained(base) > LEAST else base
+    return rungs[0].fit if rungs and rungs[0].score_gain(base) > LEAST else base
 
 
 def _unjudged(

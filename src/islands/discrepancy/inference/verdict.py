@@ -79,7 +79,7 @@ class Finding:
     parameters : mapping of str to Value
     score : float
         What it gains, in minus twice the log-likelihood, its values paid for.
-    eta : float or None
+    explained_fraction : float or None
         Share of the explainable misfit that goes with it; None for what is no misfit of the mean.
     """
 
@@ -89,7 +89,7 @@ class Finding:
     equivalents: tuple[str, ...]
     parameters: Mapping[str, Value]
     score: float
-    eta: float | None
+    explained_fraction: float | None
 
 
 def validate_out_of_sample(
@@ -172,10 +172,10 @@ def describe_effects(
     if len(found.effects) == 1:
         rivals: Sequence[Alternatives] = (Alternatives(Hypothesis(base, base.score, ()), first),)
     else:
-        rivals = found.rivals or find_alternatives(found, target, effects, spread)
+        rivals = found.alternatives or find_alternatives(found, target, effects, spread)
     for effect, each in zip(found.effects, rivals, strict=True):
-        without, rungs = each.without, each.rungs
-        scores = {rung.effect.cause: rung.gained(without.fit) for rung in reversed(rungs)}
+        without, rungs = each.without, each.screened
+        scores = {rung.effect.cause: rung.score_gain(without.fit) for rung in reversed(rungs)}
         own = max(scores.get(effect.cause, 0.0), without.cost - found.cost)
         scores[effect.cause] = own
         name, family, values = effect.cause, effect.family, _values(found.fit, effect, deviations)
@@ -207,17 +207,17 @@ def _confidence(own: float, scores: Mapping[str, float]) -> float:
 
 def _times(other: Confounder, values: Mapping[str, Value], fit: CalibrationResult) -> Mapping[str, Value]:
     """Return the values of a cause in the place of one that it is like."""
-    parameters = other.effect.parameters(fit.simulation.scene)
+    parameters = other.effect.parameters(fit.simulation.context)
     found = {}
     for parameter, each in zip(parameters, values.values(), strict=True):
         low, high = each.ci95 or (each.value, each.value)
-        reach = None if each.ci95 is None else (other.times * low, other.times * high)
-        found[parameter.name] = Value(other.times * each.value, parameter.unit, reach)
+        reach = None if each.ci95 is None else (other.factor * low, other.factor * high)
+        found[parameter.name] = Value(other.factor * each.value, parameter.unit, reach)
     return found
 
 
 def _values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
-    part = fit.simulation.part(effect)
+    part = fit.simulation.get_slice(effect)
     found = {}
     for place in range(part.start, part.stop):
         parameter, value = fit.simulation.parameters[place], float(fit.values[place])

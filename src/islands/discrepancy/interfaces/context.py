@@ -22,12 +22,12 @@ class ForceCoordinate:
         Its usual rate, per second.
     force_unit, force : str, float
         Unit and size of what acts on it.
-    sense : float
+    sign : float
         Sign of friction that is added to an output: -1 if the output follows the coordinate, 1 if the output
         is the force.
-    dissipates : bool
+    is_dissipative : bool
         Whether strengths of friction and hysteresis are bounded below by zero.
-    sharp : float
+    friction_smoothing : float
         Width of the transition of dry friction relative to the usual rate; a step has no derivative.
     """
 
@@ -36,14 +36,14 @@ class ForceCoordinate:
     rate: float
     force_unit: str
     force: float
-    sense: float = -1.0
-    dissipates: bool = False
-    sharp: float = 0.005
+    sign: float = -1.0
+    is_dissipative: bool = False
+    friction_smoothing: float = 0.005
 
     @property
-    def least(self) -> float:
+    def lower_bound(self) -> float:
         """Lower bound of a strength that can only dissipate."""
-        return 0.0 if self.dissipates else -np.inf
+        return 0.0 if self.is_dissipative else -np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,14 +63,14 @@ class SimulationContext:
     input_peak, output_peak : float
         Largest absolute values; of the output as the nominal simulation has it.
     input_unit, output_unit : str
-    fitted : float
+    fit_end_time : float
         End of the estimation part, in seconds after the first sample.
-    midway : ndarray, shape (2, samples), or None
+    intersample_values : ndarray, shape (2, samples), or None
         The input half a step and a full step after each sample, before a jump; None if it is linear between
         samples.
-    lasts : float or None
+    reference_duration : float or None
         Reference duration in seconds for strengths over the whole record; None for the duration of the input.
-    frame : ForceCoordinate
+    force_coordinate : ForceCoordinate
         Coordinate that forces act on; by default the input, and forces are added to the output.
     """
 
@@ -82,13 +82,13 @@ class SimulationContext:
     output_peak: float
     input_unit: str
     output_unit: str
-    fitted: float
-    midway: Signal | None = None
-    lasts: float | None = None
-    frame: ForceCoordinate = None  # type: ignore[assignment]
+    fit_end_time: float
+    intersample_values: Signal | None = None
+    reference_duration: float | None = None
+    force_coordinate: ForceCoordinate = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        if self.frame is None:
+        if self.force_coordinate is None:
             rate = float(np.std(np.diff(self.u))) / self.dt or 1.0
             frame = ForceCoordinate(
                 self.input_unit, self.input_peak, rate, self.output_unit, self.output_peak
@@ -100,17 +100,17 @@ class SimulationContext:
         """Seconds since the first sample, shape (samples,)."""
         return self.dt * np.arange(self.u.size, dtype=np.float64)
 
-    def midway_of(self, x: Signal) -> Signal:
+    def get_intersample_values(self, x: Signal) -> Signal:
         """Return ``midway``, or linear interpolation of the input ``x`` if that is None."""
-        if self.midway is not None:
-            return self.midway
+        if self.intersample_values is not None:
+            return self.intersample_values
         end = np.append(x[1:], x[-1])
         return np.stack([(x + end) / 2, end])
 
     @property
     def duration(self) -> float:
         """Duration of the record in seconds."""
-        return self.dt * self.u.size if self.lasts is None else self.lasts
+        return self.dt * self.u.size if self.reference_duration is None else self.reference_duration
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ class Effect:
     parameters : callable
         ``context -> tuple of Parameter``: the strength first, then the shape. The effect vanishes at the
         nominal strength.
-    grid : callable
+    starting_points : callable
         ``(context, residual) -> points``: starting points of the calibration, a value for each parameter; the
         residual is that of the current simulation, shape (samples,).
     form : callable, ForceLaw or None
@@ -46,11 +46,11 @@ class Effect:
         parameters of the effect, by name.
     source : str
         Publication that describes the form.
-    applies : callable
+    is_applicable : callable
         ``context -> bool``: whether the record can show the effect.
-    linear : int
+    linear_parameters : int
         Number of leading parameters to which the response of a weak effect is proportional.
-    gain : bool
+    is_gain : bool
         Whether the effect is a gain. Gains are searched for only if every parameter has a tolerance, since
         calibration absorbs them otherwise.
     extra_degrees_of_freedom : int
@@ -65,12 +65,12 @@ class Effect:
     family: str
     site: Site
     parameters: Callable[[SimulationContext], tuple[Parameter, ...]]
-    grid: Callable[[SimulationContext, Signal], Sequence[tuple[float, ...]]]
+    starting_points: Callable[[SimulationContext, Signal], Sequence[tuple[float, ...]]]
     form: Map | ForceLaw | None
     source: str
-    applies: Callable[[SimulationContext], bool] = lambda _: True
-    linear: int = 1
-    gain: bool = False
+    is_applicable: Callable[[SimulationContext], bool] = lambda _: True
+    linear_parameters: int = 1
+    is_gain: bool = False
     extra_degrees_of_freedom: int = 0
     confounded_with: "tuple[Effect, float] | None" = None
 

@@ -21,21 +21,21 @@ class ForceLaw:
     ----------
     force : callable
         ``(x, rate, z, numbers) -> force``; the numbers are the values of the effect, then the constants.
-    memory : callable or None
+    state_derivative : callable or None
         ``(x, rate, z, numbers) -> z'``: derivative of the internal state.
     constants : callable
         ``context -> numbers`` that are not calibrated.
-    dissipative : bool
+    is_dissipative : bool
         Whether it dissipates energy, like friction and drag.
-    begins : int or None
+    initial_state_index : int or None
         Index of the value that is the initial internal state; None if that is zero.
     """
 
     force: Law
-    memory: Law | None = None
+    state_derivative: Law | None = None
     constants: Callable[[SimulationContext], tuple[float, ...]] = lambda _: ()
-    dissipative: bool = False
-    begins: int | None = None
+    is_dissipative: bool = False
+    initial_state_index: int | None = None
 
 
 def pack_force_laws(
@@ -56,13 +56,24 @@ def pack_force_laws(
     return Elements(
         np.array([compiled(element.force).address for element, _ in parts], dtype=np.int64),
         np.array(
-            [compiled(element.memory).address if element.memory else 0 for element, _ in parts],
+            [
+                compiled(element.state_derivative).address if element.state_derivative else 0
+                for element, _ in parts
+            ],
             dtype=np.int64,
         ),
         np.array(
-            [-1.0 if balance else scene.frame.sense if element.dissipative else 1.0 for element, _ in parts]
+            [
+                -1.0 if balance else scene.force_coordinate.sign if element.is_dissipative else 1.0
+                for element, _ in parts
+            ]
         ),
-        np.array([0.0 if element.begins is None else values[element.begins] for element, values in parts]),
+        np.array(
+            [
+                0.0 if element.initial_state_index is None else values[element.initial_state_index]
+                for element, values in parts
+            ]
+        ),
         numbers,
     )
 

@@ -34,14 +34,14 @@ class Simulator(Protocol):
         """Names of effects already modelled by the simulator; excluded from the search."""
 
     @property
-    def effects(self) -> tuple[Effect, ...]:
+    def state_effects(self) -> tuple[Effect, ...]:
         """Effects on its states, in addition to the catalogue."""
 
     @property
     def is_continuous_time(self) -> bool:
         """Whether it integrates an equation, so that the input between samples matters."""
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the coordinate that forces act on; ``output`` is the nominal output, shape (samples,)."""
 
     def simulate(

@@ -32,7 +32,7 @@ class BoucWenPiezoSimulator:
         ("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing")
     )
     built_in_effects: frozenset[str] = frozenset()
-    effects: tuple[Effect, ...] = ()
+    state_effects: tuple[Effect, ...] = ()
     is_continuous_time: bool = True
 
     @property
@@ -48,7 +48,7 @@ class BoucWenPiezoSimulator:
             )
         )
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return input_coordinate(scene, output)
 

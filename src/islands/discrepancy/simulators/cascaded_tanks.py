@@ -50,7 +50,7 @@ class CascadedTanksSimulator:
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.CORE, Site.PARAMETER, Site.OUTPUT))
     supported_effects: frozenset[str] = frozenset(("gain-step", "ageing"))
     built_in_effects: frozenset[str] = frozenset()
-    effects: tuple[Effect, ...] = field(
+    state_effects: tuple[Effect, ...] = field(
         default=tuple(
             make(state) for make in (state_clip, input_offset, outflow_law) for state in (UPPER, LOWER)
         )
@@ -77,7 +77,7 @@ class CascadedTanksSimulator:
             ),
         )
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return input_coordinate(scene, output)
 
@@ -89,7 +89,7 @@ class CascadedTanksSimulator:
         gain, offset = k3 * gain_over_time(own, scene), k3 * own.get(f"input-offset:{UPPER}", 0.0)
         y = np.empty(x.size)
         cascade(
-            *(x * gain + offset, scene.midway_of(x) * gain + offset, scene.dt),
+            *(x * gain + offset, scene.get_intersample_values(x) * gain + offset, scene.dt),
             (
                 k1,
                 own.get(f"outflow-law:{UPPER}", 0.0),

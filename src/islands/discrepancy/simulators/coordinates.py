@@ -22,8 +22,8 @@ def output_coordinate(scene: SimulationContext, output: Signal) -> ForceCoordina
         rate,
         scene.input_unit,
         scene.input_peak,
-        dissipates=True,
-        sharp=0.02,
+        is_dissipative=True,
+        friction_smoothing=0.02,
     )
 
 

@@ -27,25 +27,25 @@ class ExtendedSimulator:
 
     Attributes
     ----------
-    core : Simulator
+    simulator : Simulator
     effects : tuple of Effect
         In the order of the catalogue, which is the order in which maps act.
-    scene : SimulationContext
+    context : SimulationContext
     """
 
-    core: Simulator
+    simulator: Simulator
     effects: tuple[Effect, ...]
-    scene: SimulationContext
+    context: SimulationContext
     parameters: tuple[Parameter, ...] = field(init=False)
     _parts: tuple[slice, ...] = field(init=False)
     _inner: NDArray[np.bool_] = field(init=False)
     _known: dict[bytes, Signal] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        own = len(self.core.parameters)
-        parameters, parts, inner = list(self.core.parameters), [], [True] * own
+        own = len(self.simulator.parameters)
+        parameters, parts, inner = list(self.simulator.parameters), [], [True] * own
         for effect in self.effects:
-            added = effect.parameters(self.scene)
+            added = effect.parameters(self.context)
             parts.append(slice(len(parameters), len(parameters) + len(added)))
             parameters += added
             inner += [effect.site != Site.OUTPUT] * len(added)
@@ -71,7 +71,7 @@ class ExtendedSimulator:
         """Changes that matter."""
         return np.array([parameter.scale for parameter in self.parameters])
 
-    def part(self, effect: Effect) -> slice:
+    def get_slice(self, effect: Effect) -> slice:
         """Return where an effect's values are."""
         return self._parts[self.effects.index(effect)]
 
@@ -88,14 +88,18 @@ class ExtendedSimulator:
         """
         with np.errstate(over="ignore", invalid="ignore"):
             more = bool(own or forces)
-            y = self._simulate_core(values, own, forces) if more else self._behind_core(values)
+            y = (
+                self._simulate_core(values, own, forces)
+                if more
+                else self._simulate_without_output_maps(values)
+            )
             for effect, part in zip(self.effects, self._parts, strict=True):
                 if effect.site == Site.OUTPUT:
-                    y = apply_map(effect, y, values[part], self.scene)
-            exploded = not float(np.max(np.abs(y))) < _EXPLODED * self.scene.output_peak
+                    y = apply_map(effect, y, values[part], self.context)
+            exploded = not float(np.max(np.abs(y))) < _EXPLODED * self.context.output_peak
         return np.full_like(y, np.nan) if exploded else y
 
-    def _behind_core(self, values: Signal) -> Signal:
+    def _simulate_without_output_maps(self, values: Signal) -> Signal:
         key = values[self._inner].tobytes()
         y = self._known.get(key)
         if y is None:
@@ -106,28 +110,28 @@ class ExtendedSimulator:
         return y
 
     def _simulate_core(self, values: Signal, more: Mapping[str, float], further: Forces) -> Signal:
-        x, forces = self.scene.u, list(further)
+        x, forces = self.context.u, list(further)
         own = dict(more)
-        core = values[: len(self.core.parameters)].copy()
+        core = values[: len(self.simulator.parameters)].copy()
         for effect, part in zip(self.effects, self._parts, strict=True):
             match effect.site:
                 case Site.INPUT:
-                    x = apply_map(effect, x, values[part], self.scene)
+                    x = apply_map(effect, x, values[part], self.context)
                 case Site.CORE:
                     own |= {
                         parameter.name: float(value)
                         for parameter, value in zip(self.parameters[part], values[part], strict=True)
                     }
                 case Site.PARAMETER:
-                    core[self._place(effect)] *= 1.0 + values[part][0]
+                    core[self._apply_maps(effect)] *= 1.0 + values[part][0]
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return self.core.simulate(core, x, self.scene, own, forces)
+        return self.simulator.simulate(core, x, self.context, own, forces)
 
-    def _place(self, effect: Effect) -> int:
+    def _apply_maps(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")
-        return [parameter.name for parameter in self.core.parameters].index(name)
+        return [parameter.name for parameter in self.simulator.parameters].index(name)
 
 
 def apply_map(effect: Effect, signal: Signal, values: Signal, scene: SimulationContext) -> Signal:

@@ -17,46 +17,46 @@ class SimulatorWrapper:
 
     __slots__ = ()
 
-    core: Simulator
+    simulator: Simulator
 
     @property
     def name(self) -> str:
         """As the core's."""
-        return self.core.name
+        return self.simulator.name
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """As the core's."""
-        return self.core.parameters
+        return self.simulator.parameters
 
     @property
     def sites(self) -> frozenset[Site]:
         """As the core's."""
-        return self.core.sites
+        return self.simulator.sites
 
     @property
     def supported_effects(self) -> frozenset[str]:
         """As the core's."""
-        return self.core.supported_effects
+        return self.simulator.supported_effects
 
     @property
     def built_in_effects(self) -> frozenset[str]:
         """As the core's."""
-        return self.core.built_in_effects
+        return self.simulator.built_in_effects
 
     @property
-    def effects(self) -> tuple[Effect, ...]:
+    def state_effects(self) -> tuple[Effect, ...]:
         """As the core's."""
-        return self.core.effects
+        return self.simulator.state_effects
 
     @property
     def is_continuous_time(self) -> bool:
         """As the core's."""
-        return self.core.is_continuous_time
+        return self.simulator.is_continuous_time
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return self.core.frame(scene, output)
+        return self.simulator.make_force_coordinate(scene, output)
 
 
 #: Inputs that are remembered between their samples.
@@ -66,26 +66,26 @@ _REMEMBERED = 2
 class InterSample(StrEnum):
     """What an input does between two samples."""
 
-    FIRST = "first-order"
-    ZERO = "zero-order"
-    BAND = "band-limited"
+    FOH = "first-order"
+    ZOH = "zero-order"
+    BAND_LIMITED = "band-limited"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResampledSimulator(SimulatorWrapper):
-    """A core that is simulated ``times`` as often as it is recorded.
+    """A core that is simulated ``oversampling`` as often as it is recorded.
 
     Attributes
     ----------
-    core : Simulator
-    hold : InterSample
+    simulator : Simulator
+    intersample : InterSample
         It runs straight from sample to sample, stays, or is the smoothest that passes through all samples.
-    times : int
+    oversampling : int
     """
 
-    core: Simulator
-    hold: InterSample = InterSample.FIRST
-    times: int = 1
+    simulator: Simulator
+    intersample: InterSample = InterSample.FOH
+    oversampling: int = 1
     _known: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
 
     def simulate(
@@ -93,15 +93,15 @@ class ResampledSimulator(SimulatorWrapper):
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         u, midway = self._finer(x)
-        finer = replace(scene, u=u, dt=scene.dt / self.times, midway=midway)
-        return self.core.simulate(values, u, finer, own, forces)[:: self.times]
+        finer = replace(scene, u=u, dt=scene.dt / self.oversampling, intersample_values=midway)
+        return self.simulator.simulate(values, u, finer, own, forces)[:: self.oversampling]
 
     def _finer(self, x: Signal) -> tuple[Signal, Signal]:
         key = x.tobytes()
         if key not in self._known:
             while len(self._known) >= _REMEMBERED:
                 del self._known[next(iter(self._known))]
-            self._known[key] = resample_context(x, self.hold, self.times)
+            self._known[key] = resample_context(x, self.intersample, self.oversampling)
         return self._known[key]
 
 
@@ -115,13 +115,13 @@ def resample_context(x: Signal, hold: InterSample, times: int) -> tuple[Signal, 
     ndarray, shape (2, times * samples)
     """
     match hold:
-        case InterSample.ZERO:
+        case InterSample.ZOH:
             stays = np.repeat(x, times)
             return stays, np.stack([stays, stays])
-        case InterSample.FIRST:
+        case InterSample.FOH:
             at = np.arange(2 * times * x.size + 1) / (2 * times)
             straight = np.interp(at, np.arange(x.size), x)
-        case InterSample.BAND:
+        case InterSample.BAND_LIMITED:
             # Its ends are led on by reflection: a filter that meets zeros rings.
             spare = min(64, x.size - 1)
             longer = np.concatenate([2 * x[0] - x[spare:0:-1], x, 2 * x[-1] - x[-2 : -spare - 2 : -1]])

@@ -44,7 +44,7 @@ class LinearSimulator:
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     supported_effects: frozenset[str] = frozenset()
     built_in_effects: frozenset[str] = frozenset(("offset",))
-    effects: tuple[Effect, ...] = ()
+    state_effects: tuple[Effect, ...] = ()
     is_continuous_time: bool = False
 
     @property
@@ -59,7 +59,7 @@ class LinearSimulator:
             *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
         )
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return input_coordinate(scene, output)
 

@@ -43,7 +43,7 @@ class NarxSimulator:
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.OUTPUT))
     supported_effects: frozenset[str] = frozenset()
     built_in_effects: frozenset[str] = frozenset()
-    effects: tuple[Effect, ...] = field(init=False)
+    state_effects: tuple[Effect, ...] = field(init=False)
     is_continuous_time: bool = False
     _moving: NDArray[np.int64] = field(init=False, repr=False)
     _theta: Signal = field(init=False, repr=False)
@@ -103,7 +103,7 @@ class NarxSimulator:
         terms += [(term.at(shape[SLOPE]), shape[term.name]) for term in self._missing]
         return model_of(terms, model.input_names, model.output_name, model.dt)
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return input_coordinate(scene, output)
 

@@ -37,7 +37,7 @@ class PythonFunctionSimulator:
     sites: frozenset[Site] = frozenset((Site.INPUT, Site.FORCE, Site.PARAMETER, Site.OUTPUT))
     supported_effects: frozenset[str] = frozenset()
     built_in_effects: frozenset[str] = frozenset()
-    effects: tuple[Effect, ...] = ()
+    state_effects: tuple[Effect, ...] = ()
     is_continuous_time: bool = False
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class PythonFunctionSimulator:
             for name, value in self.given.items()
         )
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return input_coordinate(scene, output)
 

@@ -31,7 +31,7 @@ class RecordedOutput:
     sites: frozenset[Site] = frozenset((Site.FORCE, Site.OUTPUT))
     supported_effects: frozenset[str] = frozenset()
     built_in_effects: frozenset[str] = frozenset()
-    effects: tuple[Effect, ...] = ()
+    state_effects: tuple[Effect, ...] = ()
     is_continuous_time: bool = False
 
     @property
@@ -39,7 +39,7 @@ class RecordedOutput:
         """How it is asked for."""
         return f"column {self.column}"
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return input_coordinate(scene, output)
 

@@ -60,7 +60,7 @@ class RigidAxisSimulator:
     sites: frozenset[Site] = frozenset(Site)
     supported_effects: frozenset[str] = frozenset(("gain-step", "ageing"))
     built_in_effects: frozenset[str] = frozenset(("viscous", "coulomb-friction", "offset", "linear-drift"))
-    effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
+    state_effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
     is_continuous_time: bool = True
 
     @property
@@ -81,9 +81,9 @@ class RigidAxisSimulator:
             Parameter("vs", f"{length}/s", self.turns, 0.3 * self.turns, 0.01 * self.turns, 20 * self.turns),
         )
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return replace(output_coordinate(scene, output), sharp=_SHARP)
+        return replace(output_coordinate(scene, output), friction_smoothing=_SHARP)
 
     def simulate(
         self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
@@ -101,13 +101,13 @@ class RigidAxisSimulator:
         def shots(position: Signal, rate: Signal) -> Signal:
             y = np.empty(x.size)
             integrate_motion(
-                *(x * gain + offset, scene.midway_of(x) * gain + offset),
+                *(x * gain + offset, scene.get_intersample_values(x) * gain + offset),
                 *(scene.dt, mass, damping, 0.0, elements),
                 *(starts, np.repeat(position, times), np.repeat(rate, times), y),
             )
             return y[::times]
 
-        return np.repeat(self._freed(shots, scene.frame), times)
+        return np.repeat(self._freed(shots, scene.force_coordinate), times)
 
     def _freed(self, shots: Callable[[Signal, Signal], Signal], frame: ForceCoordinate) -> Signal:
         """Return the shots with their states as free as can be: by Newton and Gauss, from what is measured.

@@ -18,7 +18,7 @@ class SavedExtension(SimulatorWrapper):
 
     Attributes
     ----------
-    core : Simulator
+    simulator : Simulator
         Solved as the record asked for.
     added : tuple of Effect
     values : ndarray, shape (parameters,)
@@ -27,7 +27,7 @@ class SavedExtension(SimulatorWrapper):
         Of the record that they were found in: some strengths are parts of its peaks, or of its duration.
     """
 
-    core: Simulator
+    simulator: Simulator
     added: tuple[Effect, ...]
     values: Signal
     scales: SimulationContext
@@ -35,12 +35,12 @@ class SavedExtension(SimulatorWrapper):
     @property
     def name(self) -> str:
         """The core's, and those of the effects."""
-        return " + ".join([self.core.name, *(effect.name for effect in self.added)])
+        return " + ".join([self.simulator.name, *(effect.name for effect in self.added)])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The core's, and those of each effect with the effect's name before them."""
-        found, at = list(self.core.parameters), 0
+        found, at = list(self.simulator.parameters), 0
         for effect in self.added:
             for parameter in effect.parameters(self.scales):
                 name = f"{effect.name} {parameter.name}"
@@ -56,7 +56,7 @@ class SavedExtension(SimulatorWrapper):
     @property
     def built_in_effects(self) -> frozenset[str]:
         """What the core has, and what was added."""
-        return self.core.built_in_effects | {effect.name for effect in self.added}
+        return self.simulator.built_in_effects | {effect.name for effect in self.added}
 
     def simulate(
         self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
@@ -68,8 +68,8 @@ class SavedExtension(SimulatorWrapper):
             u=np.ascontiguousarray(x),
             input_peak=scales.input_peak,
             output_peak=scales.output_peak,
-            fitted=scales.fitted,
-            lasts=scales.duration,
-            frame=scales.frame,
+            fit_end_time=scales.fit_end_time,
+            reference_duration=scales.duration,
+            force_coordinate=scales.force_coordinate,
         )
-        return ExtendedSimulator(self.core, self.added, inner).simulate(values, own, forces)
+        return ExtendedSimulator(self.simulator, self.added, inner).simulate(values, own, forces)

@@ -41,7 +41,7 @@ class SecondOrderSimulator:
     sites: frozenset[Site] = frozenset(Site)
     supported_effects: frozenset[str] = frozenset(("gain-step", "ageing"))
     built_in_effects: frozenset[str] = frozenset(("viscous",))
-    effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
+    state_effects: tuple[Effect, ...] = field(default=(input_offset(FORCE),))
     is_continuous_time: bool = True
 
     @property
@@ -66,7 +66,7 @@ class SecondOrderSimulator:
             Parameter("initial rate", f"{length}/s", system.rate, 0.02 * self.size * usual, initial=True),
         )
 
-    def frame(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         return output_coordinate(scene, output)
 
@@ -80,7 +80,7 @@ class SecondOrderSimulator:
         begins[0] = True
         y = np.empty(x.size)
         integrate_motion(
-            *(x * gain + offset, scene.midway_of(x) * gain + offset),
+            *(x * gain + offset, scene.get_intersample_values(x) * gain + offset),
             *(scene.dt, mass, damping, stiffness),
             pack_force_laws(forces, scene, balance=True),
             *(begins, np.full(x.size, position), np.full(x.size, rate), y),

@@ -143,7 +143,7 @@ class Evaluator:
             "structures": (_STRUCTURE_BYTES * len(self._seen), self.limits.structures),
         }
 
-    def forget(self) -> None:
+    def clear_caches(self) -> None:
         """Empty all caches."""
         clear(self._pairs)
         self._seen.clear()
@@ -169,7 +169,7 @@ class Evaluator:
             How many have the structure of another one or of one seen before.
         """
         self._make_room()
-        number = self._vocabulary.number
+        number = self._vocabulary.index_of
         genes: list[dict[int, Expression]] = []
         keys: list[_Key] = []
         for individual, pruned in population:
@@ -197,7 +197,7 @@ class Evaluator:
         # The kernels do not check: they would read another signal's samples, or none of the record's.
         channel, lag = max(self._vocabulary.deepest), max(self._vocabulary.deepest.values())
         if channel > self.record.inputs or lag > self.warm_up:
-            self.forget()
+            self.clear_caches()
             if channel > self.record.inputs:
                 raise RecordError(f"the genes read input {channel}, the record has {self.record.inputs}")
             raise SettingsError(
@@ -206,7 +206,7 @@ class Evaluator:
 
     def _make_room(self) -> None:
         if self._vocabulary.bytes > self.limits.genes:
-            self.forget()
+            self.clear_caches()
         if _STRUCTURE_BYTES * len(self._seen) > self.limits.structures:
             self._seen.clear()
 

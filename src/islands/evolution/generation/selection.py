@@ -23,7 +23,7 @@ def tournaments(
         Evaluates abandoned individuals. It is asked for those alone that might win, so every tournament ends
         as if nobody had been abandoned.
     """
-    drawn = [[draw.below(len(pool)) for _ in range(contestants)] for _ in range(count)]
+    drawn = [[draw.randrange(len(pool)) for _ in range(contestants)] for _ in range(count)]
     fitness = [each.fitness for each in pool]
     abandoned = {place for place, each in enumerate(pool) if each.outcome.verdict is Status.ABANDONED}
     open_ = sorted(

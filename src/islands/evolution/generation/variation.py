@@ -23,12 +23,12 @@ def random_gene(settings: Settings, inputs: int, draw: Stream, limit: int | None
     """Draw a tree by the grow method: of at most the initial height, functions and back-shifts mixed."""
     limit = settings.initial_height if limit is None else limit
     if limit == 0 or draw.chance(_LEAF):
-        return Lagged(draw.below(inputs + 1))
+        return Lagged(draw.randrange(inputs + 1))
     if settings.shifts and (not settings.primitives or draw.chance(_SHIFT)):
-        return Shift(draw.pick(settings.shifts), random_gene(settings, inputs, draw, limit - 1))
-    primitive = PRIMITIVES[draw.pick(settings.primitives)]
+        return Shift(draw.choice(settings.shifts), random_gene(settings, inputs, draw, limit - 1))
+    primitive = PRIMITIVES[draw.choice(settings.primitives)]
     if settings.structure != "free" and primitive.name in PHI:
-        channel = 1 + draw.below(inputs)
+        channel = 1 + draw.randrange(inputs)
         arguments = [_lagged_input(settings, channel, draw, limit - 1) for _ in range(primitive.arity)]
     else:
         arguments = [random_gene(settings, inputs, draw, limit - 1) for _ in range(primitive.arity)]
@@ -38,7 +38,7 @@ def random_gene(settings: Settings, inputs: int, draw: Stream, limit: int | None
 def _lagged_input(settings: Settings, channel: int, draw: Stream, limit: int) -> Expression:
     leaf: Expression = Lagged(channel)
     while limit > 0 and settings.shifts and not draw.chance(_SHIFT):
-        leaf = Shift(draw.pick(settings.shifts), leaf)
+        leaf = Shift(draw.choice(settings.shifts), leaf)
         limit -= 1
     return leaf
 
@@ -46,13 +46,13 @@ def _lagged_input(settings: Settings, channel: int, draw: Stream, limit: int) ->
 def random_genes(settings: Settings, inputs: int, draw: Stream) -> Genes:
     """Draw the genes of a first individual."""
     fewest, most = settings.initial_terms
-    count = fewest + draw.below(most - fewest + 1)
+    count = fewest + draw.randrange(most - fewest + 1)
     return legal(tuple(random_gene(settings, inputs, draw) for _ in range(count)), settings)
 
 
 def low_level_crossover(one: Genes, other: Genes, settings: Settings, draw: Stream) -> tuple[Genes, Genes]:
     """Exchange a subtree between one gene of each parent."""
-    i, j = draw.below(len(one)), draw.below(len(other))
+    i, j = draw.randrange(len(one)), draw.randrange(len(other))
     here, there = _random_path(one[i], draw), _random_path(other[j], draw)
     first = _replaced(one[i], here, _subtree(other[j], there))
     second = _replaced(other[j], there, _subtree(one[i], here))
@@ -61,14 +61,14 @@ def low_level_crossover(one: Genes, other: Genes, settings: Settings, draw: Stre
 
 def high_level_crossover(one: Genes, other: Genes, settings: Settings, draw: Stream) -> tuple[Genes, Genes]:
     """Exchange whole genes behind a cut in each parent, so that lengths vary."""
-    i, j = draw.below(len(one) + 1), draw.below(len(other) + 1)
+    i, j = draw.randrange(len(one) + 1), draw.randrange(len(other) + 1)
     first, second = one[:i] + other[j:], other[:j] + one[i:]
     return first[: settings.max_terms] or one, second[: settings.max_terms] or other
 
 
 def inner_mutation(genes: Genes, settings: Settings, inputs: int, draw: Stream) -> Genes:
     """Replace a subtree of one gene by a random one."""
-    position = draw.below(len(genes))
+    position = draw.randrange(len(genes))
     path = _random_path(genes[position], draw)
     return _with_gene(
         genes, position, _replaced(genes[position], path, random_gene(settings, inputs, draw)), settings
@@ -82,11 +82,11 @@ def outer_mutation(
 
     Without a pool it is exactly the paper's: one gene for an entirely new one.
     """
-    position = draw.below(len(genes))
+    position = draw.randrange(len(genes))
     if not (pool and draw.chance(settings.from_library)):
         return _with_gene(genes, position, random_gene(settings, inputs, draw), settings)
-    fresh = STRUCTURES[settings.structure](draw.pick(pool))
-    match draw.below(4):
+    fresh = STRUCTURES[settings.structure](draw.choice(pool))
+    match draw.randrange(4):
         case 0 if len(genes) > 1:
             return genes[:position] + genes[position + 1 :]
         case 1 if len(genes) < settings.max_terms:
@@ -119,7 +119,7 @@ _Path = tuple[int, ...]
 
 def _random_path(gene: Expression, draw: Stream) -> _Path:
     """Draw a node, each with the same probability."""
-    return draw.pick(_paths(gene))
+    return draw.choice(_paths(gene))
 
 
 def _paths(gene: Expression, above: _Path = ()) -> list[_Path]:

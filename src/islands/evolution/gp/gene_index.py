@@ -67,7 +67,7 @@ class GeneIndex:
             self._arrays = Groups(self._group, self._weight, wanted, len(self._constraint.sums))
         return self._arrays
 
-    def number(self, gene: Expression) -> int:
+    def index_of(self, gene: Expression) -> int:
         """Return the number of a gene's regressor, or `ZERO`."""
         known = self._known.get(gene)
         if known is None:

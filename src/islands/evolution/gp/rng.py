@@ -38,10 +38,10 @@ class Stream:
         """Draw true with a probability."""
         return self._uniform() < probability
 
-    def below(self, bound: int) -> int:
+    def randrange(self, bound: int) -> int:
         """Draw a whole number from 0 to ``bound - 1``."""
         return int(self._uniform() * bound)
 
-    def pick(self, items: Sequence[T]) -> T:
+    def choice(self, items: Sequence[T]) -> T:
         """Draw one of the items."""
         return items[int(self._uniform() * len(items))]

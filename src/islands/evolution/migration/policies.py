@@ -47,7 +47,7 @@ def _anyone(size: int, _fitness: Callable[[], Sequence[float]], count: int, draw
 
 def _drawn(pool: Sequence[T], count: int, draw: Stream) -> tuple[T, ...]:
     left = list(pool)
-    return tuple(left.pop(draw.below(len(left))) for _ in range(min(count, len(left))))
+    return tuple(left.pop(draw.randrange(len(left))) for _ in range(min(count, len(left))))
 
 
 #: From the elite, how many at the most, and draws: those of whom copies leave.

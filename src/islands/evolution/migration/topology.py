@@ -144,8 +144,8 @@ def _random_regular(islands: int, degree: int, draw: Stream) -> Sources:
         return sources
     while True:
         for _ in range(_SWITCHES * islands * degree):
-            one, other = draw.below(islands), draw.below(islands)
-            gift, counter = draw.pick(sorted(sources[one])), draw.pick(sorted(sources[other]))
+            one, other = draw.randrange(islands), draw.randrange(islands)
+            gift, counter = draw.choice(sorted(sources[one])), draw.choice(sorted(sources[other]))
             if gift not in {other, *sources[other]} and counter not in {one, *sources[one]}:
                 sources[one] = sources[one] - {gift} | {counter}
                 sources[other] = sources[other] - {counter} | {gift}

@@ -2,13 +2,12 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult
 from islands.discrepancy.effects import model_form
-from islands.discrepancy.interfaces.context import Parameter, Signal, SimulationContext
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
@@ -45,12 +44,12 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
     they are no effects any more.
     """
     simulation, values = fit.simulation, fit.values.copy()
-    names = [parameter.name for parameter in simulation.core.parameters]
+    names = [parameter.name for parameter in simulation.simulator.parameters]
     for effect in simulation.effects:
         if effect.site == Site.PARAMETER:
             place = names.index(effect.name.partition(":")[2])
-            values[place] *= 1.0 + values[simulation.part(effect)][0]
-    parts = [(effect, simulation.part(effect)) for effect in simulation.effects]
+            values[place] *= 1.0 + values[simulation.get_slice(effect)][0]
+    parts = [(effect, simulation.get_slice(effect)) for effect in simulation.effects]
     shape = {
         parameter.name: float(value)
         for effect, part in parts
@@ -64,7 +63,7 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
     ]
     names_of = (record.input_names, record.output_name)
     return _extended(
-        simulation.core, values[: len(names)], found, simulation.scene, *names_of, shape
+        simulation.simulator, values[: len(names)], found, simulation.context, *names_of, shape
     ).model_dump(mode="json", by_alias=True)
 
 
@@ -86,13 +85,13 @@ def describe_extension(
     }
     match core:
         case SavedExtension():
-            own, found, at = len(core.core.parameters), [], 0
+            own, found, at = len(core.simulator.parameters), [], 0
             for effect in core.added:
                 parameters = effect.parameters(core.scales)
                 here = slice(own + at, own + at + len(parameters))
                 found.append(_effect(effect, parameters, values[here]))
                 at += len(parameters)
-            return _extended(core.core, values[:own], found, core.scales, inputs, output, shape)
+            return _extended(core.simulator, values[:own], found, core.scales, inputs, output, shape)
         case NarxSimulator():
             model = core.with_shape(values, shape) if shape else core.with_values(values)
             return ModelSpec(kind="model", model=json.loads(model_json(model)), name=core.name)
@@ -124,9 +123,9 @@ def _extended(
     output: str,
     shape: Mapping[str, float] | None = None,
 ) -> LocalExtendedSpec:
-    hold, times, inner = InterSample.FIRST, 1, core
+    hold, times, inner = InterSample.FOH, 1, core
     if isinstance(core, ResampledSimulator):
-        hold, times, inner = core.hold, core.times, core.core
+        hold, times, inner = core.intersample, core.oversampling, core.simulator
     return LocalExtendedSpec(
         inputs=inputs,
         output=output,
@@ -138,10 +137,23 @@ def _extended(
             dt=scales.dt,
             input_peak=scales.input_peak,
             output_peak=scales.output_peak,
-            fitted_s=scales.fitted,
+            fitted_s=scales.fit_end_time,
             duration_s=scales.duration,
-            frame=FrameSpec.model_validate(asdict(scales.frame)),
+            frame=_frame(scales.force_coordinate),
         ),
+    )
+
+
+def _frame(coordinate: ForceCoordinate) -> FrameSpec:
+    return FrameSpec(
+        unit=coordinate.unit,
+        peak=coordinate.peak,
+        rate=coordinate.rate,
+        force_unit=coordinate.force_unit,
+        force=coordinate.force,
+        sense=coordinate.sign,
+        dissipates=coordinate.is_dissipative,
+        sharp=coordinate.friction_smoothing,
     )
 
 

@@ -134,8 +134,8 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
     solved: Simulator = core
     if (document.hold, document.times) != ("first-order", 1):
         solved = ResampledSimulator(core, InterSample(document.hold), document.times)
-    known = {**CATALOGUE, **{effect.name: effect for effect in core.effects}}
-    given = document.scales
+    known = {**CATALOGUE, **{effect.name: effect for effect in core.state_effects}}
+    given, frame = document.scales, document.scales.frame
     scales = SimulationContext(
         u=np.ascontiguousarray(record.u[:, 0]),
         dt=record.dt,
@@ -145,9 +145,18 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
         output_peak=given.output_peak,
         input_unit=record.input_units[0] or "1",
         output_unit=record.output_unit or "1",
-        fitted=given.fitted_s,
-        lasts=given.duration_s,
-        frame=ForceCoordinate(**given.frame.model_dump()),
+        fit_end_time=given.fitted_s,
+        reference_duration=given.duration_s,
+        force_coordinate=ForceCoordinate(
+            frame.unit,
+            frame.peak,
+            frame.rate,
+            frame.force_unit,
+            frame.force,
+            sign=frame.sense,
+            is_dissipative=frame.dissipates,
+            friction_smoothing=frame.sharp,
+        ),
     )
     added: list[Effect] = []
     values: list[float] = []

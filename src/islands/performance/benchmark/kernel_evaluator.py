@@ -114,7 +114,7 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
     """
     size = len(candidate.regressors)
     vocabulary = GeneIndex(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
-    terms = np.array([[vocabulary.number(item.expression) for item in candidate.regressors]], np.int64)
+    terms = np.array([[vocabulary.index_of(item.expression) for item in candidate.regressors]], np.int64)
     sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
     kept, estimated = np.empty((1, size), np.int64), np.empty((1, size))
     lengths, error, ending = np.empty(1, np.int64), np.empty(1), np.empty(1, np.int64)

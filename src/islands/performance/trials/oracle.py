@@ -33,9 +33,11 @@ def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str
     float or None
         None where the oracle gains next to nothing, or has no names for it either.
     """
-    target = Target(found.record.y, np.arange(found.record.samples) < found.fitted, None, tolerance)
+    target = Target(
+        found.record.y, np.arange(found.record.samples) < found.estimation_samples, None, tolerance
+    )
     simulation = found.base.simulation
-    effects = select_effects(simulation.core, simulation.scene, tolerance)
+    effects = select_effects(simulation.simulator, simulation.context, tolerance)
     told = found.base
     # That its own form is wrong is no gain of a cause: both are held against the model with that mended.
     for form in (effect for effect in effects if effect.name == model_form.CORE_SHAPE):
@@ -47,36 +49,38 @@ def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str
             return None
         told = min((_fitted(told, effect, target) for effect in alike), key=lambda fit: fit.mean_square)
     if told.noise.order:
-        told = calibrate(told.simulation, Target(target.y, target.seen, told.noise, tolerance), told.values)
+        told = calibrate(
+            told.simulation, Target(target.y, target.estimation_part, told.noise, tolerance), told.values
+        )
     after, best = _error(found, found.best), _error(found, told)
     return (before - after) / (before - best) if best < (1.0 - _LEAST) * before else None
 
 
 def _error(found: Diagnosis, fit: CalibrationResult) -> float:
     """Return the RMSE over the locked samples."""
-    return float(np.sqrt(np.mean((found.record.y - fit.output)[found.fitted :] ** 2)))
+    return float(np.sqrt(np.mean((found.record.y - fit.output)[found.estimation_samples :] ** 2)))
 
 
 def _fitted(fit: CalibrationResult, effect: Effect, target: Target) -> CalibrationResult:
     """Return a simulation with one more effect in it, fitted from the starts that promise most."""
-    old, scene = fit.simulation, fit.simulation.scene
+    old, scene = fit.simulation, fit.simulation.context
     extended = old.with_effects(catalogue_order((*old.effects, effect)))
-    part, own = extended.part(effect), len(old.core.parameters)
+    part, own = extended.get_slice(effect), len(old.simulator.parameters)
     residual = target.residual(fit.output)
     starts = []
-    for point in effect.grid(scene, target.y - fit.output):
+    for point in effect.starting_points(scene, target.y - fit.output):
         start = extended.nominal
         start[:own] = fit.values[:own]
         for each in old.effects:
-            start[extended.part(each)] = fit.values[old.part(each)]
+            start[extended.get_slice(each)] = fit.values[old.get_slice(each)]
         start[part] = point
-        response = target.observed(extended.simulate(start) - fit.output)
+        response = target.select(extended.simulate(start) - fit.output)
         size = float(response @ response)
         if not 0.0 < size < np.inf:
             continue
         along = float(response @ residual)
-        start[part][: effect.linear] *= along / size
-        starts.append((along**2 / size if effect.linear else 2 * along - size, start))
+        start[part][: effect.linear_parameters] *= along / size
+        starts.append((along**2 / size if effect.linear_parameters else 2 * along - size, start))
     best = sorted(starts, key=lambda each: -each[0])[:_STARTS]
     fits = [calibrate(extended, target, start) for _, start in best]
     return min((each for each in fits if np.isfinite(each.mean_square)), key=lambda each: each.mean_square)

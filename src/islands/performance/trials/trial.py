@@ -141,14 +141,18 @@ def run_trial(trial: Trial) -> TrialOutcome:
         simulated.free,
     )
     found = diagnose(hiding.record, simulated.made(hiding), simulated.tolerance, trial.seed)
-    causes = [each for each in found.effects if each.eta is not None and each.name != model_form.CORE_SHAPE]
+    causes = [
+        each
+        for each in found.effects
+        if each.explained_fraction is not None and each.name != model_form.CORE_SHAPE
+    ]
     asked = trial.oracle and trial.effects
     return TrialOutcome(
         trial,
         hiding.misfit,
         str(found.verdict),
         tuple(finding.name for finding in causes),
-        tuple(finding.name for finding in found.effects if finding.eta is None),
+        tuple(finding.name for finding in found.effects if finding.explained_fraction is None),
         tuple(finding.equivalents for finding in causes),
         tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,

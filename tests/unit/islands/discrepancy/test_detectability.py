@@ -58,7 +58,7 @@ def source() -> Surrogates:
 def diagnosis(source: Surrogates, offered: Sequence[Effect]) -> Diagnosis:
     """Of a record with dry friction in it."""
     friction = next(each for each in offered if each.name == "coulomb-friction")
-    return diagnose(source.drawn(SurrogateCase(steps(source, friction)[-1], 11)), CORE, TOLERANCE)
+    return diagnose(source.draw_record(SurrogateCase(steps(source, friction)[-1], 11)), CORE, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +69,8 @@ def offered(source: Surrogates) -> list[Effect]:
 @pytest.fixture(scope="module")
 def column(source: Surrogates) -> tuple[Diagnosis, RecordedOutput]:
     """A clean record beside somebody else's simulation of it: that takes a tenth of the time."""
-    core = RecordedOutput("theirs", source.simulated())
-    return diagnose(source.drawn(SurrogateCase(None, 12)), core), core
+    core = RecordedOutput("theirs", source.simulate())
+    return diagnose(source.draw_record(SurrogateCase(None, 12)), core), core
 
 
 @pytest.fixture(scope="module")
@@ -87,9 +87,9 @@ def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
     core = RecordedOutput("theirs", hiding.nominal)
     found = diagnose(hiding.record, core)
     source = make_surrogates(found, core, {})
-    drawn = [source.drawn(SurrogateCase(None, seed)) for seed in range(12)]
+    drawn = [source.draw_record(SurrogateCase(None, seed)) for seed in range(12)]
     assert all(np.array_equal(each.u, found.record.u) for each in drawn)
-    noise = [each.y - source.simulated() for each in drawn]
+    noise = [each.y - source.simulate() for each in drawn]
     assert np.std(noise) == pytest.approx(source.sigma, rel=0.15)
     assert np.mean([fit_ar_noise(each).coefficients[0] for each in noise]) == pytest.approx(
         found.best.noise.coefficients[0], abs=0.1
@@ -101,23 +101,23 @@ def test_what_was_named_is_taken_off(diagnosis: Diagnosis) -> None:
     assert [each.name for each in diagnosis.effects] == ["coulomb-friction"]
     source = make_surrogates(diagnosis, CORE, TOLERANCE)
     assert source.sigma < 0.3 * np.sqrt(diagnosis.base.mean_square)
-    assert np.std(diagnosis.best.output - source.simulated()) > 3 * source.sigma
-    assert diagnose_surrogate(source, SurrogateCase(None, 1)).called == NOTHING
+    assert np.std(diagnosis.best.output - source.simulate()) > 3 * source.sigma
+    assert diagnose_surrogate(source, SurrogateCase(None, 1)).named == NOTHING
 
 
 def test_to_inject_nothing_leaves_the_surrogate(source: Surrogates, offered: Sequence[Effect]) -> None:
-    clean = source.drawn(SurrogateCase(None, 7)).y
+    clean = source.draw_record(SurrogateCase(None, 7)).y
     for effect in offered:
-        nominal = tuple(each.nominal for each in effect.parameters(source.simulation.scene))
+        nominal = tuple(each.nominal for each in effect.parameters(source.simulation.context))
         nothing = Injection(effect.name, nominal, 0.0, "", 0.0)
-        assert np.array_equal(source.drawn(SurrogateCase(nothing, 7)).y, clean), effect.name
+        assert np.array_equal(source.draw_record(SurrogateCase(nothing, 7)).y, clean), effect.name
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.ci)])
 def test_a_stronger_injection_has_a_larger_misfit(
     source: Surrogates, offered: Sequence[Effect], seed: int
 ) -> None:
-    clean = source.drawn(SurrogateCase(None, 7)).y
+    clean = source.draw_record(SurrogateCase(None, 7)).y
     for effect in offered:
         found = steps(source, effect, seed)
         assert found, effect.name
@@ -125,10 +125,10 @@ def test_a_stronger_injection_has_a_larger_misfit(
         misfits = [each.misfit for each in found]
         assert sizes == sorted(set(sizes)), effect.name
         assert misfits == sorted(set(misfits)), effect.name
-        parameters = effect.parameters(source.simulation.scene)
+        parameters = effect.parameters(source.simulation.context)
         for each in found:
             assert all(p.lower <= v <= p.upper for p, v in zip(parameters, each.values, strict=True))
-            changed = (source.drawn(SurrogateCase(each, 7)).y - clean)[: source.fitted]
+            changed = (source.drawn(SurrogateCase(each, 7)).y - clean)[: source.estimation_samples]
             assert np.sqrt(np.mean(changed**2)) == pytest.approx(each.misfit * source.sigma), effect.name
 
 
@@ -169,7 +169,7 @@ def test_what_is_within_a_tolerance_has_no_limit(diagnosis: Diagnosis) -> None:
     wide = dict.fromkeys(TOLERANCE, 0.5)
     found = self_test(diagnosis, CORE, wide, 3, effects=("wrong-parameter:beta",), clean=0)
     assert found.detection_limits == {"wrong-parameter:beta": None}
-    assert found.false_alarm_rate.of == 0
+    assert found.false_alarm_rate.trials == 0
     assert found.p_value == 1.0
 
 
@@ -264,13 +264,17 @@ def test_who_waits_is_told_how_far_it_is(diagnosis: Diagnosis) -> None:
 
 
 def test_noise_that_was_fitted_to_a_drift_stays_finite(diagnosis: Diagnosis) -> None:
-    left = np.concatenate([1e-3 * 1.02 ** np.arange(diagnosis.fitted), np.zeros(diagnosis.record.samples)])
+    left = np.concatenate(
+        [1e-3 * 1.02 ** np.arange(diagnosis.estimation_samples), np.zeros(diagnosis.record.samples)]
+    )
     left = left[: diagnosis.record.samples]
     record = replace(diagnosis.record, y=diagnosis.best.output + left)
-    assert np.abs(np.roots([1.0, *-fit_ar_noise(left[: diagnosis.fitted]).coefficients])).max() > 1.0
+    assert (
+        np.abs(np.roots([1.0, *-fit_ar_noise(left[: diagnosis.estimation_samples]).coefficients])).max() > 1.0
+    )
     source = make_surrogates(replace(diagnosis, record=record), CORE, TOLERANCE)
     assert np.abs(np.roots([1.0, *-source.noise.coefficients])).max() < 1.0
-    assert np.isfinite(source.drawn(SurrogateCase(None, 0)).y).all()
+    assert np.isfinite(source.draw_record(SurrogateCase(None, 0)).y).all()
 
 
 def test_bounds_are_those_of_clopper_and_pearson() -> None:

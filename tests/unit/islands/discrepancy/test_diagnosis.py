@@ -43,8 +43,8 @@ def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: 
     assert value.ci95 is not None
     assert value.ci95[0] < value.value < value.ci95[1]
     assert finding.confidence > 0.9
-    assert finding.eta is not None
-    assert finding.eta > 0.95
+    assert finding.explained_fraction is not None
+    assert finding.explained_fraction > 0.95
     assert found.gain is not None
     assert found.gain.after.rmse == pytest.approx(0.135, rel=0.1)
     assert found.gain.ci95[0] < found.gain.reduction_percent < found.gain.ci95[1]
@@ -99,7 +99,7 @@ def test_a_column_is_a_simulation(record: Dataset) -> None:
         record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
     )
     found = diagnose(drifted, RecordedOutput("theirs", simulated))
-    assert [each.name for each in found.effects if each.eta is not None] == ["linear-drift"]
+    assert [each.name for each in found.effects if each.explained_fraction is not None] == ["linear-drift"]
     assert found.effects[0].parameters["c"].value == pytest.approx(0.5, rel=0.05)
 
 

@@ -36,13 +36,13 @@ BROKEN: dict[str, tuple[Effect, str]] = {
         replace(GOOD, form=lambda y, _values, _scene: ["a"] * y.size),
         "its form fails: ValueError",
     ),
-    "its grid raises": (replace(GOOD, grid=raises), "its grid fails: RuntimeError: out of order"),
+    "its grid raises": (replace(GOOD, starting_points=raises), "its grid fails: RuntimeError: out of order"),
     "its grid has too many values": (
-        replace(GOOD, grid=lambda _scene, _residual: ((1.0, 2.0),)),
+        replace(GOOD, starting_points=lambda _scene, _residual: ((1.0, 2.0),)),
         "its grid has to give 1 values at each point",
     ),
     "its grid has none": (
-        replace(GOOD, grid=lambda _scene, _residual: ((),)),
+        replace(GOOD, starting_points=lambda _scene, _residual: ((),)),
         "its grid has to give 1 values",
     ),
     "its map of the input raises": (replace(CATALOGUE["delay"], form=raises), "its form fails"),
@@ -58,7 +58,7 @@ def test_a_broken_effect_is_named(record: Dataset, case: str) -> None:
 
 
 def test_a_grid_without_points_leaves_an_effect_out(record: Dataset) -> None:
-    effect = replace(GOOD, grid=lambda _scene, _residual: ())
+    effect = replace(GOOD, starting_points=lambda _scene, _residual: ())
     found = diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
     assert {each.name for each in found.candidates} <= {"jump"}
 

@@ -27,7 +27,7 @@ ENCODER_ERROR = islands.Effect(
     family="sensor",
     site=islands.Site.OUTPUT,
     parameters=_amplitude,
-    grid=_start,
+    starting_points=_start,
     form=_error,
     source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
 )

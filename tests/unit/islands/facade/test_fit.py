@@ -72,7 +72,7 @@ def test_models_come_best_first_and_know_their_rank(result):
     errors = [model.metrics["validation"]["free_run"].rmse for model in result.models]
     assert errors == sorted(errors)
     assert sorted(model.model.size for model in result.models) == [1, 2, 3, 4, 5]
-    assert str(result) == summary(result.findings)
+    assert str(result) == summary(result.search_result)
 
 
 def test_a_model_simulates_any_record_in_three_ways(result):
@@ -139,7 +139,7 @@ def test_a_result_is_saved_as_a_folder(result, tmp_path):
     search = json.loads((folder / "result.json").read_text())["search"]
     assert search["wall_s"] == 2.0
     assert search["evaluations_per_second"] == pytest.approx(2.5)
-    assert result.findings.search.wall_s is None
+    assert result.search_result.search.wall_s is None
 
 
 # What determines it.
@@ -147,7 +147,7 @@ def test_a_result_is_saved_as_a_folder(result, tmp_path):
 
 def test_the_same_record_and_settings_give_the_same_result_bit_for_bit(result):
     again = islands.fit(piezo(), max_terms=5)
-    assert result_json(again.findings) == result_json(result.findings)
+    assert result_json(again.search_result) == result_json(result.search_result)
     assert [model.export("json") for model in again.models] == [
         model.export("json") for model in result.models
     ]
@@ -155,12 +155,12 @@ def test_the_same_record_and_settings_give_the_same_result_bit_for_bit(result):
 
 def test_the_seed_is_kept_and_draws_nothing():
     first, second = (islands.fit(tank(), library="polynomial", max_terms=3, seed=seed) for seed in (1, 2))
-    assert (first.findings.seed, second.findings.seed) == (1, 2)
+    assert (first.search_result.seed, second.search_result.seed) == (1, 2)
     assert [model.model for model in first.models] == [model.model for model in second.models]
 
 
 def test_settings_say_what_was_chosen_where_nothing_was_asked():
-    settings = dict(islands.fit(tank(), library="polynomial", max_terms=2).findings.settings)
+    settings = dict(islands.fit(tank(), library="polynomial", max_terms=2).search_result.settings)
     assert settings == {
         "method": "fit",
         "library": "polynomial",
@@ -173,7 +173,7 @@ def test_settings_say_what_was_chosen_where_nothing_was_asked():
     }
     asked = islands.fit(
         tank(), library="polynomial", degree=2, lags=1, constraints="hysteresis", shooting=8, max_terms=2
-    ).findings
+    ).search_result
     assert {name: asked.settings[name] for name in ("degree", "lags", "constraints", "shooting")} == {
         "degree": 2,
         "lags": 1,
@@ -195,7 +195,7 @@ def test_settings_may_be_numpys_numbers(tmp_path):
 
 
 def test_a_fraction_of_the_records_end_validates():
-    split = islands.fit(tank(), 0.1, library="polynomial", max_terms=2).findings.split
+    split = islands.fit(tank(), 0.1, library="polynomial", max_terms=2).search_result.split
     assert (split.estimation.samples, split.validation.samples) == (360, 40)
     assert np.array_equal(split.validation.y, tank().y[360:])
 
@@ -205,8 +205,8 @@ def test_a_record_of_its_own_validates_and_estimates_nothing():
     other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
     described = whole.findings.settings["validation"]
     assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
-    assert whole.findings.split.estimation.samples == 400
-    assert whole.findings.split.validation.samples == 150
+    assert whole.search_result.split.estimation.samples == 400
+    assert whole.search_result.split.validation.samples == 150
     by_size = [{m.model.size: m for m in made.models} for made in (whole, other)]
     for size in (1, 2, 3):
         assert by_size[0][size].model == by_size[1][size].model
@@ -231,8 +231,8 @@ def test_validation_data_may_have_other_names_but_not_another_number_of_inputs_o
 def test_several_recordings_are_fitted_together():
     parts = tuple(tank(samples, seed) for seed, samples in enumerate((100, 3, 160, 2, 140)))
     made = islands.fit(join(parts), library="polynomial", max_terms=4)
-    assert made.findings.record.segments == (100, 3, 160, 2, 140)
-    assert made.findings.split.estimation.segments == (100, 3, 160, 2, 39)
+    assert made.search_result.record.segments == (100, 3, 160, 2, 140)
+    assert made.search_result.split.estimation.segments == (100, 3, 160, 2, 39)
     # Rows behind a warm-up of three samples in each.
     assert made.findings.search.full_set["bytes"] == 8 * 84 * (97 + 157 + 36)
     model = {m.model.size: m.model for m in made.models}[3]
@@ -252,7 +252,7 @@ def test_two_inputs_are_fitted_by_every_library():
     assert by_size[3].physics.property_1 is True
     smooth = islands.fit(record, library="polynomial", degree=1, max_terms=5)
     # Three lags of y and of both inputs, and the constant.
-    assert smooth.findings.search.full_set == {"candidates": 10, "bytes": 8 * 10 * 447}
+    assert smooth.search_result.search.full_set == {"candidates": 10, "bytes": 8 * 10 * 447}
     assert smooth.best.metrics["validation"]["free_run"].rmse < 1e-9
 
 
@@ -296,10 +296,10 @@ def test_a_model_that_diverges_even_one_step_ahead_spoils_no_fit(tmp_path, drawi
 def test_structures_that_cannot_be_estimated_are_counted_with_their_reason():
     # Nine samples estimate: six rows behind the warm-up, enough for five parameters.
     made = islands.fit(tank(9), tank(100, seed=1), library="polynomial", max_terms=10)
-    outcomes = made.findings.search.outcomes
+    outcomes = made.search_result.search.outcomes
     assert set(outcomes) == {"ok", "too_few_rows"}
     assert outcomes["ok"] == len(made.models) == 5
-    assert sum(outcomes.values()) == made.findings.search.evaluations
+    assert sum(outcomes.values()) == made.search_result.search.evaluations
 
 
 # Progress.

@@ -53,7 +53,7 @@ def archipelago():
     hall = with_entries(HallOfFame(), population)
     assert len(hall.entries) == 2
     here = Island(0, 2**40, 7, population, population[:1], hall, 0.1 + 0.2)
-    beside = replace(here, index=1, population=population[::-1], elite=(), bar=inf)
+    beside = replace(here, index=1, population=population[::-1], elite=(), abandon_threshold=inf)
     return Archipelago((here, beside))
 
 

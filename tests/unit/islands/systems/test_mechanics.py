@@ -107,7 +107,7 @@ def test_so_does_one_with_a_cubic_spring() -> None:
 
 def test_so_does_one_with_a_hysteresis() -> None:
     form, numbers = hysteresis.SECOND_HYSTERESIS.form, (60.0, 40.0, -15.0, 0.01)
-    parts = elements((form.force, form.memory, -1.0, 0.01, numbers))
+    parts = elements((form.force, form.state_derivative, -1.0, 0.01, numbers))
     known = reference(
         lambda _x, _v, z: numbers[0] * z,
         lambda _x, v, z: v - numbers[1] * abs(v) * z - numbers[2] * v * abs(z),

@@ -320,7 +320,7 @@ def test_events_do_not_depend_on_how_they_arrive(size: int) -> None:
         ": alive\n\n" + 'id: 1\nevent: running\ndata: {"note": "ü: x"}\n\n' * 2 + "id: 9\nevent: prog"
     ).encode()
     lines = EventLines()
-    found = [event for at in range(0, len(text), size) for event in lines.take(text[at : at + size])]
+    found = [event for at in range(0, len(text), size) for event in lines.feed(text[at : at + size])]
     assert found == [Event(1, "running", {"note": "ü: x"})] * 2
 
 

@@ -23,10 +23,10 @@ def test_an_operation_runs_in_a_thread_and_what_it_returns_or_raises_comes_back(
     threads: BlockingExecutor,
 ) -> None:
     async def ask() -> None:
-        assert await threads.do(threading.get_ident) != threading.get_ident()
-        assert await threads.do(int, "ff", base=16) == 255
+        assert await threads.run(threading.get_ident) != threading.get_ident()
+        assert await threads.run(int, "ff", base=16) == 255
         with pytest.raises(ZeroDivisionError):
-            await threads.do(lambda: 1 / 0)
+            await threads.run(lambda: 1 / 0)
 
     asyncio.run(ask())
 
@@ -37,7 +37,7 @@ def test_an_operation_knows_whose_request_it_serves(threads: BlockingExecutor) -
     async def ask(name: str) -> str:
         who.set(name)
         await asyncio.sleep(0)
-        return await threads.do(who.get)
+        return await threads.run(who.get)
 
     async def all_ask() -> list[str]:
         return await asyncio.gather(*(ask(name) for name in "abc"))
@@ -55,7 +55,7 @@ def test_where_a_client_goes_away_its_operation_is_waited_for(threads: BlockingE
         ended.set()
 
     async def leave() -> None:
-        request = asyncio.create_task(threads.do(operation))
+        request = asyncio.create_task(threads.run(operation))
         await asyncio.to_thread(begun.wait, 10.0)
         request.cancel()
         await asyncio.sleep(0.05)

@@ -104,9 +104,9 @@ def test_a_reader_of_the_past_hides_nothing_from_those_who_wait(store):
         job = submitted(store)
         lease = claimed(store)
         hub = JobEventHub(store, BlockingExecutor())
-        with hub.watching(job.id, 2) as feed:
+        with hub.subscribe(job.id, 2) as feed:
             store.leases.report(lease, brought_on(0))
-            await hub._look()
+            await hub._poll()
             assert [event.number for event in feed.recent] == [3]
             waiting = watching(hub, store, job, after=2)
             assert (await anext(waiting)).number == 3
@@ -114,7 +114,7 @@ def test_a_reader_of_the_past_hides_nothing_from_those_who_wait(store):
             store.leases.report(lease, brought_on(2))
             past = await told(watching(hub, store, job), [], most=5)
             store.leases.report(lease, brought_on(3))
-            await hub._look()
+            await hub._poll()
             following = [(await anext(waiting)).number for _ in range(3)]
             await waiting.aclose()
             return past, following
@@ -173,7 +173,7 @@ def test_a_job_that_vanishes_between_two_questions_does_not_blind_the_hub(store,
 
         monkeypatch.setattr(store.jobs, "events", vanishing)
         async with running(store) as hub:
-            with hub.watching(doomed.id, 1):
+            with hub.subscribe(doomed.id, 1):
                 watcher = asyncio.create_task(told(watching(hub, store, other), []))
                 await asyncio.sleep(0.1)
                 store.jobs.cancel(other.owner, other.id)
@@ -248,7 +248,7 @@ def test_waiting_ends_at_the_change_or_at_its_time(store):
         job = submitted(store)
         loop = asyncio.get_running_loop()
         async with running(store) as hub:
-            with hub.watching(job.id, 1) as feed:
+            with hub.subscribe(job.id, 1) as feed:
                 began = loop.time()
                 assert not await hub.wait(feed, 1, 0.2)
                 assert loop.time() - began >= 0.2

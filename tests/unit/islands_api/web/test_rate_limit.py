@@ -22,7 +22,7 @@ def taken(bucket, who, most=1000):
     """How often somebody is let through."""
     for count in range(most):
         try:
-            bucket.take(who)
+            bucket.feed(who)
         except RateLimitError:
             return count
     return most
@@ -45,30 +45,30 @@ def test_nobody_uses_up_what_is_anothers(clock):
 
 def test_who_is_refused_is_told_when_to_come_back(clock):
     bucket = RateLimiter(rate=0.5, burst=1)
-    bucket.take("a")
+    bucket.acquire("a")
     clock.now += 0.5
     with pytest.raises(RateLimitError, match=r"more than 0\.5 requests a second: wait 1\.5 s") as refused:
-        bucket.take("a")
+        bucket.acquire("a")
     clock.now += refused.value.seconds
-    bucket.take("a")
+    bucket.acquire("a")
 
 
 def test_to_be_refused_costs_nothing(clock):
     bucket = RateLimiter(rate=1.0, burst=1)
-    bucket.take("a")
+    bucket.acquire("a")
     for _ in range(100):
         with pytest.raises(RateLimitError):
-            bucket.take("a")
+            bucket.acquire("a")
     clock.now += 1.0
-    bucket.take("a")
+    bucket.acquire("a")
 
 
 def test_a_dear_request_takes_more(clock):
     bucket = RateLimiter(rate=1.0, burst=20)
-    bucket.take("a", 10.0)
-    bucket.take("a", 10.0)
+    bucket.acquire("a", 10.0)
+    bucket.acquire("a", 10.0)
     with pytest.raises(RateLimitError):
-        bucket.take("a", 10.0)
+        bucket.acquire("a", 10.0)
     assert taken(bucket, "a") == 0
 
 
@@ -79,8 +79,8 @@ def test_without_a_rate_nobody_is_refused(clock):
 def test_strangers_take_up_no_memory_without_end(clock, monkeypatch):
     monkeypatch.setattr(rate_limit, "_REMEMBERED", 10)
     bucket = RateLimiter(rate=1.0, burst=2)
-    bucket.take("first")
+    bucket.acquire("first")
     for stranger in range(1000):
-        bucket.take(f"address {stranger}")
+        bucket.acquire(f"address {stranger}")
     assert len(bucket._buckets) == 10
     assert taken(bucket, "first") == 2

@@ -56,13 +56,13 @@ def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
 
     def run(kind: type[Coordinator] = Alone, name: str = "me") -> Thread:
         thread = Thread(target=kind(settings, name, stopping).run)
-        thread.stop = stopping.make  # type: ignore[attr-defined]
+        thread.stop = stopping.request  # type: ignore[attr-defined]
         thread.start()
         threads.append(thread)
         return thread
 
     yield run
-    stopping.make()
+    stopping.request()
     for thread in threads:
         thread.join(10.0)
         assert not thread.is_alive()
@@ -325,7 +325,7 @@ def test_a_sweep_that_fails_costs_a_job_nothing(
 
     class Unswept(Alone):
         def _sweep(self) -> None:
-            if self._store.jobs.standing().leases:
+            if self._store.jobs.queue_statistics().leases:
                 tries.append(1)
                 raise error
 

@@ -48,7 +48,7 @@ class Watched:
         self.told: list[bool] = []
 
     def beat(self, lease: Lease, seconds: float) -> bool:
-        self.told.append(self._leases.beat(lease, seconds))
+        self.told.append(self._leases.renew(lease, seconds))
         return self.told[-1]
 
     def __getattr__(self, name: str) -> Any:
@@ -104,7 +104,7 @@ def test_a_coordinator_that_is_to_stop_is_told_so_at_once(store: Store, lease: L
     stopping = StopRequest()
     with Heartbeat(store, lease, SECONDS, stopping) as heartbeat:
         heartbeat.check()
-        stopping.make()
+        stopping.request()
         with pytest.raises(CoordinatorStopping):
             heartbeat.check()
 
@@ -114,7 +114,7 @@ def test_a_lost_lease_counts_more_than_a_cancelled_job_and_that_more_than_the_en
 ) -> None:
     """Who stops releases the job: one that is cancelled, or not ours, must not be given back to the queue."""
     stopping = StopRequest()
-    stopping.make()
+    stopping.request()
     with Heartbeat(store, lease, SECONDS, stopping) as heartbeat:
         store.jobs.cancel(ALICE, lease.job.id)
         eventually(lambda: said(heartbeat) is JobCancelled, seconds=20.0)
@@ -159,7 +159,7 @@ class Away:
         if self.left:
             self.left -= 1
             raise StoreUnavailableError("the database does not answer")
-        return self._store.leases.beat(lease, seconds)
+        return self._store.leases.renew(lease, seconds)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._store.leases, name)

@@ -74,7 +74,7 @@ def test_what_a_preview_cannot_settle_is_read_as_the_job_would(record, changes):
     (doubt,) = doubts(record, **changes)
     inputs = tuple(changes.get("inputs", ["u_V"]))
     asked = InspectionRequest(inputs, changes.get("output", "y_um"), changes.get("dt"), changes.get("rows"))
-    assert (doubt.dataset, doubt.asked) == (record, asked)
+    assert (doubt.dataset, doubt.request) == (record, asked)
 
 
 def test_a_validation_record_is_looked_at_like_the_first():
@@ -82,7 +82,7 @@ def test_a_validation_record_is_looked_at_like_the_first():
     (doubt,) = doubts(dataset(), other, validation={"dataset": OTHER})
     assert doubt.dataset == other
     (doubt,) = doubts(dataset(), dataset(OTHER), validation={"dataset": OTHER, "rows": "5:"})
-    assert (doubt.dataset.id, doubt.asked.rows) == (OTHER, "5:")
+    assert (doubt.dataset.id, doubt.request.rows) == (OTHER, "5:")
     with pytest.raises(DatasetNotFoundError):
         doubts(dataset(), validation={"dataset": OTHER})
 

@@ -101,7 +101,7 @@ def test_it_remembers_nothing_older_than_the_last_complete_archipelago(search, c
         voyage.carry(leg)
         voyage.report(leg)
         known = [sorted(each) for each in voyage.plan.known]
-        assert {each[0] for each in known} == {voyage.plan.complete}
+        assert {each[0] for each in known} == {voyage.plan.completed_generation}
         assert all(len(each) <= ahead + 1 for each in known)
 
 
@@ -141,7 +141,7 @@ def test_who_does_not_depend_on_the_slowest_is_not_held_back_by_it(search, choos
         leg = choose.choice(ready)
         voyage.carry(leg)
         voyage.report(leg)
-    complete, away = ends.index(voyage.plan.complete), distances(voyage.sources, slowest)
+    complete, away = ends.index(voyage.plan.completed_generation), distances(voyage.sources, slowest)
     for island, known in enumerate(voyage.plan.known):
         reachable = from_there + away.get(island, len(ends))
         assert ends.index(max(known)) == min(reachable, complete + ahead, len(ends) - 1)
@@ -149,11 +149,11 @@ def test_who_does_not_depend_on_the_slowest_is_not_held_back_by_it(search, choos
 
 def test_by_default_an_island_is_on_one_epoch_and_has_two_in_the_queue():
     plan = itinerary(islands=2)
-    assert list(plan.due()) == [
+    assert list(plan.ready_tasks()) == [
         EpochTask(island, *stage) for stage in ((-1, 0), (0, 4), (4, 8)) for island in (0, 1)
     ]
-    assert list(plan.due()) == []
-    assert (plan.complete, plan.finished) == (-1, False)
+    assert list(plan.ready_tasks()) == []
+    assert (plan.completed_generation, plan.finished) == (-1, False)
 
 
 @given(searches(), orders)
@@ -169,24 +169,24 @@ def test_of_what_is_due_earlier_epochs_come_first(search, choose):
 
 
 def test_who_takes_one_of_those_that_are_due_finds_the_others_later():
-    all_of_them, plan = list(itinerary().due()), itinerary()
+    all_of_them, plan = list(itinerary().ready_tasks()), itinerary()
     one_by_one = []
     while len(one_by_one) < len(all_of_them):
-        one_by_one.append(next(plan.due()))
+        one_by_one.append(next(plan.ready_tasks()))
     assert one_by_one == all_of_them
-    assert list(plan.due()) == []
+    assert list(plan.ready_tasks()) == []
 
 
 def test_what_was_told_out_of_order_comes_in_order_as_soon_as_it_is_complete():
     plan = itinerary(islands=2, ahead=2)
-    one, other, later, other_later = plan.due()
+    one, other, later, other_later = plan.ready_tasks()
     for leg in (later, other_later, other):
-        plan.back(leg, epoch_of(leg))
-        assert list(plan.completed()) == []
-    plan.back(one, epoch_of(one))
-    assert list(plan.completed()) == [
+        plan.complete(leg, epoch_of(leg))
+        assert list(plan.completed_epochs()) == []
+    plan.complete(one, epoch_of(one))
+    assert list(plan.completed_epochs()) == [
         (epoch_of(one), epoch_of(other)),
         (epoch_of(later), epoch_of(other_later)),
     ]
-    assert plan.complete == 4
-    assert list(plan.completed()) == []
+    assert plan.completed_generation == 4
+    assert list(plan.completed_epochs()) == []

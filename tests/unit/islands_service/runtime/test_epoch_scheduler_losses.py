@@ -27,62 +27,62 @@ from support.searches import SMALL, exactly, record
 
 def test_a_lost_leg_and_what_was_sent_after_it_are_due_again_and_nobody_else_s():
     plan = itinerary(ahead=3)
-    assert len(list(plan.due())) == 9
-    plan.lost(EpochTask(1, 0, 4))
-    assert list(plan.due()) == [EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
-    plan.lost(EpochTask(2, 4, 8))
-    plan.lost(EpochTask(0, -1, 0))
-    assert list(plan.due()) == [
+    assert len(list(plan.ready_tasks())) == 9
+    plan.reschedule(EpochTask(1, 0, 4))
+    assert list(plan.ready_tasks()) == [EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
+    plan.reschedule(EpochTask(2, 4, 8))
+    plan.reschedule(EpochTask(0, -1, 0))
+    assert list(plan.ready_tasks()) == [
         EpochTask(0, -1, 0),
         EpochTask(0, 0, 4),
         EpochTask(0, 4, 8),
         EpochTask(2, 4, 8),
     ]
     # Told of the later one besides, as late as may be.
-    plan.lost(EpochTask(1, -1, 0))
-    plan.lost(EpochTask(1, 4, 8))
-    assert list(plan.due()) == [EpochTask(1, -1, 0), EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
+    plan.reschedule(EpochTask(1, -1, 0))
+    plan.reschedule(EpochTask(1, 4, 8))
+    assert list(plan.ready_tasks()) == [EpochTask(1, -1, 0), EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
 
 
 def test_a_loss_of_what_is_known_already_holds_nobody_up():
     """The second leg came back, the first one was lost; then what was sent again after it is lost too."""
     plan = itinerary(text="isolated", islands=1, ahead=2)
-    first, second = plan.due()
-    plan.back(second, epoch_of(second))
-    plan.lost(first)
-    again = list(plan.due())
-    plan.back(first, epoch_of(first))
-    assert list(plan.completed()) == [(epoch_of(first),), (epoch_of(second),)]
+    first, second = plan.ready_tasks()
+    plan.complete(second, epoch_of(second))
+    plan.reschedule(first)
+    again = list(plan.ready_tasks())
+    plan.complete(first, epoch_of(first))
+    assert list(plan.completed_epochs()) == [(epoch_of(first),), (epoch_of(second),)]
     for leg in again[1:]:
-        plan.lost(leg)
-    assert EpochTask(0, 4, 8) in list(plan.due())
+        plan.reschedule(leg)
+    assert EpochTask(0, 4, 8) in list(plan.ready_tasks())
 
 
 def completed_twice():
     """An island whose second leg is out once more, though it is known and complete; a third is out, too."""
     plan = itinerary(text="isolated", islands=1)
-    first, second, _ = plan.due()
-    plan.back(second, epoch_of(second))
-    plan.lost(first)
-    assert list(plan.due()) == [first, second, EpochTask(0, 4, 8)]
-    plan.back(first, epoch_of(first))
-    assert len(list(plan.completed())) == 2
+    first, second, _ = plan.ready_tasks()
+    plan.complete(second, epoch_of(second))
+    plan.reschedule(first)
+    assert list(plan.ready_tasks()) == [first, second, EpochTask(0, 4, 8)]
+    plan.complete(first, epoch_of(first))
+    assert len(list(plan.completed_epochs())) == 2
     return plan, second
 
 
 def test_a_loss_of_what_is_complete_loses_what_was_sent_after_it():
     plan, second = completed_twice()
-    plan.lost(second)
-    assert list(plan.due()) == [EpochTask(0, 4, 8), EpochTask(0, 8, 10)]
+    plan.reschedule(second)
+    assert list(plan.ready_tasks()) == [EpochTask(0, 4, 8), EpochTask(0, 8, 10)]
 
 
 def test_what_comes_back_of_what_is_complete_already_is_forgotten():
     plan, second = completed_twice()
     before = [dict(known) for known in plan.known]
-    plan.back(second, replace(epoch_of(second), emigrants=(Individual(()),)))
-    plan.back(EpochTask(0, -1, 0), epoch_of(EpochTask(0, -1, 0)))
+    plan.complete(second, replace(epoch_of(second), emigrants=(Individual(()),)))
+    plan.complete(EpochTask(0, -1, 0), epoch_of(EpochTask(0, -1, 0)))
     assert plan.known == before
-    assert list(plan.completed()) == []
+    assert list(plan.completed_epochs()) == []
 
 
 # With islands that evolve.
@@ -128,7 +128,7 @@ def test_in_any_order_and_with_losses_islands_evolve_as_one_after_the_other(evol
     )
     out, found, losses = [], [], 0
     while not plan.finished:
-        out += plan.due()
+        out += plan.ready_tasks()
         leg = choose.choice(
             [
                 leg
@@ -138,14 +138,14 @@ def test_in_any_order_and_with_losses_islands_evolve_as_one_after_the_other(evol
         )
         if choose.random() < 0.3:
             losses += 1
-            plan.lost(leg)
+            plan.reschedule(leg)
             out = [each for each in out if each.island != leg.island or each.end < leg.end]
             continue
         out.remove(leg)
         arriving = [plan.known[source][leg.begin].emigrants for source in plan.sources[leg.island]]
         island = plan.known[leg.island][leg.begin].island
-        plan.back(leg, run_epoch(island, arriving, evaluator, evolving, lambda: False))
-        found += plan.completed()
+        plan.complete(leg, run_epoch(island, arriving, evaluator, evolving, lambda: False))
+        found += plan.completed_epochs()
     assert losses > 0
     assert len(found) == len(whole)
     for epochs, expected in zip(found, whole, strict=True):

@@ -72,7 +72,7 @@ def old(request, empty_database, tmp_path):
     reading, target = create_engine(f"sqlite:///{source}"), Database(empty_database)
     with reading.connect() as there:
         kept = rows(there)
-        with target.alone() as here:
+        with target.exclusive() as here:
             upgrade(here, request.param)
             for name, table in tables_of(here).items():
                 if kept[name]:
@@ -107,7 +107,7 @@ def test_a_revision_never_changes(number, tmp_path):
 
     restored(number, tmp_path / "then.db")
     database = Database(f"sqlite:///{tmp_path / 'now.db'}")
-    with database.alone() as connection:
+    with database.exclusive() as connection:
         upgrade(connection, number)
     database.close()
     assert shape(tmp_path / "now.db") == shape(tmp_path / "then.db")
@@ -171,7 +171,7 @@ def test_to_prepare_again_changes_nothing(database):
         submitted(store)
         before = contents(store)
         prepare(store.database)
-        with store.database.alone() as connection:
+        with store.database.exclusive() as connection:
             upgrade(connection)
         assert contents(store) == before
 
@@ -220,7 +220,7 @@ def test_a_migration_that_is_interrupted_leaves_nothing(empty_database):
     made = Database(empty_database)
 
     def interrupted():
-        with made.alone() as connection:
+        with made.exclusive() as connection:
             upgrade(connection)
             assert revision(connection) == HEAD
             raise KeyboardInterrupt

@@ -21,7 +21,7 @@ class Fault:
     ----------
     name : str
         What the analysis should call it; "" for what it has no name for.
-    least, most : float
+    minimum, maximum : float
         Strengths, drawn evenly in their logarithm; what they mean is the form's.
     forms : tuple of callable
         The first ones are usual, the others are unlike what the analysis would extend a simulation by.
@@ -30,8 +30,8 @@ class Fault:
     """
 
     name: str
-    least: float
-    most: float
+    minimum: float
+    maximum: float
     forms: tuple[Inject, ...]
     usual: int = 1
 

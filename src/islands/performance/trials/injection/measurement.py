@@ -93,9 +93,9 @@ def inject(
     """
     entries = {**system.known, **system.unknown}
     for _ in range(_RECORDS):
-        driven = system.drive(rng, seconds or system.seconds)
-        truth = system.truth
-        for name, spread in system.spread.items() if apart else ():
+        driven = system.excitation(rng, seconds or system.seconds)
+        truth = system.plant
+        for name, spread in system.relative_error.items() if apart else ():
             factor = float(np.exp(spread * rng.standard_normal()))
             truth = alter_parameter(truth, **{name: getattr(truth, name) * factor})
         seen = _Seen(system, driven, truth, free)
@@ -128,7 +128,7 @@ class _Seen:
     def __init__(self, system: Rig, driven: Excitation, truth: Plant, free: bool) -> None:
         self._system, self._driven, self._free = system, driven, free
         self.clean = self.of(truth)
-        self.nominal = self.of(system.truth)
+        self.nominal = self.of(system.plant)
         self.sigma = system.noise * driven.output
         self._moved: Signal | None = None
 
@@ -158,7 +158,7 @@ class _Seen:
         return float(np.sqrt(np.mean(left**2))) / self.sigma
 
     def _by(self, name: str, far: float) -> Signal:
-        nominal = self._system.truth
+        nominal = self._system.plant
         change = {name: getattr(nominal, name) * (1.0 + far)}
         return self.of(alter_parameter(nominal, **change)) - self.nominal
 
@@ -211,7 +211,7 @@ def _sought(
     band: tuple[float, float] | None,
 ) -> Callable[[Plant], Plant] | None:
     """Return what hides a form with a strength whose misfit is in a band, if there is one."""
-    low, high = np.log(entry.least), np.log(entry.most)
+    low, high = np.log(entry.minimum), np.log(entry.maximum)
     logarithm = float(rng.uniform(low, high))
     state = rng.bit_generator.state
 

@@ -95,9 +95,9 @@ def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
 
 
 OSCILLATOR = Rig(
-    truth=Oscillator(),
-    spread={"m": 0.01, "c": 0.03, "k": 0.01},
-    drive=_drive,
+    plant=Oscillator(),
+    relative_error={"m": 0.01, "c": 0.03, "k": 0.01},
+    excitation=_drive,
     seconds=20.0,
     decimation=10,
     noise=0.003,

@@ -100,9 +100,9 @@ def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
 
 
 PIEZO = Rig(
-    truth=Piezo(),
-    spread={"A": 0.01, "beta": 0.01, "gamma": 0.01, "dp": 0.005},
-    drive=_drive,
+    plant=Piezo(),
+    relative_error={"A": 0.01, "beta": 0.01, "gamma": 0.01, "dp": 0.005},
+    excitation=_drive,
     seconds=60.0,
     decimation=10,
     noise=0.003,

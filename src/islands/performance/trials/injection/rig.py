@@ -19,11 +19,11 @@ class Rig:
 
     Attributes
     ----------
-    truth : Plant
+    plant : Plant
         With its nominal parameters.
-    spread : mapping
+    relative_error : mapping
         How far a truth's parameters are from their nominal values, as relative standard deviations.
-    drive : callable
+    excitation : callable
         Draws what drives it, over some seconds.
     seconds : float
         The usual length of a record.
@@ -41,9 +41,9 @@ class Rig:
         Causes that the catalogue has no name for, by what they are.
     """
 
-    truth: Plant
-    spread: Mapping[str, float]
-    drive: Callable[[np.random.Generator, float], Excitation]
+    plant: Plant
+    relative_error: Mapping[str, float]
+    excitation: Callable[[np.random.Generator, float], Excitation]
     seconds: float
     decimation: int
     noise: float
@@ -56,7 +56,7 @@ class Rig:
     @property
     def tolerance(self) -> Mapping[str, float]:
         """Tolerances of its parameters that whoever made the simulation would state."""
-        return {name: _STATED * spread for name, spread in self.spread.items()}
+        return {name: _STATED * spread for name, spread in self.relative_error.items()}
 
 
 def fault_table(*hidden: Fault) -> Mapping[str, Fault]:

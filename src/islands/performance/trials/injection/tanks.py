@@ -152,9 +152,9 @@ def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
 
 
 TANKS = Rig(
-    truth=Tanks(),
-    spread={"k1": 0.02, "k3": 0.02, "k4": 0.02},
-    drive=_drive,
+    plant=Tanks(),
+    relative_error={"k1": 0.02, "k3": 0.02, "k4": 0.02},
+    excitation=_drive,
     seconds=4096.0,
     decimation=10,
     noise=0.003,

@@ -37,12 +37,12 @@ def inputs(hold: InterSample) -> tuple[Array, Array]:
     """Return an input as it is sampled, and as it was between its samples."""
     t = DT / FINE * np.arange(SAMPLES * FINE)
     rng = np.random.default_rng(5)
-    if hold == InterSample.BAND:
+    if hold == InterSample.BAND_LIMITED:
         lines = rng.uniform(0.3, 38.0, 40), rng.uniform(0, 2 * np.pi, 40)
         u = sum(np.sin(2 * np.pi * f * t + p) for f, p in zip(*lines, strict=True))
         return u[::FINE], u
     u = rng.standard_normal(SAMPLES)
-    if hold == InterSample.ZERO:
+    if hold == InterSample.ZOH:
         return u, np.repeat(u, FINE)
     return u, np.interp(np.arange(t.size) / FINE, np.arange(SAMPLES), u)
 
@@ -59,31 +59,31 @@ def noisy(y: Array, part: float = 0.01, seed: int = 8) -> Array:
 
 
 def way(core: Simulator) -> InterSample:
-    return core.hold if isinstance(core, ResampledSimulator) else InterSample.FIRST
+    return core.intersample if isinstance(core, ResampledSimulator) else InterSample.FOH
 
 
 @pytest.mark.parametrize("hold", InterSample)
 def test_the_hold_of_the_record_is_chosen(hold: InterSample) -> None:
     u, between = inputs(hold)
     fit, target = fitted(
-        recorded(u, noisy(moved(between, straight=hold != InterSample.ZERO)), DT, ("N", "m")), oscillator()
+        recorded(u, noisy(moved(between, straight=hold != InterSample.ZOH)), DT, ("N", "m")), oscillator()
     )
     assert way(select_intersample(fit, target)) == hold
     again = fit
     for _ in range(2):  # beside what the right hold leaves, steps have to be finer
         core = select_intersample(again, target)
-        again = calibrate(ExtendedSimulator(core, (), fit.simulation.scene), target, again.values)
+        again = calibrate(ExtendedSimulator(core, (), fit.simulation.context), target, again.values)
     assert again.mean_square == pytest.approx((0.01 * target.y.std()) ** 2, rel=0.2)
     assert again.values[:3] == pytest.approx((0.5, 2.0, 500.0), rel=0.02)
     # Who has found it stays with it.
     assert way(select_intersample(again, target)) == hold
 
 
-@pytest.mark.parametrize("hold", [InterSample.ZERO, InterSample.BAND])
+@pytest.mark.parametrize("hold", [InterSample.ZOH, InterSample.BAND_LIMITED])
 def test_a_wrong_hold_leaves_more_than_the_noise(hold: InterSample) -> None:
     u, between = inputs(hold)
     fit, target = fitted(
-        recorded(u, noisy(moved(between, straight=hold != InterSample.ZERO), 0.003), DT, ("N", "m")),
+        recorded(u, noisy(moved(between, straight=hold != InterSample.ZOH), 0.003), DT, ("N", "m")),
         oscillator(),
     )
     assert fit.mean_square > 4 * (0.003 * target.y.std()) ** 2
@@ -92,14 +92,14 @@ def test_a_wrong_hold_leaves_more_than_the_noise(hold: InterSample) -> None:
 def test_steps_are_halved_until_that_changes_nothing() -> None:
     """Six samples a period: one step a sample is far too coarse."""
     stiff = (0.5, 2.0, 5500.0)
-    u, between = inputs(InterSample.FIRST)
+    u, between = inputs(InterSample.FOH)
     y = noisy(moved(between, *stiff), 0.002)
     fit, target = fitted(recorded(u, y, DT, ("N", "m")), oscillator(*stiff))
     core = select_intersample(fit, target)
     assert isinstance(core, ResampledSimulator)
-    assert core.hold == InterSample.FIRST
-    assert core.times >= 2
-    again = calibrate(ExtendedSimulator(core, (), fit.simulation.scene), target, fit.values)
+    assert core.intersample == InterSample.FOH
+    assert core.oversampling >= 2
+    again = calibrate(ExtendedSimulator(core, (), fit.simulation.context), target, fit.values)
     assert again.values[:3] == pytest.approx(stiff, rel=0.01)
     assert again.mean_square < 0.3 * fit.mean_square
 
@@ -115,7 +115,7 @@ def test_a_slow_record_is_left_to_the_core_as_it_is(seed: int) -> None:
 
 
 def test_a_core_that_is_not_integrated_in_steps_is_left_alone() -> None:
-    u, _ = inputs(InterSample.ZERO)
+    u, _ = inputs(InterSample.ZOH)
     core = RecordedOutput("theirs", u)
     fit, target = fitted(recorded(u, noisy(u)), core)
     assert select_intersample(fit, target) is core
@@ -124,8 +124,8 @@ def test_a_core_that_is_not_integrated_in_steps_is_left_alone() -> None:
 def test_ways_are_alike_or_not() -> None:
     core = BoucWenPiezoSimulator()
     assert same_discretisation(core, core)
-    assert same_discretisation(core, ResampledSimulator(core, InterSample.FIRST, 1))
-    assert not same_discretisation(core, ResampledSimulator(core, InterSample.ZERO, 1))
+    assert same_discretisation(core, ResampledSimulator(core, InterSample.FOH, 1))
+    assert not same_discretisation(core, ResampledSimulator(core, InterSample.ZOH, 1))
     assert not same_discretisation(
-        ResampledSimulator(core, InterSample.ZERO, 2), ResampledSimulator(core, InterSample.ZERO, 4)
+        ResampledSimulator(core, InterSample.ZOH, 2), ResampledSimulator(core, InterSample.ZOH, 4)
     )

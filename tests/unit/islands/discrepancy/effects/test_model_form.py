@@ -29,15 +29,15 @@ def extended(hiding: FaultyRecord) -> ExtendedSimulator:
     """Return an identified model with the terms that it lacks."""
     core = CORES["narx"].made(hiding)
     scene = make_context(hiding.record, core, 1500)
-    return ExtendedSimulator(core, core.effects, scene)
+    return ExtendedSimulator(core, core.state_effects, scene)
 
 
 def started(extended: ExtendedSimulator, hiding: FaultyRecord) -> np.ndarray:
     """Return where a search for the terms begins."""
     (effect,) = extended.effects
     values = extended.nominal
-    at_rest = extended.with_effects(()).simulate(values[: extended.part(effect).start])
-    values[extended.part(effect)] = effect.grid(extended.scene, hiding.record.y - at_rest)[0]
+    at_rest = extended.with_effects(()).simulate(values[: extended.get_slice(effect).start])
+    values[extended.get_slice(effect)] = effect.grid(extended.scene, hiding.record.y - at_rest)[0]
     return values
 
 
@@ -53,10 +53,10 @@ def test_terms_that_are_missing_do_nothing_until_they_have_coefficients(extended
 
 
 def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: ExtendedSimulator) -> None:
-    assert isinstance(extended.core, NarxSimulator)
+    assert isinstance(extended.simulator, NarxSimulator)
     names = [parameter.name for parameter in extended.parameters]
     assert len(set(names)) == len(names)
-    own = {item.text for item in extended.core.model.regressors}
+    own = {item.text for item in extended.simulator.model.regressors}
     assert not own & {name.removeprefix(f"{CORE_SHAPE} ").replace("u(", "u1(") for name in names}
     assert names[-1] == SLOPE
 
@@ -74,17 +74,17 @@ def test_where_the_search_begins_no_locked_sample_tells(extended: ExtendedSimula
     (effect,) = extended.effects
     seen = np.random.default_rng(1).standard_normal(2000)
     locked = np.where(np.arange(2000) < 1500, seen, 9.0)
-    assert effect.grid(extended.scene, seen) == effect.grid(extended.scene, locked)
+    assert effect.starting_points(extended.context, seen) == effect.starting_points(extended.context, locked)
 
 
 def test_what_holds_still_at_a_constant_input_still_does(
     extended: ExtendedSimulator, hiding: FaultyRecord
 ) -> None:
     values = started(extended, hiding)
-    resting = np.where(np.arange(2000) < 1000, extended.scene.u, extended.scene.u[999])
-    core = extended.core
+    resting = np.where(np.arange(2000) < 1000, extended.context.u, extended.scene.u[999])
+    core = extended.simulator
     own = {each.name: value for each, value in zip(extended.parameters[8:], values[8:], strict=True)}
-    y = core.simulate(values[:8], resting, extended.scene, own, ())
+    y = core.simulate(values[:8], resting, extended.context, own, ())
     assert np.ptp(y[1010:]) == 0.0
 
 
@@ -97,8 +97,8 @@ def test_a_model_is_extended_by_writing_the_terms_into_it(
     document = extended_document(fit, record)
     assert document["effects"] == []
     written = model_from_json(json.dumps(document["core"]["model"]), "extended")
-    assert isinstance(extended.core, NarxSimulator)
-    assert written.size == extended.core.model.size + len(extended.parameters) - 8 - 1
+    assert isinstance(extended.simulator, NarxSimulator)
+    assert written.size == extended.simulator.model.size + len(extended.parameters) - 8 - 1
     # It begins a sample later, with what was measured there.
     again = simulated(document, record)
     assert np.std((again - fit.output)[200:]) < 0.3 * hiding.sigma
@@ -107,7 +107,7 @@ def test_a_model_is_extended_by_writing_the_terms_into_it(
 def test_a_model_of_one_delay_or_of_levels_alone_has_its_terms_too() -> None:
     start = np.zeros(3)
     of_levels = NarxSimulator(model(a="0.5 * y(k-1)", b="0.4 * u(k-1)"), "levels", start)
-    (effect,) = of_levels.effects
+    (effect,) = of_levels.state_effects
     assert effect.family == "shape"
     output_alone = NarxSimulator(model(a="0.5 * y(k-1)", b="0.1 * y(k-2)"), "output alone", start)
-    assert output_alone.effects == ()
+    assert output_alone.state_effects == ()

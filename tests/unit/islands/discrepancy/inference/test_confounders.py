@@ -73,7 +73,7 @@ def compared(fast: Array, moved: Array, noise: float, seed: int) -> Confounder:
 def test_slips_are_told_from_play_by_how_neighbours_go_together(fast: Array, seed: int) -> None:
     slips = compared(fast, slipped(fast, 0.4), 0.1, seed)
     play = compared(fast, play_from(fast, 0.2), 0.1, seed)
-    assert (slips.effect.name, slips.times) == ("stiction", 2.0)
+    assert (slips.effect.name, slips.factor) == ("stiction", 2.0)
     assert slips.gained > 9.0
     assert play.gained < -9.0
     assert slips.beside == pytest.approx(0.4**2 / 12, rel=0.3)

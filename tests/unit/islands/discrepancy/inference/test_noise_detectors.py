@@ -61,7 +61,7 @@ def said(y: np.ndarray, residual: np.ndarray) -> set[str]:
         detection = detector.detect(y, residual, scene())
         if (
             detection is not None
-            and detection.gained > LEAST
+            and detection.score_gain > LEAST
             and not found.keys() & set(detector.excluded_by)
         ):
             found[name] = detection

@@ -73,13 +73,13 @@ def test_the_order_of_the_work_changes_no_bit_of_the_ladder() -> None:
     plain, _ = calibrated(recorded(u, u), core)
     y = plain.output + 1e-4 * u**2 + 0.05 * np.random.default_rng(2).standard_normal(u.size)
     base, target = calibrated(recorded(u, y), core)
-    effects = some(select_effects(core, base.simulation.scene, {}))
+    effects = some(select_effects(core, base.simulation.context, {}))
     forwards, back = (screen_effects(base, target, effects, spread) for spread in (map, backwards))
     assert [rung.effect.name for rung in forwards] == [rung.effect.name for rung in back]
     for one, other in zip(forwards, back, strict=True):
         assert np.array_equal(one.fit.values, other.fit.values)
-        assert one.gained(base) == other.gained(base)
-    gains = [rung.gained(base) for rung in forwards]
+        assert one.score_gain(base) == other.score_gain(base)
+    gains = [rung.score_gain(base) for rung in forwards]
     assert all(after < before + EQUAL for before, after in pairwise(gains))
     assert forwards[0].effect.name == "even-nonlinearity"
     chosen = [
@@ -117,7 +117,7 @@ def hiding() -> tuple[CalibrationResult, Target, list]:
 def test_two_that_hide_each_other_are_found_as_a_pair_alone(hiding) -> None:
     base, target, effects = hiding
     rungs = screen_effects(base, target, effects)
-    assert all(rung.gained(base) < LEAST for rung in rungs)
+    assert all(rung.score_gain(base) < LEAST for rung in rungs)
     assert stepwise_search(base, rungs, target, effects, silent)[0].effects == ()
     found, _ = stepwise_search(base, rungs, target, effects, silent, pairs=True)
     assert {each.name for each in found.effects} == {"offset", "linear-drift"}
@@ -142,7 +142,7 @@ def test_where_nothing_pays_there_is_no_pair() -> None:
     noise = np.random.default_rng(9).standard_normal(u.size)
     core = RecordedOutput("theirs", u)
     base, target = calibrated(recorded(u, u + noise), core)
-    effects = select_effects(core, base.simulation.scene, {})
+    effects = select_effects(core, base.simulation.context, {})
     found, _ = stepwise_search(
         base, screen_effects(base, target, effects), target, effects, silent, pairs=True
     )
@@ -157,7 +157,7 @@ def test_what_a_second_cause_remembers_is_no_noise_once_it_is_found() -> None:
     noise = 0.05 * np.random.default_rng(3).standard_normal(u.size)
     core = RecordedOutput("theirs", u)
     base, target = calibrated(recorded(u, u + 0.02 * u**2 + 0.3 * (time > 8.0) + noise), core)
-    effects = some(select_effects(core, base.simulation.scene, {}))
+    effects = some(select_effects(core, base.simulation.context, {}))
     rungs = screen_effects(base, target, effects)
     memory = rungs[0].fit.noise
     assert memory.order > 0
@@ -180,13 +180,13 @@ def test_what_a_tolerance_is_stretched_by_is_left_to_be_explained() -> None:
     y = y + 0.05 * np.random.default_rng(4).standard_normal(u.size)
     known = {parameter.name: 0.01 for parameter in core.parameters}
     base, target = calibrated(recorded(u, y), core)
-    target = replace(target, tolerance=known)
-    effects = select_effects(core, base.simulation.scene, known)
+    target = replace(target, prior_std=known)
+    effects = select_effects(core, base.simulation.context, known)
     offset = next(each for each in effects if each.name == "offset")
     beside = screen_effects(calibrate(base.simulation, target, base.values), target, [offset])[0].fit
-    gains = [rung for rung in screen_effects(beside, target, effects) if rung.effect.gain]
+    gains = [rung for rung in screen_effects(beside, target, effects) if rung.effect.is_gain]
     assert gains
-    assert gains[0].gained(beside) > LEAST
+    assert gains[0].score_gain(beside) > LEAST
 
 
 def test_what_explains_more_is_put_in_the_place_of_what_misled() -> None:
@@ -194,7 +194,7 @@ def test_what_explains_more_is_put_in_the_place_of_what_misled() -> None:
     core = RecordedOutput("theirs", u)
     noise = 0.05 * np.random.default_rng(5).standard_normal(u.size)
     base, target = calibrated(recorded(u, u + 0.02 * u**2 + 0.01 * u**3 + noise), core)
-    effects = select_effects(core, base.simulation.scene, {})
+    effects = select_effects(core, base.simulation.context, {})
     wrong = [next(each for each in effects if each.name == name) for name in ("cubic-stiffness", "jump")]
     fit = base
     for effect in wrong:
@@ -203,7 +203,7 @@ def test_what_explains_more_is_put_in_the_place_of_what_misled() -> None:
     found, _ = refine_by_swaps(misled, target, effects, silent)
     assert {each.name for each in found.effects} == {"cubic-stiffness", "even-nonlinearity"}
     assert found.cost < misled.cost
-    assert [each.without.effects for each in found.rivals] == [(found.effects[1],), (found.effects[0],)]
+    assert [each.without.effects for each in found.alternatives] == [(found.effects[1],), (found.effects[0],)]
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2, 3))])
@@ -213,10 +213,10 @@ def test_of_effects_that_do_the_same_the_catalogue_s_first_goes_first(seed: int)
     record, core = oscillator.record, oscillator.core
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(record.samples)
     base, target = calibrated(replace(record, y=record.y + 0.01 + noise), core)
-    effects = select_effects(core, base.simulation.scene, {})
+    effects = select_effects(core, base.simulation.context, {})
     one, other = screen_effects(base, target, effects)[:2]
     assert (one.effect.cause, other.effect.cause) == ("offset", "input-offset")
-    assert one.gained(base) == pytest.approx(other.gained(base), abs=EQUAL)
+    assert one.score_gain(base) == pytest.approx(other.score_gain(base), abs=EQUAL)
     found, _ = stepwise_search(base, (one, other), target, effects, silent)
     assert [each.name for each in found.effects] == ["offset"]
 

@@ -57,27 +57,27 @@ def weighed(request):
     alone = ExtendedSimulator(core, (), make_context(record, core, fitted))
     target = Target(record.y, np.arange(record.samples) < fitted, None, {})
     base = calibrate(alone, target, alone.nominal)
-    effects = [*core.effects, *(CATALOGUE[name] for name in request.param)]
+    effects = [*core.state_effects, *(CATALOGUE[name] for name in request.param)]
     evidence = search_with_model_error(base, target, effects, silent, map)
     return record, fitted, evidence, assess_evidence(evidence, fitted, np.random.default_rng(0))
 
 
 def test_both_causes_are_found(weighed) -> None:
     record, fitted, _, evidence = weighed
-    causes = {effect.name for effect in evidence.found.effects}
+    causes = {effect.name for effect in evidence.hypothesis.effects}
     assert "state-clip:upper" in causes
     assert evidence.verdict in (Verdict.NAMED, Verdict.REMAINDER)
-    locked = slice(fitted, record.samples)
+    locked = slice(fitted, record.effective_samples)
     before, after = (
         float(np.sqrt(np.mean((record.y - fit.output)[locked] ** 2)))
-        for fit in (evidence.base, evidence.found.fit)
+        for fit in (evidence.base, evidence.hypothesis.fit)
     )
     assert after < 0.2 * before
 
 
 def test_neighbours_count_for_less_where_the_form_is_wrong(weighed) -> None:
     _, fitted, evidence, _ = weighed
-    assert evidence.target.effective is not None
-    assert 10.0 <= evidence.target.effective < fitted
+    assert evidence.target.effective_samples is not None
+    assert 10.0 <= evidence.target.effective_samples < fitted
     assert evidence.base.noise.order == 0
-    assert evidence.base.noise.samples == evidence.target.effective
+    assert evidence.base.noise.effective_samples == evidence.target.effective_samples

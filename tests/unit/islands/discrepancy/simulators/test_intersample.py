@@ -43,7 +43,7 @@ def stepwise(u: Array) -> Array:
 
 @pytest.mark.parametrize(
     ("hold", "exact"),
-    [(InterSample.FIRST, with_a_degree_of_freedom), (InterSample.ZERO, lambda u, *_: stepwise(u))],
+    [(InterSample.FOH, with_a_degree_of_freedom), (InterSample.ZOH, lambda u, *_: stepwise(u))],
     ids=["first-order", "zero-order"],
 )
 def test_finer_steps_come_to_the_exact_motion(hold: InterSample, exact) -> None:
@@ -66,7 +66,7 @@ def test_one_step_a_sample_and_straight_is_the_core_itself() -> None:
 
 
 def test_what_it_is_apart_from_its_steps_is_the_core() -> None:
-    core, between = oscillator(), ResampledSimulator(oscillator(), InterSample.ZERO, 4)
+    core, between = oscillator(), ResampledSimulator(oscillator(), InterSample.ZOH, 4)
     for name in (
         "name",
         "parameters",
@@ -76,14 +76,16 @@ def test_what_it_is_apart_from_its_steps_is_the_core() -> None:
         "is_continuous_time",
     ):
         assert getattr(between, name) == getattr(core, name)
-    assert [each.name for each in between.effects] == [each.name for each in core.effects]
+    assert [each.name for each in between.state_effects] == [each.name for each in core.state_effects]
 
 
 def test_its_memory_changes_nothing() -> None:
     inputs = [wave(), wave() ** 2 / 20, np.flip(wave()).copy()]
-    between = ResampledSimulator(oscillator(), InterSample.BAND, 4)
+    between = ResampledSimulator(oscillator(), InterSample.BAND_LIMITED, 4)
     for u in (*inputs, *inputs):
-        assert np.array_equal(run(between, u), run(ResampledSimulator(oscillator(), InterSample.BAND, 4), u))
+        assert np.array_equal(
+            run(between, u), run(ResampledSimulator(oscillator(), InterSample.BAND_LIMITED, 4), u)
+        )
 
 
 @given(signals, st.sampled_from([1, 2, 3, 8]))
@@ -98,11 +100,11 @@ def test_every_hold_passes_through_all_samples(x: Array, times: int) -> None:
 
 @given(signals, st.sampled_from([1, 2, 3, 8]))
 def test_a_zero_order_hold_stays_and_a_first_order_one_runs_straight(x: Array, times: int) -> None:
-    u, midway = resample_context(x, InterSample.ZERO, times)
+    u, midway = resample_context(x, InterSample.ZOH, times)
     assert np.array_equal(u, np.repeat(x, times))
     # It jumps behind the end of a step, never within one.
     assert np.array_equal(midway, np.stack([u, u]))
-    u, midway = resample_context(x, InterSample.FIRST, times)
+    u, midway = resample_context(x, InterSample.FOH, times)
     assert midway[1, :-1] == pytest.approx(u[1:], abs=1e-12)
     assert midway[0, :-times] == pytest.approx((u + midway[1])[:-times] / 2, abs=1e-12)
 
@@ -113,7 +115,7 @@ def test_a_band_limited_input_is_led_through_its_samples_as_it_was(times: int) -
         return np.sin(0.7 * t) + 0.5 * np.cos(1.9 * t + 1) + 0.3 * np.sin(2.4 * t + 2)
 
     at = np.arange(600 * times) / times
-    u, midway = resample_context(signal(np.arange(600.0)), InterSample.BAND, times)
+    u, midway = resample_context(signal(np.arange(600.0)), InterSample.BAND_LIMITED, times)
     within = slice(70 * times, -70 * times)  # at its ends nobody knows how it goes on
     assert u[within] == pytest.approx(signal(at)[within], abs=0.02)
     assert midway[0][within] == pytest.approx(signal(at + 0.5 / times)[within], abs=0.02)

@@ -55,22 +55,22 @@ def test_the_best_of_n_wins_as_often_as_it_is_drawn(contestants):
 def test_ties_go_to_the_one_drawn_first():
     among = pool(1.0, 1.0, 1.0, 1.0)
     for seed in range(20):
-        assert winners(among, 1, 3, stream(seed))[0] is stream(seed).pick(among)
+        assert winners(among, 1, 3, stream(seed))[0] is stream(seed).choice(among)
 
 
 def test_it_takes_one_draw_a_contestant_tournament_after_tournament():
     draw, other, among = stream(), stream(), pool(2.0, 1.0, nan)
     found = winners(among, 5, 4, draw)
     for each in found:
-        drawn = [other.pick(among) for _ in range(4)]
+        drawn = [other.choice(among) for _ in range(4)]
         assert each is min(drawn, key=lambda contestant: contestant.fitness)
-    assert draw.below(10**9) == other.below(10**9)
+    assert draw.randrange(10**9) == other.randrange(10**9)
 
 
 def test_no_tournament_takes_no_draw():
     draw = stream()
     assert winners(pool(1.0), 0, 3, draw) == []
-    assert draw.below(10**9) == stream().below(10**9)
+    assert draw.randrange(10**9) == stream().randrange(10**9)
 
 
 def test_not_a_number_counts_as_the_worst():
@@ -85,7 +85,7 @@ seeds = st.integers(0, 2**32 - 1)
 def test_a_failure_never_wins_a_tournament_against_a_finite_fitness(values, seed):
     (winner,) = winners(pool(*values), 1, 6, stream(seed))
     again = stream(seed)
-    contestants = [again.pick(values) for _ in range(6)]
+    contestants = [again.choice(values) for _ in range(6)]
     assert winner.fitness == min((value for value in contestants if isfinite(value)), default=inf)
 
 
@@ -129,7 +129,7 @@ def test_every_tournament_ends_as_if_nobody_had_been_abandoned(drawn, count, con
     # Asked for are those in a tournament that nobody wins who is known to be within the bar, each once.
     again, needed = stream(seed), set()
     for _ in range(count):
-        met = [again.below(len(known)) for _ in range(contestants)]
+        met = [again.randrange(len(known)) for _ in range(contestants)]
         if all(among[place].fitness > bar for place in met):
             needed |= {place for place in met if among[place].outcome is ABANDONED}
     assert sorted(asked) == sorted(needed)

@@ -65,7 +65,7 @@ def test_a_child_without_genes_is_its_parent():
     empty = []
     for seed in SEEDS:
         draw = stream(seed)
-        if (draw.below(5), draw.below(3)) == (0, 2):
+        if (draw.randrange(5), draw.randrange(3)) == (0, 2):
             empty.append(high_level_crossover(LETTERS, NUMBERS, SETTINGS, stream(seed)))
     assert len(empty) > 5
     assert set(empty) == {(LETTERS, NUMBERS + LETTERS)}

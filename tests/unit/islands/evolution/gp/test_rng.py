@@ -9,7 +9,7 @@ from islands.evolution.gp.rng import Purpose, Stream
 
 def draws(*place, count=3):
     stream = Stream(*place)
-    return [stream.below(10**9) for _ in range(count)]
+    return [stream.randrange(10**9) for _ in range(count)]
 
 
 def test_the_first_draws_of_a_stream_are_what_they_have_always_been():
@@ -57,13 +57,13 @@ def test_chance_meets_its_probability():
 
 def test_whole_numbers_are_drawn_evenly_from_0_to_below_the_bound():
     stream = Stream(1, 0, 0, Purpose.SELECTION)
-    counted = Counter(stream.below(5) for _ in range(20_000))
+    counted = Counter(stream.randrange(5) for _ in range(20_000))
     assert sorted(counted) == [0, 1, 2, 3, 4]
     assert all(abs(count - 4000) < 4 * (20_000 * 0.2 * 0.8) ** 0.5 for count in counted.values())
 
 
 def test_items_are_drawn_evenly():
     stream = Stream(1, 0, 0, Purpose.INITIAL)
-    counted = Counter(stream.pick("abc") for _ in range(9000))
+    counted = Counter(stream.choice("abc") for _ in range(9000))
     assert sorted(counted) == ["a", "b", "c"]
     assert all(abs(count - 3000) < 4 * (9000 * 2 / 9) ** 0.5 for count in counted.values())

@@ -93,7 +93,7 @@ def test_a_search_ends_with_the_first_epoch_that_reaches_its_evaluations(data, s
     found = identify(data, **BUDGET, max_evaluations=budget, seed=5, progress=into(seen))
     last = next((place for place, state in enumerate(states) if state.evaluations >= budget), 4)
     assert seen == states[: last + 1]
-    search = found.findings.search
+    search = found.search_result.search
     assert search.evaluations == states[last].evaluations
     assert search.ended_by == ("generations" if last == 4 else "evaluations")
     assert found.findings.settings["max_evaluations"] == budget
@@ -107,8 +107,8 @@ def test_a_search_ends_with_the_first_epoch_that_reaches_its_error(data, states,
     last = next(at for at, state in enumerate(states) if min(state.history[-1].islands) <= target**2)
     assert last <= place
     assert seen == states[: last + 1]
-    assert found.findings.search.ended_by == ("generations" if last == 4 else "target error")
-    assert found.findings.search.history == states[last].history
+    assert found.search_result.search.ended_by == ("generations" if last == 4 else "target error")
+    assert found.search_result.search.history == states[last].history
 
 
 def test_a_budget_that_is_reached_within_an_epoch_ends_with_it(data, states):
@@ -118,7 +118,7 @@ def test_a_budget_that_is_reached_within_an_epoch_ends_with_it(data, states):
     found = identify(data, **changes, seed=5, progress=into(seen))
     assert [state.evaluations for state in seen] == [30, 120]
     assert seen[-1].history == states[3].history
-    assert (found.findings.search.generations, found.findings.search.ended_by) == (3, "evaluations")
+    assert (found.search_result.search.generations, found.search_result.search.ended_by) == (3, "evaluations")
 
 
 def test_a_search_that_ends_early_leaves_its_engine(data):
@@ -142,9 +142,9 @@ def test_a_search_that_is_stopped_keeps_its_last_epoch(data, states):
     seen = []
     found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 2)
     assert seen == states[:2]
-    assert found.findings.search.ended_by == "stopped"
-    assert found.findings.search.generations == 1
-    assert found.findings.search.history == states[1].history
+    assert found.search_result.search.ended_by == "stopped"
+    assert found.search_result.search.generations == 1
+    assert found.search_result.search.history == states[1].history
 
 
 def test_a_search_that_is_stopped_within_an_epoch_keeps_the_one_before(data, states):
@@ -157,17 +157,17 @@ def test_a_search_that_is_stopped_within_an_epoch_keeps_the_one_before(data, sta
     seen = []
     found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, progress=into(seen), stop=stop)
     assert seen == states[:1]
-    assert (found.findings.search.generations, found.findings.search.ended_by) == (0, "stopped")
+    assert (found.search_result.search.generations, found.search_result.search.ended_by) == (0, "stopped")
     # It goes on from there as if never stopped.
     go_on = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, start=seen[-1])
-    assert go_on.findings.search.history == states[-1].history
+    assert go_on.search_result.search.history == states[-1].history
 
 
 def test_a_search_that_is_stopped_after_its_last_epoch_has_ended(data, states):
     seen = []
     found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 5)
     assert seen == states
-    assert found.findings.search.ended_by == "generations"
+    assert found.search_result.search.ended_by == "generations"
 
 
 def test_a_search_that_is_stopped_before_its_first_population_is_refused(data):

@@ -21,7 +21,7 @@ from support.identifications import BUDGET, Telling, parameters
 
 
 def test_a_result_says_what_the_search_did(result):
-    search = result.findings.search
+    search = result.search_result.search
     assert search.generations == 4
     assert search.evaluations == 5 * 30
     assert sum(search.outcomes.values()) == search.evaluations
@@ -35,7 +35,7 @@ def test_a_result_says_what_the_search_did(result):
 
 
 def test_a_result_holds_the_course_of_the_search(result, states):
-    history = result.findings.search.history
+    history = result.search_result.search.history
     assert [point.generation for point in history] == [0, 1, 2, 3, 4]
     assert [point.evaluations for point in history] == [30, 60, 90, 120, 150]
     for before, behind in pairwise(history):
@@ -46,9 +46,9 @@ def test_a_result_holds_the_course_of_the_search(result, states):
 
 def test_the_full_set_is_that_of_the_lags_and_degree_of_what_was_found(result, states):
     """Equation (5); and the memory that its matrix would take, eight bytes a number."""
-    found = [item for entry in states[-1].archipelago.hall.entries for item in entry.regressors]
+    found = [item for entry in states[-1].archipelago.hall_of_fame.entries for item in entry.regressors]
     lags = max(lag for item in found for _, lag in item.lags)
-    full = result.findings.search.full_set
+    full = result.search_result.search.full_set
     assert full["lags"] == lags >= 2
     assert full["degree"] == max(item.degree for item in found) >= 2
     assert full["candidates"] == full_set(full["degree"], lags, lags)
@@ -57,13 +57,13 @@ def test_the_full_set_is_that_of_the_lags_and_degree_of_what_was_found(result, s
 
 
 def test_a_result_holds_every_setting_that_determines_it(result):
-    described = dict(result.findings.settings)
+    described = dict(result.search_result.settings)
     expected = asdict(resolve_settings("hysteresis", BUDGET))
     assert {name: described[name] for name in expected} == expected
     assert (described["method"], described["preset"], described["islands"]) == ("identify", "hysteresis", 1)
     assert described["validation"] == 0.25
-    assert result.findings.seed == 5
-    assert result.findings.record.samples == 3000
+    assert result.search_result.seed == 5
+    assert result.search_result.record.samples == 3000
 
 
 def test_models_come_best_first_one_a_size_and_none_larger_than_asked_for(result):
@@ -92,7 +92,7 @@ def test_a_model_without_property_1_is_never_the_answer_under_the_constraint(dat
     estimation = split(short, 0.25).estimation
     known = [
         estimate(entry.regressors, estimation, "hysteresis", 26).model
-        for entry in states[-1].archipelago.hall.entries
+        for entry in states[-1].archipelago.hall_of_fame.entries
     ]
     assert not all(check_physics(model, estimation).property_1 for model in known)
 
@@ -103,9 +103,9 @@ def test_a_model_without_property_1_is_never_the_answer_under_the_constraint(dat
 def test_the_same_seed_gives_the_same_models_bit_for_bit_and_another_one_others(data, result):
     again = identify(data, **BUDGET, seed=5)
     assert parameters(again) == parameters(result)
-    assert again.findings.search.history == result.findings.search.history
+    assert again.search_result.search.history == result.search_result.search.history
     other = identify(data, **BUDGET, seed=6)
-    assert other.findings.search.history != result.findings.search.history
+    assert other.search_result.search.history != result.search_result.search.history
 
 
 @pytest.mark.parametrize("stop", [0, 2, 4])
@@ -114,11 +114,11 @@ def test_a_start_goes_on_as_if_never_stopped(data, result, states, stop, tmp_pat
     stored = replace(states[stop], archipelago=read_checkpoint(tmp_path / "checkpoint.json")[0])
     resumed = identify(data, **BUDGET, seed=5, start=stored)
     assert parameters(resumed) == parameters(result)
-    assert resumed.findings.search.history == result.findings.search.history
-    assert resumed.findings.search.evaluations == result.findings.search.evaluations
-    assert resumed.findings.search.outcomes == result.findings.search.outcomes
-    assert resumed.findings.search.duplicates == result.findings.search.duplicates
-    assert resumed.findings.search.ended_by == result.findings.search.ended_by
+    assert resumed.search_result.search.history == result.search_result.search.history
+    assert resumed.search_result.search.evaluations == result.search_result.search.evaluations
+    assert resumed.search_result.search.outcomes == result.search_result.search.outcomes
+    assert resumed.search_result.search.duplicates == result.search_result.search.duplicates
+    assert resumed.search_result.search.ended_by == result.search_result.search.ended_by
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_start_of_other_islands_or_another_seed_is_refused(data, other):
 def test_a_start_of_its_own_islands_that_nobody_lives_on_is_the_beginning(data, result):
     begun = identify(data, **BUDGET, seed=5, start=SearchState(empty_archipelago(1, 5)))
     assert parameters(begun) == parameters(result)
-    assert begun.findings.search.history == result.findings.search.history
+    assert begun.search_result.search.history == result.search_result.search.history
 
 
 def islands_budget(**changes):
@@ -160,10 +160,10 @@ def test_islands_evolve_beside_each_other(data):
             data[:1000], **budget, seed=5, progress=lambda state, _settings, to=states: to.append(state)
         )
         assert result.findings.settings["islands"] == len(states[0].archipelago.islands)
-        assert result.findings.search.evaluations == 4 * 12 * result.findings.settings["islands"]
+        assert result.search_result.search.evaluations == 4 * 12 * result.findings.settings["islands"]
         for state in states:
             for place, island in enumerate(state.archipelago.islands):
-                best = min(entry.fitness for entry in island.hall.entries)
+                best = min(entry.fitness for entry in island.hall_of_fame.entries)
                 assert state.history[-1].islands[place] == best
             assert min(state.history[-1].islands) == min(state.history[-1].best.values())
     # Who receives from nobody evolves as if it were alone; nobody has left before the first epoch's end.
@@ -173,7 +173,7 @@ def test_islands_evolve_beside_each_other(data):
     assert [state.archipelago for state in apart[:2]] == [state.archipelago for state in three[:2]]
     assert apart[-1].archipelago != three[-1].archipelago
     resumed = identify(data[:1000], **islands_budget(islands=3), seed=5, start=three[1])
-    assert resumed.findings.search.history == three[-1].history
+    assert resumed.search_result.search.history == three[-1].history
 
 
 def test_an_epoch_ends_where_the_schedule_says_and_its_generations_are_all_told(data):
@@ -198,7 +198,7 @@ def test_another_engine_may_carry_a_search_out(data, result):
     assert parameters(found) == parameters(result)
     infos = [info for epoch in engine.epochs for (info,) in epoch.steps]
     assert len(infos) == 5
-    search = found.findings.search
+    search = found.search_result.search
     assert search.duplicates == sum(info.duplicates for info in infos)
     assert search.outcomes["ok"] == sum(info.outcomes["ok"] for info in infos)
     assert search.caches == engine.epochs[-1].caches

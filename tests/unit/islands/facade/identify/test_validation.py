@@ -23,10 +23,10 @@ def test_validation_may_be_a_record_of_its_own(data, result):
     parts = split(data, 0.25)
     own = identify(parts.estimation, parts.validation, **BUDGET, seed=5)
     assert parameters(own) == parameters(result)
-    assert own.findings.split.validation is parts.validation
+    assert own.search_result.split.validation is parts.validation
     elsewhere = identify(parts.estimation, record(seed=9), **BUDGET, seed=5)
     assert own.findings.settings["validation"] != elsewhere.findings.settings["validation"]
-    assert elsewhere.findings.search.history == result.findings.search.history
+    assert elsewhere.search_result.search.history == result.search_result.search.history
 
 
 def test_validation_data_never_reaches_the_search(data, result):
@@ -34,8 +34,8 @@ def test_validation_data_never_reaches_the_search(data, result):
     parts = split(data, 0.25)
     spoilt = replace(parts.validation, y=parts.validation.y[::-1].copy())
     other = identify(parts.estimation, spoilt, **BUDGET, seed=5)
-    assert other.findings.search.history == result.findings.search.history
-    assert other.findings.search.outcomes == result.findings.search.outcomes
+    assert other.search_result.search.history == result.search_result.search.history
+    assert other.search_result.search.outcomes == result.search_result.search.outcomes
     assert parameters(other) != parameters(result)
 
 
@@ -65,7 +65,7 @@ def test_a_result_is_never_worse_than_the_forward_selection_that_seeds_it(seed, 
 def test_refinement_takes_nothing_away(data):
     """Refined models stand beside those that were estimated: validation chooses."""
     plain, refined = (identify(data, **BUDGET, seed=5, refine=refine) for refine in (False, True))
-    assert plain.findings.search.history == refined.findings.search.history
+    assert plain.search_result.search.history == refined.search_result.search.history
     errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in refined.models}
     for fitted in plain.models:
         assert errors[fitted.model.size] <= fitted.metrics["validation"]["free_run"].rmse
@@ -87,7 +87,7 @@ def test_two_inputs_and_segments_are_identified():
     )
     found = identify(data, two_inputs(seed=4), **{**BUDGET, "generations": 2})
     assert found.best.model.inputs == 2
-    assert found.findings.record.segments == (1200, 1200)
+    assert found.search_result.record.segments == (1200, 1200)
     assert found.best.metrics["validation"]["free_run"].mape < 2.0
 
 
@@ -95,7 +95,7 @@ def test_two_inputs_and_segments_are_identified():
 def test_every_preset_runs_on_a_small_budget(data, preset):
     found = identify(data[:1500], preset=preset, population=12, generations=1, max_terms=4)
     assert found.findings.settings["preset"] == preset
-    search = found.findings.search
+    search = found.search_result.search
     assert search.evaluations == 24
     assert search.feasible_share == sum(search.outcomes.get(name, 0) for name in ("ok", "abandoned")) / 24
     assert all(fitted.model.size <= 4 for fitted in found.models)

@@ -46,7 +46,7 @@ def extended(asked: Made, effects: list[Effect]) -> CalibrationResult:
     residual = 0.01 * scene.output_peak * np.sin(2 * np.pi * 7.3 * scene.time)
     for effect in simulation_.effects:
         point = effect.grid(scene, residual)[0]
-        values[simulation_.part(effect)] = point
+        values[simulation_.get_slice(effect)] = point
     target = Target(asked.record.y, np.arange(asked.record.samples) < fitted, None, {})
     return evaluate_fit(simulation_, target, values)
 
@@ -108,7 +108,7 @@ def test_what_is_written_simulates_the_same(asked: Made) -> None:
 )
 def test_each_effect_by_itself_simulates_the_same(asked: Made) -> None:
     found = fixed(asked, known(asked))
-    if begins(ExtendedSimulator(asked.core, (), extended(asked, []).simulation.scene)):
+    if begins(ExtendedSimulator(asked.core, (), extended(asked, []).simulation.context)):
         found = found[::6]  # each is a fit
     for effect in found:
         simulates_the_same(asked, extended(asked, [effect]))
@@ -118,7 +118,7 @@ def test_a_state_of_an_effect_at_the_first_sample_is_fitted() -> None:
     asked, effect = made()["bouc-wen-piezo"], CATALOGUE["second-hysteresis"]
     fit = extended(asked, [effect])
     values = fit.values.copy()
-    values[fit.simulation.part(effect)] = (0.2, 0.05, 0.0, 8.0)
+    values[fit.simulation.get_slice(effect)] = (0.2, 0.05, 0.0, 8.0)
     simulates_the_same(asked, replace(fit, values=values, output=fit.simulation.simulate(values)))
 
 
@@ -162,7 +162,7 @@ def test_diagnosed_again_it_lacks_nothing(kind: str, name: str, point: tuple[flo
     asked = made()[kind]
     fit = extended(asked, [CATALOGUE[name]])
     values = fit.values.copy()
-    values[fit.simulation.part(CATALOGUE[name])] = point
+    values[fit.simulation.get_slice(CATALOGUE[name])] = point
     y = fit.simulation.simulate(values)
     noise = 0.02 * y.std() * np.random.default_rng(21).standard_normal(y.size)
     record = replace(asked.record, y=y + noise)
@@ -170,7 +170,7 @@ def test_diagnosed_again_it_lacks_nothing(kind: str, name: str, point: tuple[flo
     assert [each.name for each in found.effects][:1] == [name]
     spec = LocalExtendedSpec.model_validate(extended_document(found.best, record))
     second = diagnose(record, make_simulator(spec, record, asked.columns))
-    assert [each.name for each in second.effects if each.eta is not None] == []
+    assert [each.name for each in second.effects if each.explained_fraction is not None] == []
     assert second.verdict in ("nothing", "named")
 
 

@@ -70,4 +70,4 @@ def test_two_names_are_told_one_after_the_other() -> None:
 
 
 def test_the_piezos_core_is_given_what_is_stated() -> None:
-    assert CORES["bouc-wen-piezo"].tolerance == {name: 2 * far for name, far in PIEZO.spread.items()}
+    assert CORES["bouc-wen-piezo"].tolerance == {name: 2 * far for name, far in PIEZO.relative_error.items()}

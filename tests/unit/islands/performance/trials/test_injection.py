@@ -59,7 +59,7 @@ def test_what_tolerances_allow_is_no_misfit() -> None:
     """Of a gain only what no admissible parameters can take up is left."""
     gain = PIEZO.known["sensor-gain"]
     small, large = (
-        replace(PIEZO, known={"sensor-gain": replace(gain, least=k, most=k)}) for k in (0.015, 0.08)
+        replace(PIEZO, known={"sensor-gain": replace(gain, minimum=k, maximum=k)}) for k in (0.015, 0.08)
     )
     allowed, off, in_full = (
         inject(["sensor-gain"], np.random.default_rng(3), 12.0, system=system, apart=apart)
@@ -86,7 +86,7 @@ def test_the_oscillator_is_solved(force: object) -> None:
     rng = np.random.default_rng(2)
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
     truth = Oscillator(beside=made)
-    drive = OSCILLATOR.drive(rng, 2.0)
+    drive = OSCILLATOR.excitation(rng, 2.0)
     y = simulate_plant(truth, drive)
 
     def slope(t: float, state: np.ndarray) -> list[float]:
@@ -103,7 +103,7 @@ def test_the_oscillator_is_solved(force: object) -> None:
 
 
 def test_the_tanks_are_solved() -> None:
-    drive = TANKS.drive(np.random.default_rng(2), 800.0)
+    drive = TANKS.excitation(np.random.default_rng(2), 800.0)
     truth = Tanks(leaks=(0.002, 0.001), inflows=(0.01, -0.005))
 
     def slope(t: float, x: np.ndarray) -> list[float]:
@@ -118,7 +118,7 @@ def test_the_tanks_are_solved() -> None:
 
 
 def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
-    drive = TANKS.drive(np.random.default_rng(2), 4096.0)
+    drive = TANKS.excitation(np.random.default_rng(2), 4096.0)
     free = simulate_plant(Tanks(), drive)
     lower = simulate_plant(Tanks(below=(0.0, 0.2)), drive)
     lost, caught = (simulate_plant(Tanks(below=(0.3, 0.0), spilled=part), drive) for part in (0.0, 1.0))
@@ -129,7 +129,7 @@ def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
 
 def test_a_gain_that_changes_shows_behind_its_instant() -> None:
     for system, truth in ((PIEZO, Piezo()), (OSCILLATOR, Oscillator()), (TANKS, Tanks())):
-        drive = system.drive(np.random.default_rng(2), 0.3 * system.seconds)
+        drive = system.excitation(np.random.default_rng(2), 0.3 * system.seconds)
         half = float(drive.time[-1]) / 2
         changed = simulate_plant(
             replace(truth, gain=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive

@@ -72,9 +72,9 @@ def test_the_hall_of_fame_of_all_islands_stands_beside_the_checkpoint(run, tmp_p
     assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
     archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
     assert len(archipelago.islands) == 2
-    write_hall(archipelago.hall, tmp_path / "expected.json")
+    write_hall(archipelago.hall_of_fame, tmp_path / "expected.json")
     assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "expected.json").read_bytes()
-    best = [min(entry.fitness for entry in island.hall.entries) for island in archipelago.islands]
+    best = [min(entry.fitness for entry in island.hall_of_fame.entries) for island in archipelago.islands]
     assert about["history"][-1][3] == best
 
 
