@@ -67,7 +67,7 @@ class _Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End all that is open."""
-        self.config.app.state.doors.hub.close()  # type: ignore[union-attr]
+        self.config.app.state.islands.hub.close()  # type: ignore[union-attr]
         await super().shutdown(sockets)
 
 

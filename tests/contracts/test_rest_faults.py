@@ -195,13 +195,13 @@ def test_a_defect_of_drawing_stands_in_the_log_alone_and_is_not_met_again_at_onc
 @pytest.mark.nightly
 def test_a_lost_record_and_a_database_that_is_away_are_told_as_such_where_a_figure_is_wanted(drawing):
     path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
-    doors = drawing.app.state.doors
+    doors = drawing.app.state.islands
     gone = doors.settings.model_copy(update={"database": "sqlite:////nowhere/islands.db"})
-    drawing.app.state.doors = replace(doors, settings=gone)
+    drawing.app.state.islands = replace(doors, settings=gone)
     try:
         answer = drawing.client.get(path)
     finally:
-        drawing.app.state.doors = doors
+        drawing.app.state.islands = doors
     problem_of(answer, 503, "store-unavailable")
     assert "nowhere" not in answer.text
     (blob,) = [each for each in doors.settings.blobs.glob("??/*") if each.read_bytes() == csv(400)]

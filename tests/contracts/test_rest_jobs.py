@@ -291,7 +291,7 @@ def test_a_job_of_another_version_says_so_where_a_figure_is_wanted(service):
 
 def test_a_figure_that_a_browser_keeps_is_kept_for_its_key_alone(service):
     job = in_state(service, JobState.SUCCEEDED)
-    blob = service.app.state.doors.blobs.write(b"<svg/>" * 1000)
+    blob = service.app.state.islands.blobs.write(b"<svg/>" * 1000)
     service.store.results.keep(job, {"1/loop.svg": blob})
     headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers
     assert headers["cache-control"] == "private, max-age=86400, immutable"

@@ -116,14 +116,14 @@ def test_two_recordings_in_one_file_are_not_mixed(service):
 
 def test_what_was_accepted_is_not_inspected_again(service, dataset):
     """An inspection may take two minutes: a client that lost the answer asks again long before."""
-    order, doors = spec(dataset, rows="0:100"), service.app.state.doors
+    order, doors = spec(dataset, rows="0:100"), service.app.state.islands
     first = service.submit({"Idempotency-Key": "looked into"}, **order)
-    service.app.state.doors = replace(doors, inspections=asyncio.Semaphore(0))
+    service.app.state.islands = replace(doors, inspection_slots=asyncio.Semaphore(0))
     try:
         again = service.client.post(
             "/v1/jobs", json=order, headers={"Idempotency-Key": "looked into"}, timeout=3.0
         )
     finally:
-        service.app.state.doors = doors
+        service.app.state.islands = doors
     assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
     assert again.json() == first.json()

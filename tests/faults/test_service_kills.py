@@ -64,7 +64,7 @@ def test_a_service_finds_what_one_process_finds_by_itself(
     record = read_record(service.folder.with_suffix(".csv"), SPEC["inputs"], SPEC["output"])
     settings = {**SPEC["settings"], "generations": SHORT}
     alone = identify(record, preset="hysteresis", seed=SPEC["seed"], engine=SerialEngine(), **settings)
-    expected = result_document(alone.findings)["models"]
+    expected = result_document(alone.search_result)["models"]
     assert json.loads(undisturbed[1])["items"] == json.loads(json.dumps(expected))
 
 

@@ -47,7 +47,7 @@ def name(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def core(name: str) -> Simulator:
     found = made()[name].core
-    return found.core if name == "held" else found
+    return found.simulator if name == "held" else found
 
 
 @pytest.fixture

@@ -52,7 +52,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         opened = store or Store(settings.url)
         threads = BlockingExecutor()
         hub = JobEventHub(opened, threads)
-        app.state.doors = doors = AppState(
+        app.state.islands = state = AppState(
             settings,
             opened,
             Blobs(settings.blobs),
@@ -63,7 +63,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             asyncio.Semaphore(DRAWINGS),
             threads,
         )
-        app.state.keys = KeyCache(doors)
+        app.state.keys = KeyCache(state)
         tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_live(settings.lifeline))]
         try:
             yield
@@ -72,8 +72,8 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
                 task.cancel()
                 with suppress(asyncio.CancelledError):
                     await task
-            await doors.run_blocking(opened.close)
-            await doors.run_blocking(traces.close)
+            await state.run_blocking(opened.close)
+            await state.run_blocking(traces.close)
             threads.close()
 
     app = FastAPI(

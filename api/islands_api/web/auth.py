@@ -49,11 +49,11 @@ class KeyCache:
 
     Parameters
     ----------
-    doors : AppState
+    state : AppState
     """
 
-    def __init__(self, doors: AppState) -> None:
-        self._state = doors
+    def __init__(self, state: AppState) -> None:
+        self._state = state
         self._found: dict[str, tuple[float, Key | None]] = {}
 
     async def find(self, secret: str) -> Key | None:
@@ -90,16 +90,16 @@ async def authenticate(request: Request) -> Principal:
     """
     if not hasattr(request.state, "caller"):
         # Once for each request: it takes a token of the rate.
-        request.state.caller = await _let_in(request, request.app.state.doors, await _bearer(request))
+        request.state.caller = await _let_in(request, request.app.state.islands, await _bearer(request))
     caller: Principal = request.state.caller
     return caller
 
 
-async def _let_in(request: Request, doors: AppState, given: HTTPAuthorizationCredentials | None) -> Principal:
+async def _let_in(request: Request, state: AppState, given: HTTPAuthorizationCredentials | None) -> Principal:
     address = request.client.host if request.client is not None else "?"
     if given is None:
-        if doors.settings.keys_needed:
-            doors.rate_limiter.acquire(f"address {address}")
+        if state.settings.keys_needed:
+            state.rate_limiter.acquire(f"address {address}")
             raise AuthenticationError(
                 "this service needs a key: send 'Authorization: Bearer islands_...'; whoever runs it makes "
                 "one with 'islands keys create'"
@@ -107,10 +107,10 @@ async def _let_in(request: Request, doors: AppState, given: HTTPAuthorizationCre
         return Principal(LOCAL, frozenset(SCOPES))
     key = await request.app.state.keys.find(given.credentials)
     if key is None or not key.valid:
-        doors.rate_limiter.acquire(f"address {address}", min(_WRONG, doors.settings.burst))
+        state.rate_limiter.acquire(f"address {address}", min(_WRONG, state.settings.burst))
         what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
         raise AuthenticationError(f"the key {what}: ask whoever runs this service for another one")
-    doors.rate_limiter.acquire(f"key {key.id}")
+    state.rate_limiter.acquire(f"key {key.id}")
     return Principal(key.owner, key.scopes, given.credentials)
 
 

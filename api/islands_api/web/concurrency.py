@@ -20,7 +20,7 @@ class BlockingExecutor:
     """Carries out operations in threads. The framework's own way takes a third of a look at a job."""
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(COUNT, "doors")
+        self._pool = ThreadPoolExecutor(COUNT, "islands-web")
 
     async def run(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
         """Carry out an operation; what it returns or raises comes back here."""

@@ -41,10 +41,10 @@ class AppState:
         return await self.executor.run(operation, *arguments, **named)
 
 
-async def _doors(request: Request) -> Any:
+async def _get_state(request: Request) -> Any:
     # Asynchronous though it waits for nothing: the framework gives any other one a thread, for every request.
-    return request.app.state.doors
+    return request.app.state.islands
 
 
 #: What a route asks for to get at them.
-AppStateDep = Annotated[AppState, Depends(_doors)]
+AppStateDep = Annotated[AppState, Depends(_get_state)]

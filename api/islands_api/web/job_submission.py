@@ -44,7 +44,7 @@ Request = JobRequest | DiscrepancyRequest
 
 
 async def submit_job(
-    doors: AppState, caller: Principal, request: Request, kind: str, key: str | None
+    state: AppState, caller: Principal, request: Request, kind: str, key: str | None
 ) -> JSONDocument:
     """Accept a job, and say where it is.
 
@@ -54,9 +54,9 @@ async def submit_job(
         It could only fail, or its owner may not have it now.
     """
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
-    job, new = await _submitted(doors, request, submission)
+    job, new = await _submitted(state, request, submission)
     if new:
-        doors.metrics.accepted.inc()
+        state.metrics.accepted.inc()
     headers = {"Location": f"{JOBS}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
     if not new:
         headers["Idempotent-Replayed"] = "true"
@@ -68,21 +68,21 @@ def etag(job: Job) -> str:
     return f'"{job.version}"'
 
 
-async def _submitted(doors: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
-    before, doubts = await doors.run_blocking(_admitted, doors, request, submission)
+async def _submitted(state: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
+    before, doubts = await state.run_blocking(_admitted, state, request, submission)
     if before is not None:
         return before, False
     for doubt in doubts:
-        with link_blob(doors.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
-            async with doors.inspection_slots:
+        with link_blob(state.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
+            async with state.inspection_slots:
                 await inspect_file(
-                    path, doubt.request, doors.settings.inspection_memory, doors.settings.inspection_seconds
+                    path, doubt.request, state.settings.inspection_memory, state.settings.inspection_seconds
                 )
-    return await doors.run_blocking(doors.store.jobs.submit, submission, doors.settings.max_active)
+    return await state.run_blocking(state.store.jobs.submit, submission, state.settings.max_active)
 
 
 def _admitted(
-    doors: AppState, request: Request, submission: Submission
+    state: AppState, request: Request, submission: Submission
 ) -> tuple[Job | None, tuple[PendingInspection, ...]]:
     """Return what is in doubt about a submission, or the job that it is already.
 
@@ -90,15 +90,15 @@ def _admitted(
     if its data set was deleted since. All others are told by `Jobs.submit`, in the transaction that accepts.
     """
     try:
-        doubts = validate_job(request, submission.owner, doors.store, doors.settings)
+        doubts = validate_job(request, submission.owner, state.store, state.settings)
     except IslandsError:
-        if (before := doors.store.jobs.find_replay(submission)) is not None:
+        if (before := state.store.jobs.find_replay(submission)) is not None:
             return before, ()
         raise
-    return doors.store.jobs.find_replay(submission) if doubts else None, doubts
+    return state.store.jobs.find_replay(submission) if doubts else None, doubts
 
 
-async def get_job_of_kind(doors: AppState, caller: Principal, job: str, kind: str) -> Job:
+async def get_job_of_kind(state: AppState, caller: Principal, job: str, kind: str) -> Job:
     """Return a job that is of a kind.
 
     Raises
@@ -107,7 +107,7 @@ async def get_job_of_kind(doors: AppState, caller: Principal, job: str, kind: st
     ResourceNotFoundError
         It is of another kind, and has nothing of what is asked for.
     """
-    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
+    found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     if found.kind != kind:
         raise ResourceNotFoundError(
             f"job {job} is of the kind {found.kind}, and only those of the kind {kind} have this: its "
@@ -116,14 +116,14 @@ async def get_job_of_kind(doors: AppState, caller: Principal, job: str, kind: st
     return found
 
 
-async def get_result(doors: AppState, job: Job) -> dict[str, Any]:
+async def get_result(state: AppState, job: Job) -> dict[str, Any]:
     """Return a job's result without its models.
 
     Raises
     ------
     ResultNotReadyError
     """
-    document = await doors.run_blocking(doors.store.results.document, job.id)
+    document = await state.run_blocking(state.store.results.document, job.id)
     if document is None:
         hint = (
             "wait until it has succeeded"

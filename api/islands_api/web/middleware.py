@@ -78,10 +78,10 @@ class RequestLogging:
 
     def _note(self, scope: Scope, status: int, seconds: float) -> None:
         route = getattr(scope.get("route"), "path", "none")
-        doors: Any = getattr(scope["app"].state, "doors", None)
-        if doors is not None:
+        state: Any = getattr(scope["app"].state, "islands", None)
+        if state is not None:
             method = scope["method"] if scope["method"] in METHODS else "other"
-            doors.metrics.latency.labels(method, route, status).observe(seconds)
+            state.metrics.latency.labels(method, route, status).observe(seconds)
         # Those who look whether we live, and how we are, would fill the log.
         if route not in ("/healthz", "/readyz", "/metrics"):
             log.info(

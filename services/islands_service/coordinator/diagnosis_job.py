@@ -61,8 +61,8 @@ def discrepancy(
     stored = store.datasets.get(lease.job.owner, spec.dataset)
     tell("reading the record")
     record, columns = record_and_columns(spec, stored, blobs)
-    core = make_simulator(spec.simulation, record, columns)
-    found = diagnose(record, core, spec.tolerance, spec.seed, tell, spread or ray_map())
+    simulator = make_simulator(spec.simulation, record, columns)
+    found = diagnose(record, simulator, spec.tolerance, spec.seed, tell, spread or ray_map())
     tell("a formula for what has no name")
     proposal = explain_residual(found, spec.seed)
     wall_s = monotonic() - began
@@ -74,7 +74,7 @@ def discrepancy(
     return JobOutcome(
         JobState.SUCCEEDED,
         document,
-        summary=_summary(found, proposal, core.name, wall_s),
+        summary=_summary(found, proposal, simulator.name, wall_s),
         artefacts=artefacts,
     )
 

@@ -83,14 +83,14 @@ def identification(
     return outcome_of(result.with_wall_time(watch.spent).search_result)
 
 
-def outcome_of(findings: SearchResult) -> JobOutcome:
+def outcome_of(found: SearchResult) -> JobOutcome:
     """Return what is stored of findings."""
-    document = result_document(findings)
+    document = result_document(found)
     models = document.pop("models")
     best = models[0]
     summary = {
         "models": len(models),
-        "equation": equation(findings.models[0].model),
+        "equation": equation(found.models[0].model),
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],
         "property_1": best["physics"]["property_1"],
@@ -98,7 +98,7 @@ def outcome_of(findings: SearchResult) -> JobOutcome:
         "wall_s": document["search"]["wall_s"],
         "ended_by": document["search"]["ended_by"],
     }
-    files = [model_json(entry.model) for entry in findings.models]
+    files = [model_json(entry.model) for entry in found.models]
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 

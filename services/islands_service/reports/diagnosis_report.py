@@ -39,9 +39,8 @@ def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
     lines += [f"  {_finding(finding)}" for finding in found.effects]
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
-        lines.append(
-            f"  nearest: {nearest}; what is left depends on: {', '.join(found.residual_structure) or 'its own past'}"
-        )
+        dependence = ", ".join(found.residual_structure) or "its own past"
+        lines.append(f"  nearest: {nearest}; what is left depends on: {dependence}")
     if found.gain is not None:
         gain, unit = found.gain, found.record.output_unit
         low, high = gain.ci95
@@ -97,8 +96,9 @@ def summarise_self_test(tested: SelfTest) -> str:
     shown = sum(limit is not None for limit in limits.values())
     # So few records cannot show that it is rarer.
     least = "at most " if tested.p_value * (alarms.trials + 1) < 1.5 else ""
+    named = alarms.value * alarms.trials
     return (
-        f"Of {alarms.trials} records like this one with nothing wrong in them {alarms.value * alarms.trials:.0f} got "
+        f"Of {alarms.trials} records like this one with nothing wrong in them {named:.0f} got "
         f"a name: {100 * alarms.value:.1f} % false alarms ({low:.1f} to {high:.1f}). Chance alone makes a "
         f"candidate as good as this record's best with a probability of {least}{tested.p_value:.2g}.\n"
         f"Of {len(limits)} effects this record could show {shown}, up to a misfit of {STRENGTHS[-1]:g} times "

@@ -56,11 +56,9 @@ def main() -> int:
     try:
         with Store(settings.url) as store:
             job = store.jobs.get(asked.owner, asked.job)
-            findings = read_search_result(job, store, blobs, asked.rank)
+            found = read_search_result(job, store, blobs, asked.rank)
             made = (
-                render_figures(job, findings)
-                if asked.rank is None
-                else render_model_figures(findings, asked.rank)
+                render_figures(job, found) if asked.rank is None else render_model_figures(found, asked.rank)
             )
             store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
     except StorageFullError as error:
@@ -130,18 +128,18 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStat
     )
 
 
-def render_figures(job: Job, findings: SearchResult) -> dict[str, bytes]:
+def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     """Draw the figures of a search and write its report, by the names of their artefacts."""
-    made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](findings)) for name in search_figures(findings)}
-    best = {f"{name}.svg": _svg(draw(findings.models[0], findings.split)) for name, draw in FIGURES.items()}
-    return {**made, REPORT: identification_report(job.name or job.id, findings, {**best, **made})}
+    made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](found)) for name in search_figures(found)}
+    best = {f"{name}.svg": _svg(draw(found.models[0], found.split)) for name, draw in FIGURES.items()}
+    return {**made, REPORT: identification_report(job.name or job.id, found, {**best, **made})}
 
 
-def render_model_figures(findings: SearchResult, rank: int) -> dict[str, bytes]:
+def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Draw a model's figures, and simulate it, by the names of their artefacts."""
-    entry = findings.models[0]
-    made = {f"{rank}/{name}.svg": _svg(draw(entry, findings.split)) for name, draw in FIGURES.items()}
-    made[f"{rank}/free-run.json"] = _simulated(entry, findings)
+    entry = found.models[0]
+    made = {f"{rank}/{name}.svg": _svg(draw(entry, found.split)) for name, draw in FIGURES.items()}
+    made[f"{rank}/free-run.json"] = _simulated(entry, found)
     return made
 
 
@@ -151,9 +149,9 @@ def _svg(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _simulated(entry: RankedModel, findings: SearchResult) -> bytes:
+def _simulated(entry: RankedModel, found: SearchResult) -> bytes:
     """Return the validation data and the model's free run over it, thinned for a screen."""
-    data = findings.split.validation
+    data = found.split.validation
     simulated = free_run(entry.model, data, entry.assessment.warm_up)
     every = max(1, -(-data.samples // POINTS))
     kept = slice(None, None, every)

@@ -4,7 +4,7 @@ import base64
 from collections.abc import Mapping
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, select_autoescape
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
 from islands.evolution.search_result import SearchResult
@@ -13,7 +13,10 @@ from islands.model.equations import mathml_equation
 
 #: Pages that are files of their own.
 TEMPLATES = Environment(
-    loader=PackageLoader("islands_service", "templates"), autoescape=select_autoescape(), trim_blocks=True
+    loader=PackageLoader("islands_service", "templates"),
+    autoescape=select_autoescape(),
+    trim_blocks=True,
+    undefined=StrictUndefined,
 )
 
 #: What figures show, in the order of a report.
@@ -29,7 +32,7 @@ CAPTIONS = {
 }
 
 
-def identification_report(name: str, findings: SearchResult, figures: Mapping[str, bytes]) -> bytes:
+def identification_report(name: str, found: SearchResult, figures: Mapping[str, bytes]) -> bytes:
     """Write the report of a result.
 
     Parameters
@@ -43,14 +46,14 @@ def identification_report(name: str, findings: SearchResult, figures: Mapping[st
     models = [
         # MathML of our own making, from numbers and names of ours: the only text that is not escaped.
         {"cells": row(rank, entry), "equation": Markup(mathml_equation(entry.model))}
-        for rank, entry in enumerate(findings.models, start=1)
+        for rank, entry in enumerate(found.models, start=1)
     ]
     shown = [(caption, _inline(figures[each])) for each, caption in CAPTIONS.items() if each in figures]
     text = TEMPLATES.get_template("report.html").render(
         name=name,
-        record=findings.record,
-        findings=findings,
-        settings=_settings(findings),
+        record=found.record,
+        findings=found,
+        settings=_settings(found),
         columns=COLUMNS,
         models=models,
         figures=shown,
@@ -58,8 +61,8 @@ def identification_report(name: str, findings: SearchResult, figures: Mapping[st
     return text.encode()
 
 
-def _settings(findings: SearchResult) -> list[tuple[str, Any]]:
-    return [(name, value) for name, value in findings.settings.items() if not isinstance(value, Mapping)]
+def _settings(found: SearchResult) -> list[tuple[str, Any]]:
+    return [(name, value) for name, value in found.settings.items() if not isinstance(value, Mapping)]
 
 
 def _inline(svg: bytes) -> str:

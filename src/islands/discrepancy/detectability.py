@@ -106,7 +106,7 @@ def _quiet(_ended: int, _of: int) -> None:
 
 def self_test(
     diagnosis: Diagnosis,
-    core: Simulator,
+    simulator: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
     run: ParallelMap = map,
@@ -133,7 +133,7 @@ def self_test(
     tell : callable
         Told how many probes have ended, and of how many at the most.
     """
-    source = make_surrogates(diagnosis, core, dict(tolerance or {}))
+    source = make_surrogates(diagnosis, simulator, dict(tolerance or {}))
     ladders = {
         name: injection_strengths(source, effect, _lot(seed, name))
         for name, effect in source.effects.items()

@@ -105,7 +105,7 @@ class Diagnosis:
 
 def diagnose(
     record: Dataset,
-    core: Simulator,
+    simulator: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
     tell: Tell = ignore_progress,
@@ -140,29 +140,29 @@ def diagnose(
         A tolerance is not positive or belongs to no parameter of the simulation, two effects have one
         name, or an effect is broken.
     """
-    known = validate_prior(tolerance or {}, core)
+    known = validate_prior(tolerance or {}, simulator)
     fitted = count_fitted_samples(record)
-    scene = make_context(record, core, fitted)
+    context = make_context(record, simulator, fitted)
     rng = np.random.default_rng(seed)
-    simulation = ExtendedSimulator(core, (), scene)
+    simulation = ExtendedSimulator(simulator, (), context)
     target = Target(record.y, np.arange(record.samples) < fitted, None, known)
     tell("calibrating the simulation")
     plain = calibrate(simulation, target, simulation.nominal)
-    core = select_intersample(plain, target)
-    effects = select_effects(core, scene, known, catalogue)
+    simulator = select_intersample(plain, target)
+    effects = select_effects(simulator, context, known, catalogue)
     for _ in range(ROUNDS):
-        plain = calibrate(replace(simulation, simulator=core), target, plain.values)
+        plain = calibrate(replace(simulation, simulator=simulator), target, plain.values)
         tell(f"looking for each of {len(effects)} effects")
         rungs = screen_effects(plain, target, effects, spread)
         again = select_intersample(best_single(plain, rungs), target)
-        if same_discretisation(again, core):
+        if same_discretisation(again, simulator):
             evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
             again = select_intersample(evidence.hypothesis.fit, evidence.target)
-        if same_discretisation(again, core):
+        if same_discretisation(again, simulator):
             break
         # With a cause in it another hold, or a finer step, fits better: it was the cause that hid that.
         tell("once more: the input between its samples")
-        core = again
+        simulator = again
     else:
         evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
     tell("what is left over")
@@ -201,8 +201,8 @@ def _told(
         tell("what else could be the cause")
         named, instead = describe_effects(found, base, rungs, evidence.target, effects, floor, spread)
     residual = (record.y - found.fit.output)[:fitted]
-    scene = found.fit.simulation.context
-    noise = _noise(record.y[:fitted], residual, scene) if verdict != Verdict.UNKNOWN else ()
+    context = found.fit.simulation.context
+    noise = _noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
     simulation = plain.simulation
     given = simulation.simulate(simulation.nominal)
     best = found.fit if named else plain
@@ -226,13 +226,13 @@ def _told(
     )
 
 
-def _noise(y: Signal, residual: Signal, scene: SimulationContext) -> tuple[Finding, ...]:
+def _noise(y: Signal, residual: Signal, context: SimulationContext) -> tuple[Finding, ...]:
     """Name what sampling and noise have done, the crudest first: what it explains is not blamed on others."""
     found: list[Finding] = []
     for detector in DETECTORS.values():
         if any(each.name in detector.excluded_by for each in found):
             continue
-        detection = detector.detect(y, residual, scene)
+        detection = detector.detect(y, residual, context)
         if detection is not None and detection.score_gain > LEAST:
             values = {name: Value(value, unit, None) for name, (value, unit) in detection.parameters.items()}
             sure = 1.0 / (1.0 + float(np.exp(-detection.score_gain / (2 * TEMPER))))

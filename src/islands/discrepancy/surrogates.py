@@ -125,7 +125,7 @@ class Surrogates:
         return replace(self.record, y=simulated + self.draw_noise(probe.seed))
 
 
-def make_surrogates(diagnosis: Diagnosis, core: Simulator, tolerance: Mapping[str, float]) -> Surrogates:
+def make_surrogates(diagnosis: Diagnosis, simulator: Simulator, tolerance: Mapping[str, float]) -> Surrogates:
     """Return what surrogates of a diagnosed record are drawn from.
 
     Clean means: the simulation without effects is the truth. Where some were named it is the one that was
@@ -137,7 +137,7 @@ def make_surrogates(diagnosis: Diagnosis, core: Simulator, tolerance: Mapping[st
     left = (diagnosis.record.y - best.output)[: diagnosis.estimation_samples]
     return Surrogates(
         diagnosis.record,
-        core,
+        simulator,
         tolerance,
         simulation,
         transfer_parameters(best.values, best.simulation, simulation),
@@ -155,9 +155,9 @@ def injection_strengths(
     Its shape is a point of its grid, and its sign one of those that it may have, both by lot. Strengths are
     those at which the misfit first comes to each of `STRENGTHS`; who cannot do so ends earlier.
     """
-    scene = source.simulation.context
-    parameters = effect.parameters(scene)
-    grid = effect.starting_points(scene, source.draw_noise(int(rng.integers(2**32))))
+    context = source.simulation.context
+    parameters = effect.parameters(context)
+    grid = effect.starting_points(context, source.draw_noise(int(rng.integers(2**32))))
     point = np.array(grid[int(rng.integers(len(grid)))], dtype=np.float64)
     sized = slice(0, max(effect.linear_parameters, 1))
     lower = np.array([parameter.lower for parameter in parameters[sized]])

@@ -58,5 +58,5 @@ def diagnose(
     """
     # What is asked for has a kind; what is made has sites for effects.
     asked_for = isinstance(simulation, str) or hasattr(simulation, "kind")
-    core = made(simulation, record, columns) if asked_for else simulation  # type: ignore[arg-type]
-    return diagnosed(record, core, tolerance, seed, progress, spread, effects)  # type: ignore[arg-type]
+    simulator = made(simulation, record, columns) if asked_for else simulation  # type: ignore[arg-type]
+    return diagnosed(record, simulator, tolerance, seed, progress, spread, effects)  # type: ignore[arg-type]

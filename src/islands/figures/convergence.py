@@ -16,11 +16,11 @@ _COLUMN = 15
 
 
 @house_style()
-def draw_convergence(findings: SearchResult) -> Figure:
+def draw_convergence(found: SearchResult) -> Figure:
     """Draw the least error of every size over the generations."""
     figure = blank(3.4)
     axes = figure.subplots()
-    history = findings.search.history
+    history = found.search.history
     sizes = sorted({size for point in history for size in point.best})
     for position, size in enumerate(sizes):
         points = [(point.generation, point.best[size]) for point in history if size in point.best]
@@ -36,11 +36,11 @@ def draw_convergence(findings: SearchResult) -> Figure:
 
 
 @house_style()
-def draw_islands(findings: SearchResult) -> Figure:
+def draw_islands(found: SearchResult) -> Figure:
     """Draw the least error of every island over the generations, and the best of all."""
     figure = blank(3.4)
     axes = figure.subplots()
-    history = findings.search.history
+    history = found.search.history
     generations = [point.generation for point in history]
     errors = np.sqrt([point.islands for point in history])
     errors[np.isinf(errors)] = np.nan
@@ -58,13 +58,13 @@ def draw_islands(findings: SearchResult) -> Figure:
 
 
 @house_style()
-def draw_front(findings: SearchResult) -> Figure:
+def draw_front(found: SearchResult) -> Figure:
     """Draw the free-run error of every model against its number of terms."""
     figure = blank(3.2)
     axes = figure.subplots()
     for part, colour, marker in (("estimation", MEASURED, "o"), ("validation", SIMULATED, "s")):
         points = sorted(
-            (entry.model.size, entry.assessment.metrics[part]["free_run"].mape) for entry in findings.models
+            (entry.model.size, entry.assessment.metrics[part]["free_run"].mape) for entry in found.models
         )
         sizes, errors = zip(*points, strict=True)
         axes.plot(sizes, errors, marker=marker, color=colour, label=part)

@@ -46,8 +46,8 @@ FIGURES: Mapping[str, FigureOf] = MappingProxyType(
 )
 
 
-def _record(findings: SearchResult) -> Figure:
-    return draw_record(findings.split.estimation)
+def _record(found: SearchResult) -> Figure:
+    return draw_record(found.split.estimation)
 
 
 #: Figures of a whole search; those of its course need a history.
@@ -59,8 +59,8 @@ SEARCH_FIGURES: Mapping[str, Callable[[SearchResult], Figure]] = MappingProxyTyp
 _ISLANDS = {"convergence": 1, "islands": 2}
 
 
-def search_figures(findings: SearchResult) -> tuple[str, ...]:
+def search_figures(found: SearchResult) -> tuple[str, ...]:
     """Return the names of the search figures that these findings have."""
-    history = findings.search.history
+    history = found.search.history
     islands = len(history[-1].islands) if history else 0
     return tuple(name for name in SEARCH_FIGURES if islands >= _ISLANDS.get(name, 0))

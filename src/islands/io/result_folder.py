@@ -21,19 +21,19 @@ from islands.validation.residual_tests import ResidualTests
 SCHEMA = "islands.result/1"
 
 
-def result_json(findings: SearchResult) -> str:
+def result_json(found: SearchResult) -> str:
     """Write ``result.json``."""
-    return json.dumps(result_document(findings), indent=2, allow_nan=False) + "\n"
+    return json.dumps(result_document(found), indent=2, allow_nan=False) + "\n"
 
 
-def result_document(findings: SearchResult) -> dict[str, Any]:
+def result_document(found: SearchResult) -> dict[str, Any]:
     """Describe a result; numbers that JSON does not know (NaN, infinity) become null."""
-    search = findings.search
+    search = found.search
     document = {
         "schema": SCHEMA,
-        "record": record_document(findings.record),
-        "seed": findings.seed,
-        "settings": dict(findings.settings),
+        "record": record_document(found.record),
+        "seed": found.seed,
+        "settings": dict(found.settings),
         "search": {
             "evaluations": search.evaluations,
             "evaluations_per_second": search.evaluations_per_second,
@@ -48,7 +48,7 @@ def result_document(findings: SearchResult) -> dict[str, Any]:
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },
         },
-        "models": [_model_document(rank, entry) for rank, entry in enumerate(findings.models, start=1)],
+        "models": [_model_document(rank, entry) for rank, entry in enumerate(found.models, start=1)],
     }
     described: dict[str, Any] = _finite(document)
     return described
@@ -129,7 +129,7 @@ def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
     }
 
 
-def write_result(findings: SearchResult, folder: Path) -> None:
+def write_result(found: SearchResult, folder: Path) -> None:
     """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``.
 
     Models of a result that was in the folder are removed.
@@ -138,26 +138,26 @@ def write_result(findings: SearchResult, folder: Path) -> None:
     models.mkdir(parents=True, exist_ok=True)
     for path in models.glob("[0-9][0-9]*.json"):
         path.unlink()
-    for rank, entry in enumerate(findings.models, start=1):
+    for rank, entry in enumerate(found.models, start=1):
         write_model(entry.model, models / f"{rank:02d}.json")
-    (folder / "summary.txt").write_text(summary(findings), encoding="utf-8")
-    (folder / "result.json").write_text(result_json(findings), encoding="utf-8")
+    (folder / "summary.txt").write_text(summary(found), encoding="utf-8")
+    (folder / "result.json").write_text(result_json(found), encoding="utf-8")
 
 
-def summary(findings: SearchResult) -> str:
+def summary(found: SearchResult) -> str:
     """Write the result as plain text."""
-    record, search = findings.record, findings.search
+    record, search = found.record, found.search
     outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
     full = search.full_set
     lines = [
         f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
-        ", ".join(f"{name} {value}" for name, value in findings.settings.items()) + f", seed {findings.seed}",
+        ", ".join(f"{name} {value}" for name, value in found.settings.items()) + f", seed {found.seed}",
         f"{search.evaluations} models estimated: {outcomes}",
         f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
         "",
-        *table(findings.models),
+        *table(found.models),
         "",
-        *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(findings.models, start=1)),
+        *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
     ]
     return "\n".join(lines) + "\n"
 

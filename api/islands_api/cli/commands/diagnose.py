@@ -62,15 +62,15 @@ def diagnose(
         data, columns = _read(
             record, options.columns(inputs), channels or [], column, output_column, dt, rows
         )
-        core = make_simulator(asked, data, columns)
+        simulator = make_simulator(asked, data, columns)
         known = options.tolerances(tolerance or [])
         with _cores(workers, tested) as spread:
             began = perf_counter()
-            found = diagnosed(data, core, known, seed, lambda line: tell(line, 0.5), spread)
+            found = diagnosed(data, simulator, known, seed, lambda line: tell(line, 0.5), spread)
             tell("a formula for what has no name", 0.8)
             proposal = explain_residual(found, seed)
             wall = perf_counter() - began
-            shown = _self_tested(found, core, known, seed, spread, tell) if tested else None
+            shown = _self_tested(found, simulator, known, seed, spread, tell) if tested else None
         tell("figures", 0.9)
         write(found, out, record.name, wall, shown, proposal)
     output.print(summarise(found, proposal), markup=False)
@@ -100,7 +100,7 @@ def write(
 
 def _self_tested(
     found: Diagnosis,
-    core: Simulator,
+    simulator: Simulator,
     tolerance: Mapping[str, float],
     seed: int,
     spread: ParallelMap,
@@ -114,7 +114,7 @@ def _self_tested(
         left = (perf_counter() - began) * (of - count) / count
         tell(f"self-test, {count} of {of} analyses, {_duration(left)} left", count / of)
 
-    return self_test(found, core, tolerance, seed, spread, tell=ended)
+    return self_test(found, simulator, tolerance, seed, spread, tell=ended)
 
 
 def _cores(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:

@@ -47,7 +47,7 @@ Id = Annotated[
 async def upload(
     file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],
     caller: Writer,
-    doors: AppStateDep,
+    state: AppStateDep,
     inputs: Annotated[list[Name], Form(max_length=16, description="Columns to check as inputs.")] = [],  # noqa: B006
     output: Annotated[Name | None, Form(description="Column to check as the output.")] = None,
     dt: Annotated[FiniteFloat | None, Form(description="Sampling time in seconds.", gt=0.0)] = None,
@@ -61,21 +61,21 @@ async def upload(
     """
     name, compressed = name_of(file.filename)
     stored, new = await _stored(
-        doors, caller.owner, file, name, compressed, InspectionRequest(tuple(inputs), output, dt)
+        state, caller.owner, file, name, compressed, InspectionRequest(tuple(inputs), output, dt)
     )
-    doors.metrics.received.inc(stored.bytes if new else 0)
+    state.metrics.received.inc(stored.bytes if new else 0)
     headers = {"Location": f"{router.prefix}/{stored.id}"}
     return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
 
 
 async def _stored(
-    doors: AppState, owner: str, file: UploadFile, name: str, compressed: bool, asked: InspectionRequest
+    state: AppState, owner: str, file: UploadFile, name: str, compressed: bool, asked: InspectionRequest
 ) -> tuple[StoredDataset, bool]:
-    settings = doors.settings
-    with doors.blobs.receiving() as stream:
+    settings = state.settings
+    with state.blobs.receiving() as stream:
         # A few at a time: a small file may unpack to a thousand times its size.
-        async with doors.inspection_slots:
-            size, blob = await doors.run_blocking(
+        async with state.inspection_slots:
+            size, blob = await state.run_blocking(
                 receive, file.file, stream, name, compressed, settings.max_unpacked
             )
             with link_blob(Path(stream.name), name) as path:
@@ -83,34 +83,34 @@ async def _stored(
                     path, asked, settings.inspection_memory, settings.inspection_seconds
                 )
             suffix = Path(name).suffix.lower()
-            await doors.run_blocking(
-                doors.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored
+            await state.run_blocking(
+                state.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored
             )
             # What was refused until here is gone with the block.
-            await doors.run_blocking(doors.blobs.keep, stream)
-    return await doors.run_blocking(
-        doors.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored
+            await state.run_blocking(state.blobs.keep, stream)
+    return await state.run_blocking(
+        state.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored
     )
 
 
 @router.get("", response_model=DatasetPage)
-async def datasets(caller: Reader, doors: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
+async def datasets(caller: Reader, state: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
     """List the data sets, newest first."""
-    found, after = await doors.run_blocking(
-        doors.store.datasets.page, caller.owner, decode_cursor(cursor), limit
+    found, after = await state.run_blocking(
+        state.store.datasets.page, caller.owner, decode_cursor(cursor), limit
     )
     return JSONDocument({"items": [dataset_document(each) for each in found], "next": encode_cursor(after)})
 
 
 @router.get("/{dataset}", response_model=DatasetView)
-async def dataset(dataset: Id, caller: Reader, doors: AppStateDep) -> Any:
+async def dataset(dataset: Id, caller: Reader, state: AppStateDep) -> Any:
     """Look at a data set: columns, units, statistics, sampling, warnings."""
     return JSONDocument(
-        dataset_document(await doors.run_blocking(doors.store.datasets.get, caller.owner, dataset))
+        dataset_document(await state.run_blocking(state.store.datasets.get, caller.owner, dataset))
     )
 
 
 @router.delete("/{dataset}", status_code=204)
-async def delete(dataset: Id, caller: Writer, doors: AppStateDep) -> None:
+async def delete(dataset: Id, caller: Writer, state: AppStateDep) -> None:
     """Delete a data set that no unfinished job needs."""
-    await doors.run_blocking(doors.store.datasets.delete, caller.owner, dataset)
+    await state.run_blocking(state.store.datasets.delete, caller.owner, dataset)

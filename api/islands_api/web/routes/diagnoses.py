@@ -25,24 +25,24 @@ router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSON
 
 @router.post("/v1/discrepancies", status_code=202, response_model=JobView, responses=ACCEPTED)
 async def submit(
-    request: DiscrepancyRequest, caller: Writer, doors: AppStateDep, idempotency_key: IdempotencyKey = None
+    request: DiscrepancyRequest, caller: Writer, state: AppStateDep, idempotency_key: IdempotencyKey = None
 ) -> Any:
     """Submit a job that finds out what a simulation gets wrong about a record, and why.
 
     It is a job as all others are, under `/v1/jobs`: followed, cancelled and resumed there. Its `result` is
     what the command line writes as `discrepancy.json`, its `report` says it in words and figures.
     """
-    return await submit_job(doors, caller, request, DISCREPANCY, idempotency_key)
+    return await submit_job(state, caller, request, DISCREPANCY, idempotency_key)
 
 
 @router.get(JOBS + "/{job}/extended", response_model=dict[str, Any])
-async def extended(job: Id, caller: Reader, doors: AppStateDep) -> Response:
+async def extended(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Take the simulation with the effects that it lacked; there is none where nothing was named."""
-    found = await get_job_of_kind(doors, caller, job, DISCREPANCY)
-    document = await get_result(doors, found)
-    blob = await doors.run_blocking(doors.store.results.artefact, job, EXTENDED)
+    found = await get_job_of_kind(state, caller, job, DISCREPANCY)
+    document = await get_result(state, found)
+    blob = await state.run_blocking(state.store.results.artefact, job, EXTENDED)
     if blob is None:
         raise ResourceNotFoundError(
             f"job {job} has nothing to extend the simulation by: it found {document['verdict']}"
         )
-    return Response(await doors.run_blocking(doors.blobs.read, blob), media_type="application/json")
+    return Response(await state.run_blocking(state.blobs.read, blob), media_type="application/json")

@@ -51,28 +51,28 @@ async def events(
     request: Request,
     job: Id,
     caller: Reader,
-    doors: AppStateDep,
+    state: AppStateDep,
     last_event_id: Annotated[
         int, Header(ge=0, le=2**62, description="The last event that was seen: what came after it is sent.")
     ] = 0,
 ) -> Response:
     """Follow a job until it has ended; who is cut off comes back with `Last-Event-ID`."""
-    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
+    found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     if found.state in TERMINAL and last_event_id >= found.version:
         # A browser's event source comes back after every end but this one.
         return Response(status_code=204)
     # The framework's own event response makes a model of every event for every client; five hundred watch.
     return StreamingResponse(
         # Nobody has seen what has not happened yet: who says so would wait for ever.
-        _while_open(request.app.state.keys, caller, _stream(doors, found, min(last_event_id, found.version))),
+        _while_open(request.app.state.keys, caller, _stream(state, found, min(last_event_id, found.version))),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
 
 
-async def _stream(doors: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:
-    with doors.metrics.streams.track_inprogress():
-        async with aclosing(doors.hub.events(job.id, job.version, last, _ALIVE)) as events:
+async def _stream(state: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:
+    with state.metrics.streams.track_inprogress():
+        async with aclosing(state.hub.events(job.id, job.version, last, _ALIVE)) as events:
             async for event in events:
                 yield b": alive\n\n" if event is None else _encoded(event)
 

@@ -103,53 +103,53 @@ _FAILURES = FigureFailures()
 
 
 @router.get("/{job}/figures", response_model=Names)
-async def search_figures(job: Id, caller: Reader, doors: AppStateDep) -> Any:
+async def search_figures(job: Id, caller: Reader, state: AppStateDep) -> Any:
     """Say which figures of the search there may be."""
-    return {"items": await _of_search(doors, caller, job)}
+    return {"items": await _of_search(state, caller, job)}
 
 
 @router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG)
-async def search_figure(job: Id, figure: SearchFigure, caller: Reader, doors: AppStateDep) -> Response:
+async def search_figure(job: Id, figure: SearchFigure, caller: Reader, state: AppStateDep) -> Response:
     """See a figure of the search: the record, error against size, convergence, the islands' course."""
-    _known(figure, await _of_search(doors, caller, job))
-    return await _figure(doors, caller, job, f"{figure}.svg", None)
+    _known(figure, await _of_search(state, caller, job))
+    return await _figure(state, caller, job, f"{figure}.svg", None)
 
 
 @router.get("/{job}/models/{rank}/figures", response_model=Names)
-async def model_figures(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) -> Any:
+async def model_figures(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
     """Say which figures of a model there are."""
-    await stored(doors, caller, job, rank)
+    await stored(state, caller, job, rank)
     return {"items": MODEL_FIGURES}
 
 
 @router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG)
 async def model_figure(
-    job: Id, rank: Rank, figure: ModelFigure, caller: Reader, doors: AppStateDep
+    job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
 ) -> Response:
     """See a figure of a model: free run, hysteresis loop, holds, residual correlations."""
-    await stored(doors, caller, job, rank)
+    await stored(state, caller, job, rank)
     _known(figure, MODEL_FIGURES)
-    return await _figure(doors, caller, job, f"{rank}/{figure}.svg", rank)
+    return await _figure(state, caller, job, f"{rank}/{figure}.svg", rank)
 
 
 @router.get("/{job}/models/{rank}/simulation", response_model=dict[str, Any])
-async def simulation(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) -> Response:
+async def simulation(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Response:
     """Take a model's free run over the validation data as numbers, thinned for a screen."""
-    await stored(doors, caller, job, rank)
-    return await _figure(doors, caller, job, f"{rank}/{SIMULATION}", rank, "application/json")
+    await stored(state, caller, job, rank)
+    return await _figure(state, caller, job, f"{rank}/{SIMULATION}", rank, "application/json")
 
 
 @router.get("/{job}/report", response_class=Response, responses=_HTML)
-async def report(job: Id, caller: Reader, doors: AppStateDep) -> Response:
+async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
     """Take the report of a job: one HTML file with what it found and its figures, to be kept or sent."""
-    await get_result(doors, await doors.run_blocking(doors.store.jobs.get, caller.owner, job))
-    answer = await _figure(doors, caller, job, REPORT, None, "text/html; charset=utf-8")
+    await get_result(state, await state.run_blocking(state.store.jobs.get, caller.owner, job))
+    answer = await _figure(state, caller, job, REPORT, None, "text/html; charset=utf-8")
     answer.headers["Content-Security-Policy"] = _REPORT_POLICY
     return answer
 
 
-async def _of_search(doors: AppState, caller: Principal, job: str) -> tuple[str, ...]:
-    document = await get_result(doors, await get_job_of_kind(doors, caller, job, IDENTIFICATION))
+async def _of_search(state: AppState, caller: Principal, job: str) -> tuple[str, ...]:
+    document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
     several = document["settings"]["islands"] > 1
     return tuple(name for name in SEARCH_FIGURES if several or name != _OF_SEVERAL)
 
@@ -160,43 +160,43 @@ def _known(figure: str, figures: tuple[str, ...]) -> None:
 
 
 async def _figure(
-    doors: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
+    state: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
 ) -> Response:
-    blob = await doors.run_blocking(doors.store.results.artefact, job, name)
+    blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
-        async with doors.figure_slots:
+        async with state.figure_slots:
             # Somebody else may have had it drawn while we waited for our turn.
-            blob = await doors.run_blocking(doors.store.results.artefact, job, name)
+            blob = await state.run_blocking(state.store.results.artefact, job, name)
             if blob is None:
-                await _draw(doors, caller, job, rank)
-                blob = await doors.run_blocking(doors.store.results.artefact, job, name)
+                await _draw(state, caller, job, rank)
+                blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
         raise ResourceNotFoundError(f"job {job} has no figure {name}")
-    data = await doors.run_blocking(doors.blobs.read, blob)
+    data = await state.run_blocking(state.blobs.read, blob)
     # A browser may have several keys, one after the other.
     headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization"}
     return Response(data, media_type=media, headers=headers)
 
 
-async def _draw(doors: AppState, caller: Principal, job: str, rank: int | None) -> None:
-    found = await get_job_of_kind(doors, caller, job, IDENTIFICATION)
+async def _draw(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
+    found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     for dataset in identification_of(found.spec).datasets:
-        await doors.run_blocking(doors.store.datasets.get, caller.owner, dataset)  # it may have been deleted
+        await state.run_blocking(state.store.datasets.get, caller.owner, dataset)  # it may have been deleted
     _FAILURES.refuse(job, rank)
     try:
-        await _drawn(doors, caller, job, rank)
+        await _drawn(state, caller, job, rank)
     except (FigureError, BlobNotFoundError) as error:
         _FAILURES.remember(job, rank, error)
         raise
 
 
-async def _drawn(doors: AppState, caller: Principal, job: str, rank: int | None) -> None:
+async def _drawn(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
     of = () if rank is None else ("--rank", str(rank))
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "islands_service.reports.figure_worker", job, f"--owner={caller.owner}", *of),
         stdout=PIPE,
         stderr=PIPE,
-        env=doors.settings.environment(),
+        env=state.settings.environment(),
     )
     try:
         async with asyncio.timeout(_PATIENCE):

@@ -37,25 +37,27 @@ _POINTS, _FEWEST, _ERRORS = 5000, 50, 100_000
 
 @router.post("", status_code=202, response_model=JobView, responses=ACCEPTED)
 async def submit(
-    request: JobRequest, caller: Writer, doors: AppStateDep, idempotency_key: IdempotencyKey = None
+    request: JobRequest, caller: Writer, state: AppStateDep, idempotency_key: IdempotencyKey = None
 ) -> Any:
     """Submit a job that identifies a record. Once this answers 202 it is not lost, whatever happens.
 
     It waits until a coordinator is free; follow it by its `events`, or by `GET` with `wait`.
     """
-    return await submit_job(doors, caller, request, IDENTIFICATION, idempotency_key)
+    return await submit_job(state, caller, request, IDENTIFICATION, idempotency_key)
 
 
 @router.get("", response_model=JobPage)
 async def jobs(
     caller: Reader,
-    doors: AppStateDep,
-    state: Annotated[JobState | None, Query(description="Of this state alone.")] = None,
+    state: AppStateDep,
+    job_state: Annotated[JobState | None, Query(alias="state", description="Of this state alone.")] = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:
     """List the jobs of every kind, newest first."""
-    page = await doors.run_blocking(doors.store.jobs.page, caller.owner, state, decode_cursor(cursor), limit)
+    page = await state.run_blocking(
+        state.store.jobs.page, caller.owner, job_state, decode_cursor(cursor), limit
+    )
     return JSONDocument(
         {"items": [job_document(job) for job in page.jobs], "next": encode_cursor(page.after)}
     )
@@ -65,7 +67,7 @@ async def jobs(
 async def job(
     job: Id,
     caller: Reader,
-    doors: AppStateDep,
+    state: AppStateDep,
     wait: Annotated[
         float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
     ] = 0.0,
@@ -74,9 +76,9 @@ async def job(
     ] = None,
 ) -> Any:
     """Look at a job. With `If-None-Match` the answer is 304 as long as nothing has changed."""
-    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
+    found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     if wait and _known(if_none_match, found) and found.state not in TERMINAL:
-        found = await _changed(doors, found, wait)
+        found = await _changed(state, found, wait)
     headers = {"ETag": etag(found), "Cache-Control": "private, no-cache"}
     if found.state not in TERMINAL:
         headers["Retry-After"] = "1"
@@ -86,31 +88,31 @@ async def job(
 
 
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
-async def cancel(job: Id, caller: Writer, doors: AppStateDep) -> Any:
+async def cancel(job: Id, caller: Writer, state: AppStateDep) -> Any:
     """Cancel a job: at once if it waits; if it runs, within a second or so."""
     return JSONDocument(
-        job_document(await doors.run_blocking(doors.store.jobs.cancel, caller.owner, job)), 202
+        job_document(await state.run_blocking(state.store.jobs.cancel, caller.owner, job)), 202
     )
 
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
-async def resume(job: Id, caller: Writer, doors: AppStateDep) -> Any:
+async def resume(job: Id, caller: Writer, state: AppStateDep) -> Any:
     """Have a job that failed or was cancelled go on from its last checkpoint."""
-    resumed = await doors.run_blocking(doors.store.jobs.resume, caller.owner, job, doors.settings.max_active)
+    resumed = await state.run_blocking(state.store.jobs.resume, caller.owner, job, state.settings.max_active)
     return JSONDocument(job_document(resumed), 202)
 
 
 @router.delete("/{job}", status_code=204)
-async def delete(job: Id, caller: Writer, doors: AppStateDep) -> None:
+async def delete(job: Id, caller: Writer, state: AppStateDep) -> None:
     """Delete a finished job with its result."""
-    await doors.run_blocking(doors.store.jobs.delete, caller.owner, job)
+    await state.run_blocking(state.store.jobs.delete, caller.owner, job)
 
 
 @router.get("/{job}/history", response_model=HistoryPage)
 async def history(
     job: Id,
     caller: Reader,
-    doors: AppStateDep,
+    state: AppStateDep,
     after: Annotated[
         int, Query(ge=-1, le=2**31 - 1, description="From the generation behind this one on.")
     ] = -1,
@@ -119,22 +121,22 @@ async def history(
 
     It comes in pages: ask for what is behind the last generation of one, until a page is empty.
     """
-    found = await get_job_of_kind(doors, caller, job, IDENTIFICATION)
-    return await doors.run_blocking(_course, doors, found, after)
+    found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
+    return await state.run_blocking(_course, state, found, after)
 
 
-def _course(doors: AppState, job: Job, after: int) -> JSONItems:
+def _course(state: AppState, job: Job, after: int) -> JSONItems:
     islands = (job.spec.get("settings") or {}).get("islands") or 1
     most = min(_POINTS, max(_FEWEST, _ERRORS // islands))
     names = ("generation", "evaluations", "best", "islands")
-    points = doors.store.results.history(job.id, after, most)
+    points = state.store.results.history(job.id, after, most)
     return JSONItems([dict(zip(names, point, strict=True)) for point in points])
 
 
-async def _changed(doors: AppState, job: Job, seconds: float) -> Job:
-    with doors.hub.subscribe(job.id, job.version) as feed:
-        await doors.hub.wait(feed, job.version, seconds)
-    return await doors.run_blocking(doors.store.jobs.get, job.owner, job.id)
+async def _changed(state: AppState, job: Job, seconds: float) -> Job:
+    with state.hub.subscribe(job.id, job.version) as feed:
+        await state.hub.wait(feed, job.version, seconds)
+    return await state.run_blocking(state.store.jobs.get, job.owner, job.id)
 
 
 def _known(given: str | None, job: Job) -> bool:

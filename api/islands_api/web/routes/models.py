@@ -38,18 +38,18 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/{job}/models", response_model=ModelPage)
-async def models(job: Id, caller: Reader, doors: AppStateDep) -> Any:
+async def models(job: Id, caller: Reader, state: AppStateDep) -> Any:
     """Look at the models of a job, best first; there are none before it has succeeded."""
-    await get_job_of_kind(doors, caller, job, IDENTIFICATION)
-    return await doors.run_blocking(
-        lambda: JSONItems([model.document for model in doors.store.results.models(job)])
+    await get_job_of_kind(state, caller, job, IDENTIFICATION)
+    return await state.run_blocking(
+        lambda: JSONItems([model.document for model in state.store.results.models(job)])
     )
 
 
 @router.get("/{job}/models/{rank}", response_model=ModelView)
-async def model(job: Id, rank: Rank, caller: Reader, doors: AppStateDep) -> Any:
+async def model(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
     """Look at one model."""
-    return JSONDocument((await stored(doors, caller, job, rank)).document)
+    return JSONDocument((await stored(state, caller, job, rank)).document)
 
 
 @router.get(
@@ -61,14 +61,14 @@ async def exported(
     job: Id,
     rank: Rank,
     caller: Reader,
-    doors: AppStateDep,
+    state: AppStateDep,
     form: Annotated[
         str, Query(alias="format", description="A kind of text.", json_schema_extra={"enum": list(EXPORTS)})
     ] = "python",
 ) -> Response:
     """Take a model with you: as Python, C, MATLAB, an equation, or a model file."""
-    found = await stored(doors, caller, job, rank)
-    text = await doors.run_blocking(export, model_from_json(found.file, f"model {rank}"), form)
+    found = await stored(state, caller, job, rank)
+    text = await state.run_blocking(export, model_from_json(found.file, f"model {rank}"), form)
     name = f"model-{rank:02d}.{_ENDS.get(form, 'txt')}"
     return Response(
         text,
@@ -78,25 +78,25 @@ async def exported(
 
 
 @router.get("/{job}/result", response_model=dict[str, Any])
-async def result(job: Id, caller: Reader, doors: AppStateDep) -> Any:
+async def result(job: Id, caller: Reader, state: AppStateDep) -> Any:
     """Take the whole result, in the form of `result.json`, or of `discrepancy.json`."""
-    found = await doors.run_blocking(doors.store.jobs.get, caller.owner, job)
-    document = await get_result(doors, found)
+    found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
+    document = await get_result(state, found)
     if found.kind != IDENTIFICATION:
         return JSONDocument(document)
-    models = await doors.run_blocking(doors.store.results.models, job)
+    models = await state.run_blocking(state.store.results.models, job)
     return JSONDocument({**document, "models": [model.document for model in models]})
 
 
-async def stored(doors: AppState, caller: Principal, job: str, rank: int) -> StoredModel:
+async def stored(state: AppState, caller: Principal, job: str, rank: int) -> StoredModel:
     """Return a model of a finished job.
 
     Raises
     ------
     ResultNotReadyError, ResourceNotFoundError
     """
-    await get_result(doors, await get_job_of_kind(doors, caller, job, IDENTIFICATION))
-    found = await doors.run_blocking(doors.store.results.models, job, rank)
+    await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
+    found = await state.run_blocking(state.store.results.models, job, rank)
     if not found:
         raise ResourceNotFoundError(f"job {job} has no model {rank}: look at its /models")
     return found[0]

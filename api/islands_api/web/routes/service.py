@@ -20,9 +20,9 @@ async def healthz() -> Any:
 
 
 @router.get("/readyz", response_model=Health)
-async def readyz(doors: AppStateDep) -> Any:
+async def readyz(state: AppStateDep) -> Any:
     """Say that jobs are accepted: the database answers. Ray may still be starting."""
-    await doors.run_blocking(doors.store.jobs.versions, [])
+    await state.run_blocking(state.store.jobs.versions, [])
     return {"status": "ready"}
 
 
@@ -31,9 +31,9 @@ async def readyz(doors: AppStateDep) -> Any:
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
-async def metrics(_operator: Operator, doors: AppStateDep) -> Response:
+async def metrics(_operator: Operator, state: AppStateDep) -> Response:
     """Measure, for Prometheus: queue, leases, evaluations a second, best error, latency."""
-    return Response(await doors.run_blocking(doors.metrics.page), media_type=CONTENT_TYPE_LATEST)
+    return Response(await state.run_blocking(state.metrics.page), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/problems/{kind}", response_model=dict[str, Any])

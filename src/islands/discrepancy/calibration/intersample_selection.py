@@ -22,13 +22,13 @@ BETTER = 10.0
 
 def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
     """Return the core of a fit, solved as the record asks for it."""
-    core = fit.simulation.simulator
-    if not core.is_continuous_time:
-        return core
+    simulator = fit.simulation.simulator
+    if not simulator.is_continuous_time:
+        return simulator
     inner, now = (
-        (core.simulator, core.intersample)
-        if isinstance(core, ResampledSimulator)
-        else (core, InterSample.FOH)
+        (simulator.simulator, simulator.intersample)
+        if isinstance(simulator, ResampledSimulator)
+        else (simulator, InterSample.FOH)
     )
     held = {}
     for hold in (now, *(each for each in InterSample if each != now)):
@@ -44,16 +44,16 @@ def same_discretisation(one: Simulator, other: Simulator) -> bool:
     return _way(one) == _way(other)
 
 
-def _way(core: Simulator) -> tuple[InterSample, int]:
+def _way(simulator: Simulator) -> tuple[InterSample, int]:
     return (
-        (core.intersample, core.oversampling)
-        if isinstance(core, ResampledSimulator)
+        (simulator.intersample, simulator.oversampling)
+        if isinstance(simulator, ResampledSimulator)
         else (InterSample.FOH, 1)
     )
 
 
-def _solved(simulation: ExtendedSimulator, core: Simulator) -> ExtendedSimulator:
-    return replace(simulation, simulator=core)
+def _solved(simulation: ExtendedSimulator, simulator: Simulator) -> ExtendedSimulator:
+    return replace(simulation, simulator=simulator)
 
 
 def _fine_enough(inner: Simulator, hold: InterSample, fit: CalibrationResult) -> Simulator:

@@ -33,8 +33,8 @@ class Target:
         Relative standard deviations of the core's parameters about their nominal values; who is not named is
         free.
     effective_samples : float or None
-        How many samples that know nothing of each other the ones estimation_part are worth, where what is left is the
-        simulation's misfit and no noise; None takes it as noise that may remember.
+        Effective sample size of the estimation part if the residual is model error; None if it is noise,
+        white or coloured.
     """
 
     y: Signal

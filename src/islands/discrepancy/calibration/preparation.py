@@ -22,8 +22,8 @@ FEWEST = 200
 
 
 def select_effects(
-    core: Simulator,
-    scene: SimulationContext,
+    simulator: Simulator,
+    context: SimulationContext,
     tolerance: Mapping[str, float],
     catalogue: Sequence[Effect] = EFFECTS,
 ) -> list[Effect]:
@@ -39,26 +39,28 @@ def select_effects(
         raise SettingsError(
             f"effects need different names, and {', '.join(twice)} is given twice: rename one"
         )
-    trusted = {each.name for each in core.parameters if not each.initial} <= tolerance.keys()
+    trusted = {each.name for each in simulator.parameters if not each.initial} <= tolerance.keys()
     effects = [
         effect
         for effect in catalogue
-        if effect.site in core.sites
-        and (effect.site != Site.CORE or effect.name in core.supported_effects)
-        and effect.name not in core.built_in_effects
+        if effect.site in simulator.sites
+        and (effect.site != Site.CORE or effect.name in simulator.supported_effects)
+        and effect.name not in simulator.built_in_effects
         and (trusted or not effect.is_gain)
-        and effect.is_applicable(scene)
+        and effect.is_applicable(context)
     ]
-    effects += core.state_effects
-    return effects + [wrong_parameter(each) for each in core.parameters if each.name in tolerance]
+    effects += simulator.state_effects
+    return effects + [wrong_parameter(each) for each in simulator.parameters if each.name in tolerance]
 
 
-def validate_prior(tolerance: Mapping[str, float], core: Simulator) -> Mapping[str, float]:
+def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapping[str, float]:
     """Return tolerances, once it is known that the simulation has such parameters."""
-    names = [parameter.name for parameter in core.parameters]
+    names = [parameter.name for parameter in simulator.parameters]
     for name, value in tolerance.items():
         if name not in names:
-            raise SettingsError(f"{core.name} has no parameter {name!r}: it has {', '.join(names) or 'none'}")
+            raise SettingsError(
+                f"{simulator.name} has no parameter {name!r}: it has {', '.join(names) or 'none'}"
+            )
         if not 0.0 < value < 1.0:
             raise SettingsError(f"the tolerance of {name} is a part of its value, like 0.02; got {value:g}")
     return dict(tolerance)
@@ -90,10 +92,10 @@ def count_fitted_samples(record: Dataset) -> int:
     return fitted
 
 
-def make_context(record: Dataset, core: Simulator, fitted: int) -> SimulationContext:
+def make_context(record: Dataset, simulator: Simulator, fitted: int) -> SimulationContext:
     """Return what drives a simulation, and the scales of a record."""
     names, units = record.input_names, record.input_units
-    scene = SimulationContext(
+    context = SimulationContext(
         u=np.ascontiguousarray(record.u[:, 0]),
         dt=record.dt,
         channels={
@@ -106,12 +108,12 @@ def make_context(record: Dataset, core: Simulator, fitted: int) -> SimulationCon
         output_unit=record.output_unit or "1",
         fit_end_time=fitted * record.dt,
     )
-    simulation = ExtendedSimulator(core, (), scene)
+    simulation = ExtendedSimulator(simulator, (), context)
     nominal = simulation.simulate(simulation.nominal)
     if not np.isfinite(nominal).all():
         raise RecordError(
-            f"the simulation {core.name} diverges on this input: check its parameters, its units and the "
-            "sampling time"
+            f"the simulation {simulator.name} diverges on this input: check its parameters, its units and "
+            "the sampling time"
         )
-    scaled = replace(scene, output_peak=peak_amplitude(nominal))
-    return replace(scaled, force_coordinate=core.make_force_coordinate(scaled, nominal))
+    scaled = replace(context, output_peak=peak_amplitude(nominal))
+    return replace(scaled, force_coordinate=simulator.make_force_coordinate(scaled, nominal))

@@ -10,12 +10,12 @@ def _offset_form(y: Signal, values: Signal, _scene: SimulationContext) -> Signal
     return y + values[0]
 
 
-def _offset_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
+def _offset_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
 
 
-def _offset_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * scene.output_peak,),)
+def _offset_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * context.output_peak,),)
 
 
 OFFSET = Effect(
@@ -34,11 +34,11 @@ def input_offset(state: str) -> Effect:
     """Return the effect on one state, in the unit of the input."""
     label = f"{INPUT_OFFSET.name}:{state}"
 
-    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, scene.input_unit, 0.0, 0.01 * scene.input_peak),)
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        return (Parameter(label, context.input_unit, 0.0, 0.01 * context.input_peak),)
 
-    def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return ((0.02 * scene.input_peak,),)
+    def grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return ((0.02 * context.input_peak,),)
 
     return Effect(
         name=label,
@@ -59,16 +59,16 @@ INPUT_OFFSET = EffectTemplate(
 )
 
 
-def _linear_drift_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return y + values[0] * scene.time / scene.duration
+def _linear_drift_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * context.time / context.duration
 
 
-def _linear_drift_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),)
+def _linear_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
 
 
-def _linear_drift_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * scene.output_peak,),)
+def _linear_drift_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * context.output_peak,),)
 
 
 LINEAR_DRIFT = Effect(
@@ -83,19 +83,19 @@ LINEAR_DRIFT = Effect(
 )
 
 
-def _jump_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return y + values[0] * smooth_step(scene, values[1])
+def _jump_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * smooth_step(context, values[1])
 
 
-def _jump_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _jump_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("c", scene.output_unit, 0.0, 0.01 * scene.output_peak),
-        Parameter("instant", "s", 0.0, 0.3 * scene.fit_end_time / 45, *instant_bounds(scene)),
+        Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),
+        Parameter("instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
     )
 
 
-def _jump_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02 * scene.output_peak, instant) for instant in instant_grid(scene))
+def _jump_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02 * context.output_peak, instant) for instant in instant_grid(context))
 
 
 JUMP = Effect(
@@ -111,23 +111,23 @@ JUMP = Effect(
 )
 
 
-def _thermal_drift_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return y + values[0] * channel(scene, True)
+def _thermal_drift_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * channel(context, True)
 
 
-def _thermal_drift_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _thermal_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "k",
-            f"{scene.output_unit}/{channel_unit(scene, True)}",
+            f"{context.output_unit}/{channel_unit(context, True)}",
             0.0,
-            0.01 * scene.output_peak / spread(scene, True),
+            0.01 * context.output_peak / spread(context, True),
         ),
     )
 
 
-def _thermal_drift_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.output_peak / spread(scene, True),),)
+def _thermal_drift_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.output_peak / spread(context, True),),)
 
 
 THERMAL_DRIFT = Effect(
@@ -139,5 +139,5 @@ THERMAL_DRIFT = Effect(
     starting_points=_thermal_drift_grid,
     form=_thermal_drift_form,
     source="Doebelin, Measurement Systems, section 2",
-    is_applicable=lambda scene: has_channel(scene, True),
+    is_applicable=lambda context: has_channel(context, True),
 )

@@ -7,19 +7,19 @@ from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 
-def _exponential_creep_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return y + values[0] * (low_pass(y, float(np.exp(values[1])), scene.dt) - y[0])
+def _exponential_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * (low_pass(y, float(np.exp(values[1])), context.dt) - y[0])
 
 
-def _exponential_creep_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("kappa", "", 0.0, 0.02, -0.5, 1.0),
-        Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * scene.dt), np.log(1.5 * scene.fit_end_time)),
+        Parameter("log_tau", "ln s", 0.0, 0.3, np.log(5 * context.dt), np.log(1.5 * context.fit_end_time)),
     )
 
 
-def _exponential_creep_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    taus = (max(part * scene.fit_end_time, 6 * scene.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
+def _exponential_creep_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    taus = (max(part * context.fit_end_time, 6 * context.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
     return tuple((0.03, float(np.log(tau))) for tau in taus)
 
 
@@ -38,8 +38,8 @@ EXPONENTIAL_CREEP = Effect(
 TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 
-def _logarithmic_creep_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return y + values[0] * sum(low_pass(y, tau, scene.dt) - y[0] for tau in TAUS)
+def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * sum(low_pass(y, tau, context.dt) - y[0] for tau in TAUS)
 
 
 def _logarithmic_creep_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:

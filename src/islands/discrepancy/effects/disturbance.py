@@ -7,23 +7,23 @@ from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 
-def _cross_coupling_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return y + values[0] * channel(scene, False)
+def _cross_coupling_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return y + values[0] * channel(context, False)
 
 
-def _cross_coupling_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _cross_coupling_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "k",
-            f"{scene.output_unit}/{channel_unit(scene, False)}",
+            f"{context.output_unit}/{channel_unit(context, False)}",
             0.0,
-            0.01 * scene.output_peak / spread(scene, False),
+            0.01 * context.output_peak / spread(context, False),
         ),
     )
 
 
-def _cross_coupling_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.output_peak / spread(scene, False),),)
+def _cross_coupling_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.output_peak / spread(context, False),),)
 
 
 CROSS_COUPLING = Effect(
@@ -35,34 +35,34 @@ CROSS_COUPLING = Effect(
     starting_points=_cross_coupling_grid,
     form=_cross_coupling_form,
     source="Ljung, System Identification, 2nd ed., section 13",
-    is_applicable=lambda scene: has_channel(scene, False),
+    is_applicable=lambda context: has_channel(context, False),
 )
 
 
-def _periodic_disturbance_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    angle = 2 * np.pi * values[2] * scene.time
+def _periodic_disturbance_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    angle = 2 * np.pi * values[2] * context.time
     return y + values[0] * np.cos(angle) + values[1] * np.sin(angle)
 
 
-def _periodic_disturbance_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("cosine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
-        Parameter("sine", scene.output_unit, 0.0, 0.005 * scene.output_peak),
+        Parameter("cosine", context.output_unit, 0.0, 0.005 * context.output_peak),
+        Parameter("sine", context.output_unit, 0.0, 0.005 * context.output_peak),
         Parameter(
-            "frequency", "Hz", 0.0, 0.1 / scene.fit_end_time, 2.0 / scene.fit_end_time, 0.499 / scene.dt
+            "frequency", "Hz", 0.0, 0.1 / context.fit_end_time, 2.0 / context.fit_end_time, 0.499 / context.dt
         ),
     )
 
 
-def _periodic_disturbance_grid(scene: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _periodic_disturbance_grid(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
     # The strongest line of what is left, between the samples of its spectrum.
-    fitted = int(scene.fit_end_time / scene.dt)
+    fitted = int(context.fit_end_time / context.dt)
     seen = residual[:fitted] * np.hanning(fitted)
     spectrum = np.abs(np.fft.rfft(seen, 4 * fitted))
-    frequencies = np.fft.rfftfreq(4 * fitted, scene.dt)
-    spectrum[frequencies < 2.0 / scene.fit_end_time] = 0.0
+    frequencies = np.fft.rfftfreq(4 * fitted, context.dt)
+    spectrum[frequencies < 2.0 / context.fit_end_time] = 0.0
     strongest = float(frequencies[np.argmax(spectrum)])
-    angle = 2 * np.pi * strongest * scene.time[:fitted]
+    angle = 2 * np.pi * strongest * context.time[:fitted]
     waves = np.column_stack([np.cos(angle), np.sin(angle)])
     cosine, sine = np.linalg.lstsq(waves, residual[:fitted], rcond=None)[0]
     return ((float(cosine), float(sine), strongest),)

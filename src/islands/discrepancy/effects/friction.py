@@ -12,17 +12,17 @@ def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> 
     return numbers[0] * tanh(rate / numbers[1])
 
 
-def _coulomb_friction_turning(scene: SimulationContext) -> tuple[float, ...]:
-    return (scene.force_coordinate.friction_smoothing * scene.force_coordinate.rate,)
+def _coulomb_friction_turning(context: SimulationContext) -> tuple[float, ...]:
+    return (context.force_coordinate.friction_smoothing * context.force_coordinate.rate,)
 
 
-def _coulomb_friction_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _coulomb_friction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.lower_bound),)
 
 
-def _coulomb_friction_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.01 * scene.force_coordinate.force,),)
+def _coulomb_friction_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.01 * context.force_coordinate.force,),)
 
 
 COULOMB_FRICTION = Effect(
@@ -41,8 +41,8 @@ def _viscous_force(_x: float, rate: float, _z: float, c: Any) -> float:
     return c[0] * rate
 
 
-def _viscous_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _viscous_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     return (
         Parameter(
             "c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate, frame.lower_bound
@@ -50,8 +50,8 @@ def _viscous_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _viscous_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.rate,),)
+def _viscous_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate,),)
 
 
 VISCOUS = Effect(
@@ -70,8 +70,8 @@ def _viscous_asymmetry_force(_x: float, rate: float, _z: float, c: Any) -> float
     return c[0] * abs(rate)
 
 
-def _viscous_asymmetry_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _viscous_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
 
 
@@ -91,14 +91,14 @@ def _quadratic_drag_force(_x: float, rate: float, _z: float, c: Any) -> float:
     return c[0] * abs(rate) * rate
 
 
-def _quadratic_drag_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _quadratic_drag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     unit = f"{frame.force_unit} s^2/{frame.unit}^2"
     return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.lower_bound),)
 
 
-def _quadratic_drag_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.rate**2,),)
+def _quadratic_drag_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate**2,),)
 
 
 QUADRATIC_DRAG = Effect(

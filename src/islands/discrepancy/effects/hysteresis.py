@@ -17,15 +17,17 @@ def _stiction_form(u: Signal, values: Signal, _scene: SimulationContext) -> Sign
     return moved
 
 
-def _stiction_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _stiction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("breakaway", scene.input_unit, 0.0, 0.005 * scene.input_peak, 0.0, 0.3 * scene.input_peak),
+        Parameter(
+            "breakaway", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak
+        ),
     )
 
 
-def _stiction_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _stiction_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     # It changes by leaps, so that no derivative leads to the best one: a fine grid has to.
-    return tuple((float(part) * scene.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
+    return tuple((float(part) * context.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
 
 
 STICTION = Effect(
@@ -45,12 +47,14 @@ def _backlash_form(u: Signal, values: Signal, _scene: SimulationContext) -> Sign
     return play_from(u, values[0]) if values[0] > 0.0 else u
 
 
-def _backlash_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("b", scene.input_unit, 0.0, 0.005 * scene.input_peak, 0.0, 0.3 * scene.input_peak),)
+def _backlash_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (
+        Parameter("b", context.input_unit, 0.0, 0.005 * context.input_peak, 0.0, 0.3 * context.input_peak),
+    )
 
 
-def _backlash_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * scene.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
+def _backlash_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * context.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
 
 
 BACKLASH = Effect(
@@ -86,21 +90,21 @@ RELAXATION = Effect(
 )
 
 
-def _rate_dependent_loop_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _rate_dependent_loop_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "rate-dependent-loop",
-            f"s/{scene.input_unit}",
+            f"s/{context.input_unit}",
             0.0,
-            0.05 / scene.force_coordinate.rate,
-            -0.6 / scene.force_coordinate.rate,
-            5.0 / scene.force_coordinate.rate,
+            0.05 / context.force_coordinate.rate,
+            -0.6 / context.force_coordinate.rate,
+            5.0 / context.force_coordinate.rate,
         ),
     )
 
 
-def _rate_dependent_loop_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.1 / scene.force_coordinate.rate,),)
+def _rate_dependent_loop_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.1 / context.force_coordinate.rate,),)
 
 
 RATE_DEPENDENT_LOOP = Effect(
@@ -115,21 +119,21 @@ RATE_DEPENDENT_LOOP = Effect(
 )
 
 
-def _loop_asymmetry_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _loop_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "loop-asymmetry",
-            f"1/{scene.input_unit}",
+            f"1/{context.input_unit}",
             0.0,
-            0.02 / scene.input_peak,
-            -0.35 / scene.input_peak,
-            0.35 / scene.input_peak,
+            0.02 / context.input_peak,
+            -0.35 / context.input_peak,
+            0.35 / context.input_peak,
         ),
     )
 
 
-def _loop_asymmetry_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.04 / scene.input_peak,),)
+def _loop_asymmetry_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.04 / context.input_peak,),)
 
 
 LOOP_ASYMMETRY = Effect(
@@ -155,8 +159,8 @@ def _second_hysteresis_memory(_x: float, rate: float, z: float, numbers: Any) ->
     return rate - numbers[1] * abs(rate) * z - numbers[2] * rate * abs(z)
 
 
-def _second_hysteresis_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _second_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     turn = 1.0 / frame.peak
     return (
         Parameter("k", f"{frame.force_unit}/{frame.unit}", 0.0, 0.01 * frame.force * turn, frame.lower_bound),
@@ -168,8 +172,8 @@ def _second_hysteresis_parameters(scene: SimulationContext) -> tuple[Parameter, 
     )
 
 
-def _second_hysteresis_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    frame = scene.force_coordinate
+def _second_hysteresis_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    frame = context.force_coordinate
     return tuple(
         (0.03 * frame.force / frame.peak, quick / frame.peak, bent * quick / frame.peak, 0.0)
         for quick in _SECOND_HYSTERESIS_QUICK

@@ -113,7 +113,7 @@ def _size(expression: Expression) -> Expression:
     return Apply(PRIMITIVES["abs"], (expression,))
 
 
-def model_form(core: Simulator, model: Model, terms: Sequence[MissingTerm]) -> Effect:
+def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm]) -> Effect:
     """Return the effect on a model: the coefficients of the terms that it lacks, and their slope.
 
     Parameters
@@ -124,27 +124,27 @@ def model_form(core: Simulator, model: Model, terms: Sequence[MissingTerm]) -> E
     """
     theta = model.parameters
 
-    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
         found = []
         for term in terms:
             size = _SCALE * abs(theta[term.beside]) or _SCALE
-            found.append(Parameter(term.name, "", 0.0, size / scene.output_peak if term.folded else size))
-        slope = scene.output_peak / scene.input_peak
-        unit = f"{scene.output_unit}/{scene.input_unit}"
+            found.append(Parameter(term.name, "", 0.0, size / context.output_peak if term.folded else size))
+        slope = context.output_peak / context.input_peak
+        unit = f"{context.output_unit}/{context.input_unit}"
         return (*found, Parameter(SLOPE, unit, slope, 0.02 * slope, -_FAR * slope, _FAR * slope))
 
-    def grid(scene: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
-        seen = round(scene.fit_end_time / scene.dt)
-        own, added = core.parameters, parameters(scene)[:-1]
+    def grid(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
+        seen = round(context.fit_end_time / context.dt)
+        own, added = simulator.parameters, parameters(context)[:-1]
         at = np.array([each.nominal for each in own])
 
         def simulated(values: Signal, **shape: float) -> Signal:
-            return core.simulate(values, scene.u, scene, shape, ())[:seen]
+            return simulator.simulate(values, context.u, context, shape, ())[:seen]
 
         rest = simulated(at)
         moved = at + _STEP * np.diag([each.scale for each in own])
         known = [(simulated(values) - rest) / _STEP for values in moved]
-        u = scene.u[:seen]
+        u = context.u[:seen]
         usual = float(np.polyfit(u, rest, 1)[0])
         tried: list[tuple[float, tuple[float, ...]]] = []
         for part in _SLOPES:

@@ -19,13 +19,13 @@ def _cubic_stiffness_force(x: float, _rate: float, _z: float, k: Any) -> float:
     return k[0] * x * x * x
 
 
-def _cubic_stiffness_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _cubic_stiffness_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^3", 0.0, 0.01 * frame.force / frame.peak**3),)
 
 
-def _cubic_stiffness_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.peak**3,),)
+def _cubic_stiffness_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.peak**3,),)
 
 
 CUBIC_STIFFNESS = Effect(
@@ -44,13 +44,13 @@ def _even_nonlinearity_force(x: float, _rate: float, _z: float, k: Any) -> float
     return k[0] * x * x
 
 
-def _even_nonlinearity_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    frame = scene.force_coordinate
+def _even_nonlinearity_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    frame = context.force_coordinate
     return (Parameter("k", f"{frame.force_unit}/{frame.unit}^2", 0.0, 0.01 * frame.force / frame.peak**2),)
 
 
-def _even_nonlinearity_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * scene.force_coordinate.force / scene.force_coordinate.peak**2,),)
+def _even_nonlinearity_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.force_coordinate.force / context.force_coordinate.peak**2,),)
 
 
 EVEN_NONLINEARITY = Effect(
@@ -72,26 +72,26 @@ def _dead_zone_form(u: Signal, values: Signal, _scene: SimulationContext) -> Sig
     return np.sign(u) * np.maximum(np.abs(u) - values[0], 0.0)
 
 
-def _dead_zone_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _dead_zone_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter(
             "d",
-            scene.input_unit,
+            context.input_unit,
             0.0,
-            0.005 * scene.input_peak,
-            -0.2 * scene.input_peak,
-            0.3 * scene.input_peak,
+            0.005 * context.input_peak,
+            -0.2 * context.input_peak,
+            0.3 * context.input_peak,
         ),
     )
 
 
-def _dead_zone_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((part * scene.input_peak,) for part in (0.0075, 0.025, 0.075))
+def _dead_zone_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((part * context.input_peak,) for part in (0.0075, 0.025, 0.075))
 
 
-def _dead_zone_crossed(scene: SimulationContext) -> bool:
+def _dead_zone_crossed(context: SimulationContext) -> bool:
     # A dead zone cannot be told from an offset if the input never comes near zero.
-    return float(np.min(np.abs(scene.u))) < _DEAD_ZONE_NEAR * scene.input_peak
+    return float(np.min(np.abs(context.u))) < _DEAD_ZONE_NEAR * context.input_peak
 
 
 DEAD_ZONE = Effect(
@@ -107,8 +107,8 @@ DEAD_ZONE = Effect(
 )
 
 
-def _input_saturation_form(u: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    level = scene.input_peak * (1.0 - max(values[0], 0.0))
+def _input_saturation_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    level = context.input_peak * (1.0 - max(values[0], 0.0))
     return np.clip(u, -level, level)
 
 
@@ -133,8 +133,8 @@ INPUT_SATURATION = Effect(
 )
 
 
-def _output_saturation_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    level = scene.output_peak * (1.0 - max(values[0], 0.0))
+def _output_saturation_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    level = context.output_peak * (1.0 - max(values[0], 0.0))
     return np.clip(y, -level, level) if values[0] > 0.0 else y
 
 
@@ -185,11 +185,11 @@ def outflow_law(state: str) -> Effect:
     """Return the effect on one state, in 1/s."""
     label = f"{OUTFLOW_LAW.name}:{state}"
 
-    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-        return (Parameter(label, "1/s", 0.0, 1.0 / scene.fit_end_time),)
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        return (Parameter(label, "1/s", 0.0, 1.0 / context.fit_end_time),)
 
-    def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return tuple((times / scene.fit_end_time,) for times in (1.0, 5.0, 25.0))
+    def grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return tuple((times / context.fit_end_time,) for times in (1.0, 5.0, 25.0))
 
     return Effect(
         name=label,
@@ -222,13 +222,13 @@ def state_clip(state: str) -> Effect:
     """Return the effect on one state; the last one of a chain spills nowhere."""
     label = f"{STATE_CLIP.name}:{state}"
 
-    def parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-        peak = scene.output_peak
-        level = Parameter(label, scene.output_unit, _FAR * peak, 0.01 * peak, 0.1 * peak, _FAR * peak)
+    def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+        peak = context.output_peak
+        level = Parameter(label, context.output_unit, _FAR * peak, 0.01 * peak, 0.1 * peak, _FAR * peak)
         return (level, Parameter(f"{label} caught", "", 0.0, 0.05, 0.0, 1.0))
 
-    def grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-        return tuple((level * scene.output_peak, caught) for level in _LEVELS for caught in _CAUGHT)
+    def grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+        return tuple((level * context.output_peak, caught) for level in _LEVELS for caught in _CAUGHT)
 
     return Effect(
         name=label,

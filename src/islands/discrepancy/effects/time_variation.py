@@ -13,42 +13,42 @@ from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationCont
 INSTANTS, MARGIN = 27, 0.06
 
 
-def instant_grid(scene: SimulationContext) -> tuple[float, ...]:
+def instant_grid(context: SimulationContext) -> tuple[float, ...]:
     """Return times that a search for a change begins from, in seconds."""
-    first, last = instant_bounds(scene)
+    first, last = instant_bounds(context)
     return tuple(float(time) for time in np.linspace(first, last, INSTANTS))
 
 
-def instant_bounds(scene: SimulationContext) -> tuple[float, float]:
+def instant_bounds(context: SimulationContext) -> tuple[float, float]:
     """Return the first and the last time at which a change may be looked for."""
-    return MARGIN * scene.fit_end_time, (1.0 - MARGIN) * scene.fit_end_time
+    return MARGIN * context.fit_end_time, (1.0 - MARGIN) * context.fit_end_time
 
 
-def smooth_step(scene: SimulationContext, instant: float) -> Signal:
+def smooth_step(context: SimulationContext, instant: float) -> Signal:
     """Return 0 before an instant and 1 behind it, within a few samples: a jump would have no derivative."""
-    out: Signal = scipy.special.expit((scene.time - instant) / (2 * scene.dt))
+    out: Signal = scipy.special.expit((context.time - instant) / (2 * context.dt))
     return out
 
 
-def gain_over_time(own: Mapping[str, float], scene: SimulationContext) -> Signal | float:
+def gain_over_time(own: Mapping[str, float], context: SimulationContext) -> Signal | float:
     """Return the factor of a gain that steps or ages, for a core that understands both; 1 if it does not."""
     gain: Signal | float = 1.0
     if "gain-step" in own:
-        gain = gain * (1.0 + own["gain-step"] * smooth_step(scene, own["gain-step instant"]))
+        gain = gain * (1.0 + own["gain-step"] * smooth_step(context, own["gain-step instant"]))
     if "ageing" in own:
-        gain = gain * (1.0 + own["ageing"] * scene.time / scene.duration)
+        gain = gain * (1.0 + own["ageing"] * context.time / context.duration)
     return gain
 
 
-def _gain_step_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _gain_step_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
         Parameter("gain-step", "", 0.0, 0.01, -0.9, 2.0),
-        Parameter("gain-step instant", "s", 0.0, 0.3 * scene.fit_end_time / 45, *instant_bounds(scene)),
+        Parameter("gain-step instant", "s", 0.0, 0.3 * context.fit_end_time / 45, *instant_bounds(context)),
     )
 
 
-def _gain_step_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02, instant) for instant in instant_grid(scene))
+def _gain_step_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02, instant) for instant in instant_grid(context))
 
 
 GAIN_STEP = Effect(

@@ -8,18 +8,20 @@ from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
 
-def _delay_form(u: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return interpolate_at(u, np.arange(u.size) - values[0] / scene.dt)
+def _delay_form(u: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return interpolate_at(u, np.arange(u.size) - values[0] / context.dt)
 
 
-def _delay_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("tau", "s", 0.0, scene.dt, -0.2 * scene.dt, min(30 * scene.dt, scene.fit_end_time / 4)),
+        Parameter(
+            "tau", "s", 0.0, context.dt, -0.2 * context.dt, min(30 * context.dt, context.fit_end_time / 4)
+        ),
     )
 
 
-def _delay_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.5 * scene.dt,), (2 * scene.dt,), (6 * scene.dt,))
+def _delay_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.5 * context.dt,), (2 * context.dt,), (6 * context.dt,))
 
 
 DELAY = Effect(
@@ -38,12 +40,12 @@ def _clock_skew_form(u: Signal, values: Signal, _scene: SimulationContext) -> Si
     return interpolate_at(u, np.arange(u.size) * (1.0 + values[0]))
 
 
-def _clock_skew_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("e", "", 0.0, 0.01 * scene.dt / scene.fit_end_time, -0.02, 0.02),)
+def _clock_skew_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("e", "", 0.0, 0.01 * context.dt / context.fit_end_time, -0.02, 0.02),)
 
 
-def _clock_skew_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.5 * scene.dt / scene.fit_end_time,), (-0.5 * scene.dt / scene.fit_end_time,))
+def _clock_skew_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.5 * context.dt / context.fit_end_time,), (-0.5 * context.dt / context.fit_end_time,))
 
 
 CLOCK_SKEW = Effect(
@@ -58,16 +60,16 @@ CLOCK_SKEW = Effect(
 )
 
 
-def _sensor_lag_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
-    return low_pass(y, values[0], scene.dt) if values[0] > 0.0 else y
+def _sensor_lag_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
+    return low_pass(y, values[0], context.dt) if values[0] > 0.0 else y
 
 
-def _sensor_lag_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
-    return (Parameter("tau", "s", 0.0, scene.dt, 0.0, scene.fit_end_time / 4),)
+def _sensor_lag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
+    return (Parameter("tau", "s", 0.0, context.dt, 0.0, context.fit_end_time / 4),)
 
 
-def _sensor_lag_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.3 * scene.dt,), (2 * scene.dt,), (6 * scene.dt,))
+def _sensor_lag_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return ((0.3 * context.dt,), (2 * context.dt,), (6 * context.dt,))
 
 
 SENSOR_LAG = Effect(
@@ -85,14 +87,14 @@ SENSOR_LAG = Effect(
 FASTEST = 2.6
 
 
-def _resonance_form(y: Signal, values: Signal, scene: SimulationContext) -> Signal:
+def _resonance_form(y: Signal, values: Signal, context: SimulationContext) -> Signal:
     period, zeta = values
     w = 2 * np.pi / period if period > 0.0 else np.inf
-    if w * scene.dt > FASTEST:
+    if w * context.dt > FASTEST:
         return y
     # Bilinear, with the resonance itself kept where it is. In finer steps, the output interpolated between
     # its samples, it takes the place of a delay where these are sparse (the gas furnace, the hair dryer).
-    k = w / np.tan(w * scene.dt / 2)
+    k = w / np.tan(w * context.dt / 2)
     scale = k * k + 2 * zeta * w * k + w * w
     b = w * w / scale
     a1, a2 = 2 * (w * w - k * k) / scale, (k * k - 2 * zeta * w * k + w * w) / scale
@@ -101,16 +103,16 @@ def _resonance_form(y: Signal, values: Signal, scene: SimulationContext) -> Sign
     return out
 
 
-def _resonance_parameters(scene: SimulationContext) -> tuple[Parameter, ...]:
+def _resonance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (
-        Parameter("period", "s", 0.0, scene.dt, 0.0, scene.fit_end_time / 8),
+        Parameter("period", "s", 0.0, context.dt, 0.0, context.fit_end_time / 8),
         Parameter("zeta", "", 0.1, 0.05, 0.003, 2.0),
     )
 
 
-def _resonance_grid(scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _resonance_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple(
-        (period * scene.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
+        (period * context.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
     )
 
 

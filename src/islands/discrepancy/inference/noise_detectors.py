@@ -61,7 +61,7 @@ _MAD = 0.6745
 _QUANTISATION_COARSE = 0.5
 
 
-def _detect_quantisation(y: Signal, residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
+def _detect_quantisation(y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
     levels = np.unique(y)
     if levels.size < 3 or y.size < _CROWDED * levels.size:
         return None
@@ -70,7 +70,7 @@ def _detect_quantisation(y: Signal, residual: Signal, scene: SimulationContext) 
     off = float(np.max(np.abs(places - np.round(places))))
     if off > 1e-3 or step < _QUANTISATION_COARSE * float(np.std(residual)):
         return None
-    return NoiseFinding({"step": (step, scene.output_unit)}, float(y.size))
+    return NoiseFinding({"step": (step, context.output_unit)}, float(y.size))
 
 
 QUANTISATION = NoiseDetector(
@@ -86,7 +86,7 @@ QUANTISATION = NoiseDetector(
 _HELD_SAMPLES_RUN, _HELD_SAMPLES_BURSTS = 3, 2
 
 
-def _detect_held_samples(y: Signal, _residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
+def _detect_held_samples(y: Signal, _residual: Signal, context: SimulationContext) -> NoiseFinding | None:
     if y.size >= _CROWDED * np.unique(y).size:
         return None
     same = np.concatenate([[False], np.diff(y) == 0.0, [False]])
@@ -97,7 +97,7 @@ def _detect_held_samples(y: Signal, _residual: Signal, scene: SimulationContext)
         return None
     share = float(np.sum(bursts - 1)) / y.size
     return NoiseFinding(
-        {"share": (share, ""), "longest": (float(bursts.max()) * scene.dt, "s")},
+        {"share": (share, ""), "longest": (float(bursts.max()) * context.dt, "s")},
         float(np.sum(bursts)) * float(np.log(y.size)),
     )
 
@@ -115,7 +115,7 @@ HELD_SAMPLES = NoiseDetector(
 _OUTLIERS_FAR, _OUTLIERS_LEAST = 5.5, 3
 
 
-def _detect_outliers(_y: Signal, residual: Signal, scene: SimulationContext) -> NoiseFinding | None:
+def _detect_outliers(_y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
     left = fit_ar_noise(residual).whiten(residual)
     scale = float(np.median(np.abs(left - np.median(left)))) / _MAD
     if scale == 0.0:
@@ -128,7 +128,7 @@ def _detect_outliers(_y: Signal, residual: Signal, scene: SimulationContext) -> 
     n = left.size
     gained = n * float(np.log(np.mean(left**2)) - np.log(np.mean(usual**2))) - 2 * count * float(np.log(n))
     size = float(np.median(np.abs(left[far > _OUTLIERS_FAR])))
-    return NoiseFinding({"share": (count / n, ""), "size": (size, scene.output_unit)}, gained)
+    return NoiseFinding({"share": (count / n, ""), "size": (size, context.output_unit)}, gained)
 
 
 OUTLIERS = NoiseDetector(
@@ -146,7 +146,7 @@ _HETEROSCEDASTIC_NOISE_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0
 
 
 def _detect_heteroscedastic_noise(
-    y: Signal, residual: Signal, scene: SimulationContext
+    y: Signal, residual: Signal, context: SimulationContext
 ) -> NoiseFinding | None:
     noise = fit_ar_noise(residual)
     left = noise.whiten(residual)
@@ -166,7 +166,7 @@ def _detect_heteroscedastic_noise(
     if gained <= 0.0:
         return None
     strength = float(_HETEROSCEDASTIC_NOISE_STRENGTHS[best]) / float(np.max(np.abs(y)))
-    return NoiseFinding({"k": (strength, f"1/{scene.output_unit}")}, gained)
+    return NoiseFinding({"k": (strength, f"1/{context.output_unit}")}, gained)
 
 
 HETEROSCEDASTIC_NOISE = NoiseDetector(

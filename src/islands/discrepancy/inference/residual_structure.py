@@ -13,7 +13,7 @@ SHIFTS, FLAGGED = 200, 4.5
 
 
 def describe_remainder(
-    residual: Signal, simulated: Signal, scene: SimulationContext, rng: np.random.Generator
+    residual: Signal, simulated: Signal, context: SimulationContext, rng: np.random.Generator
 ) -> Mapping[str, float]:
     """Return maps in which a residual is no chance, each with its distance in standard deviations.
 
@@ -32,7 +32,7 @@ def describe_remainder(
         return {}
     shifts = rng.integers(n // 20, n - n // 20, SHIFTS)
     found = {}
-    for name, cells in _maps(scene.u[:n], simulated, scene.dt).items():
+    for name, cells in _maps(context.u[:n], simulated, context.dt).items():
         shifted = np.log([_explained(np.roll(left, shift), cells) for shift in shifts])
         distance = (float(np.log(_explained(left, cells))) - float(shifted.mean())) / float(shifted.std())
         if distance > FLAGGED:

@@ -124,12 +124,12 @@ def assess_evidence(evidence: SearchOutcome, fitted: int, rng: np.random.Generat
     """Drop what does not foretell samples that were not fitted, look at what is left, and decide."""
     base, target = evidence.base, evidence.target
     found = validate_out_of_sample(evidence.hypothesis, base, target, fitted, rng)
-    scene, output = found.fit.simulation.context, found.fit.output[:fitted]
+    context, output = found.fit.simulation.context, found.fit.output[:fitted]
     residual = target.y[:fitted] - output
-    left = explainable_variance(residual, scene.u[:fitted], output, rng)
-    maps = describe_remainder(residual, output, scene, rng)
+    left = explainable_variance(residual, context.u[:fitted], output, rng)
+    maps = describe_remainder(residual, output, context, rng)
     mean_square = float(np.mean(residual**2))
-    repeated = noise_variance_from_periods(scene.u[:fitted], target.y[:fitted])
+    repeated = noise_variance_from_periods(context.u[:fitted], target.y[:fitted])
     floor = max(mean_square - left, 0.0) if repeated is None else repeated
     remains = bool(maps) or left > NOTICEABLE * mean_square
     # By misfit nobody knows which part of it is noise: half of all of it has to be explained.

@@ -90,10 +90,10 @@ class SimulationContext:
     def __post_init__(self) -> None:
         if self.force_coordinate is None:
             rate = float(np.std(np.diff(self.u))) / self.dt or 1.0
-            frame = ForceCoordinate(
+            coordinate = ForceCoordinate(
                 self.input_unit, self.input_peak, rate, self.output_unit, self.output_peak
             )
-            object.__setattr__(self, "frame", frame)
+            object.__setattr__(self, "force_coordinate", coordinate)
 
     @property
     def time(self) -> Signal:

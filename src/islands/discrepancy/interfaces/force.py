@@ -39,7 +39,7 @@ class ForceLaw:
 
 
 def pack_force_laws(
-    parts: Sequence[tuple[ForceLaw, Signal]], scene: SimulationContext, balance: bool
+    parts: Sequence[tuple[ForceLaw, Signal]], context: SimulationContext, balance: bool
 ) -> Elements:
     """Return force laws and their values as arrays for the kernels.
 
@@ -51,7 +51,7 @@ def pack_force_laws(
     """
     numbers = np.zeros((len(parts), WIDTH))
     for row, (element, values) in zip(numbers, parts, strict=True):
-        given = (*values, *element.constants(scene))
+        given = (*values, *element.constants(context))
         row[: len(given)] = given
     return Elements(
         np.array([compiled(element.force).address for element, _ in parts], dtype=np.int64),
@@ -64,7 +64,7 @@ def pack_force_laws(
         ),
         np.array(
             [
-                -1.0 if balance else scene.force_coordinate.sign if element.is_dissipative else 1.0
+                -1.0 if balance else context.force_coordinate.sign if element.is_dissipative else 1.0
                 for element, _ in parts
             ]
         ),
@@ -79,7 +79,7 @@ def pack_force_laws(
 
 
 def add_output_forces(
-    x: Signal, scene: SimulationContext, parts: Sequence[tuple[ForceLaw, Signal]]
+    x: Signal, context: SimulationContext, parts: Sequence[tuple[ForceLaw, Signal]]
 ) -> Signal:
     """Return the sum of force laws on the coordinate ``x``, for a simulator without inertia."""
     total = np.zeros(x.size)
@@ -87,6 +87,6 @@ def add_output_forces(
         return total
     x = np.ascontiguousarray(x)
     integrate_along(
-        x, np.gradient(x, scene.dt), scene.dt, pack_force_laws(parts, scene, balance=False), total
+        x, np.gradient(x, context.dt), context.dt, pack_force_laws(parts, context, balance=False), total
     )
     return total

@@ -41,11 +41,11 @@ class Simulator(Protocol):
     def is_continuous_time(self) -> bool:
         """Whether it integrates an equation, so that the input between samples matters."""
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the coordinate that forces act on; ``output`` is the nominal output, shape (samples,)."""
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """Simulate the output.
 

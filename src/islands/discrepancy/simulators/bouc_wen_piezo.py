@@ -48,19 +48,19 @@ class BoucWenPiezoSimulator:
             )
         )
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return input_coordinate(scene, output)
+        return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         A, beta, gamma, dp = values
         h = np.empty_like(x)
         bouc_wen(
             np.ascontiguousarray(x),
-            *(scene.dt, A, beta, gamma),
+            *(context.dt, A, beta, gamma),
             *(
                 own.get("relaxation", 0.0),
                 own.get("rate-dependent-loop", 0.0),
@@ -68,7 +68,7 @@ class BoucWenPiezoSimulator:
             ),
             *(0.0, h),
         )
-        return dp * gain_over_time(own, scene) * x - h + add_output_forces(x, scene, forces)
+        return dp * gain_over_time(own, context) * x - h + add_output_forces(x, context, forces)
 
 
 def _about(nominal: float) -> tuple[float, float]:

@@ -77,19 +77,19 @@ class CascadedTanksSimulator:
             ),
         )
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return input_coordinate(scene, output)
+        return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], _forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], _forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         k1, k2, k3, upper, lower = map(float, values)
-        gain, offset = k3 * gain_over_time(own, scene), k3 * own.get(f"input-offset:{UPPER}", 0.0)
+        gain, offset = k3 * gain_over_time(own, context), k3 * own.get(f"input-offset:{UPPER}", 0.0)
         y = np.empty(x.size)
         cascade(
-            *(x * gain + offset, scene.get_intersample_values(x) * gain + offset, scene.dt),
+            *(x * gain + offset, context.get_intersample_values(x) * gain + offset, context.dt),
             (
                 k1,
                 own.get(f"outflow-law:{UPPER}", 0.0),
@@ -124,10 +124,10 @@ def make_cascaded_tanks(given: Mapping[str, float], record: Dataset) -> Cascaded
             k3 = given.get("k3", k2 * sqrt(level) / pumped)
             start = max(float(y[0]), 0.0)
             starts.append(CascadedTanksSimulator(k1, k2, k3, (start * high, start), units))
-    return min(starts, key=lambda core: float(np.mean((y - _free_run(core, u, record.dt)) ** 2)))
+    return min(starts, key=lambda simulator: float(np.mean((y - _free_run(simulator, u, record.dt)) ** 2)))
 
 
-def _free_run(core: CascadedTanksSimulator, u: Signal, dt: float) -> Signal:
-    scene = SimulationContext(u, dt, {}, {}, 1.0, 1.0, *core.units, u.size * dt)
-    values = np.array([parameter.nominal for parameter in core.parameters])
-    return core.simulate(values, u, scene, {}, ())
+def _free_run(simulator: CascadedTanksSimulator, u: Signal, dt: float) -> Signal:
+    context = SimulationContext(u, dt, {}, {}, 1.0, 1.0, *simulator.units, u.size * dt)
+    values = np.array([parameter.nominal for parameter in simulator.parameters])
+    return simulator.simulate(values, u, context, {}, ())

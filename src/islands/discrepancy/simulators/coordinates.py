@@ -5,23 +5,23 @@ import numpy as np
 from islands.discrepancy.interfaces.context import ForceCoordinate, Signal, SimulationContext
 
 
-def input_coordinate(scene: SimulationContext, output: Signal) -> ForceCoordinate:
+def input_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
     """Return the input as the coordinate: forces add to the output at once."""
-    rate = float(np.std(np.diff(scene.u))) / scene.dt or 1.0
+    rate = float(np.std(np.diff(context.u))) / context.dt or 1.0
     return ForceCoordinate(
-        scene.input_unit, scene.input_peak, rate, scene.output_unit, peak_amplitude(output)
+        context.input_unit, context.input_peak, rate, context.output_unit, peak_amplitude(output)
     )
 
 
-def output_coordinate(scene: SimulationContext, output: Signal) -> ForceCoordinate:
+def output_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
     """Return the output as the coordinate: forces act beside the input, and move it."""
-    rate = float(np.std(np.diff(output))) / scene.dt or 1.0
+    rate = float(np.std(np.diff(output))) / context.dt or 1.0
     return ForceCoordinate(
-        scene.output_unit,
+        context.output_unit,
         peak_amplitude(output),
         rate,
-        scene.input_unit,
-        scene.input_peak,
+        context.input_unit,
+        context.input_peak,
         is_dissipative=True,
         friction_smoothing=0.02,
     )

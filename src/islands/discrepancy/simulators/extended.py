@@ -112,7 +112,7 @@ class ExtendedSimulator:
     def _simulate_core(self, values: Signal, more: Mapping[str, float], further: Forces) -> Signal:
         x, forces = self.context.u, list(further)
         own = dict(more)
-        core = values[: len(self.simulator.parameters)].copy()
+        simulator = values[: len(self.simulator.parameters)].copy()
         for effect, part in zip(self.effects, self._parts, strict=True):
             match effect.site:
                 case Site.INPUT:
@@ -123,22 +123,22 @@ class ExtendedSimulator:
                         for parameter, value in zip(self.parameters[part], values[part], strict=True)
                     }
                 case Site.PARAMETER:
-                    core[self._apply_maps(effect)] *= 1.0 + values[part][0]
+                    simulator[self._apply_maps(effect)] *= 1.0 + values[part][0]
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return self.simulator.simulate(core, x, self.context, own, forces)
+        return self.simulator.simulate(simulator, x, self.context, own, forces)
 
     def _apply_maps(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")
         return [parameter.name for parameter in self.simulator.parameters].index(name)
 
 
-def apply_map(effect: Effect, signal: Signal, values: Signal, scene: SimulationContext) -> Signal:
+def apply_map(effect: Effect, signal: Signal, values: Signal, context: SimulationContext) -> Signal:
     """Return a signal behind the map of an effect."""
     assert callable(effect.form)
     try:
-        out = np.asarray(effect.form(signal, values, scene), dtype=np.float64)
+        out = np.asarray(effect.form(signal, values, context), dtype=np.float64)
     except Exception as error:
         raise invalid_effect_error(effect, f"its form fails: {type(error).__name__}: {error}") from error
     if out.shape != signal.shape:

@@ -54,9 +54,9 @@ class SimulatorWrapper:
         """As the core's."""
         return self.simulator.is_continuous_time
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return self.simulator.make_force_coordinate(scene, output)
+        return self.simulator.make_force_coordinate(context, output)
 
 
 #: Inputs that are remembered between their samples.
@@ -89,11 +89,11 @@ class ResampledSimulator(SimulatorWrapper):
     _known: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         u, midway = self._finer(x)
-        finer = replace(scene, u=u, dt=scene.dt / self.oversampling, intersample_values=midway)
+        finer = replace(context, u=u, dt=context.dt / self.oversampling, intersample_values=midway)
         return self.simulator.simulate(values, u, finer, own, forces)[:: self.oversampling]
 
     def _finer(self, x: Signal) -> tuple[Signal, Signal]:

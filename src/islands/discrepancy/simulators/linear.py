@@ -59,12 +59,12 @@ class LinearSimulator:
             *(Parameter(f"state {1 + place}", self.unit, 0.0, gain, initial=True) for place in range(order)),
         )
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return input_coordinate(scene, output)
+        return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, _own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, _own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         order = self.denominator.size
@@ -75,7 +75,7 @@ class LinearSimulator:
         filtered, _ = scipy.signal.lfilter(
             numerator, np.concatenate([[1.0], -denominator]), late - x[0], zi=state
         )
-        return level + filtered + add_output_forces(x, scene, forces)
+        return level + filtered + add_output_forces(x, context, forces)
 
 
 def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:

@@ -64,7 +64,7 @@ class NarxSimulator:
         further = tuple(term.regressor for term in lacking)
         object.__setattr__(self, "_missing", lacking)
         object.__setattr__(self, "_wider", LinkedModel((*self.model.regressors, *further)))
-        object.__setattr__(self, "effects", (model_form(self, self.model, lacking),) if lacking else ())
+        object.__setattr__(self, "state_effects", (model_form(self, self.model, lacking),) if lacking else ())
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -103,15 +103,15 @@ class NarxSimulator:
         terms += [(term.at(shape[SLOPE]), shape[term.name]) for term in self._missing]
         return model_of(terms, model.input_names, model.output_name, model.dt)
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return input_coordinate(scene, output)
+        return input_coordinate(context, output)
 
     def simulate(
         self,
         values: Signal,
         x: Signal,
-        scene: SimulationContext,
+        context: SimulationContext,
         own: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
@@ -126,7 +126,7 @@ class NarxSimulator:
         else:
             simulated = self._linked.free_run(theta, x[:, None], start)
         simulated[:warm_up] = start
-        return simulated + add_output_forces(x, scene, forces) if forces else simulated
+        return simulated + add_output_forces(x, context, forces) if forces else simulated
 
     def _run_wider(self, theta: Signal, x: Signal, start: Signal, slope: float) -> Signal:
         """Run with the terms that the model lacks: before the first sample all stood still."""

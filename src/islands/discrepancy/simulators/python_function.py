@@ -78,18 +78,18 @@ class PythonFunctionSimulator:
             for name, value in self.given.items()
         )
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return input_coordinate(scene, output)
+        return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, _own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, _own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         chosen = {name: float(value) for name, value in zip(self.given, values, strict=True)}
         # Its own copy: a function that writes into what it is given would spoil the record.
         try:
-            y = np.asarray(self.function(x.copy(), scene.dt, **chosen))
+            y = np.asarray(self.function(x.copy(), context.dt, **chosen))
             if np.iscomplexobj(y):
                 raise TypeError("its output is complex")
             y = np.asarray(y, dtype=np.float64)
@@ -100,4 +100,4 @@ class PythonFunctionSimulator:
                 f"{self.name} gave an output of shape {y.shape} for an input of {x.shape}: it has to give "
                 "one value a sample"
             )
-        return y + add_output_forces(x, scene, forces)
+        return y + add_output_forces(x, context, forces)

@@ -39,17 +39,17 @@ class RecordedOutput:
         """How it is asked for."""
         return f"column {self.column}"
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return input_coordinate(scene, output)
+        return input_coordinate(context, output)
 
     def simulate(
         self,
         _values: Signal,
         x: Signal,
-        scene: SimulationContext,
+        context: SimulationContext,
         _own: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return np.asarray(self.simulated) + add_output_forces(x, scene, forces)
+        return np.asarray(self.simulated) + add_output_forces(x, context, forces)

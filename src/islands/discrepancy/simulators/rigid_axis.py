@@ -81,19 +81,19 @@ class RigidAxisSimulator:
             Parameter("vs", f"{length}/s", self.turns, 0.3 * self.turns, 0.01 * self.turns, 20 * self.turns),
         )
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return replace(output_coordinate(scene, output), friction_smoothing=_SHARP)
+        return replace(output_coordinate(context, output), friction_smoothing=_SHARP)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         mass, damping, dry, turns = map(float, values)
-        gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
+        gain, offset = gain_over_time(own, context), own.get(f"input-offset:{FORCE}", 0.0)
         dry_friction = friction.COULOMB_FRICTION.form
         assert isinstance(dry_friction, ForceLaw)
-        elements = pack_force_laws([*forces, (dry_friction, np.array([dry, turns]))], scene, balance=True)
+        elements = pack_force_laws([*forces, (dry_friction, np.array([dry, turns]))], context, balance=True)
         times = x.size // self.measured.size
         starts = np.zeros(x.size, dtype=bool)
         starts[:: self.shot * times] = True
@@ -101,13 +101,13 @@ class RigidAxisSimulator:
         def shots(position: Signal, rate: Signal) -> Signal:
             y = np.empty(x.size)
             integrate_motion(
-                *(x * gain + offset, scene.get_intersample_values(x) * gain + offset),
-                *(scene.dt, mass, damping, 0.0, elements),
+                *(x * gain + offset, context.get_intersample_values(x) * gain + offset),
+                *(context.dt, mass, damping, 0.0, elements),
                 *(starts, np.repeat(position, times), np.repeat(rate, times), y),
             )
             return y[::times]
 
-        return np.repeat(self._freed(shots, scene.force_coordinate), times)
+        return np.repeat(self._freed(shots, context.force_coordinate), times)
 
     def _freed(self, shots: Callable[[Signal, Signal], Signal], frame: ForceCoordinate) -> Signal:
         """Return the shots with their states as free as can be: by Newton and Gauss, from what is measured.

@@ -59,12 +59,12 @@ class SavedExtension(SimulatorWrapper):
         return self.simulator.built_in_effects | {effect.name for effect in self.added}
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         scales = self.scales
         inner = replace(
-            scene,
+            context,
             u=np.ascontiguousarray(x),
             input_peak=scales.input_peak,
             output_peak=scales.output_peak,

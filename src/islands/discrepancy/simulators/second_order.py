@@ -66,23 +66,23 @@ class SecondOrderSimulator:
             Parameter("initial rate", f"{length}/s", system.rate, 0.02 * self.size * usual, initial=True),
         )
 
-    def make_force_coordinate(self, scene: SimulationContext, output: Signal) -> ForceCoordinate:
+    def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return output_coordinate(scene, output)
+        return output_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, scene: SimulationContext, own: Mapping[str, float], forces: Forces
+        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
     ) -> Signal:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""
         mass, damping, stiffness, position, rate = map(float, values)
-        gain, offset = gain_over_time(own, scene), own.get(f"input-offset:{FORCE}", 0.0)
+        gain, offset = gain_over_time(own, context), own.get(f"input-offset:{FORCE}", 0.0)
         begins = np.zeros(x.size, dtype=bool)
         begins[0] = True
         y = np.empty(x.size)
         integrate_motion(
-            *(x * gain + offset, scene.get_intersample_values(x) * gain + offset),
-            *(scene.dt, mass, damping, stiffness),
-            pack_force_laws(forces, scene, balance=True),
+            *(x * gain + offset, context.get_intersample_values(x) * gain + offset),
+            *(context.dt, mass, damping, stiffness),
+            pack_force_laws(forces, context, balance=True),
             *(begins, np.full(x.size, position), np.full(x.size, rate), y),
         )
         return y

@@ -11,9 +11,9 @@ from islands.io.simulator_spec.specification import LocalExtendedSpec
 
 def in_words(asked: LocalExtendedSpec) -> str:
     """Say what is simulated, and every effect with its form and its values."""
-    core = asked.core.model_dump(mode="json", exclude_defaults=True)
-    kind = core.pop("kind", "extended")
-    lines = [f"{asked.output} from {', '.join(asked.inputs)}: {kind} {json.dumps(core)}"]
+    simulator = asked.core.model_dump(mode="json", exclude_defaults=True)
+    kind = simulator.pop("kind", "extended")
+    lines = [f"{asked.output} from {', '.join(asked.inputs)}: {kind} {json.dumps(simulator)}"]
     if asked.times > 1 or asked.hold != "first-order":
         lines.append(f"solved in {asked.times} steps a sample; the input between samples: {asked.hold}")
     for effect in asked.effects:

@@ -68,7 +68,7 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
 
 
 def describe_extension(
-    core: Simulator,
+    simulator: Simulator,
     values: Signal,
     inputs: tuple[str, ...],
     output: str,
@@ -80,42 +80,44 @@ def describe_extension(
     """
     named = {
         parameter.name: float(value)
-        for parameter, value in zip(core.parameters, values, strict=True)
+        for parameter, value in zip(simulator.parameters, values, strict=True)
         if not parameter.initial
     }
-    match core:
+    match simulator:
         case SavedExtension():
-            own, found, at = len(core.simulator.parameters), [], 0
-            for effect in core.added:
-                parameters = effect.parameters(core.scales)
+            own, found, at = len(simulator.simulator.parameters), [], 0
+            for effect in simulator.added:
+                parameters = effect.parameters(simulator.scales)
                 here = slice(own + at, own + at + len(parameters))
                 found.append(_effect(effect, parameters, values[here]))
                 at += len(parameters)
-            return _extended(core.simulator, values[:own], found, core.scales, inputs, output, shape)
+            return _extended(
+                simulator.simulator, values[:own], found, simulator.scales, inputs, output, shape
+            )
         case NarxSimulator():
-            model = core.with_shape(values, shape) if shape else core.with_values(values)
-            return ModelSpec(kind="model", model=json.loads(model_json(model)), name=core.name)
+            model = simulator.with_shape(values, shape) if shape else simulator.with_values(values)
+            return ModelSpec(kind="model", model=json.loads(model_json(model)), name=simulator.name)
         case RecordedOutput():
-            return ColumnSpec(kind="column", column=core.column)
+            return ColumnSpec(kind="column", column=simulator.column)
         case LinearSimulator():
-            order = core.denominator.size
+            order = simulator.denominator.size
             coefficients = tuple(map(float, values))
             return LinearSpec(
                 kind="linear",
                 order=order,
-                delay=core.delay,
+                delay=simulator.delay,
                 numerator=coefficients[: order + 1],
                 denominator=coefficients[order + 1 : 2 * order + 1],
                 level=coefficients[2 * order + 1],
             )
         case PythonFunctionSimulator():
-            path, _, function = core.source.rpartition(":")
+            path, _, function = simulator.source.rpartition(":")
             return ProgramSpec(kind="python", path=path, function=function, parameters=named)
-    return PhysicalSpec(kind=core.name, parameters=named)  # type: ignore[arg-type]
+    return PhysicalSpec(kind=simulator.name, parameters=named)  # type: ignore[arg-type]
 
 
 def _extended(
-    core: Simulator,
+    simulator: Simulator,
     values: Signal,
     effects: Sequence[EffectSpec],
     scales: SimulationContext,
@@ -123,9 +125,9 @@ def _extended(
     output: str,
     shape: Mapping[str, float] | None = None,
 ) -> LocalExtendedSpec:
-    hold, times, inner = InterSample.FOH, 1, core
-    if isinstance(core, ResampledSimulator):
-        hold, times, inner = core.intersample, core.oversampling, core.simulator
+    hold, times, inner = InterSample.FOH, 1, simulator
+    if isinstance(simulator, ResampledSimulator):
+        hold, times, inner = simulator.intersample, simulator.oversampling, simulator.simulator
     return LocalExtendedSpec(
         inputs=inputs,
         output=output,

@@ -106,8 +106,8 @@ def simulated(
     """
     if isinstance(asked, Mapping):
         asked = LocalExtendedSpec.model_validate(asked)
-    core = make_simulator(asked, record, columns)
-    alone = ExtendedSimulator(core, (), make_context(record, core, record.samples))
+    simulator = make_simulator(asked, record, columns)
+    alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
     begins = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
     if not begins:
         return alone.simulate(alone.nominal)
@@ -130,11 +130,11 @@ def simulated(
 
 
 def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
-    core = make_simulator(document.core, record, columns)
-    solved: Simulator = core
+    simulator = make_simulator(document.core, record, columns)
+    solved: Simulator = simulator
     if (document.hold, document.times) != ("first-order", 1):
-        solved = ResampledSimulator(core, InterSample(document.hold), document.times)
-    known = {**CATALOGUE, **{effect.name: effect for effect in core.state_effects}}
+        solved = ResampledSimulator(simulator, InterSample(document.hold), document.times)
+    known = {**CATALOGUE, **{effect.name: effect for effect in simulator.state_effects}}
     given, frame = document.scales, document.scales.frame
     scales = SimulationContext(
         u=np.ascontiguousarray(record.u[:, 0]),
@@ -163,7 +163,7 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
     for each in document.effects:
         if each.name not in known:
             raise ModelError(
-                f"this version of islands knows no effect {each.name!r} of {core.name}: diagnose again"
+                f"this version of islands knows no effect {each.name!r} of {simulator.name}: diagnose again"
             )
         effect = known[each.name]
         names = [parameter.name for parameter in effect.parameters(scales)]

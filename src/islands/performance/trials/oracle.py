@@ -63,12 +63,12 @@ def _error(found: Diagnosis, fit: CalibrationResult) -> float:
 
 def _fitted(fit: CalibrationResult, effect: Effect, target: Target) -> CalibrationResult:
     """Return a simulation with one more effect in it, fitted from the starts that promise most."""
-    old, scene = fit.simulation, fit.simulation.context
+    old, context = fit.simulation, fit.simulation.context
     extended = old.with_effects(catalogue_order((*old.effects, effect)))
     part, own = extended.get_slice(effect), len(old.simulator.parameters)
     residual = target.residual(fit.output)
     starts = []
-    for point in effect.starting_points(scene, target.y - fit.output):
+    for point in effect.starting_points(context, target.y - fit.output):
         start = extended.nominal
         start[:own] = fit.values[:own]
         for each in old.effects:

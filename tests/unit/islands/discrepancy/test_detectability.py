@@ -128,7 +128,7 @@ def test_a_stronger_injection_has_a_larger_misfit(
         parameters = effect.parameters(source.simulation.context)
         for each in found:
             assert all(p.lower <= v <= p.upper for p, v in zip(parameters, each.values, strict=True))
-            changed = (source.drawn(SurrogateCase(each, 7)).y - clean)[: source.estimation_samples]
+            changed = (source.draw_record(SurrogateCase(each, 7)).y - clean)[: source.estimation_samples]
             assert np.sqrt(np.mean(changed**2)) == pytest.approx(each.misfit * source.sigma), effect.name
 
 

@@ -77,7 +77,7 @@ def test_models_come_best_first_and_know_their_rank(result):
 
 def test_a_model_simulates_any_record_in_three_ways(result):
     record, model = piezo(200, seed=9), result.best.model
-    shooting = result.findings.settings["shooting"]
+    shooting = result.search_result.settings["shooting"]
     assert shooting == 45
     expected = {
         "one-step": one_step_ahead(model, record).y,
@@ -203,7 +203,7 @@ def test_a_fraction_of_the_records_end_validates():
 def test_a_record_of_its_own_validates_and_estimates_nothing():
     whole = islands.fit(tank(), tank(150, seed=5), library="polynomial", max_terms=3)
     other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
-    described = whole.findings.settings["validation"]
+    described = whole.search_result.settings["validation"]
     assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
     assert whole.search_result.split.estimation.samples == 400
     assert whole.search_result.split.validation.samples == 150
@@ -234,7 +234,7 @@ def test_several_recordings_are_fitted_together():
     assert made.search_result.record.segments == (100, 3, 160, 2, 140)
     assert made.search_result.split.estimation.segments == (100, 3, 160, 2, 39)
     # Rows behind a warm-up of three samples in each.
-    assert made.findings.search.full_set["bytes"] == 8 * 84 * (97 + 157 + 36)
+    assert made.search_result.search.full_set["bytes"] == 8 * 84 * (97 + 157 + 36)
     model = {m.model.size: m.model for m in made.models}[3]
     terms = {plain(item.expression): theta for item, theta in zip(model.regressors, model.theta, strict=True)}
     assert terms == {name: pytest.approx(theta, abs=0.02) for name, theta in TANK.items()}

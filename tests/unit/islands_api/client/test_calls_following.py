@@ -219,11 +219,11 @@ def test_the_end_of_a_job_is_told_though_the_stream_ended_before(
     def end_streams() -> None:
         # As a service does that is ending; the job ends before anybody has come back.
         carried_out(job)
-        service.app.state.doors.hub.close()
+        service.app.state.islands.hub.close()
         time.sleep(0.05)
-        service.app.state.doors.hub.closed = False
+        service.app.state.islands.hub.closed = False
 
-    service.app.state.doors.hub.closed = False
+    service.app.state.islands.hub.closed = False
     later(0.15, end_streams)
     assert seen(connect(service.url, me.secret).events(job)) == happened()
 

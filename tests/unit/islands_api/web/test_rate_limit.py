@@ -22,7 +22,7 @@ def taken(bucket, who, most=1000):
     """How often somebody is let through."""
     for count in range(most):
         try:
-            bucket.feed(who)
+            bucket.acquire(who)
         except RateLimitError:
             return count
     return most

@@ -51,7 +51,7 @@ def undisturbed(record: Path) -> tuple[list[Any], list[Any]]:
         engine=SerialEngine(),
         **SETTINGS,
     )
-    models = json.loads(json.dumps(result_document(found.findings)["models"]))
+    models = json.loads(json.dumps(result_document(found.search_result)["models"]))
     return models, json.loads(json.dumps(history_document(states[-1].history)))
 
 

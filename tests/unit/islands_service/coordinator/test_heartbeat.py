@@ -47,7 +47,7 @@ class Watched:
         self._leases, self.leases = store.leases, self
         self.told: list[bool] = []
 
-    def beat(self, lease: Lease, seconds: float) -> bool:
+    def renew(self, lease: Lease, seconds: float) -> bool:
         self.told.append(self._leases.renew(lease, seconds))
         return self.told[-1]
 
@@ -155,7 +155,7 @@ class Away:
         self._store, self.left = store, beats
         self.leases = self
 
-    def beat(self, lease: Lease, seconds: float) -> bool:
+    def renew(self, lease: Lease, seconds: float) -> bool:
         if self.left:
             self.left -= 1
             raise StoreUnavailableError("the database does not answer")

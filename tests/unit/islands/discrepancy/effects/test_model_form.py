@@ -37,7 +37,9 @@ def started(extended: ExtendedSimulator, hiding: FaultyRecord) -> np.ndarray:
     (effect,) = extended.effects
     values = extended.nominal
     at_rest = extended.with_effects(()).simulate(values[: extended.get_slice(effect).start])
-    values[extended.get_slice(effect)] = effect.grid(extended.scene, hiding.record.y - at_rest)[0]
+    values[extended.get_slice(effect)] = effect.starting_points(extended.context, hiding.record.y - at_rest)[
+        0
+    ]
     return values
 
 
@@ -81,7 +83,7 @@ def test_what_holds_still_at_a_constant_input_still_does(
     extended: ExtendedSimulator, hiding: FaultyRecord
 ) -> None:
     values = started(extended, hiding)
-    resting = np.where(np.arange(2000) < 1000, extended.context.u, extended.scene.u[999])
+    resting = np.where(np.arange(2000) < 1000, extended.context.u, extended.context.u[999])
     core = extended.simulator
     own = {each.name: value for each, value in zip(extended.parameters[8:], values[8:], strict=True)}
     y = core.simulate(values[:8], resting, extended.context, own, ())

@@ -67,7 +67,7 @@ def test_both_causes_are_found(weighed) -> None:
     causes = {effect.name for effect in evidence.hypothesis.effects}
     assert "state-clip:upper" in causes
     assert evidence.verdict in (Verdict.NAMED, Verdict.REMAINDER)
-    locked = slice(fitted, record.effective_samples)
+    locked = slice(fitted, record.samples)
     before, after = (
         float(np.sqrt(np.mean((record.y - fit.output)[locked] ** 2)))
         for fit in (evidence.base, evidence.hypothesis.fit)

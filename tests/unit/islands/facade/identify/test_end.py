@@ -96,7 +96,7 @@ def test_a_search_ends_with_the_first_epoch_that_reaches_its_evaluations(data, s
     search = found.search_result.search
     assert search.evaluations == states[last].evaluations
     assert search.ended_by == ("generations" if last == 4 else "evaluations")
-    assert found.findings.settings["max_evaluations"] == budget
+    assert found.search_result.settings["max_evaluations"] == budget
 
 
 @pytest.mark.parametrize("place", [0, 2, 4])

@@ -159,8 +159,8 @@ def test_islands_evolve_beside_each_other(data):
         result = identify(
             data[:1000], **budget, seed=5, progress=lambda state, _settings, to=states: to.append(state)
         )
-        assert result.findings.settings["islands"] == len(states[0].archipelago.islands)
-        assert result.search_result.search.evaluations == 4 * 12 * result.findings.settings["islands"]
+        assert result.search_result.settings["islands"] == len(states[0].archipelago.islands)
+        assert result.search_result.search.evaluations == 4 * 12 * result.search_result.settings["islands"]
         for state in states:
             for place, island in enumerate(state.archipelago.islands):
                 best = min(entry.fitness for entry in island.hall_of_fame.entries)

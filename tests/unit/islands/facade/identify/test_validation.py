@@ -25,7 +25,7 @@ def test_validation_may_be_a_record_of_its_own(data, result):
     assert parameters(own) == parameters(result)
     assert own.search_result.split.validation is parts.validation
     elsewhere = identify(parts.estimation, record(seed=9), **BUDGET, seed=5)
-    assert own.findings.settings["validation"] != elsewhere.findings.settings["validation"]
+    assert own.search_result.settings["validation"] != elsewhere.search_result.settings["validation"]
     assert elsewhere.search_result.search.history == result.search_result.search.history
 
 
@@ -94,7 +94,7 @@ def test_two_inputs_and_segments_are_identified():
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_runs_on_a_small_budget(data, preset):
     found = identify(data[:1500], preset=preset, population=12, generations=1, max_terms=4)
-    assert found.findings.settings["preset"] == preset
+    assert found.search_result.settings["preset"] == preset
     search = found.search_result.search
     assert search.evaluations == 24
     assert search.feasible_share == sum(search.outcomes.get(name, 0) for name in ("ok", "abandoned")) / 24

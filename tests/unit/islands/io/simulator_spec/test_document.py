@@ -45,7 +45,7 @@ def extended(asked: Made, effects: list[Effect]) -> CalibrationResult:
     values = simulation_.nominal
     residual = 0.01 * scene.output_peak * np.sin(2 * np.pi * 7.3 * scene.time)
     for effect in simulation_.effects:
-        point = effect.grid(scene, residual)[0]
+        point = effect.starting_points(scene, residual)[0]
         values[simulation_.get_slice(effect)] = point
     target = Target(asked.record.y, np.arange(asked.record.samples) < fitted, None, {})
     return evaluate_fit(simulation_, target, values)
