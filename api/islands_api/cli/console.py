@@ -13,16 +13,21 @@ output = Console(highlight=False, soft_wrap=True)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-class Tell(Protocol):
-    """Takes what is to be shown: a text beside the bar, the share that is done, and lines under the bar."""
+class Display(Protocol):
+    """Progress callback that can show lines below its bar."""
 
-    def __call__(self, text: str, share: float, lines: Sequence[str] = ()) -> None:
-        """Show it."""
+    def __call__(self, message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
+        """Show a message next to the bar, the completed fraction, and lines below the bar."""
         ...
 
 
+def print_message(message: str, _fraction: float | None = None, /) -> None:
+    """Print a progress message to the standard error stream."""
+    errors.print(message, markup=False)
+
+
 @contextmanager
-def progress(title: str) -> Iterator[Tell]:
+def progress(title: str) -> Iterator[Display]:
     """Show a moving bar while something runs."""
     columns = (
         SpinnerColumn(),
@@ -35,8 +40,8 @@ def progress(title: str) -> Iterator[Tell]:
     task = bar.add_task("", total=1.0, title=title)
     with Live(bar, console=errors, transient=True, refresh_per_second=10) as live:
 
-        def tell(text: str, share: float, lines: Sequence[str] = ()) -> None:
-            bar.update(task, description=text, completed=share)
+        def tell(message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
+            bar.update(task, description=message, completed=fraction)
             live.update(Group(bar, *(Text(line) for line in lines)))
 
         yield tell

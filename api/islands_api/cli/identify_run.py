@@ -27,7 +27,7 @@ from islands.io.records import fingerprint, read_record
 from islands.io.records.row_range import parse_rows
 from islands.validation.metrics import metrics
 from islands_api.cli import options
-from islands_api.cli.console import Tell, compile_kernels, errors, output, progress
+from islands_api.cli.console import Display, compile_kernels, errors, output, print_message, progress
 from islands_api.cli.output_folder import show_result
 from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
@@ -73,7 +73,7 @@ def run(
     with (
         progress("identify") as tell,
         # Ray takes over SIGTERM when it starts: it comes before our own handlers.
-        carry_out(manner.address, lambda line: errors.print(line, markup=False)) as engine,
+        carry_out(manner.address, print_message) as engine,
         _stop_requests(manner.wall_time) as stop,
     ):
         if state is None:
@@ -160,7 +160,7 @@ class _Watch:
     """Shows where the search stands and writes checkpoints."""
 
     def __init__(
-        self, folder: Path, job: dict[str, Any], tell: Tell, state: SearchState | None, spent: float
+        self, folder: Path, job: dict[str, Any], tell: Display, state: SearchState | None, spent: float
     ) -> None:
         self._folder, self._job = folder, job
         self._show = search_progress(tell)

@@ -8,13 +8,13 @@ from time import monotonic
 from islands.evolution.history import HistoryPoint
 from islands.evolution.search_state import SearchState
 from islands.evolution.settings import Settings
-from islands_api.cli.console import Tell
+from islands_api.cli.console import Display
 
 #: Islands that are shown one by one.
 SHOWN = 16
 
 
-def search_progress(tell: Tell) -> Callable[[SearchState, Settings], None]:
+def search_progress(tell: Display) -> Callable[[SearchState, Settings], None]:
     """Return a watcher that shows generation, speed, time left, the best of every size and every island."""
     began: list[tuple[float, int]] = []
 

@@ -254,7 +254,11 @@ class Coordinator:
 
         if ended := kill_stale_actors(lease.job.id, lease.epoch):
             log.warning("actors of a lost lease ended", actors=ended)
-        return RayEngine(lambda line: log.warning("islands", note=line), f"{lease.job.id}.{lease.epoch}")
+
+        def warn(message: str, _fraction: float | None = None, /) -> None:
+            log.warning("islands", note=message)
+
+        return RayEngine(warn, f"{lease.job.id}.{lease.epoch}")
 
     def _sweep_now_and_then(self) -> None:
         if monotonic() > self._sweep_at:

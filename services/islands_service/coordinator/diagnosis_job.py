@@ -49,24 +49,24 @@ def discrepancy(
     """
     began = monotonic()
 
-    def tell(line: str) -> None:
+    def report(message: str, _fraction: float | None = None, /) -> None:
         check()
         try:
-            store.leases.report(lease, ProgressReport({"phase": line}))
+            store.leases.report(lease, ProgressReport({"phase": message}))
         except StoreError as error:
             # The analysis goes on: the next line tells where it is.
             log.warning("report failed", job=lease.job.id, reason=str(error))
 
     spec = discrepancy_of(lease.job.spec)
     stored = store.datasets.get(lease.job.owner, spec.dataset)
-    tell("reading the record")
+    report("reading the record")
     record, columns = record_and_columns(spec, stored, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    found = diagnose(record, simulator, spec.tolerance, spec.seed, tell, spread or ray_map())
-    tell("a formula for what has no name")
+    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, spread or ray_map())
+    report("a formula for what has no name")
     proposal = explain_residual(found, spec.seed)
     wall_s = monotonic() - began
-    tell("writing the report")
+    report("writing the report")
     artefacts = {REPORT: blobs.write(diagnosis_report(stored.name, found, proposal=proposal))}
     if found.gain is not None:
         artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())

@@ -9,8 +9,8 @@ import ray
 from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
-from islands.evolution.engine import Tell
 from islands.evolution.problem import Problem
+from islands.evolution.progress import ProgressCallback
 from islands_service.runtime.cluster import LOST
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor
@@ -45,16 +45,16 @@ class IslandActorPool:
     ----------
     problem : Problem
     islands : int
-    tell : callable
+    progress : ProgressCallback
         Told when an actor is lost, and when some have to wait for a CPU.
     title : str
         What the actors' names begin with; "" leaves them without. Who takes over a job finds by it the
         actors of a coordinator that hangs, and would keep their CPUs.
     """
 
-    def __init__(self, problem: Problem, islands: int, tell: Tell, title: str = "") -> None:
+    def __init__(self, problem: Problem, islands: int, progress: ProgressCallback, title: str = "") -> None:
         self._problem = ray.put(problem)
-        self._islands, self._report, self._title, self._actor_count = islands, tell, title, 0
+        self._islands, self._report, self._title, self._actor_count = islands, progress, title, 0
         self._size = 0
         # By place; with the reference that ends when the actor is prepared, or when it dies.
         self._joining: dict[int, tuple[ActorHandle, ray.ObjectRef]] = {}

@@ -7,8 +7,9 @@ import ray
 from ray.exceptions import RayError, RayTaskError
 
 from islands.evolution.archipelago import Archipelago
-from islands.evolution.engine import ArchipelagoEpoch, Caches, Stop, Tell
+from islands.evolution.engine import ArchipelagoEpoch, Caches, Stop
 from islands.evolution.problem import Problem
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOST
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
@@ -27,21 +28,21 @@ class RayEngine:
 
     Parameters
     ----------
-    tell : callable
+    progress : ProgressCallback
         Takes a line for the user when an actor is lost, or has to wait for a CPU.
     title : str
         What the names of the actors begin with: ``<job>.<lease epoch>``.
     """
 
-    def __init__(self, tell: Tell = lambda _line: None, title: str = "") -> None:
-        self._tell, self._title = tell, title
+    def __init__(self, progress: ProgressCallback = ignore_progress, title: str = "") -> None:
+        self._progress, self._title = progress, title
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
         """See `islands.evolution.engine.Engine`."""
         itinerary = EpochScheduler(problem, start, pack_epoch)
         if itinerary.finished:
             return
-        crew = IslandActorPool(problem, len(start.islands), self._tell, self._title)
+        crew = IslandActorPool(problem, len(start.islands), self._progress, self._title)
         try:
             yield from _carried_out(itinerary, crew, stop)
         except RayError as error:

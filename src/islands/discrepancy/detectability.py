@@ -5,7 +5,7 @@ clean, into others each effect is put at several strengths, and all are diagnose
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import inf
@@ -24,6 +24,7 @@ from islands.discrepancy.surrogates import (
     injection_strengths,
     make_surrogates,
 )
+from islands.evolution.progress import ProgressCallback, ignore_progress
 
 #: Clean surrogates.
 CLEAN = 40
@@ -100,10 +101,6 @@ def diagnose_surrogate(source: Surrogates, probe: SurrogateCase) -> SurrogateOut
     )
 
 
-def _quiet(_ended: int, _of: int) -> None:
-    pass
-
-
 def self_test(
     diagnosis: Diagnosis,
     simulator: Simulator,
@@ -112,7 +109,7 @@ def self_test(
     run: ParallelMap = map,
     effects: Sequence[str] | None = None,
     clean: int = CLEAN,
-    tell: Callable[[int, int], None] = _quiet,
+    progress: ProgressCallback = ignore_progress,
 ) -> SelfTest:
     """Find out what an analysis of a record could have shown, and how often it names what is not there.
 
@@ -130,8 +127,8 @@ def self_test(
         Names of those to be put in; by default all that could enter the simulation.
     clean : int
         Surrogates that nothing is put into.
-    tell : callable
-        Told how many probes have ended, and of how many at the most.
+    progress : ProgressCallback
+        Takes the number of completed analyses and an upper bound of their total.
     """
     source = make_surrogates(diagnosis, simulator, dict(tolerance or {}))
     ladders = {
@@ -153,7 +150,7 @@ def self_test(
         most = ended + left + sum(probe.injection is None for probe in asked)
         for probe, answer in zip(asked, run(partial(diagnose_surrogate, source), asked), strict=True):
             ended += 1
-            tell(ended, most)
+            progress(f"{ended} of {most} analyses", ended / most)
             hidden = probe.injection
             confusion[hidden.cause if hidden else NOTHING, answer.named] += 1
             if hidden is None:

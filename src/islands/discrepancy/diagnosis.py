@@ -19,7 +19,7 @@ from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
-from islands.discrepancy.inference.stepwise_search import LEAST, Tell, ignore_progress
+from islands.discrepancy.inference.stepwise_search import LEAST
 from islands.discrepancy.inference.strategies import (
     SearchOutcome,
     assess_evidence,
@@ -39,6 +39,7 @@ from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationCont
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.evolution.progress import ProgressCallback, ignore_progress
 
 #: Times that causes are looked for anew because with them the record asks for another hold or step.
 ROUNDS = 3
@@ -108,7 +109,7 @@ def diagnose(
     simulator: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
-    tell: Tell = ignore_progress,
+    progress: ProgressCallback = ignore_progress,
     spread: ParallelMap = map,
     catalogue: Sequence[Effect] = EFFECTS,
 ) -> Diagnosis:
@@ -125,7 +126,7 @@ def diagnose(
         named is free, and what another value of it mends is no discrepancy.
     seed : int
         Of all that is drawn by lot.
-    tell : callable
+    progress : ProgressCallback
         Told what is being done.
     spread : ParallelMap
         Applies a function to every effect, in parallel or not; the result is the same.
@@ -146,33 +147,35 @@ def diagnose(
     rng = np.random.default_rng(seed)
     simulation = ExtendedSimulator(simulator, (), context)
     target = Target(record.y, np.arange(record.samples) < fitted, None, known)
-    tell("calibrating the simulation")
+    progress("calibrating the simulation")
     plain = calibrate(simulation, target, simulation.nominal)
     simulator = select_intersample(plain, target)
     effects = select_effects(simulator, context, known, catalogue)
     for _ in range(ROUNDS):
         plain = calibrate(replace(simulation, simulator=simulator), target, plain.values)
-        tell(f"looking for each of {len(effects)} effects")
+        progress(f"looking for each of {len(effects)} effects")
         rungs = screen_effects(plain, target, effects, spread)
         again = select_intersample(best_single(plain, rungs), target)
         if same_discretisation(again, simulator):
-            evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
+            evidence = search_with_ar_noise(plain, rungs, target, effects, progress, spread)
             again = select_intersample(evidence.hypothesis.fit, evidence.target)
         if same_discretisation(again, simulator):
             break
         # With a cause in it another hold, or a finer step, fits better: it was the cause that hid that.
-        tell("once more: the input between its samples")
+        progress("once more: the input between its samples")
         simulator = again
     else:
-        evidence = search_with_ar_noise(plain, rungs, target, effects, tell, spread)
-    tell("what is left over")
+        evidence = search_with_ar_noise(plain, rungs, target, effects, progress, spread)
+    progress("what is left over")
     evidence = assess_evidence(evidence, fitted, rng)
     if evidence.verdict == Verdict.UNKNOWN or (
         evidence.verdict == Verdict.NOTHING and evidence.hypothesis.fit.noise.order
     ):
-        second = assess_evidence(search_with_model_error(plain, target, effects, tell, spread), fitted, rng)
+        second = assess_evidence(
+            search_with_model_error(plain, target, effects, progress, spread), fitted, rng
+        )
         evidence = second if second.verdict != Verdict.UNKNOWN else evidence
-    return _told(record, evidence, plain, effects, fitted, rng, tell, spread)
+    return _told(record, evidence, plain, effects, fitted, rng, progress, spread)
 
 
 def _told(
@@ -182,7 +185,7 @@ def _told(
     effects: Sequence[Effect],
     fitted: int,
     rng: np.random.Generator,
-    tell: Tell,
+    progress: ProgressCallback,
     spread: ParallelMap,
 ) -> Diagnosis:
     """Say what the evidence comes to, and measure the gain: once, on the locked part."""
@@ -198,7 +201,7 @@ def _told(
     named: tuple[Finding, ...] = ()
     instead: tuple[ScreenedEffect, ...] = ()
     if gain is not None:
-        tell("what else could be the cause")
+        progress("what else could be the cause")
         named, instead = describe_effects(found, base, rungs, evidence.target, effects, floor, spread)
     residual = (record.y - found.fit.output)[:fitted]
     context = found.fit.simulation.context

@@ -14,9 +14,6 @@ from islands.evolution.problem import Problem
 #: Answers with true once the search is to end.
 Stop = Callable[[], bool]
 
-#: Takes a line for the user.
-Tell = Callable[[str], None]
-
 #: Bytes that every cache takes, and its limit.
 Caches = Mapping[str, tuple[int, int]]
 

@@ -6,10 +6,10 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as diagnosed
 from islands.discrepancy.effects import EFFECTS
-from islands.discrepancy.inference.stepwise_search import Tell, ignore_progress
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.io.simulator_spec.factory import make_simulator as made
 from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 
@@ -22,7 +22,7 @@ def diagnose(
     columns: Mapping[str, Signal] | None = None,
     effects: Sequence[Effect] = EFFECTS,
     seed: int = 0,
-    progress: Tell = ignore_progress,
+    progress: ProgressCallback = ignore_progress,
     spread: ParallelMap = map,
 ) -> Diagnosis:
     """Find out what a simulation gets wrong about a record, why, and what mending it is worth.

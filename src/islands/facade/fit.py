@@ -1,7 +1,6 @@
 """Fit: forward selection over a library, (constrained) least squares, assessment. The classical answer."""
 
 from collections import Counter
-from collections.abc import Callable
 
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
@@ -9,6 +8,7 @@ from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import constraint
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
@@ -18,8 +18,6 @@ from islands.validation.assessment import assess
 
 #: Samples of a shooting interval, the paper's case 1; a short record takes a tenth of its own.
 SHOOTING = 500
-
-Progress = Callable[[str, float], None]
 
 
 def fit(
@@ -33,7 +31,7 @@ def fit(
     constraints: str | None = None,
     shooting: int | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: ProgressCallback = ignore_progress,
 ) -> Result:
     """Fit nested models to a record by forward selection and rank them on validation data.
 
@@ -81,11 +79,10 @@ def fit(
     shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
-    tell = progress or (lambda _text, _share: None)
 
     pool = candidates(library, degree, lags, record.inputs)
     warm_up = max(item.maximum_lag for item in pool)
-    tell(f"inner products of {len(pool)} candidates", 0.0)
+    progress(f"inner products of {len(pool)} candidates", 0.0)
     structures = forward_selection(pool, parts.estimation, constraints, max_terms)
     if isinstance(structures, EvaluationOutcome):
         raise SettingsError(f"nothing can be fitted with these settings: {structures}")
@@ -98,7 +95,7 @@ def fit(
             continue
         outcomes["ok"] += 1
         models.append(RankedModel(estimated.model, assess(estimated.model, parts, shooting, warm_up)))
-        tell(f"model of {estimated.model.size} terms", done / len(structures))
+        progress(f"model of {estimated.model.size} terms", done / len(structures))
     if not models:
         raise SettingsError(
             f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"

@@ -36,8 +36,8 @@ FEASIBLE = ("ok", "abandoned")
 #: Predictions on the validation data that a test of the residual takes.
 _RESIDUALS = 3
 
-#: Called after every epoch.
-Watch = Callable[[SearchState, Settings], None]
+#: Takes the state of a search after every epoch, and its settings.
+SearchCallback = Callable[[SearchState, Settings], None]
 
 
 def identify(
@@ -46,7 +46,7 @@ def identify(
     *,
     preset: str = "hysteresis",
     seed: int = 0,
-    progress: Watch | None = None,
+    progress: SearchCallback | None = None,
     stop: Stop | None = None,
     start: SearchState | None = None,
     engine: Engine | None = None,

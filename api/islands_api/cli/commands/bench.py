@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from islands.errors import IslandsError
+from islands.evolution.progress import ProgressCallback
 from islands.performance.benchmark.report import BenchmarkReport, check_goals, to_document
 from islands.performance.benchmark.run import measure
 from islands.performance.benchmark.scaling import save_scalings
@@ -44,7 +45,7 @@ def bench(
         output.print(str(path), markup=False)
 
 
-def _measured(quick: bool, tell: Callable[[str, float], None]) -> BenchmarkReport:
+def _measured(quick: bool, tell: ProgressCallback) -> BenchmarkReport:
     """Measure in a process of its own: a linear algebra library reads its threads when it is loaded.
 
     They wait in a loop, and their waiting would be counted as CPU time of plain numpy.
@@ -62,7 +63,7 @@ def _measured(quick: bool, tell: Callable[[str, float], None]) -> BenchmarkRepor
         process.join()
 
 
-def _followed(receiving: Connection, tell: Callable[[str, float], None]) -> BenchmarkReport:
+def _followed(receiving: Connection, tell: ProgressCallback) -> BenchmarkReport:
     """Pass on what the measuring process tells, until it sends the report or its error."""
     while True:
         try:
@@ -83,7 +84,7 @@ def _followed(receiving: Connection, tell: Callable[[str, float], None]) -> Benc
 
 def _measure(quick: bool, sending: Connection) -> None:
     try:
-        sending.send(measure(quick, lambda text, share: sending.send((text, float(share)))))
+        sending.send(measure(quick, lambda text, share=None, /: sending.send((text, float(share or 0.0)))))
     except IslandsError as error:
         sending.send(error)
     except KeyboardInterrupt:

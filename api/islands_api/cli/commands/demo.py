@@ -16,7 +16,7 @@ from islands.simulation.predictors import free_run
 from islands.systems.catalogue import SYSTEMS, make_record
 from islands.systems.published_models import PUBLISHED
 from islands.validation.metrics import Metrics, metrics
-from islands_api.cli.console import compile_kernels, errors, output, progress
+from islands_api.cli.console import compile_kernels, output, print_message, progress
 from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
@@ -44,7 +44,7 @@ def demo(
     began = perf_counter()
     with (
         progress("demo") as tell,
-        ENGINES["ray"](None, lambda line: errors.print(line, markup=False)) as engine,
+        ENGINES["ray"](None, print_message) as engine,
     ):
         result = islands.identify(
             *(estimation, validation),

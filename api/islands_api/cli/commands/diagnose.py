@@ -22,7 +22,7 @@ from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import ColumnSpec, innermost, parse_spec
 from islands_api.cli import options
-from islands_api.cli.console import Tell, compile_kernels, output, progress
+from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
@@ -66,7 +66,7 @@ def diagnose(
         known = options.tolerances(tolerance or [])
         with _cores(workers, tested) as spread:
             began = perf_counter()
-            found = diagnosed(data, simulator, known, seed, lambda line: tell(line, 0.5), spread)
+            found = diagnosed(data, simulator, known, seed, tell, spread)
             tell("a formula for what has no name", 0.8)
             proposal = explain_residual(found, seed)
             wall = perf_counter() - began
@@ -104,17 +104,17 @@ def _self_tested(
     tolerance: Mapping[str, float],
     seed: int,
     spread: ParallelMap,
-    tell: Tell,
+    tell: Display,
 ) -> SelfTest:
     """Carry out the self-test, and show how long it will take."""
     tell("self-test", 0.0)
     began = perf_counter()
 
-    def ended(count: int, of: int) -> None:
-        left = (perf_counter() - began) * (of - count) / count
-        tell(f"self-test, {count} of {of} analyses, {_duration(left)} left", count / of)
+    def show(message: str, fraction: float | None = None, /) -> None:
+        left = (perf_counter() - began) * (1 / fraction - 1) if fraction else 0.0
+        tell(f"self-test, {message}, {_duration(left)} left", fraction)
 
-    return self_test(found, simulator, tolerance, seed, spread, tell=ended)
+    return self_test(found, simulator, tolerance, seed, spread, progress=show)
 
 
 def _cores(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:

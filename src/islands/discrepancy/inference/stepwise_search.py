@@ -1,9 +1,8 @@
 """The search for causes: single effects and combinations, a few of them followed at a time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import TypeAlias
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from islands.discrepancy.inference.hypothesis import (
 from islands.discrepancy.inference.screening import EQUAL, ScreenedEffect, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
+from islands.evolution.progress import ProgressCallback
 
 #: The least that an effect has to gain, in minus twice the log-likelihood: six is one to twenty.
 LEAST = 6.0
@@ -30,20 +30,13 @@ BEAM, MOST, SEEDS = 3, 3, 6
 #: Fits with the memory of the noise that the one before has left, at the most.
 REFITS = 6
 
-#: Told what is being done.
-Tell: TypeAlias = Callable[[str], None]
-
-
-def ignore_progress(_line: str) -> None:
-    """Tell nobody."""
-
 
 def stepwise_search(
     base: CalibrationResult,
     first: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
-    tell: Tell,
+    progress: ProgressCallback,
     spread: ParallelMap = map,
     pairs: bool = False,
 ) -> tuple[Hypothesis, Target]:
@@ -67,7 +60,7 @@ def stepwise_search(
     while followed and _causes(followed[0]) < most:
         alone = not followed[0].effects
         if not alone:
-            tell(f"effects beside {' and '.join(effect.name for effect in followed[0].effects)}")
+            progress(f"effects beside {' and '.join(effect.name for effect in followed[0].effects)}")
         least = LEAST if alone else _further(target, effects)
         further: dict[frozenset[str], Hypothesis] = {}
         for each in followed:
@@ -85,7 +78,7 @@ def stepwise_search(
             best, target = followed[0], there
         elif not (alone and pairs):
             break
-    return refine_by_swaps(best, target, effects, tell, spread, most)
+    return refine_by_swaps(best, target, effects, progress, spread, most)
 
 
 def _causes(found: Hypothesis) -> int:
@@ -108,7 +101,7 @@ def refine_by_swaps(
     found: Hypothesis,
     target: Target,
     effects: Sequence[Effect],
-    tell: Tell,
+    progress: ProgressCallback,
     spread: ParallelMap = map,
     most: int = MOST,
 ) -> tuple[Hypothesis, Target]:
@@ -129,7 +122,7 @@ def refine_by_swaps(
         rivals: tuple[Alternatives, ...] = ()
         further = []
         if len(found.effects) > 1:
-            tell("what else could be the cause")
+            progress("what else could be the cause")
             rivals = find_alternatives(found, target, effects, spread)
             further = [with_effect(each.without, rung) for each in rivals for rung in each.screened[:1]]
         if len(found.effects) < len(complete) and _causes(found) < most:

@@ -21,7 +21,7 @@ from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
 from islands.discrepancy.inference.residual_structure import describe_remainder
 from islands.discrepancy.inference.screening import ScreenedEffect, is_same_fit, screen_effects
-from islands.discrepancy.inference.stepwise_search import LEAST, Tell, stepwise_search
+from islands.discrepancy.inference.stepwise_search import LEAST, stepwise_search
 from islands.discrepancy.inference.verdict import (
     Verdict,
     classify,
@@ -31,6 +31,7 @@ from islands.discrepancy.inference.verdict import (
 )
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap, memoised_map
+from islands.evolution.progress import ProgressCallback
 
 #: Share of the misfit that a single effect has to explain for pairs to be looked for: of noise none does.
 WORTHWHILE = 0.1
@@ -76,7 +77,7 @@ def search_with_ar_noise(
     rungs: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
-    tell: Tell,
+    progress: ProgressCallback,
     spread: ParallelMap,
 ) -> SearchOutcome:
     """Look for what explains a record, what is left being noise that may remember.
@@ -89,19 +90,23 @@ def search_with_ar_noise(
     memory = best_single(base, rungs).noise
     if memory.order:
         # Once more, with what the noise remembers taken out: plain least squares would fit that as well.
-        tell("the noise remembers: once more with that taken out")
+        progress("the noise remembers: once more with that taken out")
         target = replace(target, noise=memory)
         base = calibrate(base.simulation, target, base.values)
         rungs = screen_effects(base, target, effects, spread)
-    found, target = stepwise_search(base, rungs, target, effects, tell, spread)
+    found, target = stepwise_search(base, rungs, target, effects, progress, spread)
     return _unjudged(base, rungs, target, found)
 
 
 def search_with_model_error(
-    base: CalibrationResult, target: Target, effects: Sequence[Effect], tell: Tell, spread: ParallelMap
+    base: CalibrationResult,
+    target: Target,
+    effects: Sequence[Effect],
+    progress: ProgressCallback,
+    spread: ParallelMap,
 ) -> SearchOutcome:
     """Look for what explains a record's misfit, whatever is left being of the simulation's form."""
-    tell("the form is wrong: once more by the misfit alone")
+    progress("the form is wrong: once more by the misfit alone")
     rungs: Sequence[ScreenedEffect] = ()
     found = Hypothesis(base, base.score, ())
     spread = memoised_map(
@@ -114,7 +119,7 @@ def search_with_model_error(
         rungs = screen_effects(base, target, effects, spread)
         if not any(explained_fraction(base, rung.fit, 0.0) > WORTHWHILE for rung in rungs):
             break
-        found, _ = stepwise_search(base, rungs, target, effects, tell, spread, pairs=True)
+        found, _ = stepwise_search(base, rungs, target, effects, progress, spread, pairs=True)
         if not found.effects:
             break
     return _unjudged(base, rungs, target, found)

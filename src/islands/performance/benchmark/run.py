@@ -6,6 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from islands.data.dataset import Dataset
+from islands.evolution.progress import ProgressCallback
 from islands.performance.benchmark import kernel_evaluator
 from islands.performance.benchmark.clock import refuse_threads
 from islands.performance.benchmark.comparison import Comparison, compare
@@ -26,8 +27,6 @@ from islands.performance.benchmark.workload import (
     fingerprint,
     workload,
 )
-
-Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +59,12 @@ FULL = BenchmarkSize(30, 3, 7, ISLAND.generations, 100, True)
 QUICK = BenchmarkSize(4, 1, 2, 10, 10, False)
 
 
-def measure(quick: bool, tell: Tell) -> BenchmarkReport:
+def measure(quick: bool, progress: ProgressCallback) -> BenchmarkReport:
     """Carry out the benchmark.
 
     Parameters
     ----------
-    tell : callable
+    progress : ProgressCallback
         Is told what is measured, and which share of everything is done.
 
     Raises
@@ -77,7 +76,7 @@ def measure(quick: bool, tell: Tell) -> BenchmarkReport:
     """
     refuse_threads()
     effort = QUICK if quick else FULL
-    tell("record and individuals", 0.0)
+    progress("record and individuals", 0.0)
     record = benchmark_record()
     searched = replace(ISLAND, generations=effort.generations)
     individuals = workload(record, effort.individuals, searched)
@@ -85,25 +84,25 @@ def measure(quick: bool, tell: Tell) -> BenchmarkReport:
     with TemporaryDirectory() as folder:
         kinds: dict[str, Comparison] = {}
         for kind, candidates in individuals.items():
-            told = _part(tell, f"evaluations: {kind}", 0.05 + 0.1 * len(kinds), 0.1)
+            told = _part(progress, f"evaluations: {kind}", 0.05 + 0.1 * len(kinds), 0.1)
             kinds[kind] = compare(candidates, state, effort.rounds, Path(folder), told)
         peak_flops = peak(Path(folder))
     scalings = [
-        against_samples(record, effort.scaling, _part(tell, "cost against samples", 0.35, 0.04)),
-        against_terms(state, effort.scaling, _part(tell, "cost against terms", 0.39, 0.04)),
-        against_tree_size(state, effort.scaling, _part(tell, "cost against tree size", 0.43, 0.04)),
+        against_samples(record, effort.scaling, _part(progress, "cost against samples", 0.35, 0.04)),
+        against_terms(state, effort.scaling, _part(progress, "cost against terms", 0.39, 0.04)),
+        against_tree_size(state, effort.scaling, _part(progress, "cost against tree size", 0.43, 0.04)),
     ]
     runs = {}
     for share, samples in ((0.47, SAMPLES), (0.65, SAMPLES // 10)):
-        told = _part(tell, f"search on {samples} samples", share, 0.15)
+        told = _part(progress, f"search on {samples} samples", share, 0.15)
         runs[f"n{samples}"] = run_island(record[:samples], searched, 0, told)
-    tell("search in one process, then in two", 0.8)
+    progress("search in one process, then in two", 0.8)
     together = _processes(record, effort.parallel)
     alone, pair = (sum(run.per_second for run in each) for each in together.values())
     scalings.append(against_islands(together))
     case1 = None
     if effort.case1:
-        tell("the whole case 1, two islands in two processes", 0.85)
+        progress("the whole case 1, two islands in two processes", 0.85)
         case1, _ = run_in_processes(record, ISLAND, range(ISLANDS))
     return BenchmarkReport(
         quick=quick,
@@ -126,7 +125,7 @@ def _processes(record: Dataset, generations: int) -> dict[int, tuple[Run, ...]]:
     return {count: run_in_processes(record, settings, [0] * count, warm=True)[1] for count in (1, 2)}
 
 
-def _part(tell: Tell, text: str, begin: float, share: float) -> Callable[[float], None]:
+def _part(progress: ProgressCallback, text: str, begin: float, share: float) -> Callable[[float], None]:
     """Tell of a part of the benchmark; what is returned takes the share of the part that is done."""
-    tell(text, begin)
-    return lambda done: tell(text, begin + share * done)
+    progress(text, begin)
+    return lambda done: progress(text, begin + share * done)

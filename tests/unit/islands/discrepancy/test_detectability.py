@@ -255,12 +255,12 @@ def test_the_limit_is_where_naming_begins(diagnosis: Diagnosis, source: Surrogat
 
 
 def test_who_waits_is_told_how_far_it_is(diagnosis: Diagnosis) -> None:
-    told: list[tuple[int, int]] = []
+    told: list[tuple[str, float | None]] = []
     self_test(
         *(diagnosis, CORE, TOLERANCE, 0, answering(NOTHING, 0.0), ("offset",), 2),
-        tell=lambda ended, of: told.append((ended, of)),
+        progress=lambda message, fraction=None: told.append((message, fraction)),
     )
-    assert told == [(ended, 6) for ended in range(1, 7)]
+    assert told == [(f"{ended} of 6 analyses", ended / 6) for ended in range(1, 7)]
 
 
 def test_noise_that_was_fitted_to_a_drift_stays_finite(diagnosis: Diagnosis) -> None:

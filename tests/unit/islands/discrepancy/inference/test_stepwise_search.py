@@ -26,13 +26,10 @@ from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
+from islands.evolution.progress import ignore_progress
 from support.simulated_records import DT, made, recorded, wave
 
 Array = NDArray[np.float64]
-
-
-def silent(_line: str) -> None:
-    pass
 
 
 def backwards(function: Callable, arguments: Iterable) -> Iterator:
@@ -84,7 +81,8 @@ def test_the_order_of_the_work_changes_no_bit_of_the_ladder() -> None:
     assert forwards[0].effect.name == "even-nonlinearity"
     chosen = [
         tuple(
-            each.name for each in stepwise_search(base, forwards, target, effects, silent, spread)[0].effects
+            each.name
+            for each in stepwise_search(base, forwards, target, effects, ignore_progress, spread)[0].effects
         )
         for spread in (map, backwards)
     ]
@@ -118,8 +116,8 @@ def test_two_that_hide_each_other_are_found_as_a_pair_alone(hiding) -> None:
     base, target, effects = hiding
     rungs = screen_effects(base, target, effects)
     assert all(rung.score_gain(base) < LEAST for rung in rungs)
-    assert stepwise_search(base, rungs, target, effects, silent)[0].effects == ()
-    found, _ = stepwise_search(base, rungs, target, effects, silent, pairs=True)
+    assert stepwise_search(base, rungs, target, effects, ignore_progress)[0].effects == ()
+    found, _ = stepwise_search(base, rungs, target, effects, ignore_progress, pairs=True)
     assert {each.name for each in found.effects} == {"offset", "linear-drift"}
     assert found.cost < base.score - LEAST
 
@@ -127,7 +125,7 @@ def test_two_that_hide_each_other_are_found_as_a_pair_alone(hiding) -> None:
 def test_without_one_of_its_effects_an_explanation_is_fitted_anew(hiding) -> None:
     base, target, effects = hiding
     found, _ = stepwise_search(
-        base, screen_effects(base, target, effects), target, effects, silent, pairs=True
+        base, screen_effects(base, target, effects), target, effects, ignore_progress, pairs=True
     )
     for effect in effects:
         left = without_effect(found, effect, target)
@@ -144,7 +142,7 @@ def test_where_nothing_pays_there_is_no_pair() -> None:
     base, target = calibrated(recorded(u, u + noise), core)
     effects = select_effects(core, base.simulation.context, {})
     found, _ = stepwise_search(
-        base, screen_effects(base, target, effects), target, effects, silent, pairs=True
+        base, screen_effects(base, target, effects), target, effects, ignore_progress, pairs=True
     )
     assert found.effects == ()
     assert found.fit is base
@@ -163,7 +161,9 @@ def test_what_a_second_cause_remembers_is_no_noise_once_it_is_found() -> None:
     assert memory.order > 0
     target = replace(target, noise=memory)
     base = calibrate(base.simulation, target, base.values)
-    found, target = stepwise_search(base, screen_effects(base, target, effects), target, effects, silent)
+    found, target = stepwise_search(
+        base, screen_effects(base, target, effects), target, effects, ignore_progress
+    )
     assert {each.name for each in found.effects} == {"even-nonlinearity", "jump"}
     assert target.noise is not None
     assert target.noise.order == 0
@@ -200,7 +200,7 @@ def test_what_explains_more_is_put_in_the_place_of_what_misled() -> None:
     for effect in wrong:
         fit = screen_effects(fit, target, [effect])[0].fit
     misled = Hypothesis(fit, fit.score, tuple(wrong))
-    found, _ = refine_by_swaps(misled, target, effects, silent)
+    found, _ = refine_by_swaps(misled, target, effects, ignore_progress)
     assert {each.name for each in found.effects} == {"cubic-stiffness", "even-nonlinearity"}
     assert found.cost < misled.cost
     assert [each.without.effects for each in found.alternatives] == [(found.effects[1],), (found.effects[0],)]
@@ -217,7 +217,7 @@ def test_of_effects_that_do_the_same_the_catalogue_s_first_goes_first(seed: int)
     one, other = screen_effects(base, target, effects)[:2]
     assert (one.effect.cause, other.effect.cause) == ("offset", "input-offset")
     assert one.score_gain(base) == pytest.approx(other.score_gain(base), abs=EQUAL)
-    found, _ = stepwise_search(base, (one, other), target, effects, silent)
+    found, _ = stepwise_search(base, (one, other), target, effects, ignore_progress)
     assert [each.name for each in found.effects] == ["offset"]
 
 
@@ -252,6 +252,6 @@ def test_a_name_that_the_simulation_fitted_anew_does_without_is_left_out() -> No
     effects = [CATALOGUE["input-gain"], CATALOGUE["jump"]]
     fit = evaluate_fit(base.simulation.with_effects(effects[:1]), target, np.array([1.0, 0.3]))
     misled = Hypothesis(fit, fit.score, tuple(effects[:1]))
-    found, _ = refine_by_swaps(misled, target, effects, silent)
+    found, _ = refine_by_swaps(misled, target, effects, ignore_progress)
     assert found.effects == ()
     assert found.fit.values == pytest.approx([1.3], rel=1e-3)

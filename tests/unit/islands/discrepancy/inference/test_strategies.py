@@ -10,6 +10,7 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.inference.strategies import assess_evidence, search_with_model_error
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.evolution.progress import ignore_progress
 from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec
 from support.simulated_records import recorded
@@ -25,10 +26,6 @@ RIVALS = (
         marks=pytest.mark.nightly,
     ),
 )
-
-
-def silent(_line: str) -> None:
-    pass
 
 
 def overflowing(rim: float, beside: float, samples: int = 400, dt: float = 4.0) -> Dataset:
@@ -58,7 +55,7 @@ def weighed(request):
     target = Target(record.y, np.arange(record.samples) < fitted, None, {})
     base = calibrate(alone, target, alone.nominal)
     effects = [*core.state_effects, *(CATALOGUE[name] for name in request.param)]
-    evidence = search_with_model_error(base, target, effects, silent, map)
+    evidence = search_with_model_error(base, target, effects, ignore_progress, map)
     return record, fitted, evidence, assess_evidence(evidence, fitted, np.random.default_rng(0))
 
 
