@@ -135,7 +135,7 @@ class IslandActorPool:
                         f"a machine of the cluster has islands {theirs}, this one {version('islands')}: the "
                         "result would depend on who computes it; install one version on all"
                     )
-                self._members[place] = (actor, actor.live.remote())
+                self._members[place] = (actor, actor.wait_until_killed.remote())
                 self._vacant.discard(place)
             del self._joining[place]
         standing_in = [STAND_IN] if now - self._started_at > STAND_IN_AFTER else []
