@@ -2,7 +2,7 @@
 
     python benchmarks/migration.py [--preset paper-case1] [--seeds 10] [--json FILE]
 
-Watched, not asserted: the figures stand in docs/decisions. The error is the RMSE of multiple shooting on the
+Watched, not asserted: the figures are in docs/decisions. The error is the RMSE of multiple shooting on the
 estimation data, which evolution minimises: of the best model of any size, and of six terms at most.
 """
 

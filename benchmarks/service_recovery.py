@@ -41,7 +41,7 @@ LEASE = 5.0
 #: Generations that may be under way at once, and more.
 AHEAD = 20
 
-#: How soon a cluster's head misses a machine: what `docs/service.md` says to give to it.
+#: How soon a cluster's head misses a machine: as `docs/how-to/deploy-the-service.md` configures it.
 HEALTH = {
     "RAY_health_check_initial_delay_ms": "1000",
     "RAY_health_check_period_ms": "500",

@@ -1,4 +1,4 @@
-"""A stranger follows docs/service.md to the letter: the same job by curl, by Python and by the command line.
+"""A new user follows docs/how-to/use-the-rest-api.md: the same job by curl, by Python and by the command line.
 
 The commands are those of the page. Put in are the address, and the ids, which a stranger has to
 put in as well.
@@ -42,7 +42,9 @@ def section(page: str, title: str) -> str:
 def block(way: str) -> str:
     """The code of a way to submit a job."""
     found = re.search(
-        rf"\*\*{way}\*\*.*?```\w+\n(.*?)```", section("docs/service.md", "A job in three ways"), re.DOTALL
+        rf"\*\*{way}\*\*.*?```\w+\n(.*?)```",
+        section("docs/how-to/use-the-rest-api.md", "A job in three ways"),
+        re.DOTALL,
     )
     assert found, way
     return found[1]

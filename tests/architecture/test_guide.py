@@ -1,69 +1,85 @@
-"""The guide of the discrepancy analysis says what the code has: effects, simulations, verdicts, pictures."""
+"""The written documentation agrees with the code: effects, simulations, verdicts, links and pictures."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from islands.discrepancy.effects import CATALOGUE, OF_EACH, summary_of
+from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import SimulationContext
 from islands.io.simulator_spec.specification import KINDS
-from support.repository import DOCS
+from support.repository import DOCS, ROOT
 
-GUIDE = (DOCS / "discrepancy.md").read_text()
+DIAGNOSE = (DOCS / "how-to" / "diagnose-a-simulation.md").read_text()
 
-#: A row of the catalogue: what stands behind a name and its family.
+#: Cells of a row of the table of effects by name: parameters, similar effects, distinguishing observation.
 ROWS = {
-    name: [cell.strip().replace("&#124;", "|") for cell in cells.split("|")]
-    for name, cells in re.findall(r"^\| `([a-z-]+)`, ([a-z]+(?: \|[^|]+){4}) \|$", GUIDE, re.MULTILINE)
+    name: [cell.strip() for cell in cells.split("|")]
+    for name, cells in re.findall(
+        r"^\| `([a-z-]+)` \|((?:[^|]+\|){2}[^|]+) \|$",
+        (DOCS / "how-to" / "tell-effects-apart.md").read_text(),
+        re.MULTILINE,
+    )
 }
 
+#: Folders of pages that are generated, and need not exist in a checkout.
+GENERATED = ("reference", "tutorials")
 
-def said(name: str) -> str:
-    return DETECTORS[name].summary if name in DETECTORS else summary_of(name)
+#: Pages that are written by hand.
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *(page for page in sorted(DOCS.rglob("*.md")) if page.relative_to(DOCS).parts[0] not in GENERATED),
+]
 
 
-def test_the_guide_has_every_effect_and_no_other() -> None:
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_the_table_of_effects_has_every_effect_and_no_other() -> None:
     assert ROWS.keys() == {*CATALOGUE, *OF_EACH, *DETECTORS}
 
 
 @pytest.mark.parametrize("name", [*CATALOGUE, *OF_EACH, *DETECTORS])
-def test_the_guide_has_the_summary_of_every_effect(name: str) -> None:
-    family, what, parameters, alike, apart = ROWS[name]
-    assert what == said(name)
+def test_every_row_of_the_table_of_effects_is_complete(name: str) -> None:
+    parameters, alike, apart = ROWS[name]
     assert parameters
     assert alike
     assert apart
-    known = {**CATALOGUE, **DETECTORS}
-    assert name not in known or family == known[name].family
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_the_guide_has_an_effects_parameters(name: str, scene: SimulationContext) -> None:
-    in_guide = re.findall(r"`([^`]+)`", ROWS[name][2])
+def test_the_table_of_effects_has_the_parameters_of_an_effect(name: str, scene: SimulationContext) -> None:
+    in_guide = re.findall(r"`([^`]+)`", ROWS[name][0])
     assert [each.name for each in CATALOGUE[name].parameters(scene)] == in_guide
 
 
-def test_the_guide_has_every_simulation_and_every_verdict() -> None:
-    assert not [kind for kind in KINDS if not re.search(rf"^\| `{kind}[\[:`]", GUIDE, re.MULTILINE)]
-    assert not [verdict for verdict in Verdict if f"| `{verdict}` |" not in GUIDE]
+def test_the_guide_of_the_diagnosis_has_every_simulation_and_every_verdict() -> None:
+    assert not [kind for kind in KINDS if not re.search(rf"^\| `{kind}[\[:`]", DIAGNOSE, re.MULTILINE)]
+    assert not [verdict for verdict in Verdict if f"| `{verdict}` |" not in DIAGNOSE]
 
 
-def test_links_and_pictures_of_the_guide_lead_somewhere() -> None:
-    headings = re.findall(r"^#+ (.+)$", GUIDE, re.MULTILINE)
-    anchors = {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
-    links = re.findall(r"\]\(([^)]+)\)", GUIDE)
-    assert links
-    for link in links:
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_relative_links_of_a_page_lead_to_existing_places(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in link:
+            continue
         file, _, anchor = link.partition("#")
-        assert not file or (DOCS / file).is_file(), link
-        assert file or anchor in anchors, link
+        target = (page.parent / file).resolve() if file else page
+        if target.is_relative_to(DOCS) and target.relative_to(DOCS).parts[0] in GENERATED:
+            continue
+        assert target.is_file(), link
+        assert not anchor or anchor in anchors(target), link
 
 
 def test_pictures_are_small_and_all_are_shown() -> None:
-    shown = "".join(path.read_text() for path in DOCS.glob("*.md"))
+    shown = "".join(page.read_text() for page in PAGES)
     for picture in (DOCS / "pictures").iterdir():
         assert f"pictures/{picture.name}" in shown
         assert picture.stat().st_size < 200_000, picture

@@ -14,7 +14,7 @@ class ServiceError(IslandsError):
     status : int
         Of HTTP.
     type : str
-        ``/problems/invalid-record`` and so on: see docs/service.md.
+        ``/problems/invalid-record`` and so on: see docs/how-to/use-the-rest-api.md.
     detail : str
         What is wrong, and what to do.
     document : mapping

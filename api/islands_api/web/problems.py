@@ -1,6 +1,6 @@
 """Problems: the one table from an error to what HTTP says of it (RFC 9457).
 
-A newcomer's error is an entry here; its type is documented in docs/service.md and never changes.
+A new error is an entry here; its type is documented in docs/how-to/use-the-rest-api.md and never changes.
 """
 
 from collections.abc import Mapping
