@@ -1,4 +1,4 @@
-"""A new user follows docs/how-to/use-the-rest-api.md: the same job by curl, by Python and by the command line.
+"""A new user follows docs/how-to/use-the-rest-api.md: one job by curl, by Python and by the command line.
 
 The commands are those of the page. Put in are the address, and the ids, which a stranger has to
 put in as well.
