@@ -178,7 +178,7 @@ def errors(case: Case, record: islands.Dataset, found) -> dict[str, list[float]]
         test = made()
         rows[name] = []
         for fit in (found.base, found.best):
-            y = islands.simulated(extended_document(fit, record), test)
+            y = islands.simulate(extended_document(fit, record), test).y
             rows[name].append(case.scale * float(np.sqrt(np.mean((test.y - y)[case.skip :] ** 2))))
     return rows
 

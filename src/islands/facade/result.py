@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.errors import lookup
+from islands.errors import SettingsError, lookup
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.export import export
 from islands.io.result_folder import summary, write_result
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
+from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
@@ -19,6 +22,8 @@ from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 
 #: How a model may be simulated, by the names of the command line.
 SIMULATIONS = ("one-step", "shooting", "free-run")
@@ -133,18 +138,43 @@ class Result:
         return summary(self.search_result)
 
 
-def simulate(model: Model, record: Dataset, mode: str = "free-run", shooting: int = 500) -> Simulation:
-    """Simulate a model on a record.
+def simulate(
+    model: "Model | str | Mapping[str, Any] | SimulationSpec | LocalSpec",
+    record: Dataset,
+    mode: str = "free-run",
+    shooting: int = 500,
+    columns: Mapping[str, Any] | None = None,
+) -> Simulation:
+    """Simulate a record.
 
     Parameters
     ----------
+    model : Model, str, mapping or spec
+        A model, or a simulator: its name as on the command line (``second-order``), its specification, or
+        the document of an extended simulation.
+    record : Dataset
+        Inputs, and the output that initial states are taken from.
     mode : str
-        ``one-step``, ``shooting`` (intervals of ``shooting`` samples) or ``free-run``.
+        ``one-step``, ``shooting`` (intervals of ``shooting`` samples) or ``free-run``; a simulator has
+        ``free-run`` only.
+    shooting : int
+        Samples of an interval.
+    columns : mapping, optional
+        Recorded simulations by name for the simulator ``column:NAME``, each of shape (samples,).
 
     Raises
     ------
     SettingsError
-        The mode is unknown.
+        The mode or the simulator is unknown.
     """
     intervals = dict(zip(SIMULATIONS, (1, shooting, None), strict=True))
-    return multiple_shooting(model, record, lookup(intervals, mode, "mode"))
+    interval = lookup(intervals, mode, "mode")
+    if isinstance(model, Model):
+        return multiple_shooting(model, record, interval)
+    if interval is not None:
+        raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
+    # The simulators of the discrepancy analysis: most users of a model do not need them.
+    from islands.io.simulator_spec.factory import simulate_spec  # noqa: PLC0415
+
+    y = simulate_spec(model, record, columns)
+    return Simulation(y, float(np.mean((record.y - y) ** 2)), EvaluationOutcome())

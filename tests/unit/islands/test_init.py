@@ -8,8 +8,8 @@ from islands.facade.identify import identify
 from support.repository import ROOT
 
 
-def test_every_public_name_is_there_and_says_what_it_is():
-    reference = (ROOT / "docs" / "reference.md").read_text() + (ROOT / "README.md").read_text()
+def test_every_public_name_is_documented():
+    reference = "".join(page.read_text() for page in (ROOT / "docs").rglob("*.md"))
     assert islands.__all__ == sorted(islands.__all__, key=lambda name: (not name.isupper(), name))
     for name in islands.__all__:
         entry = getattr(islands, name)
@@ -21,7 +21,12 @@ def test_every_public_name_is_there_and_says_what_it_is():
             assert name in reference, name
 
 
-def test_the_package_says_how_it_is_used():
+def test_the_stub_file_lists_the_public_names():
+    stub = (ROOT / "src" / "islands" / "__init__.pyi").read_text()
+    assert stub == islands._make_stub()
+
+
+def test_the_package_docstring_shows_its_use():
     assert "islands.read_record(" in islands.__doc__
     assert "islands.fit(" in islands.__doc__
 

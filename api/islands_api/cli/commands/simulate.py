@@ -13,7 +13,7 @@ from islands.facade.fit import SHOOTING
 from islands.facade.result import simulate as run
 from islands.io.records import read_record, write_simulation
 from islands.io.records.row_range import parse_rows
-from islands.io.simulator_spec.factory import simulated
+from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
 from islands_api.cli import options
@@ -76,7 +76,7 @@ def _extended(
     whole = read_record(record, [*driving, *beside], output_column or asked.output, dt, parse_rows(rows))
     data = whole.first_inputs(len(driving))
     compile_kernels()
-    y = simulated(asked, data, dict.fromkeys(beside, whole.u[:, -1]))
+    y = simulate_spec(asked, data, dict.fromkeys(beside, whole.u[:, -1]))
     _show(data, y, f"{mode}: {', '.join(effect.name for effect in asked.effects)} in it", out)
 
 

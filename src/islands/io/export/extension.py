@@ -46,7 +46,7 @@ EXTENDED = json.loads("""
 
 if __name__ == "__main__":
     record = islands.read_record(sys.argv[1], inputs=[{inputs}], output={asked.output!r})
-    y = islands.simulated(EXTENDED, record)
+    y = islands.simulate(EXTENDED, record).y
     with open(sys.argv[2], "w") as file:
         file.write("y_sim\\n" + "\\n".join(repr(float(value)) for value in y) + "\\n")
 '''

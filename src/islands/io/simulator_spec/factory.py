@@ -91,7 +91,7 @@ def make_simulator(
             return _column(name, lookup(columns or {}, name, "column"), record)
 
 
-def simulated(
+def simulate_spec(
     asked: str | Mapping[str, Any] | SimulationSpec | LocalSpec,
     record: Dataset,
     columns: Mapping[str, Any] | None = None,

@@ -195,7 +195,7 @@ def test_a_simulation_that_is_the_record_lacks_nothing(record: Dataset, name: st
     """The simulation is the record to the last bit: there is no noise, and nothing that could be fitted."""
     record = record[:300]
     columns = {"theirs": 0.8 * record.u[:, 0]}
-    y = islands.simulated(ASKED[name], record, columns)
+    y = islands.simulate(ASKED[name], record, columns=columns).y
     found = islands.diagnose(replace(record, y=y), ASKED[name], columns=columns)
     assert found.verdict == Verdict.NOTHING
     assert found.effects == ()

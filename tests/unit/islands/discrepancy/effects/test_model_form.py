@@ -12,7 +12,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.document import extended_document
-from islands.io.simulator_spec.factory import simulated
+from islands.io.simulator_spec.factory import simulate_spec
 from islands.model.model import Model, model_of
 from islands.model.parsing import parse
 from islands.performance.trials.cases import CORES
@@ -102,7 +102,7 @@ def test_a_model_is_extended_by_writing_the_terms_into_it(
     assert isinstance(extended.simulator, NarxSimulator)
     assert written.size == extended.simulator.model.size + len(extended.parameters) - 8 - 1
     # It begins a sample later, with what was measured there.
-    again = simulated(document, record)
+    again = simulate_spec(document, record)
     assert np.std((again - fit.output)[200:]) < 0.3 * hiding.sigma
 
 

@@ -18,7 +18,7 @@ from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.errors import ModelError, SettingsError
 from islands.io.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
-from islands.io.simulator_spec.factory import make_simulator, simulated
+from islands.io.simulator_spec.factory import make_simulator, simulate_spec
 from islands.io.simulator_spec.specification import LocalExtendedSpec, ModelSpec, innermost, parse_spec
 from support.simulated_records import Made, made
 
@@ -78,7 +78,8 @@ def simulates_the_same(asked: Made, fit: CalibrationResult) -> None:
     document = json.loads(extended_json(fit, asked.record))
     fitted = begins(fit.simulation)
     record = replace(asked.record, y=fit.output) if fitted else asked.record
-    found, rel, behind = simulated(document, record, asked.columns), 1e-5 if fitted else 1e-12, slice(None)
+    found = simulate_spec(document, record, asked.columns)
+    rel, behind = 1e-5 if fitted else 1e-12, slice(None)
     if isinstance(innermost(asked.spec), ModelSpec):
         # It begins at the measured samples, which are others in another record, and forgets them.
         rel, behind = 1e-3, slice(FORGOTTEN, None)
@@ -217,5 +218,5 @@ def test_what_is_wrong_with_a_document_is_said(case: str) -> None:
     document = extended_document(extended(asked, [CATALOGUE["cubic-stiffness"]]), asked.record)
     spoil(document)
     with pytest.raises(kind) as refused:
-        simulated(document, asked.record)
+        simulate_spec(document, asked.record)
     assert words in str(refused.value)
