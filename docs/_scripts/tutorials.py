@@ -1,0 +1,193 @@
+"""Tutorials: executed examples as Markdown pages.
+
+An example is a Python script in ``examples/``. Its docstring is the title and the introduction of the page. A line
+``# %%`` begins a cell: the comment lines that follow are Markdown, the rest is code. The code of a cell ``# %% checks``
+runs and is not shown. A page shows the text, the code, what the code prints and the SVG figures that it writes to
+its output folder.
+
+``build`` writes the pages to a folder. The plug-in mkdocs-gen-files runs this file as a script.
+"""
+
+import ast
+import hashlib
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+
+#: Results of executed examples, by a hash of the example and the packages. Git ignores ``build/``.
+CACHE = ROOT / "build" / "tutorials"
+
+#: Folders that are imported by examples: a change of their sources changes the hash.
+PACKAGES = ("src", "services", "api")
+
+#: Opens a file of the site for writing: ``(path relative to the site, mode) -> stream``.
+Opener = Callable[[str, str], Any]
+
+
+class Cell(NamedTuple):
+    """Part of an example; ``line`` is the number of the first line of the code."""
+
+    text: str
+    code: str
+    line: int
+    shown: bool
+
+
+class Example(NamedTuple):
+    """A parsed example."""
+
+    name: str
+    title: str
+    introduction: str
+    cells: tuple[Cell, ...]
+
+
+def list_examples() -> list[Path]:
+    """Return the paths of all examples in the order of their numbers."""
+    return sorted(EXAMPLES.glob("[0-9][0-9]_*.py"))
+
+
+def parse(path: Path) -> Example:
+    """Read an example.
+
+    Raises
+    ------
+    ValueError
+        The file has no docstring or no cells.
+    """
+    source = path.read_text(encoding="utf-8")
+    docstring = ast.get_docstring(ast.parse(source))
+    head, *blocks = re.split(r"^# %%(.*)\n", source, flags=re.MULTILINE)
+    if not docstring or not blocks:
+        raise ValueError(f"{path.name} needs a docstring and cells that begin with '# %%'")
+    title, _, introduction = docstring.partition("\n")
+    line, cells = head.count("\n") + 1, []
+    for marker, block in zip(blocks[::2], blocks[1::2], strict=True):
+        comments = re.match(r"(#.*\n)*", block)
+        text = comments[0] if comments else ""
+        code = block[len(text) :]
+        first = line + 1 + text.count("\n")
+        cells.append(Cell(re.sub(r"^# ?", "", text, flags=re.MULTILINE).strip(), code, first, "checks" not in marker))
+        line += 1 + block.count("\n")
+    return Example(path.stem, title.rstrip("."), introduction.strip(), tuple(cells))
+
+
+def run(path: Path, folder: Path) -> None:
+    """Execute the cells of an example in this process; write ``cells.json`` and figures into a folder."""
+    import matplotlib as mpl  # noqa: PLC0415 - only the process that executes an example needs it
+
+    mpl.rcParams["svg.hashsalt"] = "islands"
+    sys.argv = [str(path), "--out", str(folder / "out")]
+    sys.path.insert(0, str(path.parent))
+    namespace: dict[str, Any] = {"__name__": "__main__", "__file__": str(path)}
+    results: list[dict[str, Any]] = []
+    seen: set[str] = set()
+    for cell in parse(path).cells:
+        printed = io.StringIO()
+        with redirect_stdout(printed):
+            # Empty lines in front keep the line numbers of error messages.
+            exec(compile("\n" * (cell.line - 1) + cell.code, str(path), "exec"), namespace)
+        figures = sorted({file.name for file in (folder / "out").glob("*.svg")} - seen)
+        seen.update(figures)
+        results.append({"output": printed.getvalue().replace(str(folder / "out"), "out"), "figures": figures})
+    (folder / "cells.json").write_text(json.dumps(results), encoding="utf-8")
+
+
+def execute(path: Path) -> Path:
+    """Execute an example in a process unless the cache has its results; return the folder of the results.
+
+    Raises
+    ------
+    RuntimeError
+        The example fails; the message has its error output.
+    """
+    folder = CACHE / f"{path.stem}-{_hash_sources(path)}"
+    if not (folder / "cells.json").exists():
+        for stale in CACHE.glob(f"{path.stem}-*"):
+            shutil.rmtree(stale)
+        (folder / "out").mkdir(parents=True)
+        command = [sys.executable, __file__, str(path), str(folder)]
+        environment = {**os.environ, "MPLBACKEND": "agg", "SOURCE_DATE_EPOCH": "0"}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise RuntimeError(f"{path.name} failed with exit code {done.returncode}:\n{done.stderr}")
+    return folder
+
+
+def _hash_sources(path: Path) -> str:
+    files = [path, Path(__file__), *(file for folder in PACKAGES for file in sorted((ROOT / folder).rglob("*.py")))]
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def render(example: Example, results: list[dict[str, Any]]) -> str:
+    """Return the Markdown of a page."""
+    note = (
+        f"This page is the script [`examples/{example.name}.py`]({example.name}.py) and its output. The script writes "
+        "its files to the folder `out`."
+    )
+    parts = [f"# {example.title}", example.introduction, note]
+    for cell, result in zip(example.cells, results, strict=True):
+        parts.append(cell.text)
+        if cell.shown and cell.code.strip():
+            parts.append(f"```python\n{cell.code.strip()}\n```")
+            if output := result["output"].rstrip():
+                parts.append(f"Output:\n\n```text\n{output}\n```")
+        parts += [f"![{name.removesuffix('.svg')}]({example.name}/{name})" for name in result["figures"]]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def make_pages() -> Iterator[tuple[str, bytes]]:
+    """Execute the examples; yield the path in the site and the content of each page, script and figure."""
+    index = ["# Tutorials", f"Each tutorial is a script that runs. [`examples/README.md`]({_README}) says how to run them."]
+    for path in list_examples():
+        example, folder = parse(path), execute(path)
+        results = json.loads((folder / "cells.json").read_text(encoding="utf-8"))
+        yield f"tutorials/{example.name}.md", render(example, results).encode()
+        yield f"tutorials/{path.name}", path.read_bytes()
+        for name in (name for result in results for name in result["figures"]):
+            yield f"tutorials/{example.name}/{name}", (folder / "out" / name).read_bytes()
+        index.append(f"* [{example.title}]({example.name}.md)")
+    yield "tutorials/index.md", ("\n".join(index) + "\n").encode()
+
+
+def write_pages(open_file: Opener) -> list[str]:
+    """Write all pages through a function that opens files of the site; return their paths."""
+    written = []
+    for name, content in make_pages():
+        stream: IO[bytes]
+        with open_file(name, "wb") as stream:
+            stream.write(content)
+        written.append(name)
+    return written
+
+
+def build(output: Path) -> list[Path]:
+    """Write all pages below a folder; return their paths."""
+
+    def open_file(name: str, mode: str) -> Any:
+        (output / name).parent.mkdir(parents=True, exist_ok=True)
+        return (output / name).open(mode)
+
+    return [output / name for name in write_pages(open_file)]
+
+
+if __name__ == "__main__":
+    run(Path(sys.argv[1]), Path(sys.argv[2]))
+elif __name__ == "<run_path>":  # mkdocs-gen-files runs its scripts by runpy.run_path
+    import mkdocs_gen_files
+
+    write_pages(mkdocs_gen_files.open)
