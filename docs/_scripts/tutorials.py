@@ -78,7 +78,9 @@ def parse(path: Path) -> Example:
         text = comments[0] if comments else ""
         code = block[len(text) :]
         first = line + 1 + text.count("\n")
-        cells.append(Cell(re.sub(r"^# ?", "", text, flags=re.MULTILINE).strip(), code, first, "checks" not in marker))
+        cells.append(
+            Cell(re.sub(r"^# ?", "", text, flags=re.MULTILINE).strip(), code, first, "checks" not in marker)
+        )
         line += 1 + block.count("\n")
     return Example(path.stem, title.rstrip("."), introduction.strip(), tuple(cells))
 
@@ -126,7 +128,11 @@ def execute(path: Path) -> Path:
 
 
 def _hash_sources(path: Path) -> str:
-    files = [path, Path(__file__), *(file for folder in PACKAGES for file in sorted((ROOT / folder).rglob("*.py")))]
+    files = [
+        path,
+        Path(__file__),
+        *(file for folder in PACKAGES for file in sorted((ROOT / folder).rglob("*.py"))),
+    ]
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
@@ -152,7 +158,10 @@ def render(example: Example, results: list[dict[str, Any]]) -> str:
 
 def make_pages() -> Iterator[tuple[str, bytes]]:
     """Execute the examples; yield the path in the site and the content of each page, script and figure."""
-    index = ["# Tutorials", f"Each tutorial is a script that runs. [`examples/README.md`]({_README}) says how to run them."]
+    index = [
+        "# Tutorials",
+        f"Each tutorial is a script that runs. [`examples/README.md`]({_README}) says how to run them.",
+    ]
     for path in list_examples():
         example, folder = parse(path), execute(path)
         results = json.loads((folder / "cells.json").read_text(encoding="utf-8"))

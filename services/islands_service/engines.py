@@ -9,12 +9,28 @@ from islands.evolution.progress import ProgressCallback
 
 
 @contextmanager
-def _serial(_address: str | None, _progress: ProgressCallback) -> Iterator[Engine]:
+def serial_engine(_address: str | None = None, _progress: ProgressCallback = print) -> Iterator[Engine]:
+    """Run islands one after the other in this process."""
     yield SerialEngine()
 
 
 @contextmanager
-def _ray(address: str | None, progress: ProgressCallback) -> Iterator[Engine]:
+def ray_engine(address: str | None = None, progress: ProgressCallback = print) -> Iterator[Engine]:
+    """Run islands in parallel with Ray, for ``islands.identify(..., engine=engine)``.
+
+    Parameters
+    ----------
+    address : str, optional
+        ``HOST:PORT`` of the head of a Ray cluster. If None, Ray is started on the cores of this machine and
+        ends with the block.
+    progress : ProgressCallback
+        Takes a message when machines or actors join or fail.
+
+    Raises
+    ------
+    ClusterError
+        The address does not answer, or Ray does not start.
+    """
     # Ray takes a quarter of a second to import, and only this engine needs it.
     from islands_service.runtime.cluster import cluster  # noqa: PLC0415
     from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
@@ -23,7 +39,7 @@ def _ray(address: str | None, progress: ProgressCallback) -> Iterator[Engine]:
         yield RayEngine(progress)
 
 
-#: Engines by name. Each takes the address of a cluster, None for this machine, and a progress callback.
-ENGINES: Mapping[str, Callable[[str | None, ProgressCallback], AbstractContextManager[Engine]]] = (
-    MappingProxyType({"serial": _serial, "ray": _ray})
-)
+EngineFactory = Callable[[str | None, ProgressCallback], AbstractContextManager[Engine]]
+
+#: Engines by name.
+ENGINES: Mapping[str, EngineFactory] = MappingProxyType({"serial": serial_engine, "ray": ray_engine})
