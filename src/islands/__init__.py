@@ -24,7 +24,7 @@ _PUBLIC = {
     "evolution.migration.topology": ("TOPOLOGIES",),
     "evolution.presets": ("PRESETS",),
     "evolution.settings": ("Settings",),
-    "facade.diagnose": ("diagnose",),
+    "facade.diagnose": ("diagnose", "function_simulator"),
     "facade.explain_residual": ("explain_residual",),
     "facade.fit": ("fit",),
     "facade.identify": ("identify",),

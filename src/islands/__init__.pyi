@@ -17,6 +17,7 @@ from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
 from islands.facade.diagnose import diagnose as diagnose
+from islands.facade.diagnose import function_simulator as function_simulator
 from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify

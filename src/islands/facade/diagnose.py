@@ -1,6 +1,6 @@
 """Diagnose: hold a simulation against a record, by its name or by what a file says of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis
@@ -9,6 +9,7 @@ from islands.discrepancy.effects import EFFECTS
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.io.simulator_spec.factory import make_simulator as made
 from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
@@ -60,3 +61,22 @@ def diagnose(
     asked_for = isinstance(simulation, str) or hasattr(simulation, "kind")
     simulator = made(simulation, record, columns) if asked_for else simulation  # type: ignore[arg-type]
     return diagnosed(record, simulator, tolerance, seed, progress, spread, effects)  # type: ignore[arg-type]
+
+
+def function_simulator(function: Callable[..., Signal], **nominal: float) -> Simulator:
+    """Make a simulator from a Python function, for `diagnose`.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(u, dt, **parameters) -> y``: input and output of shape (samples,), sampling time in
+        seconds. Each parameter has a number as its default.
+    **nominal
+        Nominal values of parameters that differ from the defaults.
+
+    Raises
+    ------
+    SettingsError
+        The function does not have this form, or has no such parameter.
+    """
+    return PythonFunctionSimulator(function, getattr(function, "__name__", "function"), nominal)

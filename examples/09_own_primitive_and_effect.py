@@ -1,0 +1,171 @@
+"""Your own primitive and effect: extend the tables without changing the package.
+
+Models are built from primitives such as `sin` and `abs`, and diagnoses search a catalogue of effects. This tutorial
+adds a primitive to the models and an effect to the search.
+"""
+
+# %%
+# ## A primitive
+#
+# A primitive is a plain function of one or two numbers. `primitive` checks that it is finite at zero, at negative and
+# at large arguments, and that it has the declared parity (-1: odd). The bodies in C and MATLAB are needed only for
+# exports to these languages.
+import argparse
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.signal import lfilter
+
+import islands
+
+parser = argparse.ArgumentParser(description="Add a primitive and an effect.")
+parser.add_argument("--out", type=Path, help="folder of the results; a temporary one by default")
+out = parser.parse_args().out or Path(tempfile.mkdtemp(prefix="islands-"))
+out.mkdir(parents=True, exist_ok=True)
+
+
+def soften(a):
+    """Limit a number smoothly to the range from -1 to 1."""
+    return a / (1.0 + abs(a))
+
+
+soft = islands.primitive("soften", soften, parity=-1, c="return a / (1.0 + fabs(a));")
+
+# %%
+# `parse` reads an expression with the built-in primitives and yours, and `model_of` makes a model from terms.
+table = islands.PRIMITIVES | {"soften": soft}
+terms = [("y(k-1)", 0.9), ("soften(u(k-1))", 0.5)]
+model = islands.model_of(((islands.parse(text, table), value) for text, value in terms), dt=0.1)
+
+# %%
+# Simulate it on a record. A free run reads the output in the first sample only (one per lag), so the rest may be
+# missing (NaN).
+u = np.full(50, 3.0)
+y = np.full(50, np.nan)
+y[0] = 0.0
+step = islands.simulate(model, islands.Dataset(u, y, 0.1)).y
+print(f"step response: {step[1]:.4f}, {step[2]:.4f}, ..., {step[-1]:.4f}")
+
+# %%
+# The model can be written to a file and read again with the same table.
+islands.write_model(model, out / "soft.json")
+print(islands.read_model(out / "soft.json", table) == model)
+
+# %%
+# ## A record with an unknown cause
+#
+# A stage follows a voltage with a small lag. Its encoder has a periodic error with the pitch of its scale, 2 um, and an
+# amplitude of 0.05 um. Noise has a standard deviation of 0.02 um.
+PITCH, DT = 2.0, 0.01
+
+
+def stage(u, dt, gain=1.0, tau=0.05):
+    """Simulate a stage: a first-order lag with a gain in um/V."""
+    pole = np.exp(-dt / tau)
+    return lfilter([0.0, gain * (1.0 - pole)], [1.0, -pole], u)
+
+
+rng = np.random.default_rng(5)
+time = DT * np.arange(1000)
+u = sum(
+    size * np.sin(2 * np.pi * frequency * time + phase)
+    for size, frequency, phase in ((6, 0.37, 1), (5, 1.1, 2), (4, 1.9, 3))
+)
+position = stage(u, DT, gain=1.05, tau=0.06)
+encoder = position + 0.05 * np.sin(2 * np.pi * position / PITCH)
+measured = encoder + 0.02 * rng.standard_normal(u.size)
+record = islands.Dataset(u, measured, DT, ("u_V",), "y_um", ("V",), "um")
+
+# %%
+# The catalogue has no encoder error. The verdict is `unknown`: the simulation is wrong, but by none of the effects
+# of the catalogue. `remainder` says on which quantity the residual depends, here on the output, and how far that is
+# from chance, in standard deviations.
+simulator = islands.function_simulator(stage)
+diagnosis = islands.diagnose(record, simulator)
+print(diagnosis.verdict, [effect.name for effect in diagnosis.effects])
+print({name: round(distance, 1) for name, distance in diagnosis.remainder.items()})
+
+# %%
+# ## An effect
+#
+# This hint leads to a hypothesis, a sine and a cosine of the output. An `Effect` has
+#
+# * a site: here the output, so `form` maps the simulated output to the measured one;
+# * parameters with unit, nominal value (no effect), and the scale of a typical change;
+# * a grid of starting points for the calibration;
+# * `linear`: the number of leading parameters to which the response is proportional.
+
+
+def parameters(context):
+    """Return the amplitudes, in the unit of the output."""
+    unit = context.output_unit
+    return (islands.Parameter("sine", unit, 0.0, 0.01), islands.Parameter("cosine", unit, 0.0, 0.01))
+
+
+def form(y, values, context):
+    """Add the periodic error to the output."""
+    phase = 2 * np.pi * y / PITCH
+    return y + values[0] * np.sin(phase) + values[1] * np.cos(phase)
+
+
+encoder_error = islands.Effect(
+    name="encoder-error",
+    summary="The encoder errs periodically: y + a sin(2 pi y / p) + b cos(2 pi y / p), p = 2 um",
+    family="sensor",
+    site=islands.Site.OUTPUT,
+    parameters=parameters,
+    grid=lambda context, residual: ((0.02, 0.0),),
+    form=form,
+    linear=2,
+    source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
+)
+
+# %%
+# Search for it together with the catalogue:
+better = islands.diagnose(record, simulator, effects=(*islands.EFFECTS, encoder_error))
+print(better.verdict)
+for effect in better.effects:
+    for name, value in effect.parameters.items():
+        low, high = value.ci95
+        print(
+            f"{effect.name}: {name} = {value.value:.3f} {value.unit}, 95 % interval {low:.3f} to {high:.3f}"
+        )
+print(
+    f"RMSE on samples that were kept back: {better.gain.before.rmse:.3f} -> {better.gain.after.rmse:.3f} um"
+)
+
+# %%
+# The intervals contain the true amplitudes, 0.05 um and 0, and the error falls to that of the noise. In the figure
+# each point is the residual of a sample, over the output.
+figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
+residuals = {"calibrated": better.base.output, "with encoder error": better.best.output}
+for (name, output), colour in zip(residuals.items(), ("#d55e00", "#0072b2"), strict=True):
+    axes.plot(output, record.y - output, ".", markersize=3, color=colour, label=name)
+axes.set(xlabel="output (um)", ylabel="residual (um)")
+figure.legend(loc="outside upper center", ncols=2)
+figure.savefig(out / "residuals.svg")
+
+# %% checks
+assert abs(step[1] - 0.375) < 1e-12
+assert abs(step[2] - 0.7125) < 1e-12
+assert islands.read_model(out / "soft.json", table) == model
+assert diagnosis.verdict == "unknown"
+assert not diagnosis.effects
+assert diagnosis.remainder.keys() == {"output"}
+assert better.verdict == "named"
+assert [effect.name for effect in better.effects] == ["encoder-error"]
+found = better.effects[0].parameters
+for name, true in (("sine", 0.05), ("cosine", 0.0)):
+    low, high = found[name].ci95
+    assert low < true < high, (name, low, high)
+assert better.gain.before.rmse > 0.035
+assert 0.018 < better.gain.after.rmse < 0.022
+
+# %%
+# ## Next
+#
+# * [Diagnose a simulation](06_diagnose_a_simulation.md)
+# * [Export to C](10_export_to_c.md): a model with your primitive in a controller.
+print(f"results in {out}")
