@@ -1,14 +1,14 @@
 """A first model: from a CSV file to an equation.
 
-You have a CSV file with the input and the output of a system, and you want the difference equation behind it.
-This tutorial writes such a file, reads it, finds the equation in two ways, and chooses a model.
+You have a CSV file with the input and the output of a system, and you want the difference equation behind
+it. This tutorial writes such a file, reads it, finds the equation in two ways, and chooses a model.
 """
 
 # %%
 # ## A record
 #
-# The record comes from a system whose equation is known, so that you can compare the result with the truth. The
-# input `u` is a voltage, the output `y` is a level:
+# The record comes from a system whose equation is known, so that you can compare the result with the truth.
+# The input `u` is a voltage, the output `y` is a level:
 #
 #     y(k) = 0.8*y(k-1) + 0.4*u(k-1) - 0.1*y(k-1)*u(k-1)
 #
@@ -35,42 +35,42 @@ for k in range(1, u.size):
 y += 0.01 * rng.standard_normal(u.size)
 
 # %%
-# A CSV file has one column per signal. The name of a column ends with its unit, `u_V` and `y_cm`. The column `t_s`
-# is the time in seconds.
+# A CSV file has one column per signal. The name of a column ends with its unit, `u_V` and `y_cm`. The
+# column `t_s` is the time in seconds.
 table = np.column_stack([0.1 * np.arange(u.size), u, y]).round(5)
 np.savetxt(out / "level.csv", table, fmt="%g", delimiter=",", header="t_s,u_V,y_cm", comments="")
 print((out / "level.csv").read_text()[:58])
 
 # %%
-# `read_record` reads the columns that you name, takes the sampling time from the time column, and refuses a file
-# that cannot be used, with the reason.
+# `read_record` reads the columns that you name, takes the sampling time from the time column, and refuses a
+# file that cannot be used, with the reason.
 record = islands.read_record(out / "level.csv", inputs=["u_V"], output="y_cm")
 print(f"{record.samples} samples, one every {record.dt:g} s")
 
 # %%
 # ## The classical way: fit
 #
-# `fit` writes down a library of candidate terms, here all products of at most two lagged signals, and selects
-# terms one after the other by how much of the output they explain (forward orthogonal regression). The last quarter
-# of the record is kept for validation. The result has one model for each number of terms.
+# `fit` writes down a library of candidate terms, here all products of at most two lagged signals, and
+# selects terms one after the other by how much of the output they explain (forward orthogonal regression).
+# The last quarter of the record is kept for validation. The result has one model for each number of terms.
 fitted = islands.fit(record, library="polynomial", degree=2, lags=2)
 for model in sorted(fitted.models, key=lambda model: model.model.size)[:5]:
     error = model.metrics["validation"]["free_run"].mape
     print(f"{model.model.size} terms, error {error:6.3f} %: {model}")
 
 # %%
-# The error is that of a *free run* over the validation data. In a free run the model is a simulator: it gets the
-# input only, and its own past output instead of the measured one. The error is the mean absolute error in per cent
-# of the output's range (MAPE).
+# The error is that of a *free run* over the validation data. In a free run the model is a simulator: it
+# gets the input only, and its own past output instead of the measured one. The error is the mean absolute
+# error in per cent of the output's range (MAPE).
 #
-# With three terms the error reaches the noise, and further terms do not lower it. The equation with three terms is
-# the one that made the record.
+# With three terms the error reaches the noise, and further terms do not lower it. The equation with three
+# terms is the one that made the record.
 #
 # ## Evolution: identify
 #
-# `fit` needs a library. `identify` evolves the terms instead, so that powers and lags need not be guessed. The
-# preset `narx` is for smooth systems. The same seed gives the same result. Twenty generations are enough here;
-# the default is sixty.
+# `fit` needs a library. `identify` evolves the terms instead, so that powers and lags need not be guessed.
+# The preset `narx` is for smooth systems. The same seed gives the same result. Twenty generations are
+# enough here; the default is sixty.
 evolved = islands.identify(record, preset="narx", generations=20, max_terms=6, seed=0)
 for model in sorted(evolved.models, key=lambda model: model.model.size):
     error = model.metrics["validation"]["free_run"].mape
@@ -79,8 +79,9 @@ for model in sorted(evolved.models, key=lambda model: model.model.size):
 # %%
 # ## Choose a model
 #
-# `evolved.best` has the least error on the validation data. Here the errors of all models with three or more terms
-# differ by less than 5 %, so their order is chance. Take the smallest model whose error is close to the least.
+# `evolved.best` has the least error on the validation data. Here the errors of all models with three or
+# more terms differ by less than 5 %, so their order is chance. Take the smallest model whose error is close
+# to the least.
 least = evolved.best.metrics["validation"]["free_run"].rmse
 close = [model for model in evolved.models if model.metrics["validation"]["free_run"].rmse < 1.05 * least]
 chosen = min(close, key=lambda model: model.model.size)
@@ -93,7 +94,8 @@ print(f"RMSE {error.rmse:.4f} cm, R2 {error.r2:.4f}")
 chosen.plot("free-run").savefig(out / "free-run.svg")
 
 # %%
-# A model can be simulated on any record with the same inputs, and exported to Python, C, MATLAB, LaTeX or JSON.
+# A model can be simulated on any record with the same inputs, and exported to Python, C, MATLAB, LaTeX or
+# JSON.
 simulated = chosen.simulate(record).y
 print(f"level after 10 s: {simulated[100]:.2f} cm simulated, {record.y[100]:.2f} cm measured")
 print(chosen.export("latex"))
@@ -102,6 +104,13 @@ print(chosen.export("latex"))
 # `save` writes everything to a folder: the models as files, the figures, a summary and `result.json`.
 evolved.save(out / "result")
 print(sorted(path.name for path in (out / "result").iterdir()))
+
+# %%
+# ## Next
+#
+# * [Hysteresis](02_hysteresis.md): a system whose output depends on the path of the input.
+# * [Multiple inputs](03_multiple_inputs.md)
+# * [Export to C](10_export_to_c.md)
 
 # %% checks
 true = {"y(k-1)": 0.8, "u1(k-1)": 0.4, "y(k-1)*u1(k-1)": -0.1}
@@ -117,11 +126,4 @@ for result in (fitted, evolved):
     assert all(value > 0.95 * errors[3] for value in errors.values()), errors
 assert 0.009 < error.rmse < 0.011
 assert abs(simulated[100] - record.y[100]) < 0.05
-
-# %%
-# ## Next
-#
-# * [Hysteresis](02_hysteresis.md): a system whose output depends on the path of the input.
-# * [Multiple inputs](03_multiple_inputs.md)
-# * [Export to C](10_export_to_c.md)
 print(f"results in {out}")

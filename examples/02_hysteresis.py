@@ -1,16 +1,16 @@
 """Hysteresis: a model that keeps its output when the input rests.
 
-The output of a piezo actuator, of a magnet or of a joint with friction depends on the path of its input. When the
-input rests, the output keeps its value: every value between the two branches of the loop is an equilibrium (a
-continuum of equilibria). This tutorial shows what an ordinary model gets wrong there, and how a constraint on the
-parameters makes it right.
+The output of a piezo actuator, of a magnet or of a joint with friction depends on the path of its input.
+When the input rests, the output keeps its value: every value between the two branches of the loop is an
+equilibrium (a continuum of equilibria). This tutorial shows what an ordinary model gets wrong there, and
+how a constraint on the parameters makes it right.
 """
 
 # %%
 # ## A record of a piezo actuator
 #
-# The Bouc-Wen equations describe the displacement `y` of an actuator under a voltage `u` with a hysteretic state
-# `h`. The input is a sum of four sines. The noise has a standard deviation of 0.05 um.
+# The Bouc-Wen equations describe the displacement `y` of an actuator under a voltage `u` with a hysteretic
+# state `h`. The input is a sum of four sines. The noise has a standard deviation of 0.05 um.
 #
 #     h' = 0.9 u' - 0.008 |u'| h - 0.008 u' |h|
 #     y  = 1.6 u - h
@@ -51,9 +51,9 @@ record = islands.Dataset(
 # %%
 # ## With and without the constraint
 #
-# The preset `hysteresis` builds terms from the increments of the input and their signs. Its constraint fixes sums of
-# parameters: the coefficient of `y(k-1)` is 1, and all terms without an increment cancel. When the input rests, such
-# a model reduces to `y(k) = y(k-1)`.
+# The preset `hysteresis` builds terms from the increments of the input and their signs. Its constraint
+# fixes sums of parameters: the coefficient of `y(k-1)` is 1, and all terms without an increment cancel.
+# When the input rests, such a model reduces to `y(k) = y(k-1)`.
 #
 # For comparison, the second search has no constraint.
 constrained = islands.identify(record, preset="hysteresis", generations=15, seed=0).best
@@ -74,9 +74,9 @@ constrained.plot("loop").savefig(out / "loop.svg")
 # %%
 # ## The hold test
 #
-# `physics` holds the input constant at five levels, each reached while loading and while unloading, and measures how
-# far the output drifts, in per cent of the output's range. `property_1` says whether the model has a continuum of
-# equilibria.
+# `physics` holds the input constant at five levels, each reached while loading and while unloading, and
+# measures how far the output drifts, in per cent of the output's range. `property_1` says whether the model
+# has a continuum of equilibria.
 for name, model in (("constrained", constrained), ("unconstrained", free)):
     print(f"{name}: continuum of equilibria {model.physics.property_1}, "
           f"largest drift {model.physics.hold_drift_percent:.3f} %")  # fmt: skip
@@ -92,12 +92,19 @@ free.plot("hold").savefig(out / "hold-unconstrained.svg")
 # %%
 # ## Why
 #
-# The coefficient of `y(k-1)` is 1 under the constraint. Without it, noise makes it slightly smaller, and the output
-# decays as soon as the input rests. A record in which the input never rests does not show it.
+# The coefficient of `y(k-1)` is 1 under the constraint. Without it, noise makes it slightly smaller, and
+# the output decays as soon as the input rests. A record in which the input never rests does not show it.
 for name, model in (("constrained", constrained), ("unconstrained", free)):
     for regressor, parameter in zip(model.model.regressors, model.model.parameters, strict=True):
         if regressor.text == "y(k-1)":
             print(f"{name}: {parameter:.6f} * y(k-1)")
+
+# %%
+# ## Next
+#
+# * [Diagnose a simulation](06_diagnose_a_simulation.md): find a hysteresis that a simulation lacks.
+# * [Islands on all cores](04_islands_on_all_cores.md): a larger search.
+# * [Export to C](10_export_to_c.md)
 
 # %% checks
 errors = [each.metrics["validation"]["free_run"].mape for each in (constrained, free)]
@@ -111,11 +118,4 @@ first = [dict(zip([r.text for r in each.model.regressors], each.model.parameters
 assert abs(first[0] - 1.0) < 1e-9
 assert 0.99 < first[1] < 1.0 - 1e-6
 assert len(constrained.physics.holds) == 10
-
-# %%
-# ## Next
-#
-# * [Diagnose a simulation](06_diagnose_a_simulation.md): find a hysteresis that a simulation lacks.
-# * [Islands on all cores](04_islands_on_all_cores.md): a larger search.
-# * [Export to C](10_export_to_c.md)
 print(f"results in {out}")

@@ -1,15 +1,16 @@
 """Multiple inputs: several inputs and several recordings.
 
-A system often has more than one input, and its data often come in several files. This tutorial identifies a heated
-box with two inputs from two recordings, and validates on a third one. It also finds the dead time of an input.
+A system often has more than one input, and its data often come in several files. This tutorial identifies a
+heated box with two inputs from two recordings, and validates on a third one. It also finds the dead time of
+an input.
 """
 
 # %%
 # ## Three recordings
 #
-# A heater with the power `heater_kW` warms a box. A fan with the speed `fan`, from 0 to 1, cools it. The cooling is
-# proportional to the temperature and acts one sample later than the heating. The temperature `T_K` is that above
-# the surroundings, sampled every second. The noise has a standard deviation of 0.02 K.
+# A heater with the power `heater_kW` warms a box. A fan with the speed `fan`, from 0 to 1, cools it. The
+# cooling is proportional to the temperature and acts one sample later than the heating. The temperature
+# `T_K` is that above the surroundings, sampled every second. The noise has a standard deviation of 0.02 K.
 #
 #     T(k) = 0.9 T(k-1) + 2 heater(k-1) - 0.15 T(k-1) fan(k-2)
 import argparse
@@ -53,30 +54,33 @@ first, second, validation = [
 ]
 
 # %%
-# `join` puts recordings of the same system together. Each stays a segment: no model reads across the boundary
-# between two segments.
+# `join` puts recordings of the same system together. Each stays a segment: no model reads across the
+# boundary between two segments.
 estimation = islands.join((first, second))
 print(f"{estimation.samples} samples in segments of {estimation.segments}, inputs {estimation.input_names}")
 
 # %%
 # ## Fit
 #
-# The second argument is the validation data: a record, or the fraction of the first record that is kept at its end.
+# The second argument is the validation data: a record, or the fraction of the first record that is kept at
+# its end.
 result = islands.fit(estimation, validation, library="polynomial", degree=2, lags=3)
 for model in sorted(result.models, key=lambda model: model.model.size)[:5]:
     error = model.metrics["validation"]["free_run"].rmse
     print(f"{model.model.size} terms, RMSE {error:.4f} K: {model}")
 
 # %%
-# Three terms reach the noise of 0.02 K, and more terms do not lower the error. The equation with three terms is the
-# true one: the selection found the product of temperature and fan, and the dead time of the fan, `u2(k-2)`.
+# Three terms reach the noise of 0.02 K, and more terms do not lower the error. The equation with three
+# terms is the true one: the selection found the product of temperature and fan, and the dead time of the
+# fan, `u2(k-2)`.
 chosen = next(model for model in result.models if model.model.size == 3)
 chosen.plot("free-run").savefig(out / "free-run.svg")
 
 # %%
 # ## Is the second input needed?
 #
-# Without the fan the error is much larger, however many terms the model has. `first_inputs` leaves out the others.
+# Without the fan the error is much larger, however many terms the model has. `first_inputs` leaves out the
+# others.
 alone = islands.fit(
     estimation.first_inputs(1), validation.first_inputs(1), library="polynomial", degree=2, lags=3
 )
@@ -87,12 +91,18 @@ for name, model in (("heater and fan", chosen), ("heater only", alone.best)):
 # %%
 # ## Standard errors
 #
-# Each parameter has a standard error. It says how well the data determine the parameter, if the model is right and
-# the noise is white.
+# Each parameter has a standard error. It says how well the data determine the parameter, if the model is
+# right and the noise is white.
 for regressor, value, error in zip(
     chosen.model.regressors, chosen.model.parameters, chosen.model.standard_errors, strict=True
 ):
     print(f"{regressor.text:16} {value:8.4f} +- {error:.4f}")
+
+# %%
+# ## Next
+#
+# * [Islands on all cores](04_islands_on_all_cores.md): evolve the terms in parallel.
+# * [Diagnose a simulation](06_diagnose_a_simulation.md): test a simulation that you have already.
 
 # %% checks
 errors = {model.model.size: model.metrics["validation"]["free_run"].rmse for model in result.models}
@@ -106,10 +116,4 @@ assert found.keys() == true.keys(), found
 assert all(abs(found[name] / true[name] - 1.0) < 0.01 for name in true), found
 assert min(each.metrics["validation"]["free_run"].rmse for each in alone.models) > 10 * errors[3]
 assert estimation.segments == (600, 900)
-
-# %%
-# ## Next
-#
-# * [Islands on all cores](04_islands_on_all_cores.md): evolve the terms in parallel.
-# * [Diagnose a simulation](06_diagnose_a_simulation.md): test a simulation that you have already.
 print(f"results in {out}")

@@ -1,8 +1,8 @@
 """Islands on all cores: a larger search in parallel.
 
-An island is a population that evolves on its own. Every few generations the islands exchange individuals (migration).
-This tutorial runs the same search in one process and on all cores of this machine with Ray, and shows that both give
-the same result, bit for bit.
+An island is a population that evolves on its own. Every few generations the islands exchange individuals
+(migration). This tutorial runs the same search in one process and on all cores of this machine with Ray,
+and shows that both give the same result, bit for bit.
 """
 
 # %%
@@ -40,8 +40,8 @@ record = islands.Dataset(u, y, 0.01, ("u_V",), "y_um", ("V",), "um")
 # %%
 # ## In one process
 #
-# Four islands in a ring: every five generations the best individual of each island goes to the next island. Without
-# an engine the islands run one after the other in this process.
+# Four islands in a ring: every five generations the best individual of each island goes to the next island.
+# Without an engine the islands run one after the other in this process.
 settings = {"preset": "hysteresis", "islands": 4, "topology": "ring", "migrate_every": 5, "generations": 20}
 serial = islands.identify(record, seed=0, **settings)
 print(f"{serial.findings.search.evaluations} models evaluated")
@@ -50,11 +50,12 @@ print(f"error {serial.best.metrics['validation']['free_run'].mape:.3f} %")
 # %%
 # ## On all cores
 #
-# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. Each island runs in a
-# process. Starting Ray takes a few seconds, so parallel islands pay off in searches that take longer than this one.
+# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. Each island
+# runs in a process. Starting Ray takes a few seconds, so parallel islands pay off in searches that take
+# longer than this one.
 #
-# `progress` is called after every migration with the state of the search. It prints the number of individuals that
-# were evaluated so far.
+# `progress` is called after every migration with the state of the search. It prints the number of
+# individuals that were evaluated so far.
 
 
 def show(state, settings):
@@ -77,6 +78,12 @@ print(parallel.best)
 parallel.save(out / "result")
 shutil.copy(out / "result" / "figures" / "islands.svg", out / "islands.svg")
 
+# %%
+# ## Next
+#
+# * [Cluster](05_cluster.md): the same search on several machines.
+# * [REST client](08_rest_client.md): send a search to a service.
+
 # %% checks
 assert [str(model) for model in parallel.models] == [str(model) for model in serial.models]
 for each, other in zip(parallel.models, serial.models, strict=True):
@@ -84,10 +91,4 @@ for each, other in zip(parallel.models, serial.models, strict=True):
 assert len(parallel.findings.search.history[-1].islands) == 4
 assert parallel.best.metrics["validation"]["free_run"].mape < 0.2
 assert parallel.best.physics.property_1
-
-# %%
-# ## Next
-#
-# * [Cluster](05_cluster.md): the same search on several machines.
-# * [REST client](08_rest_client.md): send a search to a service.
 print(f"results in {out}")

@@ -1,23 +1,24 @@
 """Cluster: the islands of one search on several machines.
 
-The same code runs on one machine and on a Ray cluster. Only the address of the cluster differs. This tutorial reads
-the address from the option `--address` or from the environment variable `ISLANDS_RAY_ADDRESS`. Without an address it
-starts Ray on this machine.
+The same code runs on one machine and on a Ray cluster. Only the address of the cluster differs. This
+tutorial reads the address from the option `--address` or from the environment variable
+`ISLANDS_RAY_ADDRESS`. Without an address it starts Ray on this machine.
 """
 
 # %%
 # ## Start a cluster
 #
-# Install the package in the same version on each machine. Start Ray on the first machine, then on the others. The
-# token keeps other users out; Ray listens on all network interfaces, so keep it behind a firewall as well.
+# Install the package in the same version on each machine. Start Ray on the first machine, then on the
+# others. The token keeps other users out; Ray listens on all network interfaces, so keep it behind a
+# firewall as well.
 #
 #     export RAY_AUTH_TOKEN=...                       # the same secret on all machines
 #     ray start --head --port 6379                    # on the first machine, called "head" here
 #     ray start --address head:6379                   # on each other machine
 #     python 05_cluster.py --address head:6379        # where you work
 #
-# Machines may join or leave while a search runs. If a machine fails, its islands continue on another one from their
-# last migration, and the result does not change.
+# Machines may join or leave while a search runs. If a machine fails, its islands continue on another one
+# from their last migration, and the result does not change.
 import argparse
 import os
 import tempfile
@@ -41,9 +42,10 @@ print(
 # %%
 # ## A search with a budget
 #
-# The record is a level with a nonlinear outflow. Eight islands search at most 30 generations. The search ends earlier
-# if `max_evaluations` models have been evaluated or if a model reaches `target_error`, in the unit of the output. An
-# island needs one CPU while it works; islands in excess of the CPUs wait for their turn.
+# The record is a level with a nonlinear outflow. Eight islands search at most 30 generations. The search
+# ends earlier if `max_evaluations` models have been evaluated or if a model reaches `target_error`, in the
+# unit of the output. An island needs one CPU while it works; islands in excess of the CPUs wait for their
+# turn.
 rng = np.random.default_rng(1)
 u = np.repeat(rng.uniform(0.0, 1.0, 200), 5)
 level = np.zeros(u.size)
@@ -74,10 +76,16 @@ error = chosen.metrics["validation"]["free_run"]
 print(f"RMSE {error.rmse:.4f} cm: {chosen}")
 
 # %%
-# The model with three terms is the true equation, and its error is that of the noise, 0.005 cm. The same seed gives
-# the same models on any cluster.
+# The model with three terms is the true equation, and its error is that of the noise, 0.005 cm. The same
+# seed gives the same models on any cluster.
 (out / "model.json").write_text(chosen.export("json"))
 chosen.plot("free-run").savefig(out / "free-run.svg")
+
+# %%
+# ## Next
+#
+# * [REST client](08_rest_client.md): a service that queues searches and survives restarts.
+# * [Islands on all cores](04_islands_on_all_cores.md)
 
 # %% checks
 assert search.ended_by == "evaluations"
@@ -89,10 +97,4 @@ true = {"y(k-1)": 0.95, "u1(k-1)": 0.3, "y(k-1)^2": -0.02}
 assert found.keys() == true.keys(), found
 assert all(abs(found[name] / true[name] - 1.0) < 0.02 for name in true), found
 assert 0.0045 < error.rmse < 0.0056
-
-# %%
-# ## Next
-#
-# * [REST client](08_rest_client.md): a service that queues searches and survives restarts.
-# * [Islands on all cores](04_islands_on_all_cores.md)
 print(f"results in {out}")

@@ -1,15 +1,16 @@
 """Diagnose a simulation: find what it lacks, by name.
 
-You have a record of a system and a simulation of it, and the two differ. `diagnose` calibrates the simulation, tests
-some forty physical effects that it may lack, and names the cause. This tutorial hides dry friction in the data of an
-oscillator and lets the diagnosis find it. It also shows the answer for data without a hidden effect.
+You have a record of a system and a simulation of it, and the two differ. `diagnose` calibrates the
+simulation, tests some forty physical effects that it may lack, and names the cause. This tutorial hides dry
+friction in the data of an oscillator and lets the diagnosis find it. It also shows the answer for data
+without a hidden effect.
 """
 
 # %%
 # ## Two records
 #
-# The system is a mass on a spring with a damper. The force `u_N` drives it, the position `y_mm` is measured with
-# noise of 0.5 mm (standard deviation) at a range of about 500 mm.
+# The system is a mass on a spring with a damper. The force `u_N` drives it, the position `y_mm` is measured
+# with noise of 0.5 mm (standard deviation) at a range of about 500 mm.
 #
 #     1 kg x'' + 1.5 Ns/m x' + 100 N/m x + F sign(x') = u
 #
@@ -62,8 +63,8 @@ rubbing = measure(u, friction=0.6, seed=2)
 # %%
 # ## Clean data
 #
-# `second-order` is the linear oscillator. Mass, damping and stiffness need not be known: they are estimated. If the
-# simulation explains the record within its noise, the verdict is `nothing`.
+# `second-order` is the linear oscillator. Mass, damping and stiffness need not be known: they are
+# estimated. If the simulation explains the record within its noise, the verdict is `nothing`.
 without = islands.diagnose(clean, "second-order")
 print(without.verdict)
 
@@ -79,27 +80,26 @@ for effect in diagnosis.effects:
     print(f"  not distinguishable from: {', '.join(effect.equivalents) or 'nothing else'}")
 
 # %%
-# The diagnosis names dry friction, and the interval contains the hidden value of 0.6 N. *Confidence* compares the
-# effect with the others that would explain the same data.
+# The diagnosis names dry friction, and the interval contains the hidden value of 0.6 N. *Confidence*
+# compares the effect with the others that would explain the same data.
 #
-# `candidates` has the score of each effect alone. The score is a gain in log-likelihood minus a penalty for the
-# number of parameters. The second effect scores less than half as much.
+# `candidates` has the score of each effect alone. The score is a gain in log-likelihood minus a penalty for
+# the number of parameters. The second effect scores less than half as much.
 for candidate in diagnosis.candidates[:3]:
     print(f"{candidate.name:20} score {candidate.score:7.1f}")
 
 # %%
 # ## What the correction is worth
 #
-# The last quarter of the record is kept back: neither the calibration nor the search uses it. `gain` compares the
-# calibrated simulation there without and with the effect.
+# The last quarter of the record is kept back: neither the calibration nor the search uses it. `gain`
+# compares the calibrated simulation there without and with the effect.
 gain = diagnosis.gain
-print(
-    f"RMSE before {gain.before.rmse:.2f} mm, after {gain.after.rmse:.2f} mm: {gain.reduction_percent:.0f} % less"
-)
+print(f"RMSE before {gain.before.rmse:.2f} mm, after {gain.after.rmse:.2f} mm")
+print(f"reduction {gain.reduction_percent:.0f} %")
 
 # %%
-# After the correction the error is that of the noise. The figure shows the residuals, measured minus simulated. The
-# part that was kept back is grey.
+# After the correction the error is that of the noise. The figure shows the residuals, measured minus
+# simulated. The part that was kept back is grey.
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 axes.axvspan(time[diagnosis.fitted], time[-1], color="0.9")
 axes.plot(time, rubbing.y - diagnosis.base.output, color="#d55e00", label="calibrated simulation")
@@ -112,9 +112,17 @@ figure.savefig(out / "residuals.svg")
 # ## Other simulations
 #
 # The second argument names the simulation. It can be a linear model (`linear:2`), an identified model
-# (`model:model.json`), a physical system (`cascaded-tanks`), or your own function. A simulation that runs elsewhere
-# is given as a column, its output with one value per sample: `islands.diagnose(record, "column:y_sim",
-# columns={"y_sim": values})`. Effects inside its equation, such as this friction, cannot be found then.
+# (`model:model.json`), a physical system (`cascaded-tanks`), or your own function. A simulation that runs
+# elsewhere is given as a column, its output with one value per sample: `islands.diagnose(record,
+# "column:y_sim", columns={"y_sim": values})`. Effects inside its equation, such as this friction, cannot be
+# found then.
+
+# %%
+# ## Next
+#
+# * [Your own simulator](07_own_simulator.md)
+# * [Your own primitive and effect](09_own_primitive_and_effect.md): search for an effect that the catalogue
+#   lacks.
 
 # %% checks
 assert without.verdict == "nothing"
@@ -133,10 +141,4 @@ assert 0.4 < gain.after.rmse < 0.6
 assert gain.before.rmse > 2.0
 assert 450 < rubbing.output_range < 550
 assert abs(diagnosis.fitted - 750) <= 1
-
-# %%
-# ## Next
-#
-# * [Your own simulator](07_own_simulator.md)
-# * [Your own primitive and effect](09_own_primitive_and_effect.md): search for an effect that the catalogue lacks.
 print(f"results in {out}")

@@ -1,16 +1,16 @@
 """Your own simulator: diagnose a Python function.
 
-Your simulation need not be one of the built-in systems. Any Python function from an input to an output can be
-diagnosed. This tutorial writes a simulation of an oven, calibrates it, and finds out that the amplifier of the heater
-saturates.
+Your simulation need not be one of the built-in systems. Any Python function from an input to an output can
+be diagnosed. This tutorial writes a simulation of an oven, calibrates it, and finds out that the amplifier
+of the heater saturates.
 """
 
 # %%
 # ## The simulator
 #
-# A simulator is a function `(u, dt, **parameters) -> y`. It gets the input of shape `(samples,)` and the sampling time
-# in seconds, and returns the output of the same shape. Each parameter has a number as its default: its nominal value.
-# The diagnosis calibrates the parameters.
+# A simulator is a function `(u, dt, **parameters) -> y`. It gets the input of shape `(samples,)` and the
+# sampling time in seconds, and returns the output of the same shape. Each parameter has a number as its
+# default: its nominal value. The diagnosis calibrates the parameters.
 import argparse
 import tempfile
 from pathlib import Path
@@ -36,9 +36,9 @@ def oven(u, dt, gain=20.0, tau=2.0):
 # %%
 # ## The measurement
 #
-# The real oven has a gain of 22 K/kW and a time constant of 2.5 s. These differ from the nominal values, which is no
-# discrepancy: calibration corrects it. But the amplifier also limits the power to 1.5 kW, and the simulation does not
-# know that. The noise has a standard deviation of 0.05 K.
+# The real oven has a gain of 22 K/kW and a time constant of 2.5 s. These differ from the nominal values,
+# which is no discrepancy: calibration corrects it. But the amplifier also limits the power to 1.5 kW, and
+# the simulation does not know that. The noise has a standard deviation of 0.05 K.
 DT = 0.1
 rng = np.random.default_rng(4)
 time = DT * np.arange(1000)
@@ -59,9 +59,9 @@ print(f"the commanded power reaches {u.max():.2f} kW")
 # %%
 # ## Diagnose it
 #
-# `function_simulator` makes a simulator from a function. Values that you know better than the defaults are given by
-# name: `function_simulator(oven, gain=21.0)`. On the command line the function is named by its file:
-# `--simulation python:oven.py:oven`.
+# `function_simulator` makes a simulator from a function. Values that you know better than the defaults are
+# given by name: `function_simulator(oven, gain=21.0)`. On the command line the function is named by its
+# file: `--simulation python:oven.py:oven`.
 simulator = islands.function_simulator(oven)
 print("without a limit:", islands.diagnose(intact, simulator).verdict)
 
@@ -79,8 +79,8 @@ print(f"limit {(1.0 - cut) * u.max():.3f} kW")
 # %%
 # ## Calibrated parameters
 #
-# `base` is the simulation calibrated without the effect, `best` the one with it. The saturation distorts the
-# calibration of `base`; `best` recovers the true values, 22 K/kW and 2.5 s.
+# `base` is the simulation calibrated without the effect, `best` the one with it. The saturation distorts
+# the calibration of `base`; `best` recovers the true values, 22 K/kW and 2.5 s.
 for name, calibrated in (("without the effect", diagnosis.base), ("with the effect", diagnosis.best)):
     values = zip(simulator.parameters, calibrated.values, strict=False)
     print(f"{name}: " + ", ".join(f"{parameter.name} = {value:.3f}" for parameter, value in values))
@@ -100,18 +100,25 @@ figure.savefig(out / "residuals.svg")
 # %%
 # ## Parameters that you know
 #
-# By default each parameter is free, so an effect that another parameter value can imitate is not reported. If you know
-# a parameter, give its relative standard deviation: `tolerance={"gain": 0.01, "tau": 0.05}`. If all parameters have a
-# tolerance, wrong gains and wrong parameters become effects that can be found: here the gain of 22 differs from the
-# nominal 20 by 10 %.
+# By default each parameter is free, so an effect that another parameter value can imitate is not reported.
+# If you know a parameter, give its relative standard deviation: `tolerance={"gain": 0.01, "tau": 0.05}`. If
+# all parameters have a tolerance, wrong gains and wrong parameters become effects that can be found: here
+# the gain of 22 differs from the nominal 20 by 10 %.
 known = islands.diagnose(intact, simulator, tolerance={"gain": 0.01, "tau": 0.5})
 for effect in known.effects:
     print(effect.name, [f"{name} = {value.value:.3f}" for name, value in effect.parameters.items()])
     print("not distinguishable from:", effect.equivalents)
 
 # %%
-# The gain is about 10 % too small. A gain of the input, of the sensor and of the oven change this output alike, so the
-# record cannot tell them apart: `equivalents` lists the names between which you have to decide.
+# The gain is about 10 % too small. A gain of the input, of the sensor and of the oven change this output
+# alike, so the record cannot tell them apart: `equivalents` lists the names between which you have to
+# decide.
+
+# %%
+# ## Next
+#
+# * [Your own primitive and effect](09_own_primitive_and_effect.md)
+# * [Diagnose a simulation](06_diagnose_a_simulation.md): how to read a diagnosis.
 
 # %% checks
 assert diagnosis.verdict == "named"
@@ -124,10 +131,4 @@ assert abs(diagnosis.base.values[0] - 22.0) > 0.2
 assert known.effects[0].name == "input-gain"
 assert abs(known.effects[0].parameters["k"].value - 0.1) < 0.01
 assert {"wrong-parameter", "sensor-gain"} < set(known.effects[0].equivalents)
-
-# %%
-# ## Next
-#
-# * [Your own primitive and effect](09_own_primitive_and_effect.md)
-# * [Diagnose a simulation](06_diagnose_a_simulation.md): how to read a diagnosis.
 print(f"results in {out}")

@@ -1,7 +1,7 @@
 """Export to C: a model in a controller.
 
-A model can be exported as one file of C99 without dependencies. This tutorial identifies a model, exports it, compiles
-it, and shows that the program computes the same numbers as the Python model.
+A model can be exported as one file of C99 without dependencies. This tutorial identifies a model, exports
+it, compiles it, and shows that the program computes the same numbers as the Python model.
 """
 
 # %%
@@ -39,8 +39,8 @@ print(model)
 # %%
 # ## C source
 #
-# `predict` computes one sample from the samples before it, for a controller that measures the output. `simulate` is a
-# free run over a whole input.
+# `predict` computes one sample from the samples before it, for a controller that measures the output.
+# `simulate` is a free run over a whole input.
 (out / "model.c").write_text(model.export("c"))
 print((out / "model.c").read_text())
 
@@ -82,22 +82,23 @@ difference = np.abs(compiled[lag:] - python[lag:]).max()
 print(f"{record.samples - lag} samples, largest difference {difference}")
 
 # %%
-# The difference is exactly zero. Models with `exp`, `log`, `sin`, `cos` or `tanh` may differ in the last bits, because
-# each machine has its own library for these.
+# The difference is exactly zero. Models with `exp`, `log`, `sin`, `cos` or `tanh` may differ in the last
+# bits, because each machine has its own library for these.
 #
 # ## Other languages
 #
-# The other formats are `python` (a module that needs only `math`), `matlab`, `latex`, `mathml`, `plain` and `json`.
+# The other formats are `python` (a module that needs only `math`), `matlab`, `latex`, `mathml`, `plain` and
+# `json`.
 print(model.export("matlab"))
-
-# %% checks
-assert difference == 0.0
-assert model.model.size == 3
-assert "predict" in model.export("python")
 
 # %%
 # ## Next
 #
 # * [A first model](01_first_model.md)
 # * [Your own primitive and effect](09_own_primitive_and_effect.md)
+
+# %% checks
+assert difference == 0.0
+assert model.model.size == 3
+assert "predict" in model.export("python")
 print(f"results in {out}")

@@ -1,11 +1,9 @@
 """Tutorials: executed examples as Markdown pages.
 
-An example is a Python script in ``examples/``. Its docstring is the title and the introduction of the page. A line
-``# %%`` begins a cell: the comment lines that follow are Markdown, the rest is code. The code of a cell ``# %% checks``
-runs and is not shown. A page shows the text, the code, what the code prints and the SVG figures that it writes to
-its output folder.
-
-``build`` writes the pages to a folder. The plug-in mkdocs-gen-files runs this file as a script.
+An example is a Python script in ``examples/``. Its docstring is the title and the introduction of the page. A
+line ``# %%`` begins a cell: the comment lines that follow are Markdown, the rest is code. The code of a cell
+``# %% checks`` runs and is not shown. Each page shows the text, the code, the printed output and the SVG
+figures that the script writes to its output folder. mkdocs-gen-files runs this file as a script.
 """
 
 import ast
@@ -19,24 +17,18 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
+from itertools import takewhile
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = ROOT / "examples"
 
-#: Results of executed examples, by a hash of the example and the packages. Git ignores ``build/``.
+#: Results of executed examples, by a hash of the example and of the packages. Git ignores ``build/``.
 CACHE = ROOT / "build" / "tutorials"
-
-#: Folders that are imported by examples: a change of their sources changes the hash.
-PACKAGES = ("src", "services", "api")
-
-#: Opens a file of the site for writing: ``(path relative to the site, mode) -> stream``.
-Opener = Callable[[str, str], Any]
 
 
 class Cell(NamedTuple):
-    """Part of an example; ``line`` is the number of the first line of the code."""
+    """Text and code of a cell; ``line`` is the line number at which the code begins."""
 
     text: str
     code: str
@@ -55,33 +47,24 @@ class Example(NamedTuple):
 
 def list_examples() -> list[Path]:
     """Return the paths of all examples in the order of their numbers."""
-    return sorted(EXAMPLES.glob("[0-9][0-9]_*.py"))
+    return sorted((ROOT / "examples").glob("[0-9][0-9]_*.py"))
 
 
 def parse(path: Path) -> Example:
-    """Read an example.
-
-    Raises
-    ------
-    ValueError
-        The file has no docstring or no cells.
-    """
+    """Read an example; raise a ``ValueError`` if it has no docstring or no cells."""
     source = path.read_text(encoding="utf-8")
     docstring = ast.get_docstring(ast.parse(source))
     head, *blocks = re.split(r"^# %%(.*)\n", source, flags=re.MULTILINE)
     if not docstring or not blocks:
         raise ValueError(f"{path.name} needs a docstring and cells that begin with '# %%'")
     title, _, introduction = docstring.partition("\n")
-    line, cells = head.count("\n") + 1, []
+    line, cells = head.count("\n") + 2, []
     for marker, block in zip(blocks[::2], blocks[1::2], strict=True):
-        comments = re.match(r"(#.*\n)*", block)
-        text = comments[0] if comments else ""
-        code = block[len(text) :]
-        first = line + 1 + text.count("\n")
-        cells.append(
-            Cell(re.sub(r"^# ?", "", text, flags=re.MULTILINE).strip(), code, first, "checks" not in marker)
-        )
-        line += 1 + block.count("\n")
+        comments = "".join(takewhile(lambda row: row.startswith("#"), block.splitlines(keepends=True)))
+        text = re.sub(r"^# ?", "", comments, flags=re.MULTILINE).strip()
+        code = block[len(comments) :]
+        cells.append(Cell(text, code, line + comments.count("\n"), "checks" not in marker))
+        line += block.count("\n") + 1
     return Example(path.stem, title.rstrip("."), introduction.strip(), tuple(cells))
 
 
@@ -90,8 +73,8 @@ def run(path: Path, folder: Path) -> None:
     import matplotlib as mpl  # noqa: PLC0415 - only the process that executes an example needs it
 
     mpl.rcParams["svg.hashsalt"] = "islands"
-    sys.argv = [str(path), "--out", str(folder / "out")]
-    sys.path.insert(0, str(path.parent))
+    out = folder / "out"
+    sys.argv = [str(path), "--out", str(out)]
     namespace: dict[str, Any] = {"__name__": "__main__", "__file__": str(path)}
     results: list[dict[str, Any]] = []
     seen: set[str] = set()
@@ -100,21 +83,20 @@ def run(path: Path, folder: Path) -> None:
         with redirect_stdout(printed):
             # Empty lines in front keep the line numbers of error messages.
             exec(compile("\n" * (cell.line - 1) + cell.code, str(path), "exec"), namespace)
-        figures = sorted({file.name for file in (folder / "out").glob("*.svg")} - seen)
+        figures = sorted({file.name for file in out.glob("*.svg")} - seen)
         seen.update(figures)
-        results.append({"output": printed.getvalue().replace(str(folder / "out"), "out"), "figures": figures})
+        results.append({"output": printed.getvalue().replace(str(out), "out"), "figures": figures})
     (folder / "cells.json").write_text(json.dumps(results), encoding="utf-8")
 
 
 def execute(path: Path) -> Path:
-    """Execute an example in a process unless the cache has its results; return the folder of the results.
-
-    Raises
-    ------
-    RuntimeError
-        The example fails; the message has its error output.
-    """
-    folder = CACHE / f"{path.stem}-{_hash_sources(path)}"
+    """Execute an example in a process unless the cache has its results; return the folder of the results."""
+    digest = hashlib.sha256()
+    packages = (ROOT / "src", ROOT / "services", ROOT / "api")
+    sources = (file for folder in packages for file in sorted(folder.rglob("*.py")))
+    for file in (path, Path(__file__), *sources):
+        digest.update(file.read_bytes())
+    folder = CACHE / f"{path.stem}-{digest.hexdigest()[:16]}"
     if not (folder / "cells.json").exists():
         for stale in CACHE.glob(f"{path.stem}-*"):
             shutil.rmtree(stale)
@@ -123,45 +105,28 @@ def execute(path: Path) -> Path:
         environment = {**os.environ, "MPLBACKEND": "agg", "SOURCE_DATE_EPOCH": "0"}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise RuntimeError(f"{path.name} failed with exit code {done.returncode}:\n{done.stderr}")
+            raise RuntimeError(f"{path.name} ended with exit code {done.returncode}:\n{done.stderr}")
     return folder
-
-
-def _hash_sources(path: Path) -> str:
-    files = [
-        path,
-        Path(__file__),
-        *(file for folder in PACKAGES for file in sorted((ROOT / folder).rglob("*.py"))),
-    ]
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def render(example: Example, results: list[dict[str, Any]]) -> str:
     """Return the Markdown of a page."""
-    note = (
-        f"This page is the script [`examples/{example.name}.py`]({example.name}.py) and its output. The script writes "
-        "its files to the folder `out`."
-    )
-    parts = [f"# {example.title}", example.introduction, note]
+    script = f"[`examples/{example.name}.py`]({example.name}.py)"
+    source = f"This page shows the script {script} and its output. `out` is the folder of the results."
+    parts = [f"# {example.title}", example.introduction, source]
     for cell, result in zip(example.cells, results, strict=True):
         parts.append(cell.text)
         if cell.shown and cell.code.strip():
             parts.append(f"```python\n{cell.code.strip()}\n```")
             if output := result["output"].rstrip():
-                parts.append(f"Output:\n\n```text\n{output}\n```")
+                parts.append(f'```text title="Output"\n{output}\n```')
         parts += [f"![{name.removesuffix('.svg')}]({example.name}/{name})" for name in result["figures"]]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def make_pages() -> Iterator[tuple[str, bytes]]:
     """Execute the examples; yield the path in the site and the content of each page, script and figure."""
-    index = [
-        "# Tutorials",
-        f"Each tutorial is a script that runs. [`examples/README.md`]({_README}) says how to run them.",
-    ]
+    index = ["# Tutorials\n", "Each tutorial is a script that you can run, and its output.\n"]
     for path in list_examples():
         example, folder = parse(path), execute(path)
         results = json.loads((folder / "cells.json").read_text(encoding="utf-8"))
@@ -173,30 +138,26 @@ def make_pages() -> Iterator[tuple[str, bytes]]:
     yield "tutorials/index.md", ("\n".join(index) + "\n").encode()
 
 
-def write_pages(open_file: Opener) -> list[str]:
-    """Write all pages through a function that opens files of the site; return their paths."""
-    written = []
+def write_pages(open_file: Callable[[str, str], Any]) -> None:
+    """Write all pages with ``open_file(path in the site, mode)``."""
     for name, content in make_pages():
-        stream: IO[bytes]
         with open_file(name, "wb") as stream:
             stream.write(content)
-        written.append(name)
-    return written
 
 
 def build(output: Path) -> list[Path]:
     """Write all pages below a folder; return their paths."""
-
-    def open_file(name: str, mode: str) -> Any:
+    written = []
+    for name, content in make_pages():
         (output / name).parent.mkdir(parents=True, exist_ok=True)
-        return (output / name).open(mode)
-
-    return [output / name for name in write_pages(open_file)]
+        (output / name).write_bytes(content)
+        written.append(output / name)
+    return written
 
 
 if __name__ == "__main__":
     run(Path(sys.argv[1]), Path(sys.argv[2]))
-elif __name__ == "<run_path>":  # mkdocs-gen-files runs its scripts by runpy.run_path
+elif __name__ == "<run_path>":  # mkdocs-gen-files runs its scripts with runpy.run_path
     import mkdocs_gen_files
 
     write_pages(mkdocs_gen_files.open)
