@@ -160,7 +160,7 @@ assert abs(step[2] - 0.7125) < 1e-12
 assert islands.read_model(out / "soft.json", table) == model
 assert diagnosis.verdict == "unknown"
 assert not diagnosis.effects
-assert max(diagnosis.remainder, key=diagnosis.remainder.__getitem__) == "output"
+assert diagnosis.remainder["output"] == max(diagnosis.remainder.values())
 assert better.verdict == "named"
 assert [effect.name for effect in better.effects] == ["encoder-error"]
 found = better.effects[0].parameters
