@@ -50,12 +50,12 @@ print(f"error {serial.best.metrics['validation']['free_run'].mape:.3f} %")
 # %%
 # ## On all cores
 #
-# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. Each island
-# runs in a process. Starting Ray takes a few seconds, so parallel islands pay off in searches that take
+# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. The islands run
+# in several processes at the same time. Starting Ray takes a few seconds, so it pays off in searches that take
 # longer than this one.
 #
-# `progress` is called after every migration with the state of the search. It prints the number of
-# individuals that were evaluated so far.
+# `progress` is called after the first generation and after every migration, with the state of the search and
+# its settings.
 
 
 def show(state, settings):

@@ -35,9 +35,8 @@ parser.add_argument("--address", default=os.environ.get("ISLANDS_RAY_ADDRESS"), 
 arguments = parser.parse_args()
 out = arguments.out or Path(tempfile.mkdtemp(prefix="islands-"))
 out.mkdir(parents=True, exist_ok=True)
-print(
-    f"cluster {arguments.address}" if arguments.address else "no address is given: Ray starts on this machine"
-)
+address = arguments.address
+print(f"cluster {address}" if address else "no address is given: Ray starts on this machine")
 
 # %%
 # ## A search with a budget
@@ -54,7 +53,7 @@ for k in range(1, u.size):
 level += 0.005 * rng.standard_normal(u.size)
 record = islands.Dataset(u, level, 1.0, ("u_V",), "level_cm", ("V",), "cm")
 
-with ray_engine(arguments.address) as engine:
+with ray_engine(address) as engine:
     result = islands.identify(
         record,
         preset="narx",

@@ -1,4 +1,6 @@
-"""`islands.diagnose`: effects of the user's own."""
+"""`islands.diagnose`: effects of the user's own, and simulators from Python functions."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -59,3 +61,27 @@ def test_the_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.D
     found = islands.diagnose(data, "column:theirs", columns={"theirs": simulated})
     assert "encoder-error" not in {each.name for each in found.candidates}
     assert len(islands.EFFECTS) == len({effect.name for effect in islands.EFFECTS})
+
+
+def _proportional(u: Signal, dt: float, gain: float = 0.8) -> Signal:
+    del dt
+    return gain * u
+
+
+def test_function_simulator_is_diagnosed_like_the_function_of_a_file(
+    record: tuple[islands.Dataset, Signal], tmp_path: Path
+) -> None:
+    data, _ = record
+    file = tmp_path / "stage.py"
+    file.write_text("def proportional(u, dt, gain=0.8):\n    return gain * u\n")
+    found = islands.diagnose(data, islands.function_simulator(_proportional), effects=(ENCODER_ERROR,))
+    same = islands.diagnose(data, f"python:{file}:proportional", effects=(ENCODER_ERROR,))
+    assert [each.name for each in found.effects] == ["encoder-error"]
+    assert found.best.values.tolist() == same.best.values.tolist()
+
+
+def test_function_simulator_takes_nominal_values_by_name() -> None:
+    (parameter,) = islands.function_simulator(_proportional, gain=0.7).parameters
+    assert (parameter.name, parameter.nominal) == ("gain", 0.7)
+    with pytest.raises(islands.SettingsError, match="no parameter offset"):
+        islands.function_simulator(_proportional, offset=1.0)
