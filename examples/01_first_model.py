@@ -69,8 +69,8 @@ for model in sorted(fitted.models, key=lambda model: model.model.size)[:5]:
 # ## Evolution: identify
 #
 # `fit` needs a library. `identify` evolves the terms instead, so that powers and lags need not be guessed.
-# The preset `narx` is for smooth systems. The same seed gives the same result. Fewer generations than those of
-# the preset are enough here.
+# The preset `narx` is for smooth systems. The same seed gives the same result. Fewer generations than those
+# of the preset are enough here.
 evolved = islands.identify(record, preset="narx", generations=20, max_terms=6, seed=0)
 for model in sorted(evolved.models, key=lambda model: model.model.size):
     error = model.metrics["validation"]["free_run"].mape

@@ -44,18 +44,18 @@ record = islands.Dataset(u, y, 0.01, ("u_V",), "y_um", ("V",), "um")
 # Without an engine the islands run one after the other in this process.
 settings = {"preset": "hysteresis", "islands": 4, "topology": "ring", "migrate_every": 5, "generations": 20}
 serial = islands.identify(record, seed=0, **settings)
-print(f"{serial.findings.search.evaluations} models evaluated")
+print(f"{serial.search_result.search.evaluations} models evaluated")
 print(f"error {serial.best.metrics['validation']['free_run'].mape:.3f} %")
 
 # %%
 # ## On all cores
 #
-# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. The islands run
-# in several processes at the same time. Starting Ray takes a few seconds, so it pays off in searches that take
-# longer than this one.
+# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. The islands
+# run in several processes at the same time. Starting Ray takes a few seconds, so it pays off in searches
+# that take longer than this one.
 #
-# `progress` is called after the first generation and after every migration, with the state of the search and
-# its settings.
+# `progress` is called after the first generation and after every migration, with the state of the search
+# and its settings.
 
 
 def show(state, settings):
@@ -88,7 +88,7 @@ shutil.copy(out / "result" / "figures" / "islands.svg", out / "islands.svg")
 assert [str(model) for model in parallel.models] == [str(model) for model in serial.models]
 for each, other in zip(parallel.models, serial.models, strict=True):
     assert each.model.parameters == other.model.parameters
-assert len(parallel.findings.search.history[-1].islands) == 4
+assert len(parallel.search_result.search.history[-1].islands) == 4
 assert parallel.best.metrics["validation"]["free_run"].mape < 0.2
 assert parallel.best.physics.property_1
 print(f"results in {out}")

@@ -68,7 +68,7 @@ with ray_engine(address) as engine:
 
 # %%
 # `ended_by` names the budget that ended the search.
-search = result.findings.search
+search = result.search_result.search
 print(f"ended by {search.ended_by} after {search.generations} generations, {search.evaluations} models")
 chosen = next(model for model in result.models if model.model.size == 3)
 error = chosen.metrics["validation"]["free_run"]

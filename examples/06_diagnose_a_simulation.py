@@ -101,7 +101,7 @@ print(f"reduction {gain.reduction_percent:.0f} %")
 # After the correction the error is that of the noise. The figure shows the residuals, measured minus
 # simulated. The part that was kept back is grey.
 figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-axes.axvspan(time[diagnosis.fitted], time[-1], color="0.9")
+axes.axvspan(time[diagnosis.estimation_samples], time[-1], color="0.9")
 axes.plot(time, rubbing.y - diagnosis.base.output, color="#d55e00", label="calibrated simulation")
 axes.plot(time, rubbing.y - diagnosis.best.output, color="#0072b2", label="with dry friction")
 axes.set(xlabel="time (s)", ylabel="residual (mm)")
@@ -140,5 +140,5 @@ assert diagnosis.candidates[1].score < 0.5 * diagnosis.candidates[0].score
 assert 0.4 < gain.after.rmse < 0.6
 assert gain.before.rmse > 2.0
 assert 450 < rubbing.output_range < 550
-assert abs(diagnosis.fitted - 750) <= 1
+assert abs(diagnosis.estimation_samples - 750) <= 1
 print(f"results in {out}")

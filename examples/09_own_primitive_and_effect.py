@@ -81,12 +81,12 @@ record = islands.Dataset(u, measured, DT, ("u_V",), "y_um", ("V",), "um")
 
 # %%
 # The catalogue has no encoder error. The verdict is `unknown`: the simulation is wrong, but by none of the
-# effects of the catalogue. `remainder` lists the quantities on which the residual depends, here the output
-# above all, and how far that is from chance, in standard deviations.
+# effects of the catalogue. `residual_structure` lists the quantities on which the residual depends, here
+# the output above all, and how far that is from chance, in standard deviations.
 simulator = islands.function_simulator(stage)
 diagnosis = islands.diagnose(record, simulator)
 print(diagnosis.verdict, [effect.name for effect in diagnosis.effects])
-print({name: round(distance, 1) for name, distance in diagnosis.remainder.items()})
+print({name: round(distance, 1) for name, distance in diagnosis.residual_structure.items()})
 
 # %%
 # ## An effect
@@ -95,8 +95,8 @@ print({name: round(distance, 1) for name, distance in diagnosis.remainder.items(
 #
 # * a site: here the output, so `form` maps the simulated output to the measured one;
 # * parameters with unit, nominal value (no effect), and the scale of a typical change;
-# * a grid of starting points for the calibration;
-# * `linear`: the number of leading parameters to which the response is proportional.
+# * starting points for the calibration;
+# * `linear_parameters`: the number of leading parameters to which the response is proportional.
 
 
 def parameters(context):
@@ -117,9 +117,9 @@ encoder_error = islands.Effect(
     family="sensor",
     site=islands.Site.OUTPUT,
     parameters=parameters,
-    grid=lambda _context, _residual: ((0.02, 0.0),),
+    starting_points=lambda _context, _residual: ((0.02, 0.0),),
     form=form,
-    linear=2,
+    linear_parameters=2,
     source="Birch, Optical fringe subdivision with nanometric accuracy, 1990",
 )
 
@@ -160,7 +160,7 @@ assert abs(step[2] - 0.7125) < 1e-12
 assert islands.read_model(out / "soft.json", table) == model
 assert diagnosis.verdict == "unknown"
 assert not diagnosis.effects
-assert diagnosis.remainder["output"] == max(diagnosis.remainder.values())
+assert diagnosis.residual_structure["output"] == max(diagnosis.residual_structure.values())
 assert better.verdict == "named"
 assert [effect.name for effect in better.effects] == ["encoder-error"]
 found = better.effects[0].parameters

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("src", "services", "api")
 
 #: Results of executed examples, by a hash of the example and of the packages. Git ignores ``build/``.
 CACHE = ROOT / "build" / "tutorials"
@@ -75,9 +76,8 @@ def run(path: Path, folder: Path) -> None:
     mpl.rcParams["svg.hashsalt"] = "islands"
     out = folder / "out"
     sys.argv = [str(path), "--out", str(out)]
-    namespace: dict[str, Any] = {"__name__": "__main__", "__file__": str(path)}
-    results: list[dict[str, Any]] = []
-    seen: set[str] = set()
+    namespace = {"__name__": "__main__", "__file__": str(path)}
+    results, seen = [], set()
     for cell in parse(path).cells:
         printed = io.StringIO()
         with redirect_stdout(printed):
@@ -91,12 +91,9 @@ def run(path: Path, folder: Path) -> None:
 
 def execute(path: Path) -> Path:
     """Execute an example in a process unless the cache has its results; return the folder of the results."""
-    digest = hashlib.sha256()
-    packages = (ROOT / "src", ROOT / "services", ROOT / "api")
-    sources = (file for folder in packages for file in sorted(folder.rglob("*.py")))
-    for file in (path, Path(__file__), *sources):
-        digest.update(file.read_bytes())
-    folder = CACHE / f"{path.stem}-{digest.hexdigest()[:16]}"
+    sources = (file for name in PACKAGES for file in sorted((ROOT / name).rglob("*.py")))
+    content = b"".join(file.read_bytes() for file in (path, Path(__file__), *sources))
+    folder = CACHE / f"{path.stem}-{hashlib.sha256(content).hexdigest()[:16]}"
     if not (folder / "cells.json").exists():
         for stale in CACHE.glob(f"{path.stem}-*"):
             shutil.rmtree(stale)
@@ -111,9 +108,10 @@ def execute(path: Path) -> Path:
 
 def render(example: Example, results: list[dict[str, Any]]) -> str:
     """Return the Markdown of a page."""
-    script = f"[`examples/{example.name}.py`]({example.name}.py)"
-    source = f"This page shows the script {script} and its output. `out` is the folder of the results."
-    parts = [f"# {example.title}", example.introduction, source]
+    script = (
+        f"This page is [`{example.name}.py`]({example.name}.py) and its output; `out` is its output folder."
+    )
+    parts = [f"# {example.title}", example.introduction, script]
     for cell, result in zip(example.cells, results, strict=True):
         parts.append(cell.text)
         if cell.shown and cell.code.strip():
@@ -126,7 +124,7 @@ def render(example: Example, results: list[dict[str, Any]]) -> str:
 
 def make_pages() -> Iterator[tuple[str, bytes]]:
     """Execute the examples; yield the path in the site and the content of each page, script and figure."""
-    index = ["# Tutorials\n", "Each tutorial is a script that you can run, and its output.\n"]
+    index = "# Tutorials\n\nEach tutorial is a script that you can run, and its output.\n\n"
     for path in list_examples():
         example, folder = parse(path), execute(path)
         results = json.loads((folder / "cells.json").read_text(encoding="utf-8"))
@@ -134,8 +132,8 @@ def make_pages() -> Iterator[tuple[str, bytes]]:
         yield f"tutorials/{path.name}", path.read_bytes()
         for name in (name for result in results for name in result["figures"]):
             yield f"tutorials/{example.name}/{name}", (folder / "out" / name).read_bytes()
-        index.append(f"* [{example.title}]({example.name}.md)")
-    yield "tutorials/index.md", ("\n".join(index) + "\n").encode()
+        index += f"* [{example.title}]({example.name}.md)\n"
+    yield "tutorials/index.md", index.encode()
 
 
 def write_pages(open_file: Callable[[str, str], Any]) -> None:
