@@ -152,7 +152,7 @@ figure.savefig(out / "residuals.svg")
 # ## Next
 #
 # * [Diagnose a simulation](06_diagnose_a_simulation.md)
-# * [Export to C](10_export_to_c.md): a model with your primitive in a controller.
+# * [Export to C](10_export_to_c.md): a model in a controller.
 
 # %% checks
 assert abs(step[1] - 0.375) < 1e-12
