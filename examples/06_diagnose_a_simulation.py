@@ -1,4 +1,4 @@
-"""Diagnose a simulation: find what it lacks, by name.
+"""Diagnose a simulation: name the effect that is missing.
 
 You have a record of a system and a simulation of it, and the two differ. `diagnose` calibrates the
 simulation, tests more than thirty physical effects that it may lack, and names the cause. This tutorial

@@ -9,8 +9,8 @@ Python, follows it, and fetches the result.
 # ## Start the service
 #
 # On a server you start it with `islands serve` and leave it running. Here it gets a free port of this
-# machine and a folder of its own, and the script stops it at the end. On other addresses than 127.0.0.1 the
-# service requires keys and TLS.
+# machine and a temporary folder, and the script stops it at the end. On other addresses than 127.0.0.1 the
+# service requires keys.
 import argparse
 import atexit
 import socket

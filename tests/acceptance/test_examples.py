@@ -31,7 +31,7 @@ PATIENCE = 240
 
 
 def run(path: Path, *arguments: object, **environment: str) -> str:
-    """Run an example as a script; return what it prints."""
+    """Run an example as a script; return its output."""
     done = subprocess.run(
         [sys.executable, path, *map(str, arguments)],
         env={**os.environ, "MPLBACKEND": "agg", **environment},
