@@ -1,7 +1,7 @@
-"""Hysteresis: a model that keeps its output when the input rests.
+"""Hysteresis: a model that keeps its output while the input is constant.
 
 The output of a piezo actuator, of a magnet or of a joint with friction depends on the path of its input.
-When the input rests, the output keeps its value: every value between the two branches of the loop is an
+While the input is constant, so is the output: every value between the two branches of the loop is an
 equilibrium (a continuum of equilibria). This tutorial shows what an ordinary model gets wrong there, and
 how a constraint on the parameters makes it right.
 """
@@ -52,8 +52,7 @@ record = islands.Dataset(
 # ## With and without the constraint
 #
 # The preset `hysteresis` builds terms from the increments of the input and their signs. Its constraint
-# fixes sums of parameters: the coefficient of `y(k-1)` is 1, and all terms without an increment cancel.
-# When the input rests, such a model reduces to `y(k) = y(k-1)`.
+# fixes sums of parameters so that the model reduces to `y(k) = y(k-1)` while the input is constant.
 #
 # For comparison, the second search has no constraint.
 constrained = islands.identify(record, preset="hysteresis", generations=15, seed=0).best
@@ -82,7 +81,7 @@ for name, model in (("constrained", constrained), ("unconstrained", free)):
           f"largest drift {model.physics.hold_drift_percent:.3f} %")  # fmt: skip
 
 # %%
-# The constrained model keeps its output. The next figure shows the output before and while the input rests:
+# The constrained model keeps its output. The next figure shows the output before the hold and during it:
 constrained.plot("hold").savefig(out / "hold-constrained.svg")
 
 # %%
@@ -92,8 +91,8 @@ free.plot("hold").savefig(out / "hold-unconstrained.svg")
 # %%
 # ## Why
 #
-# The coefficient of `y(k-1)` is 1 under the constraint. Without it, noise makes it slightly smaller, and
-# the output decays as soon as the input rests. A record in which the input never rests does not show it.
+# The coefficient of `y(k-1)` is 1 under the constraint. Without it, the estimate is slightly smaller, and
+# the output decays while the input is constant. A record in which the input always moves does not show it.
 for name, model in (("constrained", constrained), ("unconstrained", free)):
     for regressor, parameter in zip(model.model.regressors, model.model.parameters, strict=True):
         if regressor.text == "y(k-1)":

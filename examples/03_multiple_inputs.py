@@ -79,8 +79,8 @@ chosen.plot("free-run").savefig(out / "free-run.svg")
 # %%
 # ## Is the second input needed?
 #
-# Without the fan the error is much larger, however many terms the model has. `first_inputs` leaves out the
-# others.
+# Without the fan the error is much larger, however many terms the model has. `first_inputs(1)` keeps the
+# first input only.
 alone = islands.fit(
     estimation.first_inputs(1), validation.first_inputs(1), library="polynomial", degree=2, lags=3
 )

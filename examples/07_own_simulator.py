@@ -101,18 +101,18 @@ figure.savefig(out / "residuals.svg")
 # ## Parameters that you know
 #
 # By default each parameter is free, so an effect that another parameter value can imitate is not reported.
-# If you know a parameter, give its relative standard deviation: `tolerance={"gain": 0.01, "tau": 0.05}`. If
-# all parameters have a tolerance, wrong gains and wrong parameters become effects that can be found: here
-# the gain of 22 differs from the nominal 20 by 10 %.
+# If you know a parameter, give its relative standard deviation as a tolerance. If all parameters have a
+# tolerance, wrong gains and wrong parameters become effects that can be found: here the gain of 22 differs
+# from the nominal 20 by 10 %.
 known = islands.diagnose(intact, simulator, tolerance={"gain": 0.01, "tau": 0.5})
 for effect in known.effects:
     print(effect.name, [f"{name} = {value.value:.3f}" for name, value in effect.parameters.items()])
     print("not distinguishable from:", effect.equivalents)
 
 # %%
-# The gain is about 10 % too small. A gain of the input, of the sensor and of the oven change this output
-# alike, so the record cannot tell them apart: `equivalents` lists the names between which you have to
-# decide.
+# The simulation lacks about 10 % of gain. A gain of the input, of the sensor and of the oven change this
+# output alike, so the record cannot tell them apart: `equivalents` lists the names between which you have
+# to decide.
 
 # %%
 # ## Next

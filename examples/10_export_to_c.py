@@ -1,7 +1,7 @@
 """Export to C: a model in a controller.
 
-A model can be exported as one file of C99 without dependencies. This tutorial identifies a model, exports
-it, compiles it, and shows that the program computes the same numbers as the Python model.
+A model can be exported as one file of C99 that needs only the standard library. This tutorial identifies a
+model, exports it, compiles it, and shows that the program computes the same numbers as the Python model.
 """
 
 # %%
