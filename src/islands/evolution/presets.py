@@ -73,6 +73,18 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
     }
 )
 
+#: What each preset is for.
+PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
+    {
+        "paper-case1": "Section 6.1 of the paper: theoretical piezo, no seeding",
+        "paper-case2": "Section 6.2 of the paper: measured micromanipulator, no seeding",
+        "paper-appendix": "Appendix A of the paper, system S1: one-step-ahead error, no constraint",
+        "paper-appendix-s2": "Appendix A of the paper, system S2: as for S1, with larger models",
+        "hysteresis": "Systems with hysteresis: seeded by constrained forward selection, refined",
+        "narx": "Smooth systems: seeded by forward selection, without constraints, refined",
+    }
+)
+
 
 def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
     """Return a preset's settings with changes.

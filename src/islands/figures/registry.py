@@ -21,10 +21,12 @@ FigureOf = Callable[[RankedModel, Split], Figure]
 
 
 def _free_run(entry: RankedModel, split: Split) -> Figure:
+    """Draw the measured output, the free run and the residual over time."""
     return draw_free_run(split.validation, _simulated(entry, split))
 
 
 def _loop(entry: RankedModel, split: Split) -> Figure:
+    """Draw the measured output and the free run against every input."""
     return draw_loop(split.validation, _simulated(entry, split))
 
 
@@ -34,10 +36,12 @@ def _simulated(entry: RankedModel, split: Split) -> NDArray[np.float64]:
 
 
 def _hold(entry: RankedModel, split: Split) -> Figure:
+    """Draw the output while the input is held at five levels."""
     return draw_holds(entry.model, split.estimation)
 
 
 def _residuals(entry: RankedModel, _split: Split) -> Figure:
+    """Draw the correlation functions of the residual with their 95 % band."""
     return draw_residual_correlations(entry.assessment.residual_tests)
 
 
@@ -47,6 +51,7 @@ FIGURES: Mapping[str, FigureOf] = MappingProxyType(
 
 
 def _record(found: SearchResult) -> Figure:
+    """Draw every input and the output of the estimation data."""
     return draw_record(found.split.estimation)
 
 

@@ -40,6 +40,8 @@ class Primitive:
         f(a, b) = f(b, a).
     simplify : callable or None
         The canonical arguments to an equal, simpler expression, or to None where there is none.
+    summary : str
+        Meaning in one line, for the reference.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Primitive:
     degree: float | None = field(default=None, compare=False)
     commutative: bool = field(default=False, compare=False)
     simplify: "Callable[..., Expression | None] | None" = field(default=None, compare=False)
+    summary: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,9 +95,9 @@ def _smaller(a: float, b: float) -> float:
 
 # Operators of every language need no function in C and MATLAB, nor does what is written as an operator in
 # canonical form (phi1, square) or in other primitives (phi2).
-MUL = Primitive("mul", 2, _multiply, r"{0} {1}", commutative=True)
-ADD = Primitive("add", 2, _add, r"{0} + {1}", commutative=True)
-SUB = Primitive("sub", 2, _subtract, r"{0} - {1}")
+MUL = Primitive("mul", 2, _multiply, r"{0} {1}", commutative=True, summary="`a*b`")
+ADD = Primitive("add", 2, _add, r"{0} + {1}", commutative=True, summary="`a + b`")
+SUB = Primitive("sub", 2, _subtract, r"{0} - {1}", summary="`a - b`")
 
 
 def _sign_of_sign(a: Expression) -> Expression | None:
@@ -114,6 +114,7 @@ SIGN = Primitive(
     parity=-1,
     degree=0.0,
     simplify=_sign_of_sign,
+    summary="-1, 0 or 1; `sign(0)` is 0, so `sign(x)^2` is not simplified to 1",
 )
 
 
@@ -149,13 +150,21 @@ _BUILT_IN = (
     MUL,
     SUB,
     SIGN,
-    Primitive("phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=_difference),
+    Primitive(
+        "phi1",
+        2,
+        _subtract,
+        r"\left({0} - {1}\right)",
+        simplify=_difference,
+        summary="`a - b`, written as `sub`",
+    ),
     Primitive(
         "phi2",
         2,
         _sign_of_difference,
         r"\operatorname{{sign}}({0} - {1})",
         simplify=_sign_of_a_difference,
+        summary="`sign(a - b)`, written as `sign` and `sub`",
     ),
     ADD,
     Primitive(
@@ -166,12 +175,13 @@ _BUILT_IN = (
         c=f"return fabs(b) < {TINY} ? 1.0 : a / b;",
         matlab=f"if abs(b) < {TINY}, r = 1; else, r = a / b; end",
         simplify=_simpler_quotient,
+        summary=f"`a/b`; 1 if the divisor is smaller than {TINY}, so that `x/x` is 1 everywhere",
     ),
     Primitive(
-        "abs", 1, _absolute, r"\left|{0}\right|", "return fabs(a);", "r = abs(a);", parity=1, degree=1.0
+        "abs", 1, _absolute, r"\left|{0}\right|", "return fabs(a);", "r = abs(a);", 1, 1.0, summary="`|a|`"
     ),
-    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=_second_power),
-    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=_third_power),
+    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=_second_power, summary="`a^2`"),
+    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=_third_power, summary="`a^3`"),
     Primitive(
         "sqrt",
         1,
@@ -181,6 +191,7 @@ _BUILT_IN = (
         matlab="r = sqrt(abs(a));",
         parity=1,
         degree=0.5,
+        summary="Square root of the absolute value",
     ),
     Primitive(
         "exp",
@@ -189,6 +200,7 @@ _BUILT_IN = (
         r"\exp({0})",
         c=f"return exp(a > {LARGEST_EXPONENT} ? {LARGEST_EXPONENT} : a);",
         matlab=f"r = exp(min(a, {LARGEST_EXPONENT}));",
+        summary=f"Exponential; the argument is clipped at {LARGEST_EXPONENT:g}",
     ),
     Primitive(
         "log",
@@ -198,6 +210,7 @@ _BUILT_IN = (
         c=f"return fabs(a) < {TINY} ? 0.0 : log(fabs(a));",
         matlab=f"if abs(a) < {TINY}, r = 0; else, r = log(abs(a)); end",
         parity=1,
+        summary=f"Natural logarithm of the absolute value; 0 if that is smaller than {TINY}",
     ),
     Primitive("sin", 1, _sine, r"\sin({0})", "return sin(a);", "r = sin(a);", parity=-1),
     Primitive("cos", 1, _cosine, r"\cos({0})", "return cos(a);", "r = cos(a);", parity=1),

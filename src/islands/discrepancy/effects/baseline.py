@@ -27,6 +27,8 @@ OFFSET = Effect(
     starting_points=_offset_grid,
     form=_offset_form,
     source="Doebelin, Measurement Systems, section 3",
+    similar_to="jump, even-nonlinearity, input-offset",
+    distinguished_by="the mean of the residual",
 )
 
 
@@ -56,6 +58,8 @@ def input_offset(state: str) -> Effect:
 INPUT_OFFSET = EffectTemplate(
     "input-offset",
     "Something flows in, or pushes, beside the input: + c in the balance of one state",
+    similar_to="offset, outflow-law",
+    distinguished_by="an offset filtered by the equation; in tanks it shifts with the level",
 )
 
 
@@ -80,6 +84,8 @@ LINEAR_DRIFT = Effect(
     starting_points=_linear_drift_grid,
     form=_linear_drift_form,
     source="Doebelin, Measurement Systems, section 3",
+    similar_to="jump, thermal-drift, exponential-creep",
+    distinguished_by="the residual over time",
 )
 
 
@@ -108,6 +114,8 @@ JUMP = Effect(
     form=_jump_form,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
+    similar_to="linear-drift, offset",
+    distinguished_by="the residual over time, before and after one instant",
 )
 
 
@@ -140,4 +148,6 @@ THERMAL_DRIFT = Effect(
     form=_thermal_drift_form,
     source="Doebelin, Measurement Systems, section 2",
     is_applicable=lambda context: has_channel(context, True),
+    similar_to="cross-coupling; linear-drift if the temperature only rises",
+    distinguished_by="follows a channel in K, degC or degF",
 )

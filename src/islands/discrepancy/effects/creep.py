@@ -32,6 +32,8 @@ EXPONENTIAL_CREEP = Effect(
     starting_points=_exponential_creep_grid,
     form=_exponential_creep_form,
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
+    similar_to="relaxation, logarithmic-creep, linear-drift",
+    distinguished_by="the output continues at constant input, with one time constant",
 )
 
 #: Time constants in seconds.
@@ -61,4 +63,6 @@ LOGARITHMIC_CREEP = Effect(
     starting_points=_logarithmic_creep_grid,
     form=_logarithmic_creep_form,
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
+    similar_to="exponential-creep",
+    distinguished_by="the output continues at constant input, by equal steps in each decade of time",
 )

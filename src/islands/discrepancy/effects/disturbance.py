@@ -36,6 +36,8 @@ CROSS_COUPLING = Effect(
     form=_cross_coupling_form,
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),
+    similar_to="thermal-drift",
+    distinguished_by="follows a channel that is not a temperature",
 )
 
 
@@ -79,4 +81,6 @@ PERIODIC_DISTURBANCE = Effect(
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
     linear_parameters=2,
     extra_degrees_of_freedom=2,
+    similar_to="resonance",
+    distinguished_by="a line in the spectrum that the input does not have",
 )

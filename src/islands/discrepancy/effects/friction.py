@@ -34,6 +34,8 @@ COULOMB_FRICTION = Effect(
     starting_points=_coulomb_friction_grid,
     form=ForceLaw(_coulomb_friction_force, constants=_coulomb_friction_turning, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+    similar_to="backlash, second-hysteresis",
+    distinguished_by="a step of the residual at rate zero",
 )
 
 
@@ -63,6 +65,8 @@ VISCOUS = Effect(
     starting_points=_viscous_grid,
     form=ForceLaw(_viscous_force, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+    similar_to="delay, sensor-lag",
+    distinguished_by="the hysteretic part of the output is not delayed",
 )
 
 
@@ -84,6 +88,8 @@ VISCOUS_ASYMMETRY = Effect(
     starting_points=_viscous_grid,
     form=ForceLaw(_viscous_asymmetry_force, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
+    similar_to="offset, loop-asymmetry",
+    distinguished_by="the slope over the rate differs with the sign of the rate",
 )
 
 
@@ -110,4 +116,6 @@ QUADRATIC_DRAG = Effect(
     starting_points=_quadratic_drag_grid,
     form=ForceLaw(_quadratic_drag_force, is_dissipative=True),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+    similar_to="viscous; on a single sine also second-hysteresis",
+    distinguished_by="drag grows with the square of the frequency, hysteresis does not",
 )

@@ -40,6 +40,8 @@ STICTION = Effect(
     form=_stiction_form,
     source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
     linear_parameters=0,
+    similar_to="backlash, dead-zone, coulomb-friction",
+    distinguished_by="samples of one slip have the same error while the input is slow; noise can hide that",
 )
 
 
@@ -67,6 +69,8 @@ BACKLASH = Effect(
     form=_backlash_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),
+    similar_to="stiction, coulomb-friction, exponential-creep",
+    distinguished_by="lost motion of constant width after each reversal",
 )
 
 
@@ -87,6 +91,8 @@ RELAXATION = Effect(
     starting_points=_relaxation_grid,
     form=None,
     source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
+    similar_to="exponential-creep",
+    distinguished_by="hysteresis decays while the input is constant; slow loops are narrower",
 )
 
 
@@ -116,6 +122,8 @@ RATE_DEPENDENT_LOOP = Effect(
     starting_points=_rate_dependent_loop_grid,
     form=None,
     source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
+    similar_to="viscous, delay",
+    distinguished_by="the width of the loop over the rate, at one amplitude",
 )
 
 
@@ -145,6 +153,8 @@ LOOP_ASYMMETRY = Effect(
     starting_points=_loop_asymmetry_grid,
     form=None,
     source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
+    similar_to="jump, offset, viscous-asymmetry",
+    distinguished_by="the two branches of the loop are not mirror images",
 )
 
 #: Starting points: how quickly it turns, in one over the coordinate's peak, and g in parts of chi.
@@ -190,4 +200,6 @@ SECOND_HYSTERESIS = Effect(
     starting_points=_second_hysteresis_grid,
     form=ForceLaw(_second_hysteresis_force, _second_hysteresis_memory, initial_state_index=3),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
+    similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",
+    distinguished_by="memory that does not depend on the rate: repeat the record at another frequency",
 )

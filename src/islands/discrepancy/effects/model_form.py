@@ -191,4 +191,6 @@ def _at(expression: Expression, slope: float) -> Expression:
 MODEL_FORM = EffectTemplate(
     CORE_SHAPE,
     "The model's own form is wrong: it lacks psi |y - c u|, |psi| (y - c u), psi(k-1), psi its regressors",
+    similar_to="second-hysteresis, coulomb-friction, exponential-creep",
+    distinguished_by="a loop that is too wide or too narrow wherever the input moves",
 )

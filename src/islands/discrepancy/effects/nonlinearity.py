@@ -37,6 +37,8 @@ CUBIC_STIFFNESS = Effect(
     starting_points=_cubic_stiffness_grid,
     form=ForceLaw(_cubic_stiffness_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+    similar_to="input-saturation; second-hysteresis if that does not dissipate",
+    distinguished_by="an odd curve over the coordinate, at all rates",
 )
 
 
@@ -62,6 +64,8 @@ EVEN_NONLINEARITY = Effect(
     starting_points=_even_nonlinearity_grid,
     form=ForceLaw(_even_nonlinearity_force),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
+    similar_to="absolute-value-sensor, offset",
+    distinguished_by="a parabola over the coordinate",
 )
 
 #: Part of its peak within which an input has to come to zero.
@@ -104,6 +108,8 @@ DEAD_ZONE = Effect(
     form=_dead_zone_form,
     is_applicable=_dead_zone_crossed,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
+    similar_to="backlash, input-saturation",
+    distinguished_by="flat around zero in both directions; a negative `d` is a step at zero",
 )
 
 
@@ -130,6 +136,8 @@ INPUT_SATURATION = Effect(
     form=_input_saturation_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     linear_parameters=0,
+    similar_to="cubic-stiffness, output-saturation",
+    distinguished_by="a plateau over the input",
 )
 
 
@@ -152,6 +160,8 @@ OUTPUT_SATURATION = Effect(
     form=_output_saturation_form,
     source="Doebelin, Measurement Systems, section 3",
     linear_parameters=0,
+    similar_to="input-saturation, state-clip",
+    distinguished_by="a plateau over the output",
 )
 
 
@@ -178,6 +188,8 @@ ABSOLUTE_VALUE_SENSOR = Effect(
     starting_points=_absolute_value_sensor_grid,
     form=_absolute_value_sensor_form,
     source="Doebelin, Measurement Systems, section 3",
+    similar_to="even-nonlinearity",
+    distinguished_by="a kink at output zero",
 )
 
 
@@ -207,6 +219,8 @@ def outflow_law(state: str) -> Effect:
 OUTFLOW_LAW = EffectTemplate(
     "outflow-law",
     "The outflow has a linear part beside that of Bernoulli's law: + l x in the flow out of one state",
+    similar_to="state-clip, input-offset, a nonlinear sensor",
+    distinguished_by="the outflow grows more steeply with the level than a square root",
 )
 
 
@@ -247,4 +261,6 @@ def state_clip(state: str) -> Effect:
 STATE_CLIP = EffectTemplate(
     "state-clip",
     "A state stops at a level, as a tank's at its rim: what is above it is lost, or spills on in part",
+    similar_to="output-saturation, input-offset, outflow-law",
+    distinguished_by="the output flattens later than the state: an unmeasured state is clipped",
 )

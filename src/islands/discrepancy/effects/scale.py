@@ -26,6 +26,8 @@ INPUT_GAIN = Effect(
     form=_input_gain_form,
     source="Doebelin, Measurement Systems, section 3",
     is_gain=True,
+    similar_to="sensor-gain, wrong-parameter",
+    distinguished_by="only tolerances of all parameters distinguish them",
 )
 
 
@@ -51,6 +53,8 @@ SENSOR_GAIN = Effect(
     form=_sensor_gain_form,
     source="Doebelin, Measurement Systems, section 3",
     is_gain=True,
+    similar_to="input-gain, wrong-parameter",
+    distinguished_by="only tolerances of all parameters distinguish them",
 )
 
 
@@ -80,4 +84,6 @@ def wrong_parameter(parameter: Parameter) -> Effect:
 WRONG_PARAMETER = EffectTemplate(
     "wrong-parameter",
     "A parameter of the simulation is off: it is another one than its tolerance allows",
+    similar_to="input-gain, sensor-gain, other parameters",
+    distinguished_by="only tolerances distinguish them; the name says which parameter",
 )

@@ -61,6 +61,8 @@ GAIN_STEP = Effect(
     form=None,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
+    similar_to="ageing",
+    distinguished_by="the slope of output over input changes at one instant",
 )
 
 
@@ -81,4 +83,6 @@ AGEING = Effect(
     starting_points=_ageing_grid,
     form=None,
     source="Doebelin, Measurement Systems, section 3",
+    similar_to="gain-step, linear-drift",
+    distinguished_by="a residual proportional to time and output",
 )

@@ -33,6 +33,8 @@ DELAY = Effect(
     starting_points=_delay_grid,
     form=_delay_form,
     source="Ljung, System Identification, 2nd ed., section 16",
+    similar_to="sensor-lag, resonance, viscous",
+    distinguished_by="the phase grows with the frequency at constant amplitude; hysteresis is delayed too",
 )
 
 
@@ -57,6 +59,8 @@ CLOCK_SKEW = Effect(
     starting_points=_clock_skew_grid,
     form=_clock_skew_form,
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
+    similar_to="delay",
+    distinguished_by="a delay that grows along the record",
 )
 
 
@@ -81,6 +85,8 @@ SENSOR_LAG = Effect(
     starting_points=_sensor_lag_grid,
     form=_sensor_lag_form,
     source="Doebelin, Measurement Systems, section 3",
+    similar_to="delay, resonance, viscous",
+    distinguished_by="the amplitude falls with the frequency",
 )
 
 #: Radians of a sample: a faster mode is not there for this record.
@@ -125,4 +131,6 @@ RESONANCE = Effect(
     starting_points=_resonance_grid,
     form=_resonance_form,
     source="Ljung, System Identification, 2nd ed., section 4",
+    similar_to="delay, sensor-lag",
+    distinguished_by="ringing after fast changes",
 )

@@ -41,6 +41,8 @@ class NoiseDetector:
     source : str
     excluded_by : tuple of str
         Detectors before it that leave the same traces.
+    similar_to, distinguished_by : str
+        As in `Effect`.
     """
 
     name: str
@@ -49,6 +51,8 @@ class NoiseDetector:
     detect: Callable[[Signal, Signal, SimulationContext], NoiseFinding | None]
     source: str
     excluded_by: tuple[str, ...] = ()
+    similar_to: str = ""
+    distinguished_by: str = ""
 
 
 #: Samples for each level from which on the levels are a lattice.
@@ -79,6 +83,8 @@ QUANTISATION = NoiseDetector(
     "data",
     _detect_quantisation,
     "Widrow and Kollar, Quantization Noise, section 1",
+    similar_to="held-samples",
+    distinguished_by="values lie on a lattice that is coarse compared with the residual",
 )
 
 
@@ -108,6 +114,8 @@ HELD_SAMPLES = NoiseDetector(
     "data",
     _detect_held_samples,
     "Little and Rubin, Statistical Analysis with Missing Data",
+    similar_to="quantisation",
+    distinguished_by="equal neighbours in bursts, not everywhere",
 )
 
 
@@ -138,6 +146,8 @@ OUTLIERS = NoiseDetector(
     _detect_outliers,
     "Hampel, The influence curve and its role in robust estimation, 1974",
     ("held-samples",),
+    similar_to="heteroscedastic-noise",
+    distinguished_by="single samples beyond 5.5 scaled median deviations",
 )
 
 
@@ -176,6 +186,8 @@ HETEROSCEDASTIC_NOISE = NoiseDetector(
     _detect_heteroscedastic_noise,
     "Davidian and Carroll, Variance function estimation, 1987",
     ("held-samples", "outliers"),
+    similar_to="outliers",
+    distinguished_by="the size of the residual over that of the output",
 )
 
 
@@ -196,6 +208,8 @@ COLOURED_NOISE = NoiseDetector(
     _detect_coloured_noise,
     "Ljung, System Identification, 2nd ed., section 4",
     ("held-samples",),
+    similar_to="exponential-creep, linear-drift",
+    distinguished_by="autocorrelation of the residual of the best simulation",
 )
 
 

@@ -58,6 +58,10 @@ class Effect:
         frequency that was searched for among all samples.
     confounded_with : tuple or None
         Another effect with the same mean response, and the factor between the values of both.
+    similar_to : str
+        Names of effects with a similar response, for the reference.
+    distinguished_by : str
+        What distinguishes it from those, for the reference.
     """
 
     name: str
@@ -73,6 +77,8 @@ class Effect:
     is_gain: bool = False
     extra_degrees_of_freedom: int = 0
     confounded_with: "tuple[Effect, float] | None" = None
+    similar_to: str = ""
+    distinguished_by: str = ""
 
     @property
     def cause(self) -> str:
@@ -88,7 +94,11 @@ class EffectTemplate:
     ----------
     name, summary : str
         As in `Effect`; the name of an effect is followed by a colon and the name of its state or parameter.
+    similar_to, distinguished_by : str
+        As in `Effect`.
     """
 
     name: str
     summary: str
+    similar_to: str = ""
+    distinguished_by: str = ""

@@ -8,14 +8,17 @@ Interval = Callable[[int], int | None]
 
 
 def _one_step_ahead(_shooting: int) -> int | None:
+    """Error of the one-step-ahead prediction."""
     return 1
 
 
 def _shooting(shooting: int) -> int | None:
+    """Error of multiple shooting over intervals of ``shooting`` samples."""
     return shooting
 
 
 def _free_run(_shooting: int) -> int | None:
+    """Error of the free run over the whole record."""
     return None
 
 

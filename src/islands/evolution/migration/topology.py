@@ -91,14 +91,17 @@ def _edges(text: str, islands: int) -> Sources:
 
 
 def _isolated(islands: int, _degree: int, _draw: Stream) -> Sources:
+    """Connect no islands."""
     return [set() for _ in range(islands)]
 
 
 def _ring(islands: int, _degree: int, _draw: Stream) -> Sources:
+    """Let each island send to the next one."""
     return [{(island - 1) % islands} for island in range(islands)]
 
 
 def _bidirectional_ring(islands: int, _degree: int, _draw: Stream) -> Sources:
+    """Let each island send to the next one and to the previous one."""
     return [{(island - 1) % islands, (island + 1) % islands} for island in range(islands)]
 
 
@@ -117,6 +120,7 @@ def _torus(islands: int, _degree: int, _draw: Stream) -> Sources:
 
 
 def _fully_connected(islands: int, _degree: int, _draw: Stream) -> Sources:
+    """Let each island send to all others."""
     if islands > _FULLY:
         raise SettingsError(f"at most {_FULLY} islands are fully connected, got {islands}: take a torus")
     return [set(range(islands)) for _ in range(islands)]

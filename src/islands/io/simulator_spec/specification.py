@@ -6,6 +6,7 @@ kernels.
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeAlias
@@ -175,16 +176,71 @@ LocalSpec: TypeAlias = Annotated[
 ExtendedSpec.model_rebuild()
 LocalExtendedSpec.model_rebuild()
 
-#: Names that a text on the command line begins with.
-KINDS = (
-    "bouc-wen-piezo",
-    "second-order",
-    "rigid-axis",
-    "cascaded-tanks",
-    "linear",
-    "model",
-    "column",
-    "python",
+
+@dataclass(frozen=True, slots=True)
+class SimulatorKind:
+    """A kind of simulator that can be specified on the command line.
+
+    Attributes
+    ----------
+    argument : str
+        What follows the name; brackets are optional parts.
+    summary : str
+    estimated : str
+        What is estimated from the record unless it is given; empty if nothing is.
+    """
+
+    argument: str
+    summary: str
+    estimated: str = ""
+
+
+#: Kinds of simulators by the name that their text on the command line begins with.
+KINDS: Mapping[str, SimulatorKind] = MappingProxyType(
+    {
+        "bouc-wen-piezo": SimulatorKind(
+            "[:FILE.json]",
+            "Piezoelectric actuator: y = dp u - h, h' = A u' - beta |u'| h - gamma u' |h|. Parameters that "
+            "are not given have the values of the paper",
+        ),
+        "second-order": SimulatorKind(
+            "[:FILE.json]",
+            "Oscillator: m x'' + c x' + k x = u, y = x",
+            "m, c, k; position and rate at the first sample",
+        ),
+        "rigid-axis": SimulatorKind(
+            "[:FILE.json]",
+            "Axis with friction: m x'' + c x' + F tanh(x' / vs) = u, y = x. It restarts every half second "
+            "from a state fitted to the measured output (multiple shooting), because its free run drifts",
+            "m, c, F, vs",
+        ),
+        "cascaded-tanks": SimulatorKind(
+            "[:FILE.json]",
+            "Two tanks: x1' = k3 u - k1 sqrt(x1), x2' = k1 sqrt(x1) - k2 sqrt(x2), y = x2",
+            "k1, k2, k3; both levels at the first sample",
+        ),
+        "linear": SimulatorKind(
+            ":ORDER[:DELAY]",
+            "Linear model of order 0 to 10, with as many zeros as poles; the input acts DELAY samples late",
+            "all coefficients, the level and the initial state",
+        ),
+        "model": SimulatorKind(
+            ":FILE.json",
+            "Identified model with one input, in free run; or an extended simulation (`extended.json`)",
+            "all parameters except those of terms that are linear in the output alone",
+        ),
+        "column": SimulatorKind(
+            ":NAME",
+            "Column of the record: the output of another simulation. Effects on its input or in its equation "
+            "cannot be searched for",
+        ),
+        "python": SimulatorKind(
+            ":FILE.py:FUNCTION",
+            "Function `(u, dt, **parameters)` that returns the output; arguments with a number as default "
+            "are parameters. The file is executed, so REST does not accept it",
+            "its parameters",
+        ),
+    }
 )
 
 
