@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test ci nightly lint bench wheel clean
+.PHONY: setup demo test ci nightly lint bench docs wheel clean
 
 setup: .venv/ready
 
@@ -49,8 +49,12 @@ lint: setup
 bench: setup
 	$(BIN)/islands bench
 
+# The theme prints a notice about a later version of MkDocs, which is not installed.
+docs: setup
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site
+
 wheel: setup
 	$(BIN)/python -m build --no-isolation --wheel --outdir dist .
 
 clean:
-	rm -rf .venv dist demo-out bench-out
+	rm -rf .venv build dist demo-out bench-out site

@@ -151,12 +151,7 @@ _BUILT_IN = (
     SUB,
     SIGN,
     Primitive(
-        "phi1",
-        2,
-        _subtract,
-        r"\left({0} - {1}\right)",
-        simplify=_difference,
-        summary="`a - b`, written as `sub`",
+        "phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=_difference, summary="`a - b`, as `sub`"
     ),
     Primitive(
         "phi2",
@@ -164,7 +159,7 @@ _BUILT_IN = (
         _sign_of_difference,
         r"\operatorname{{sign}}({0} - {1})",
         simplify=_sign_of_a_difference,
-        summary="`sign(a - b)`, written as `sign` and `sub`",
+        summary="`sign(a - b)`, as `sign` and `sub`",
     ),
     ADD,
     Primitive(

@@ -1,0 +1,85 @@
+"""Generated reference of the discrepancy analysis: effects, noise detectors, verdicts and simulators."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from tables import code, codes, escape, page, section, table
+
+from islands.discrepancy.effects import CATALOGUE, OF_EACH
+from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetector
+from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
+from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
+from islands.io.simulator_spec.schema import KINDS, PARAMETERS
+
+Entry = Effect | EffectTemplate | NoiseDetector
+
+
+def symbolic_context() -> SimulationContext:
+    """Return a context whose units are symbols: [u] of the input, [y], [x] of the coordinate, [F] of a force."""
+    u = np.sin(np.arange(400) / 20)
+    coordinate = ForceCoordinate("[x]", 1.0, 1.0, "[F]", 1.0)
+    return SimulationContext(
+        u, 0.01, {"T": u, "w": u}, {"T": "K", "w": "[w]"}, 1.0, 1.0, "[u]", "[y]", 3.0, frame=coordinate
+    )
+
+
+def effects() -> str:
+    """Return the page of effects and noise detectors."""
+    every: list[Entry] = [*CATALOGUE.values(), *OF_EACH.values(), *DETECTORS.values()]
+    overview = ((f"[{code(each.name)}](#{each.name})", _family(each), escape(each.summary)) for each in every)
+    return page(
+        "Effects",
+        "Effects that the discrepancy analysis searches for, and detectors of sampling and noise.",
+        "u is the input, y the output, v the output before the sensor, x the coordinate that forces act on, x' its "
+        "rate, h a hysteretic state, T the duration of the record or a temperature. [u], [y], [x] are their units, "
+        "[F] is the unit of a force. Parameters without a unit are relative.\n",
+        table(("Effect", "Family", ""), overview),
+        section("Effects", "", *map(_entry, CATALOGUE.values())),
+        section(
+            "Effects on one state, parameter or model",
+            "The name of the state or parameter follows the name of the effect: `state-clip:upper`.",
+            *map(_entry, OF_EACH.values()),
+        ),
+        section(
+            "Sampling and noise",
+            "Detectors examine the samples and the residual of the best simulation. They do not change the simulation.",
+            *map(_entry, DETECTORS.values()),
+        ),
+    )
+
+
+def _family(entry: Entry) -> str:
+    return "" if isinstance(entry, EffectTemplate) else entry.family
+
+
+def _entry(entry: Entry) -> str:
+    rows = [(title, escape(text)) for title, text in _properties(entry) if text]
+    return section(f"`{entry.name}`", f"{escape(entry.summary)}.", table(("", ""), rows), level=3)
+
+
+def _properties(entry: Entry) -> Iterator[tuple[str, str]]:
+    if isinstance(entry, Effect):
+        yield "Acts on", str(entry.site)
+        yield "Parameters", _parameters(entry.parameters(symbolic_context()))
+    yield "Similar to", entry.similar_to
+    yield "Distinguished by", entry.distinguished_by
+    if not isinstance(entry, EffectTemplate):
+        yield "Source", entry.source
+
+
+def _parameters(parameters: Iterable[Parameter]) -> str:
+    return "; ".join(code(each.name) + (f" in {each.unit}" if each.unit else "") for each in parameters)
+
+
+def simulators() -> str:
+    """Return the page of the simulators that can be diagnosed."""
+    rows = (
+        (code(name + kind.argument), escape(kind.summary), codes(PARAMETERS.get(name, ())), escape(kind.estimated))
+        for name, kind in KINDS.items()
+    )
+    return page(
+        "Simulators",
+        "Values of `islands diagnose --simulation` and of the first argument after the record in `islands.diagnose`.",
+        table(("Simulator", "", "Parameters in `FILE.json`", "Estimated unless given"), rows),
+        "`FILE.json` is an object with the parameters that are known: `{\"m\": 1.2, \"k\": 4000}`.\n",
+    )
