@@ -1,7 +1,7 @@
 """MkDocs hook: add the generated files to the site and expand ``folder/*`` in the navigation.
 
-A module of this folder generates files if it has a function ``make_pages()`` that yields the path of each file below
-``docs/`` and its content.
+A module of this folder generates files if it has a function ``make_pages()`` that yields the path below
+``docs/`` and the content of each file.
 """
 
 import sys

@@ -44,8 +44,8 @@ def search_settings() -> str:
     )
     return page(
         "Settings of a search",
-        "Presets and settings of `islands identify`, `islands.identify` and `POST /v1/jobs`. A preset is a set of "
-        "settings; each setting can be changed on top of it.",
+        "Presets and settings of `islands identify`, `islands.identify` and `POST /v1/jobs`. A preset is a "
+        "set of settings; each setting can be changed in addition.",
         section("Presets", _presets()),
         section(
             "Settings",
@@ -90,8 +90,8 @@ def islands() -> str:
         "has the settings that choose them.",
         section(
             "Topologies",
-            "Values of `topology`. A list of edges is a topology, too: `0>1,1>2` sends from island 0 to 1 and from 1 "
-            f"to 2. A degree may follow {code(degrees)}: `{WITH_DEGREE[0]}:4`.",
+            "Values of `topology`. A list of edges is a topology, too: `0>1,1>2` sends from island 0 to 1 "
+            f"and from 1 to 2. A degree may follow {code(degrees)}: `{WITH_DEGREE[0]}:4`.",
             entries("Topology", TOPOLOGIES),
         ),
         section(
@@ -106,8 +106,8 @@ def islands() -> str:
         ),
         section(
             "Island profiles",
-            "Values of `characters`. A profile changes settings of variation and selection on its island; fitness, "
-            "constraints and sizes are the same on all islands.",
+            "Values of `characters`. A profile changes settings of variation and selection on its island; "
+            "fitness, constraints and sizes are the same on all islands.",
             table(("Profile", "Changed settings"), profiles),
         ),
         section(
@@ -132,9 +132,9 @@ def primitives() -> str:
     )
     return page(
         "Primitives",
-        "Functions that may occur in an expression, by the names that `--primitive` and `islands.parse` accept.",
+        "Functions that may occur in expressions, by names that `--primitive` and `islands.parse` take.",
         table(("Primitive", "Call", "Value", "Parity", "Commutative"), rows),
-        "`islands.primitive` defines further ones: see [Python](python.md).\n",
+        "`islands.primitive` defines further ones: see [expressions](expressions.md).\n",
     )
 
 
@@ -150,12 +150,12 @@ def systems() -> str:
     )
     return page(
         "Systems and published models",
-        "Simulated systems that `islands systems make` and the tests use, and models that the paper publishes.",
-        section("Systems", table(("System", "", "Variants", "Parts"), rows)),
+        "Simulated systems of `islands systems make`, and models that the paper publishes.",
+        section("Systems", table(("System", "Meaning", "Variants", "Parts"), rows)),
         section(
             "Published models",
-            "Accepted in place of a model file. The errors are those of Table 1: MAPE of the free run in percent.",
-            table(("Model", "", "Estimation", "Validation"), models),
+            "Accepted instead of a model file. The errors are MAPE of the free run in percent (Table 1).",
+            table(("Model", "Source", "Estimation", "Validation"), models),
         ),
     )
 
@@ -166,9 +166,7 @@ def output_formats() -> str:
         "Export formats and figures",
         "Formats of `islands show --format`, `export` in Python and over REST; figures of a result.",
         section("Export formats", entries("Format", EXPORTS)),
-        section(
-            "Figures of a model", "`best.plot(name)` draws them in Python.", entries("Figure", FIGURES)
-        ),
+        section("Figures of a model", "`best.plot(name)` draws them in Python.", entries("Figure", FIGURES)),
         section("Figures of a search", entries("Figure", SEARCH_FIGURES)),
         section("Record formats", "[Records](records.md) has the details.", entries("Suffix", READERS)),
     )
@@ -184,8 +182,8 @@ def service_settings() -> str:
     )
     return page(
         "Settings of the service",
-        "Environment variables that all roles of the service read; `islands serve` has options for the most common "
-        "ones. Units are bytes, seconds and counts.",
+        "Environment variables that all roles of the service read; `islands serve` has options for the most "
+        "common ones. Units are bytes, seconds and counts.",
         table(("Variable", "Default", "Meaning"), rows),
     )
 
@@ -228,7 +226,9 @@ PAGES: Mapping[str, Callable[[], str]] = {
 def make_pages() -> Iterator[tuple[str, str]]:
     """Yield the path below ``docs/`` and the text of every generated page."""
     found = {path: generate() for path, generate in PAGES.items()}
-    written = {f"reference/{path.name}": path.read_text("utf-8") for path in (DOCS / "reference").glob("*.md")}
+    written = {
+        f"reference/{path.name}": path.read_text("utf-8") for path in (DOCS / "reference").glob("*.md")
+    }
     yield "reference/index.md", index({**found, **written})
     yield from found.items()
 
@@ -238,7 +238,7 @@ def index(found: Mapping[str, str]) -> str:
     return page(
         "Reference",
         "Tables and interfaces. Most of these pages are generated from the code.",
-        table(("Page", ""), map(_index_row, found.items())),
+        table(("Page", "Content"), map(_index_row, found.items())),
     )
 
 

@@ -11,7 +11,7 @@ import islands_api
 def python() -> str:
     """Return the page of the package ``islands``."""
     return page(
-        "Python",
+        "Python API",
         "The public names of the package `islands`.",
         *_groups(islands),
     )
@@ -21,7 +21,7 @@ def client() -> str:
     """Return the page of the package ``islands_api``."""
     return page(
         "Python client",
-        "The public names of the package `islands_api`: clients of a running service. The client needs REST only.",
+        "The public names of the package `islands_api`: clients of a running service.",
         *_groups(islands_api),
     )
 

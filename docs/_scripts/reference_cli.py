@@ -1,13 +1,13 @@
 """Generated reference of the command line, from the command tree of typer."""
 
 import inspect
-import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
-from tables import code, escape, page, section, table
+from tables import attributes, code, escape, page, section, table
 from typer.main import get_command
 
+from islands.evolution.settings import Settings
 from islands_api.cli.app import app
 
 
@@ -37,17 +37,17 @@ def cli() -> str:
 
 
 def _command(name: str, command: Any) -> str:
-    level = 1 + len(name.split()) - 1
+    level = len(name.split())
     members = hasattr(command, "list_commands")
     arguments = [each for each in command.params if each.param_type_name == "argument"]
     usage = [name, *(_usage(each) for each in arguments), "COMMAND" if members else "[OPTIONS]"]
     parts = [_help(command.help), f"```text\n{' '.join(usage)}\n```"]
     rows = [(code(each.name.upper()), escape(each.help or "")) for each in arguments]
     if rows:
-        parts.append(table(("Argument", ""), rows))
-    rows = [(_names(each), escape(each.help or ""), _default(each)) for each in options(command)]
+        parts.append(table(("Argument", "Meaning"), rows))
+    rows = [(_names(each), escape(_meaning(each)), _default(each)) for each in options(command)]
     if rows:
-        parts.append(table(("Option", "", "Default"), rows))
+        parts.append(table(("Option", "Meaning", "Default"), rows))
     return section(f"`{name}`", *parts, level=level)
 
 
@@ -64,10 +64,16 @@ def _names(option: Any) -> str:
 
 
 def _type(option: Any) -> str:
-    kind = option.metavar or {str: "TEXT", int: "INT", float: "FLOAT"}.get(
-        option.type_descriptor.annotation, ""
-    )
-    return kind or re.sub(r".*\b(\w+)\W*$", r"\1", str(option.type_descriptor.annotation)).upper()
+    if option.metavar:
+        return str(option.metavar)
+    annotation = option.type_descriptor.annotation
+    kind = (get_args(annotation) or (annotation,))[0]
+    return {"str": "TEXT"}.get(kind.__name__, kind.__name__.upper())
+
+
+def _meaning(option: Any) -> str:
+    """Return the help of an option, or the description of the setting of a search that it has the name of."""
+    return option.help or attributes(Settings).get(option.name, "")
 
 
 def _default(option: Any) -> str:

@@ -15,7 +15,7 @@ Entry = Effect | EffectTemplate | NoiseDetector
 
 
 def symbolic_context() -> SimulationContext:
-    """Return a context whose units are symbols: [u] of the input, [y], [x] of the coordinate, [F] of a force."""
+    """Return a context with symbols as units: [u], [y], [x] of the coordinate, [F] of a force."""
     u = np.sin(np.arange(400) / 20)
     coordinate = ForceCoordinate("[x]", 1.0, 1.0, "[F]", 1.0)
     return SimulationContext(
@@ -30,10 +30,12 @@ def effects() -> str:
     return page(
         "Effects",
         "Effects that the discrepancy analysis searches for, and detectors of sampling and noise.",
-        "u is the input, y the output, v the output before the sensor, x the coordinate that forces act on, x' its "
-        "rate, h a hysteretic state, T the duration of the record or a temperature. [u], [y], [x] are their units, "
-        "[F] is the unit of a force. Parameters without a unit are relative.\n",
-        table(("Effect", "Family", ""), overview),
+        "u is the input, y the output, v the output before the sensor, x the coordinate that forces act on, "
+        "x' its rate, h a hysteretic state, T the duration of the record or a temperature. [u], [y], [x] are "
+        "their units, [F] is the unit of a force. Parameters without a unit are relative.\n",
+        "Effects of one family resemble each other. Which effects a record cannot distinguish depends on the "
+        "record: the analysis lists them as equivalents of each finding.\n",
+        table(("Effect", "Family", "Meaning"), overview),
         section("Effects", "", *map(_entry, CATALOGUE.values())),
         section(
             "Effects on one state, parameter or model",
@@ -42,7 +44,7 @@ def effects() -> str:
         ),
         section(
             "Sampling and noise",
-            "Detectors examine the samples and the residual of the best simulation. They do not change the simulation.",
+            "Detectors examine samples and the residual of the best simulation, which they do not change.",
             *map(_entry, DETECTORS.values()),
         ),
     )
@@ -74,12 +76,17 @@ def _parameters(parameters: Iterable[Parameter]) -> str:
 def simulators() -> str:
     """Return the page of the simulators that can be diagnosed."""
     rows = (
-        (code(name + kind.argument), escape(kind.summary), codes(PARAMETERS.get(name, ())), escape(kind.estimated))
+        (
+            code(name + kind.argument),
+            escape(kind.summary),
+            codes(PARAMETERS.get(name, ())),
+            escape(kind.estimated),
+        )
         for name, kind in KINDS.items()
     )
     return page(
         "Simulators",
-        "Values of `islands diagnose --simulation` and of the first argument after the record in `islands.diagnose`.",
-        table(("Simulator", "", "Parameters in `FILE.json`", "Estimated unless given"), rows),
-        "`FILE.json` is an object with the parameters that are known: `{\"m\": 1.2, \"k\": 4000}`.\n",
+        "Values of `islands diagnose --simulation` and of the argument `simulation` of `islands.diagnose`.",
+        table(("Simulator", "Meaning", "Parameters in `FILE.json`", "Estimated unless given"), rows),
+        '`FILE.json` is an object with the parameters that are known: `{"m": 1.2, "k": 4000}`.\n',
     )

@@ -21,7 +21,7 @@ def rest() -> str:
     schemas = document["components"]["schemas"]
     return page(
         "REST API",
-        "Endpoints of the service, from the OpenAPI document that a running service offers at `/openapi.json`.",
+        "Endpoints of the service, from the OpenAPI document that a service offers at `/openapi.json`.",
         "Every response that is not a success is a [problem](problems.md).\n",
         *(section(tag.capitalize(), *operations) for tag, operations in by_tag.items()),
         section("Schemas", *(_schema(name, schema) for name, schema in schemas.items())),
@@ -35,11 +35,14 @@ def _operation(title: str, operation: dict[str, Any]) -> str:
         for each in operation.get("parameters", ())
     ]
     if rows:
-        parts.append(table(("Parameter", "In", "Type", ""), rows))
+        parts.append(table(("Parameter", "In", "Type", "Meaning"), rows))
     for media, content in operation.get("requestBody", {}).get("content", {}).items():
         parts.append(f"Body: {code(media)}, {_type(content['schema'])}")
-    rows = [(code(status), escape(_response(each)), _content(each)) for status, each in operation["responses"].items()]
-    parts.append(table(("Status", "", "Content"), rows))
+    rows = [
+        (code(status), escape(_response(each)), _content(each))
+        for status, each in sorted(operation["responses"].items())
+    ]
+    parts.append(table(("Status", "Meaning", "Content"), rows))
     return section(f"`{title}`", *parts, level=3)
 
 
@@ -50,7 +53,9 @@ def _response(response: dict[str, Any]) -> str:
 
 def _content(response: dict[str, Any]) -> str:
     found = response.get("content", {})
-    return "<br>".join(f"{code(media)} {_type(content.get('schema', {}))}" for media, content in found.items())
+    return "<br>".join(
+        f"{code(media)} {_type(content.get('schema', {}))}" for media, content in found.items()
+    )
 
 
 def _schema(name: str, schema: dict[str, Any]) -> str:
@@ -63,7 +68,7 @@ def _schema(name: str, schema: dict[str, Any]) -> str:
     if values := schema.get("enum"):
         parts.append(", ".join(map(code, values)))
     if rows:
-        parts.append(table(("Field", "Type", "Required", ""), rows))
+        parts.append(table(("Field", "Type", "Required", "Meaning"), rows))
     return section(name, *parts, level=3)
 
 

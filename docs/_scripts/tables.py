@@ -46,7 +46,9 @@ def summarise(entry: Any) -> str:
 
 def entries(header: str, found: Mapping[str, Any]) -> str:
     """Return the table of the names and the summaries of a mapping."""
-    return table((header, ""), ((code(name), escape(summarise(entry))) for name, entry in found.items()))
+    return table(
+        (header, "Meaning"), ((code(name), escape(summarise(entry))) for name, entry in found.items())
+    )
 
 
 def attributes(documented: type) -> dict[str, str]:
