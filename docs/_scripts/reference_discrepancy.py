@@ -9,7 +9,7 @@ from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetector
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
-from islands.io.simulator_spec.schema import KINDS, PARAMETERS
+from islands.io.simulator_spec.specification import KINDS, PARAMETERS
 
 Entry = Effect | EffectTemplate | NoiseDetector
 
