@@ -207,7 +207,7 @@ def _shown(value: object) -> str:
 
 #: Generated pages by their path, in the order of the index.
 PAGES: Mapping[str, Callable[[], str]] = {
-    "reference/python.md": reference_api.python,
+    "reference/api.md": reference_api.python,
     "reference/client.md": reference_api.client,
     "reference/cli.md": reference_cli.cli,
     "reference/settings.md": search_settings,

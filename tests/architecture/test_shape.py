@@ -10,21 +10,6 @@ from statistics import median
 
 import pytest
 
-from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.gene_structure import STRUCTURES
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.topology import TOPOLOGIES
-from islands.evolution.presets import PRESETS
-from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.export import EXPORTS
-from islands.io.records import READERS
-from islands.model.candidate_library import LIBRARIES
-from islands.model.primitives import PRIMITIVES
-from islands.systems.catalogue import SYSTEMS
-from islands.systems.published_models import PUBLISHED
-from islands_service.engines import ENGINES
 from support.repository import ROOT
 
 FOLDERS = ("src", "services", "api")
@@ -85,34 +70,6 @@ def test_a_source_folder_is_not_importable_as_a_package(package: str) -> None:
         [sys.executable, "-c", f"import {package}"], cwd=ROOT / "src", capture_output=True, check=False
     )
     assert done.returncode != 0
-
-
-@pytest.mark.parametrize(
-    "table",
-    [
-        PRIMITIVES,
-        LIBRARIES,
-        CONSTRAINTS,
-        STRUCTURES,
-        FITNESSES,
-        PRESETS,
-        SYSTEMS,
-        PUBLISHED,
-        FIGURES,
-        SEARCH_FIGURES,
-        EXPORTS,
-        READERS,
-        TOPOLOGIES,
-        SELECTION_POLICIES,
-        REPLACEMENT_POLICIES,
-        ISLAND_PROFILES,
-        ENGINES,
-    ],
-)
-def test_every_table_entry_is_documented(table: dict[str, object]) -> None:
-    text = (ROOT / "docs" / "reference.md").read_text()
-    missing = [name for name in table if f"`{name}`" not in text]
-    assert not missing
 
 
 def test_the_lock_file_names_hashes_and_no_index() -> None:

@@ -19,7 +19,7 @@ SETTINGS = (
 )
 
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESETS))]
-Seed = Annotated[int, typer.Option("--seed", min=0)]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
 Population = Annotated[int | None, typer.Option("--population")]
 Generations = Annotated[int | None, typer.Option("--generations")]
 MaxTerms = Annotated[int | None, typer.Option("--max-terms")]

@@ -40,7 +40,7 @@ def diagnose(
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     tested: Annotated[
         bool,
         typer.Option("--self-test", help="Find out what this record could show: takes minutes."),

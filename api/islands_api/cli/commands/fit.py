@@ -40,7 +40,7 @@ def fit(
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
     """Fit small models to a record by forward selection and least squares, and assess them."""

@@ -29,8 +29,10 @@ def make(
     system: Annotated[str, typer.Argument(help="A name from the list.")],
     out: Annotated[Path, typer.Option("--out", help="CSV file to write.")],
     variant: Annotated[str | None, typer.Option("--variant", help="By default the first.")] = None,
-    part: Annotated[str, typer.Option("--part")] = "estimation",
-    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    part: Annotated[
+        str, typer.Option("--part", help="Part of the record; `islands systems list` lists them.")
+    ] = "estimation",
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
 ) -> None:
     """Make a record and write it as CSV, every number exactly."""
     chosen = variant or (SYSTEMS[system].variants[0] if system in SYSTEMS else "")

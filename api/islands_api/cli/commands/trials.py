@@ -61,7 +61,7 @@ def trials(
     variant: Annotated[
         bool, typer.Option("--variant", help="Hide in forms unlike those that the analysis extends by.")
     ] = False,
-    seed: Annotated[int, typer.Option("--seed", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     seconds: Annotated[
         float | None,
         typer.Option(

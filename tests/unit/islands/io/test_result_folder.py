@@ -48,7 +48,7 @@ def with_best(findings, **changes):
     return replace(findings, models=(changed, *others))
 
 
-# The contract: the fields that issue 2 lists, and those that docs/reference.md adds.
+# The contract: the fields that issue 2 lists, and those that docs/reference/result-json.md adds.
 
 
 def test_a_result_has_every_field_of_the_contract(findings):

@@ -1,0 +1,146 @@
+"""The documentation agrees with the repository: links, navigation, code, commands and tables."""
+
+import ast
+import builtins
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tables import summarise
+
+from islands.discrepancy.effects import CATALOGUE, OF_EACH
+from islands.discrepancy.inference.noise_detectors import DETECTORS
+from islands.discrepancy.inference.verdict import Verdict
+from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.evolution.gp.fitness import FITNESSES
+from islands.evolution.gp.gene_structure import STRUCTURES
+from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
+from islands.evolution.migration.topology import TOPOLOGIES
+from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
+from islands.figures.registry import FIGURES, SEARCH_FIGURES
+from islands.io.export import EXPORTS
+from islands.io.records import READERS
+from islands.io.simulator_spec.specification import KINDS, PARAMETERS
+from islands.model.candidate_library import LIBRARIES
+from islands.systems.catalogue import SYSTEMS
+from islands.systems.published_models import PUBLISHED
+from islands_service.engines import ENGINES
+from support import pages
+from support.pages import PAGES, page_name
+from support.repository import DOCS, ROOT
+
+PYTHON_BLOCKS = [
+    pytest.param(code, id=f"{page_name(page)}-{place}")
+    for page in PAGES
+    for place, (language, code) in enumerate(pages.blocks(page))
+    if language == "python"
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_links_of_a_page_lead_to_files_and_anchors(page: Path) -> None:
+    for target in pages.links(page):
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if file.is_relative_to(DOCS) and pages.is_generated(file.relative_to(DOCS).as_posix()):
+            generated = file.relative_to(DOCS).as_posix()
+            assert generated in pages.site_pages() or generated.startswith("tutorials/"), target
+            continue
+        assert file.exists(), target
+        assert not anchor or anchor in pages.anchors(file), target
+
+
+def test_every_written_page_is_in_the_navigation() -> None:
+    assert pages.written_pages() <= pages.site_pages()
+
+
+def test_every_page_of_the_navigation_exists_or_is_generated() -> None:
+    missing = [page for page in pages.site_pages() - pages.written_pages() if not pages.is_generated(page)]
+    assert not missing
+
+
+def test_pictures_are_small_and_all_are_shown() -> None:
+    shown = "".join(page.read_text("utf-8") for page in PAGES)
+    for picture in (DOCS / "pictures").iterdir():
+        assert f"pictures/{picture.name}" in shown
+        assert picture.stat().st_size < 200_000, picture
+
+
+@pytest.mark.parametrize("code", PYTHON_BLOCKS)
+def test_python_blocks_compile(code: str) -> None:
+    compile(code, "block", "exec")
+
+
+@pytest.mark.parametrize("code", PYTHON_BLOCKS)
+def test_self_contained_python_blocks_run(code: str) -> None:
+    if undefined_names(code) or re.search(r"[\w*]\.(csv|json|html|svg)\"|http://", code):
+        pytest.skip("the block needs a file, a service or the block before it")
+    exec(compile(code, "block", "exec"), {})
+
+
+def undefined_names(code: str) -> set[str]:
+    """Return the names that a block reads and does not define."""
+    nodes = list(ast.walk(ast.parse(code)))
+    defined = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    defined |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+    defined |= {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    defined |= {(each.asname or each.name).partition(".")[0] for node in imports for each in node.names}
+    return {node.id for node in nodes if isinstance(node, ast.Name)} - defined - set(dir(builtins))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_make_targets_of_a_page_exist(page: Path) -> None:
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+    used = {command.split()[1] for command in pages.commands(page) if command.startswith("make ")}
+    assert used <= targets
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        *(
+            CONSTRAINTS,
+            STRUCTURES,
+            FITNESSES,
+            LIBRARIES,
+            SYSTEMS,
+            PUBLISHED,
+            FIGURES,
+            SEARCH_FIGURES,
+            EXPORTS,
+        ),
+        *(READERS, TOPOLOGIES, SELECTION_POLICIES, REPLACEMENT_POLICIES, ENGINES, CATALOGUE, OF_EACH),
+        *(DETECTORS, KINDS),
+    ],
+    ids=lambda table: next(iter(table)),
+)
+def test_every_table_entry_has_a_summary_for_the_reference(table: Mapping[str, Any]) -> None:
+    assert not [name for name, entry in table.items() if not summarise(entry)]
+
+
+def test_every_preset_has_a_summary() -> None:
+    assert PRESET_SUMMARIES.keys() == PRESETS.keys()
+    assert all(PRESET_SUMMARIES.values())
+
+
+def test_every_effect_says_what_resembles_it_and_what_distinguishes_it() -> None:
+    for entry in [*CATALOGUE.values(), *OF_EACH.values(), *DETECTORS.values()]:
+        assert entry.similar_to, entry.name
+        assert entry.distinguished_by, entry.name
+
+
+def test_simulators_with_parameters_are_simulators() -> None:
+    assert PARAMETERS.keys() <= KINDS.keys()
+
+
+def test_the_guide_explains_every_verdict() -> None:
+    guide = (DOCS / "how-to" / "diagnose-a-simulation.md").read_text("utf-8")
+    assert not [verdict for verdict in Verdict if f"| `{verdict}` |" not in guide]
+
+
+def test_the_page_on_records_names_every_suffix() -> None:
+    page = (DOCS / "reference" / "records.md").read_text("utf-8")
+    assert not [suffix for suffix in READERS if f"`{suffix}`" not in page]
