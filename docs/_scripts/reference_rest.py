@@ -1,6 +1,7 @@
 """Generated reference of the REST API: endpoints and schemas of the OpenAPI document, and problem types."""
 
 import inspect
+from http import HTTPStatus
 from typing import Any
 
 from tables import code, escape, page, section, summarise, table
@@ -39,16 +40,16 @@ def _operation(title: str, operation: dict[str, Any]) -> str:
     for media, content in operation.get("requestBody", {}).get("content", {}).items():
         parts.append(f"Body: {code(media)}, {_type(content['schema'])}")
     rows = [
-        (code(status), escape(_response(each)), _content(each))
+        (code(status), escape(_response(status, each)), _content(each))
         for status, each in sorted(operation["responses"].items())
     ]
     parts.append(table(("Status", "Meaning", "Content"), rows))
     return section(f"`{title}`", *parts, level=3)
 
 
-def _response(response: dict[str, Any]) -> str:
+def _response(status: str, response: dict[str, Any]) -> str:
     text = str(response["description"])
-    return "" if text == "Successful Response" else text
+    return HTTPStatus(int(status)).phrase if text == "Successful Response" else text
 
 
 def _content(response: dict[str, Any]) -> str:
