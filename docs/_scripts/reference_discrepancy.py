@@ -19,7 +19,16 @@ def symbolic_context() -> SimulationContext:
     u = np.sin(np.arange(400) / 20)
     coordinate = ForceCoordinate("[x]", 1.0, 1.0, "[F]", 1.0)
     return SimulationContext(
-        u, 0.01, {"T": u, "w": u}, {"T": "K", "w": "[w]"}, 1.0, 1.0, "[u]", "[y]", 3.0, frame=coordinate
+        u,
+        0.01,
+        {"T": u, "w": u},
+        {"T": "K", "w": "[w]"},
+        1.0,
+        1.0,
+        "[u]",
+        "[y]",
+        3.0,
+        force_coordinate=coordinate,
     )
 
 
