@@ -26,8 +26,12 @@ class ServiceSettings(BaseSettings):
         Uploads, results, and the database unless another one is given.
     database
         ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
+    host, port
+        Address that the service listens on.
     ray_address
         ``HOST:PORT`` of a Ray cluster; by default a Ray on this machine is started.
+    coordinators
+        Number of jobs that run at the same time.
     lease
         Seconds after which a coordinator that says nothing has lost its job; at least one.
     checkpoint_every
@@ -48,6 +52,10 @@ class ServiceSettings(BaseSettings):
         Seconds after which a finished job is forgotten; 0 keeps it for ever.
     rate, burst
         Requests a second of one key, and how many more at once; 0 does not limit.
+    tls_certificate, tls_key
+        PEM files for HTTPS.
+    log_format
+        Format of log messages: ``text`` or ``json``.
     telemetry
         Where traces go, OTLP over HTTP: ``http://collector:4318/v1/traces``. Needs the extra ``telemetry``.
     lifeline

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tables import summarise
+from tables import attributes, summarise
 
 from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS
@@ -19,6 +19,7 @@ from islands.evolution.gp.gene_structure import STRUCTURES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
+from islands.evolution.settings import Settings
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS
@@ -27,6 +28,7 @@ from islands.model.candidate_library import LIBRARIES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
 from islands_service.engines import ENGINES
+from islands_service.settings import ServiceSettings
 from support import pages
 from support.pages import PAGES, page_name
 from support.repository import DOCS, ROOT
@@ -124,6 +126,11 @@ def test_every_table_entry_has_a_summary_for_the_reference(table: Mapping[str, A
 def test_every_preset_has_a_summary() -> None:
     assert PRESET_SUMMARIES.keys() == PRESETS.keys()
     assert all(PRESET_SUMMARIES.values())
+
+
+@pytest.mark.parametrize("settings", [Settings, ServiceSettings])
+def test_every_setting_is_described(settings: type) -> None:
+    assert attributes(settings).keys() == {*settings.__annotations__} - {"model_config"}
 
 
 def test_every_effect_says_what_resembles_it_and_what_distinguishes_it() -> None:
