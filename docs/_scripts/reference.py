@@ -227,7 +227,8 @@ def make_pages() -> Iterator[tuple[str, str]]:
     """Yield the path below ``docs/`` and the text of every generated page."""
     found = {path: generate() for path, generate in PAGES.items()}
     written = {
-        f"reference/{path.name}": path.read_text("utf-8") for path in (DOCS / "reference").glob("*.md")
+        f"reference/{path.name}": path.read_text("utf-8")
+        for path in sorted((DOCS / "reference").glob("*.md"))
     }
     yield "reference/index.md", index({**found, **written})
     yield from found.items()

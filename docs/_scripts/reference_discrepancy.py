@@ -1,5 +1,6 @@
 """Generated reference of the discrepancy analysis: effects, noise detectors, verdicts and simulators."""
 
+import re
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -64,18 +65,25 @@ def _family(entry: Entry) -> str:
 
 
 def _entry(entry: Entry) -> str:
-    rows = [(title, escape(text)) for title, text in _properties(entry) if text]
-    return section(f"`{entry.name}`", f"{escape(entry.summary)}.", table(("", ""), rows), level=3)
+    properties = "\n".join(f"* {title}: {text}" for title, text in _properties(entry) if text)
+    return section(f"`{entry.name}`", f"{escape(entry.summary)}.", properties, level=3)
 
 
 def _properties(entry: Entry) -> Iterator[tuple[str, str]]:
     if isinstance(entry, Effect):
         yield "Acts on", str(entry.site)
-        yield "Parameters", _parameters(entry.parameters(symbolic_context()))
-    yield "Similar to", entry.similar_to
-    yield "Distinguished by", entry.distinguished_by
+        yield "Parameters", escape(_parameters(entry.parameters(symbolic_context())))
+    yield "Similar to", _link_effects(escape(entry.similar_to))
+    yield "Distinguished by", escape(entry.distinguished_by)
     if not isinstance(entry, EffectTemplate):
-        yield "Source", entry.source
+        yield "Source", escape(entry.source)
+
+
+def _link_effects(text: str) -> str:
+    known = {*CATALOGUE, *OF_EACH, *DETECTORS}
+    return re.sub(
+        r"[a-z][a-z-]*", lambda name: f"[{name[0]}](#{name[0]})" if name[0] in known else name[0], text
+    )
 
 
 def _parameters(parameters: Iterable[Parameter]) -> str:
