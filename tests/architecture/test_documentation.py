@@ -12,7 +12,6 @@ from tables import attributes, summarise
 
 from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS
-from islands.discrepancy.inference.verdict import Verdict
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_structure import STRUCTURES
@@ -141,11 +140,6 @@ def test_every_effect_says_what_resembles_it_and_what_distinguishes_it() -> None
 
 def test_simulators_with_parameters_are_simulators() -> None:
     assert PARAMETERS.keys() <= KINDS.keys()
-
-
-def test_the_guide_explains_every_verdict() -> None:
-    guide = (DOCS / "how-to" / "diagnose-a-simulation.md").read_text("utf-8")
-    assert not [verdict for verdict in Verdict if f"| `{verdict}` |" not in guide]
 
 
 def test_the_page_on_records_names_every_suffix() -> None:
