@@ -3,7 +3,7 @@
 An example is a Python script in ``examples/``. Its docstring is the title and the introduction of the page. A
 line ``# %%`` begins a cell: the comment lines that follow are Markdown, the rest is code. The code of a cell
 ``# %% checks`` runs and is not shown. Each page shows the text, the code, the printed output and the SVG
-figures that the script writes to its output folder. mkdocs-gen-files runs this file as a script.
+figures that the script writes to its output folder. ``hooks.py`` adds the pages to the site.
 """
 
 import ast
@@ -15,7 +15,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import redirect_stdout
 from itertools import takewhile
 from pathlib import Path
@@ -136,13 +136,6 @@ def make_pages() -> Iterator[tuple[str, bytes]]:
     yield "tutorials/index.md", index.encode()
 
 
-def write_pages(open_file: Callable[[str, str], Any]) -> None:
-    """Write all pages with ``open_file(path in the site, mode)``."""
-    for name, content in make_pages():
-        with open_file(name, "wb") as stream:
-            stream.write(content)
-
-
 def build(output: Path) -> list[Path]:
     """Write all pages below a folder; return their paths."""
     written = []
@@ -155,7 +148,3 @@ def build(output: Path) -> list[Path]:
 
 if __name__ == "__main__":
     run(Path(sys.argv[1]), Path(sys.argv[2]))
-elif __name__ == "<run_path>":  # mkdocs-gen-files runs its scripts with runpy.run_path
-    import mkdocs_gen_files
-
-    write_pages(mkdocs_gen_files.open)

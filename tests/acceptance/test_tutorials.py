@@ -1,6 +1,5 @@
 """Tutorials: how pages are made of examples."""
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -80,25 +79,6 @@ def test_page_shows_text_code_output_and_figures_but_no_checks(example: Path) ->
     assert "hidden" not in page
     assert "assert out" not in page
     assert "(11_test.py)" in page
-
-
-def test_pages_are_written_through_the_function_that_opens_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        tutorials, "make_pages", lambda: iter([("tutorials/a.md", b"A"), ("tutorials/b", b"B")])
-    )
-    written: dict[str, bytes] = {}
-
-    class Stream(io.BytesIO):
-        def __init__(self, name: str) -> None:
-            super().__init__()
-            self.path = name
-
-        def close(self) -> None:
-            written[self.path] = self.getvalue()
-            super().close()
-
-    tutorials.write_pages(lambda name, mode: Stream(name + mode.removeprefix("wb")))
-    assert written == {"tutorials/a.md": b"A", "tutorials/b": b"B"}
 
 
 def test_build_writes_pages_below_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
