@@ -117,7 +117,7 @@ def self_test(
     ----------
     diagnosis : Diagnosis
         Of the record.
-    core, tolerance
+    simulator, tolerance
         As the record was diagnosed.
     seed : int
         Of all that is drawn by lot.
