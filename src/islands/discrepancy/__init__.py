@@ -1,1 +1,1 @@
-"""What a simulation gets wrong, why, and what mending it is worth."""
+"""Diagnosis of a simulation: which effects it lacks, and how much they improve it. Read `diagnosis` first."""

@@ -1,7 +1,7 @@
-"""The self-test: what the analysis could have shown on this very record, and how often it cries wolf.
+"""Detection limits and false-alarm rate on a record, from surrogate data.
 
-Surrogates are drawn: what the record would be if the simulation were right, on its own inputs. Some are left
-clean, into others each effect is put at several strengths, and all are diagnosed as the record was.
+Surrogates are records that would be measured if the simulation were right, with the same inputs. Some are
+clean, others have one effect injected at several strengths. Each of them is diagnosed like the record.
 """
 
 from collections import Counter
@@ -26,28 +26,31 @@ from islands.discrepancy.surrogates import (
 )
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
-#: Clean surrogates.
-CLEAN = 40
+#: Number of clean surrogates.
+CLEAN_SURROGATES = 40
 
-#: What stands in the place of a name.
-NOTHING, UNKNOWN = "nothing", "unknown"
+#: Label of a surrogate without an injection, and of a diagnosis that finds no discrepancy.
+NOTHING = "nothing"
 
-#: What the bounds of a rate leave out, half of it on either side.
-_OUTSIDE = 0.05
+#: Label of a diagnosis that finds a discrepancy of unknown cause.
+UNKNOWN = "unknown"
+
+#: One minus the coverage of the confidence interval of a rate.
+_SIGNIFICANCE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class SurrogateOutcome:
-    """What the analysis said of a probe.
+    """Result of the diagnosis of a surrogate.
 
     Attributes
     ----------
     named : str
-        The first name, "nothing" or "unknown".
+        Name of the first cause, "nothing" or "unknown".
     recognised : bool
-        What was injected is among the names, or among those that cannot be told from them.
+        Whether the injected effect is among the named causes or their equivalents.
     score : float
-        Of the best candidate.
+        Score of the best candidate.
     """
 
     named: str
@@ -57,7 +60,7 @@ class SurrogateOutcome:
 
 @dataclass(frozen=True, slots=True)
 class DetectionRate:
-    """A part of some surrogates, with Clopper and Pearson's 95 % interval."""
+    """A proportion of surrogates, with its Clopper-Pearson 95 % interval."""
 
     value: float
     ci95: tuple[float, float]
@@ -66,18 +69,18 @@ class DetectionRate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SelfTest:
-    """What the analysis can do on a record.
+    """Detection limits and error rates of the diagnosis of a record.
 
     Attributes
     ----------
     detection_limits : mapping of str to Injection or None
-        The smallest injection of each effect that is named; None where none is.
+        The smallest injection of each effect that is recognised; None if none is.
     false_alarm_rate : DetectionRate
-        Of clean surrogates that got a name.
+        Proportion of clean surrogates for which a cause is named.
     p_value : float
-        How often chance alone makes a candidate as good as the record's best one.
+        Probability under the null hypothesis of a candidate as good as the best one of the record.
     confusion : mapping of (str, str) to int
-        ``(hidden, called)`` to how often.
+        Counts of ``(injected cause, first named cause)``.
     """
 
     detection_limits: Mapping[str, Injection | None]
@@ -86,18 +89,18 @@ class SelfTest:
     confusion: Mapping[tuple[str, str], int]
 
 
-def diagnose_surrogate(source: Surrogates, probe: SurrogateCase) -> SurrogateOutcome:
+def diagnose_surrogate(surrogates: Surrogates, case: SurrogateCase) -> SurrogateOutcome:
     """Draw a surrogate and diagnose it."""
-    found = diagnose(source.draw_record(probe), source.simulator, source.prior_std, probe.seed)
-    # That the noise remembers is true of a surrogate whose noise does.
-    named = [each for each in found.effects if each.name != "coloured-noise" or source.noise.order == 0]
-    # Causes of a misfit stand before what is said of the noise.
-    said = {name for each in named for name in (each.name, *each.equivalents)}
+    found = diagnose(surrogates.draw_record(case), surrogates.simulator, surrogates.prior_std, case.seed)
+    # Coloured noise is no false alarm if the noise of the surrogates is coloured.
+    named = [each for each in found.effects if each.name != "coloured-noise" or surrogates.noise.order == 0]
+    # Findings of effects come before those of the noise, so that the first one is the cause of the misfit.
+    names = {name for each in named for name in (each.name, *each.equivalents)}
     otherwise = UNKNOWN if found.verdict == Verdict.UNKNOWN else NOTHING
     return SurrogateOutcome(
         named[0].name if named else otherwise,
-        probe.injection is not None and probe.injection.cause in said,
-        _best(found),
+        case.injection is not None and case.injection.cause in names,
+        _get_best_score(found),
     )
 
 
@@ -106,96 +109,102 @@ def self_test(
     simulator: Simulator,
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
-    run: ParallelMap = map,
+    parallel_map: ParallelMap = map,
     effects: Sequence[str] | None = None,
-    clean: int = CLEAN,
+    clean_surrogates: int = CLEAN_SURROGATES,
     progress: ProgressCallback = ignore_progress,
 ) -> SelfTest:
-    """Find out what an analysis of a record could have shown, and how often it names what is not there.
+    """Estimate the detection limits and the false-alarm rate of the diagnosis of a record.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Of the record.
+        Diagnosis of the record.
     simulator, tolerance
-        As the record was diagnosed.
+        Simulator and tolerances of the diagnosis.
     seed : int
-        Of all that is drawn by lot.
-    run : callable
-        Carries out probes; they know nothing of each other.
+        Seed of the random generator.
+    parallel_map : ParallelMap
+        Diagnoses the surrogates, which are independent of each other.
     effects : sequence of str, optional
-        Names of those to be put in; by default all that could enter the simulation.
-    clean : int
-        Surrogates that nothing is put into.
+        Names of the effects that are injected; by default all that are applicable to the simulation.
+    clean_surrogates : int
+        Number of clean surrogates.
     progress : ProgressCallback
         Takes the number of completed analyses and an upper bound of their total.
     """
-    source = make_surrogates(diagnosis, simulator, dict(tolerance or {}))
-    ladders = {
-        name: injection_strengths(source, effect, _lot(seed, name))
-        for name, effect in source.effects.items()
+    surrogates = make_surrogates(diagnosis, simulator, dict(tolerance or {}))
+    strengths = {
+        name: injection_strengths(surrogates, effect, _derive_rng(seed, name))
+        for name, effect in surrogates.effects.items()
         if effects is None or name in effects
     }
-    # The same noise for all strengths of an effect: they differ by nothing else.
-    seeds = {name: int(_lot(seed, name, 1).integers(2**32)) for name in ladders}
-    # The last step that is known not to be named, and the first that is.
-    between = {name: (-1, len(steps)) for name, steps in ladders.items()}
+    # All strengths of an effect have the same noise, so that nothing else differs.
+    seeds = {name: int(_derive_rng(seed, name, 1).integers(2**32)) for name in strengths}
+    # Bisection per effect: index of the largest strength known to be missed, and of the smallest recognised.
+    brackets = {name: (-1, len(injections)) for name, injections in strengths.items()}
     confusion: Counter[tuple[str, str]] = Counter()
-    cleans: list[SurrogateOutcome] = []
-    asked = [SurrogateCase(None, int(_lot(seed, NOTHING, turn).integers(2**32))) for turn in range(clean)]
-    asked += _middles(ladders, between, seeds)
+    clean_outcomes: list[SurrogateOutcome] = []
+    cases = [
+        SurrogateCase(None, int(_derive_rng(seed, NOTHING, turn).integers(2**32)))
+        for turn in range(clean_surrogates)
+    ]
+    cases += _make_next_cases(strengths, brackets, seeds)
     ended = 0
-    while asked:
-        left = sum((high - low - 1).bit_length() for low, high in between.values())
-        most = ended + left + sum(probe.injection is None for probe in asked)
-        for probe, answer in zip(asked, run(partial(diagnose_surrogate, source), asked), strict=True):
+    while cases:
+        remaining = sum((high - low - 1).bit_length() for low, high in brackets.values())
+        total = ended + remaining + sum(case.injection is None for case in cases)
+        outcomes = parallel_map(partial(diagnose_surrogate, surrogates), cases)
+        for case, outcome in zip(cases, outcomes, strict=True):
             ended += 1
-            progress(f"{ended} of {most} analyses", ended / most)
-            hidden = probe.injection
-            confusion[hidden.cause if hidden else NOTHING, answer.named] += 1
-            if hidden is None:
-                cleans.append(answer)
+            progress(f"{ended} of {total} analyses", ended / total)
+            injection = case.injection
+            confusion[injection.cause if injection else NOTHING, outcome.named] += 1
+            if injection is None:
+                clean_outcomes.append(outcome)
                 continue
-            step = ladders[hidden.effect].index(hidden)
-            low, high = between[hidden.effect]
-            between[hidden.effect] = (low, step) if answer.recognised else (step, high)
-        asked = _middles(ladders, between, seeds)
-    as_good = sum(answer.score >= _best(diagnosis) for answer in cleans)
+            index = strengths[injection.effect].index(injection)
+            low, high = brackets[injection.effect]
+            brackets[injection.effect] = (low, index) if outcome.recognised else (index, high)
+        cases = _make_next_cases(strengths, brackets, seeds)
+    best_score = _get_best_score(diagnosis)
+    as_good = sum(outcome.score >= best_score for outcome in clean_outcomes)
+    false_alarms = sum(outcome.named not in (NOTHING, UNKNOWN) for outcome in clean_outcomes)
     return SelfTest(
         {
-            name: steps[high] if (high := between[name][1]) < len(steps) else None
-            for name, steps in ladders.items()
+            name: injections[high] if (high := brackets[name][1]) < len(injections) else None
+            for name, injections in strengths.items()
         },
-        estimate_rate(sum(answer.named not in (NOTHING, UNKNOWN) for answer in cleans), len(cleans)),
-        (1 + as_good) / (1 + len(cleans)),
+        estimate_rate(false_alarms, len(clean_outcomes)),
+        (1 + as_good) / (1 + len(clean_outcomes)),
         dict(sorted(confusion.items())),
     )
 
 
 def estimate_rate(count: int, of: int) -> DetectionRate:
-    """Return a rate with its bounds."""
-    low = float(betaincinv(count, of - count + 1, _OUTSIDE / 2)) if count else 0.0
-    high = float(betaincinv(count + 1, of - count, 1 - _OUTSIDE / 2)) if count < of else 1.0
+    """Estimate a proportion and its confidence interval."""
+    low = float(betaincinv(count, of - count + 1, _SIGNIFICANCE / 2)) if count else 0.0
+    high = float(betaincinv(count + 1, of - count, 1 - _SIGNIFICANCE / 2)) if count < of else 1.0
     return DetectionRate(count / of if of else 0.0, (low, high), of)
 
 
-def _middles(
-    ladders: Mapping[str, tuple[Injection, ...]],
-    between: Mapping[str, tuple[int, int]],
+def _derive_rng(seed: int, name: str, turn: int = 0) -> np.random.Generator:
+    """Return a random generator for a name, so that its draws do not depend on which others are tested."""
+    return np.random.default_rng([seed, turn, *map(ord, name)])
+
+
+def _make_next_cases(
+    strengths: Mapping[str, tuple[Injection, ...]],
+    brackets: Mapping[str, tuple[int, int]],
     seeds: Mapping[str, int],
 ) -> list[SurrogateCase]:
-    """Return the next probe of every effect whose limit is not known yet."""
+    """Return the next case of every effect whose detection limit is not known yet."""
     return [
-        SurrogateCase(ladders[name][(low + high) // 2], seeds[name])
-        for name, (low, high) in between.items()
+        SurrogateCase(strengths[name][(low + high) // 2], seeds[name])
+        for name, (low, high) in brackets.items()
         if high - low > 1
     ]
 
 
-def _lot(seed: int, name: str, turn: int = 0) -> np.random.Generator:
-    # By name and not in turn: an effect's share of chance does not hang on which others are tested.
-    return np.random.default_rng([seed, turn, *map(ord, name)])
-
-
-def _best(diagnosis: Diagnosis) -> float:
+def _get_best_score(diagnosis: Diagnosis) -> float:
     return max((candidate.score for candidate in diagnosis.candidates), default=-inf)

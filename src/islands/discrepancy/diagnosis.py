@@ -1,4 +1,4 @@
-"""Diagnosis: what a simulation gets wrong, its cause, the simulation with it, and what that is worth."""
+"""Diagnosis of a simulation on a record: discrepancies, their causes, and the gain of modelling them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from islands.discrepancy.inference.experiment_design import suggest_experiment
 from islands.discrepancy.inference.holdout import HoldoutGain, measure_gain
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.screening import ScreenedEffect, screen_effects
-from islands.discrepancy.inference.stepwise_search import LEAST
+from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.inference.strategies import (
     SearchOutcome,
     assess_evidence,
@@ -28,7 +28,7 @@ from islands.discrepancy.inference.strategies import (
     search_with_model_error,
 )
 from islands.discrepancy.inference.verdict import (
-    TEMPER,
+    CONFIDENCE_TEMPERATURE,
     Finding,
     Value,
     Verdict,
@@ -41,17 +41,27 @@ from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
 
-#: Times that causes are looked for anew because with them the record asks for another hold or step.
-ROUNDS = 3
+#: Maximum number of searches, one after each change of the intersample behaviour or the step size.
+MAX_ROUNDS = 3
 
-#: Percent that errors grow by, with 97.5 % certainty, on samples that nothing has seen, before names are
-#: withdrawn: a gain that calibration takes up as well changes them by next to nothing, either way.
-REFUTED = 0.5
+#: Effects are rejected if they increase the RMSE of the hold-out part by more than this percentage, with a
+#: certainty of 97.5 %. It is not zero, since an effect that calibration absorbs changes the RMSE by almost
+#: nothing in either direction.
+MAX_HOLDOUT_LOSS_PERCENT = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A rung of the first ladder: one effect beside the simulation alone."""
+    """A screened effect: the simulation extended by this effect alone.
+
+    Attributes
+    ----------
+    name : str
+    score : float
+        Score gain in minus twice the log-likelihood, less the BIC penalty.
+    explained_fraction : float
+        Fraction of the explainable misfit that the effect explains.
+    """
 
     name: str
     score: float
@@ -60,33 +70,33 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """What was found.
+    """Result of a diagnosis.
 
     Attributes
     ----------
     verdict : Verdict
     effects : tuple of Finding
-        The most important first; empty for "nothing" and "unknown".
+        The named causes, the most important first; empty for "nothing" and "unknown".
     candidates : tuple of Candidate
-        All effects beside the simulation, the best first.
+        All screened effects, the best first.
     gain : HoldoutGain or None
-        On data that nothing else has seen; None where nothing was added to the simulation.
+        Errors over the hold-out part; None if no effect was added to the simulation.
     residual_structure : mapping of str to float
-        Maps in which what is left is no chance, with their distance in standard deviations.
+        Maps in which the residual is not random, with their distance in standard deviations.
     suggested_experiment : str
-        What would tell apart what this record cannot; "" where there is nothing to tell apart.
+        Experiment that discriminates between the named causes and their equivalents; empty if there is none.
     record : Dataset
     estimation_samples : int
-        Samples, from the first on, that estimation has seen; the rest is locked.
+        Number of samples, from the first on, that are used for estimation; the rest is the hold-out part.
     base, best : CalibrationResult
         The simulation calibrated without the effects, and with them.
     noise_floor : float
-        RMSE that no simulation is expected to be below.
+        Expected lower bound on the RMSE of any simulation.
     is_noise_floor_measured : bool
-        The floor is known, from periods that repeat; else it is an upper bound, by what a flexible fit of the
-        record foretells: nobody can know it.
+        Whether the noise floor is measured from repeated periods; otherwise it is an upper bound from a
+        flexible reference model.
     nominal_rmse : float
-        RMSE of the simulation with its nominal values over the locked samples.
+        RMSE of the simulation at its nominal values over the hold-out part.
     """
 
     verdict: Verdict
@@ -110,152 +120,158 @@ def diagnose(
     tolerance: Mapping[str, float] | None = None,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
-    spread: ParallelMap = map,
+    parallel_map: ParallelMap = map,
     catalogue: Sequence[Effect] = EFFECTS,
 ) -> Diagnosis:
-    """Find out what a simulation gets wrong about a record.
+    """Diagnose a simulation on a record.
 
     Parameters
     ----------
     record : Dataset
-        Its first input drives the simulation; further ones are channels that may couple in.
-    core : Simulator
-        The simulation.
+        Measured record. Its first input drives the simulation; further inputs are channels that may couple
+        in.
+    simulator : Simulator
     tolerance : mapping, optional
-        Relative standard deviations of the simulation's parameters about their nominal values. Who is not
-        named is free, and what another value of it mends is no discrepancy.
+        Relative standard deviations of the simulator's parameters about their nominal values. Parameters that
+        are not in it are free: a misfit that calibrating them removes is no discrepancy.
     seed : int
-        Of all that is drawn by lot.
+        Seed of the random generator.
     progress : ProgressCallback
-        Told what is being done.
-    spread : ParallelMap
-        Applies a function to every effect, in parallel or not; the result is the same.
+        Takes a message at the start of each step.
+    parallel_map : ParallelMap
+        Calibrates the effects. The result does not depend on it.
     catalogue : sequence of Effect
         The effects that are searched for.
 
     Raises
     ------
     RecordError
-        The record is too short, has gaps or a signal that does not move, or the simulation diverges on it.
+        The record is too short, has gaps or a constant signal, or the simulation diverges on it.
     SettingsError
-        A tolerance is not positive or belongs to no parameter of the simulation, two effects have one
-        name, or an effect is broken.
+        A tolerance is not positive or belongs to no parameter of the simulator, two effects have the same
+        name, or an effect is invalid.
     """
-    known = validate_prior(tolerance or {}, simulator)
+    prior_std = validate_prior(tolerance or {}, simulator)
     fitted = count_fitted_samples(record)
     context = make_context(record, simulator, fitted)
     rng = np.random.default_rng(seed)
     simulation = ExtendedSimulator(simulator, (), context)
-    target = Target(record.y, np.arange(record.samples) < fitted, None, known)
+    target = Target(record.y, np.arange(record.samples) < fitted, None, prior_std)
     progress("calibrating the simulation")
-    plain = calibrate(simulation, target, simulation.nominal)
-    simulator = select_intersample(plain, target)
-    effects = select_effects(simulator, context, known, catalogue)
-    for _ in range(ROUNDS):
-        plain = calibrate(replace(simulation, simulator=simulator), target, plain.values)
-        progress(f"looking for each of {len(effects)} effects")
-        rungs = screen_effects(plain, target, effects, spread)
-        again = select_intersample(best_single(plain, rungs), target)
-        if same_discretisation(again, simulator):
-            evidence = search_with_ar_noise(plain, rungs, target, effects, progress, spread)
-            again = select_intersample(evidence.hypothesis.fit, evidence.target)
-        if same_discretisation(again, simulator):
+    base = calibrate(simulation, target, simulation.nominal)
+    simulator = select_intersample(base, target)
+    effects = select_effects(simulator, context, prior_std, catalogue)
+    for _ in range(MAX_ROUNDS):
+        base = calibrate(replace(simulation, simulator=simulator), target, base.values)
+        progress(f"screening {len(effects)} effects")
+        screened = screen_effects(base, target, effects, parallel_map)
+        selected = select_intersample(best_single(base, screened), target)
+        if same_discretisation(selected, simulator):
+            outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
+            selected = select_intersample(outcome.hypothesis.fit, outcome.target)
+        if same_discretisation(selected, simulator):
             break
-        # With a cause in it another hold, or a finer step, fits better: it was the cause that hid that.
-        progress("once more: the input between its samples")
-        simulator = again
+        # The missing effect had hidden that another intersample behaviour or a finer step fits better.
+        progress("intersample behaviour changed: repeating the search")
+        simulator = selected
     else:
-        evidence = search_with_ar_noise(plain, rungs, target, effects, progress, spread)
-    progress("what is left over")
-    evidence = assess_evidence(evidence, fitted, rng)
-    if evidence.verdict == Verdict.UNKNOWN or (
-        evidence.verdict == Verdict.NOTHING and evidence.hypothesis.fit.noise.order
+        outcome = search_with_ar_noise(base, screened, target, effects, progress, parallel_map)
+    progress("analysing the residual")
+    outcome = assess_evidence(outcome, fitted, rng)
+    if outcome.verdict == Verdict.UNKNOWN or (
+        outcome.verdict == Verdict.NOTHING and outcome.hypothesis.fit.noise.order
     ):
-        second = assess_evidence(
-            search_with_model_error(plain, target, effects, progress, spread), fitted, rng
-        )
-        evidence = second if second.verdict != Verdict.UNKNOWN else evidence
-    return _told(record, evidence, plain, effects, fitted, rng, progress, spread)
+        model_error = search_with_model_error(base, target, effects, progress, parallel_map)
+        second = assess_evidence(model_error, fitted, rng)
+        outcome = second if second.verdict != Verdict.UNKNOWN else outcome
+    return _make_diagnosis(record, outcome, base, effects, fitted, rng, progress, parallel_map)
 
 
-def _told(
+def _make_diagnosis(
     record: Dataset,
-    evidence: SearchOutcome,
-    plain: CalibrationResult,
+    outcome: SearchOutcome,
+    base: CalibrationResult,
     effects: Sequence[Effect],
     fitted: int,
     rng: np.random.Generator,
     progress: ProgressCallback,
-    spread: ParallelMap,
+    parallel_map: ParallelMap,
 ) -> Diagnosis:
-    """Say what the evidence comes to, and measure the gain: once, on the locked part."""
-    base, found, rungs, verdict = evidence.base, evidence.hypothesis, evidence.screened, evidence.verdict
-    floor = evidence.noise_floor
-    locked = slice(fitted, record.samples)
+    """Measure the gain on the hold-out part, describe the effects and detect properties of the noise.
+
+    The base of ``outcome`` may be calibrated to whitened residuals; ``base`` is calibrated to unweighted
+    ones.
+    """
+    hypothesis, verdict, floor = outcome.hypothesis, outcome.verdict, outcome.noise_floor
+    holdout = slice(fitted, record.samples)
     gain = None
     if verdict in (Verdict.NAMED, Verdict.REMAINDER):
-        gain = measure_gain(record, plain.output, found.fit.output, locked, floor**0.5, rng)
-        if found.effects and gain.ci95[1] < -REFUTED:
-            # What nothing has seen speaks against it: there is something, but it is not this.
+        gain = measure_gain(record, base.output, hypothesis.fit.output, holdout, floor**0.5, rng)
+        if hypothesis.effects and gain.ci95[1] < -MAX_HOLDOUT_LOSS_PERCENT:
+            # The hold-out part contradicts the effects: there is a discrepancy, but its cause is another.
             gain, verdict = None, Verdict.UNKNOWN
-    named: tuple[Finding, ...] = ()
-    instead: tuple[ScreenedEffect, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    equivalents: tuple[ScreenedEffect, ...] = ()
     if gain is not None:
-        progress("what else could be the cause")
-        named, instead = describe_effects(found, base, rungs, evidence.target, effects, floor, spread)
-    residual = (record.y - found.fit.output)[:fitted]
-    context = found.fit.simulation.context
-    noise = _noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
-    simulation = plain.simulation
-    given = simulation.simulate(simulation.nominal)
-    best = found.fit if named else plain
+        progress("screening alternative causes")
+        findings, equivalents = describe_effects(
+            hypothesis, outcome.base, outcome.screened, outcome.target, effects, floor, parallel_map
+        )
+    residual = (record.y - hypothesis.fit.output)[:fitted]
+    context = hypothesis.fit.simulation.context
+    noise = _detect_noise(record.y[:fitted], residual, context) if verdict != Verdict.UNKNOWN else ()
+    simulation = base.simulation
+    nominal = simulation.simulate(simulation.nominal)
     return Diagnosis(
         Verdict.NAMED if noise and verdict == Verdict.NOTHING else verdict,
-        (*named, *noise),
+        (*findings, *noise),
         tuple(
-            Candidate(r.effect.cause, r.score_gain(base), explained_fraction(base, r.fit, floor))
-            for r in rungs
+            Candidate(
+                each.effect.cause,
+                each.score_gain(outcome.base),
+                explained_fraction(outcome.base, each.fit, floor),
+            )
+            for each in outcome.screened
         ),
         gain,
-        evidence.residual_structure,
-        suggest_experiment(found.fit, instead),
+        outcome.residual_structure,
+        suggest_experiment(hypothesis.fit, equivalents),
         record,
         fitted,
-        plain,
-        best,
+        base,
+        hypothesis.fit if findings else base,
         floor**0.5,
-        evidence.is_noise_floor_measured,
-        float(np.sqrt(np.mean((record.y - given)[locked] ** 2))),
+        outcome.is_noise_floor_measured,
+        float(np.sqrt(np.mean((record.y - nominal)[holdout] ** 2))),
     )
 
 
-def _noise(y: Signal, residual: Signal, context: SimulationContext) -> tuple[Finding, ...]:
-    """Name what sampling and noise have done, the crudest first: what it explains is not blamed on others."""
-    found: list[Finding] = []
+def _detect_noise(y: Signal, residual: Signal, context: SimulationContext) -> tuple[Finding, ...]:
+    """Run the noise detectors in order; skip those that an earlier finding excludes."""
+    findings: list[Finding] = []
     for detector in DETECTORS.values():
-        if any(each.name in detector.excluded_by for each in found):
+        if any(each.name in detector.excluded_by for each in findings):
             continue
         detection = detector.detect(y, residual, context)
-        if detection is not None and detection.score_gain > LEAST:
+        if detection is not None and detection.score_gain > MIN_GAIN:
+            score = detection.score_gain
             values = {name: Value(value, unit, None) for name, (value, unit) in detection.parameters.items()}
-            sure = 1.0 / (1.0 + float(np.exp(-detection.score_gain / (2 * TEMPER))))
-            found.append(
-                Finding(detector.name, detector.family, sure, (), values, detection.score_gain, None)
-            )
-    return tuple(found)
+            confidence = 1.0 / (1.0 + float(np.exp(-score / (2 * CONFIDENCE_TEMPERATURE))))
+            findings.append(Finding(detector.name, detector.family, confidence, (), values, score, None))
+    return tuple(findings)
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualFormula:
-    """A formula for what the best simulation leaves over.
+    """A formula for the residual of the best simulation.
 
     Attributes
     ----------
     formula : str
-        Of the residual, measured minus simulated, in free run: it reads its own past, the input and the
-        simulated output.
+        Formula of the residual, measured minus simulated output, in free run. Its regressors are past values
+        of the residual, the input and the simulated output.
     explains : float
-        Fraction of the remainder's mean square that the formula predicts over the locked samples.
+        Fraction of the residual's mean square that the formula predicts over the hold-out part.
     """
 
     formula: str

@@ -1,4 +1,4 @@
-"""Surrogates: what a record would be if the simulation were right, and with an effect put into it."""
+"""Surrogate records: output of the calibrated simulation plus noise, with or without an injected effect."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,29 +16,33 @@ from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
-#: Misfits of what is injected, in standard deviations of the residual.
+#: Misfits of the injections of an effect, in standard deviations of the residual.
 STRENGTHS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 
-#: Doublings of a strength from the grid's, either way, and halvings of the interval in which a misfit lies.
-_DOUBLINGS, _HALVINGS = 30, 7
+#: Maximum number of doublings or halvings of a strength, relative to the starting point of the effect.
+_MAX_DOUBLINGS = 30
 
-#: Time constants of the noise that a record holds at the least: noise that remembers longer is no noise.
-_MEMORIES = 10.0
+#: Number of bisections of the interval that contains a misfit.
+_BISECTIONS = 7
+
+#: Minimum length of a record in time constants of its noise; slower noise is drift.
+_MIN_TIME_CONSTANTS = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Injection:
-    """An effect that is put into a surrogate.
+    """An effect with values, injected into a surrogate.
 
     Attributes
     ----------
     effect : str
+        Name of the effect.
     values : tuple of float
-        Of its parameters.
+        Values of its parameters.
     strength, unit : float, str
-        Its size without a sign, in the effect's own unit.
+        Magnitude of the effect in its own unit.
     misfit : float
-        Root mean square of what it changes over the fitted samples, in standard deviations of the residual.
+        RMS change of the output over the estimation part, in standard deviations of the residual.
     """
 
     effect: str
@@ -49,13 +53,16 @@ class Injection:
 
     @property
     def cause(self) -> str:
-        """The effect's name in the catalogue: without the state or the parameter that it is about."""
+        """Name of the effect in the catalogue, without a state or a parameter."""
         return self.effect.partition(":")[0]
 
 
 @dataclass(frozen=True, slots=True)
 class SurrogateCase:
-    """One surrogate to be diagnosed; without an injection it is a clean one."""
+    """A surrogate to be diagnosed, given by its injection and the seed of its noise.
+
+    A surrogate without an injection is clean.
+    """
 
     injection: Injection | None
     seed: int
@@ -63,22 +70,22 @@ class SurrogateCase:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surrogates:
-    """What surrogates of a record are drawn from.
+    """Generator of surrogates of a diagnosed record.
 
     Attributes
     ----------
     record : Dataset
     simulator, prior_std : Simulator, mapping
-        As they were diagnosed.
+        Simulator and tolerances of the diagnosis.
     simulation : ExtendedSimulator
-        Without effects.
+        The simulation without effects.
     values : ndarray, shape (parameters,)
-        Of the simulation.
+        Values of the simulation.
     noise : NoiseModel
     sigma : float
-        The residual's standard deviation.
+        Standard deviation of the residual.
     estimation_samples : int
-        Samples that estimation sees.
+        Number of samples used for estimation.
     """
 
     record: Dataset
@@ -91,128 +98,138 @@ class Surrogates:
     estimation_samples: int
 
     def simulate(self, effect: Effect | None = None, values: Sequence[float] = ()) -> Signal:
-        """Return the output without noise, with one effect in it or with none."""
+        """Return the output without noise, with at most one effect."""
         if effect is None:
             return self.simulation.simulate(self.values)
         extended = self.simulation.with_effects([effect])
-        moved = transfer_parameters(self.values, self.simulation, extended)
-        moved[extended.get_slice(effect)] = values
-        return extended.simulate(moved)
+        extended_values = transfer_parameters(self.values, self.simulation, extended)
+        extended_values[extended.get_slice(effect)] = values
+        return extended.simulate(extended_values)
 
     @property
     def effects(self) -> Mapping[str, Effect]:
-        """What could enter the simulation, by name."""
-        offered = select_effects(self.simulation.simulator, self.simulation.context, self.prior_std)
-        return {effect.name: effect for effect in offered}
+        """Effects of the catalogue that are applicable to the simulation, by name."""
+        effects = select_effects(self.simulation.simulator, self.simulation.context, self.prior_std)
+        return {effect.name: effect for effect in effects}
 
     def draw_noise(self, seed: int) -> Signal:
         """Draw the noise of a surrogate."""
         samples = self.record.samples
-        # Apart from what the analysis draws by the same seed. The first half warms the memory up.
+        # The stream differs from that of the diagnosis with the same seed. The first half is the filter's
+        # warm-up.
         white = np.random.default_rng([seed, 1]).standard_normal(2 * samples)
         filtered = scipy.signal.lfilter([1.0], np.concatenate([[1.0], -self.noise.coefficients]), white)
-        drawn: Signal = np.sqrt(self.noise.variance) * filtered[samples:]
-        return drawn
+        noise: Signal = np.sqrt(self.noise.variance) * filtered[samples:]
+        return noise
 
-    def draw_record(self, probe: SurrogateCase) -> Dataset:
-        """Return the surrogate of a probe."""
-        injection = probe.injection
+    def draw_record(self, case: SurrogateCase) -> Dataset:
+        """Draw the surrogate record of a case."""
+        injection = case.injection
         simulated = (
             self.simulate()
             if injection is None
             else self.simulate(self.effects[injection.effect], injection.values)
         )
-        return replace(self.record, y=simulated + self.draw_noise(probe.seed))
+        return replace(self.record, y=simulated + self.draw_noise(case.seed))
 
 
 def make_surrogates(diagnosis: Diagnosis, simulator: Simulator, tolerance: Mapping[str, float]) -> Surrogates:
-    """Return what surrogates of a diagnosed record are drawn from.
+    """Make the generator of surrogates of a diagnosed record.
 
-    Clean means: the simulation without effects is the truth. Where some were named it is the one that was
-    calibrated beside them, and they are taken off; its noise is what the simulation with them leaves. So no
-    surrogate has a cause in it that was not put there, and noise is not blamed for one that was named.
+    Clean surrogates follow the simulation without effects. If the diagnosis named effects, the values of the
+    simulation are those calibrated together with them, and the noise is the residual of the extended
+    simulation. A surrogate thus has no cause but the injected one, and a named cause is not part of its
+    noise.
     """
     best = diagnosis.best
     simulation = best.simulation.with_effects(())
-    left = (diagnosis.record.y - best.output)[: diagnosis.estimation_samples]
+    residual = (diagnosis.record.y - best.output)[: diagnosis.estimation_samples]
     return Surrogates(
         diagnosis.record,
         simulator,
         tolerance,
         simulation,
         transfer_parameters(best.values, best.simulation, simulation),
-        _fading(fit_ar_noise(left), diagnosis.record.samples),
-        float(np.sqrt(np.mean(left**2))),
+        _limit_poles(fit_ar_noise(residual), diagnosis.record.samples),
+        float(np.sqrt(np.mean(residual**2))),
         diagnosis.estimation_samples,
     )
 
 
 def injection_strengths(
-    source: Surrogates, effect: Effect, rng: np.random.Generator
+    surrogates: Surrogates, effect: Effect, rng: np.random.Generator
 ) -> tuple[Injection, ...]:
-    """Return injections of one effect, each stronger than the one before.
+    """Return injections of one effect in order of increasing strength.
 
-    Its shape is a point of its grid, and its sign one of those that it may have, both by lot. Strengths are
-    those at which the misfit first comes to each of `STRENGTHS`; who cannot do so ends earlier.
+    The shape is a random starting point of the effect, with a random sign if both are allowed. The strengths
+    are the smallest ones with the misfits `STRENGTHS`. Effects that cannot reach a misfit yield fewer
+    injections.
     """
-    context = source.simulation.context
+    context = surrogates.simulation.context
     parameters = effect.parameters(context)
-    grid = effect.starting_points(context, source.draw_noise(int(rng.integers(2**32))))
-    point = np.array(grid[int(rng.integers(len(grid)))], dtype=np.float64)
-    sized = slice(0, max(effect.linear_parameters, 1))
-    lower = np.array([parameter.lower for parameter in parameters[sized]])
-    upper = np.array([parameter.upper for parameter in parameters[sized]])
-    if rng.random() < 0.5 and (-point[sized] >= lower).all():
-        point[sized] *= -1.0
-    ends = np.where(point[sized] > 0.0, upper, lower)
-    moving = point[sized] != 0.0
-    farthest = min(2.0**_DOUBLINGS, float(np.min(ends[moving] / point[sized][moving], initial=inf)))
-    at_rest = source.simulate()
+    points = effect.starting_points(context, surrogates.draw_noise(int(rng.integers(2**32))))
+    point = np.array(points[int(rng.integers(len(points)))], dtype=np.float64)
+    scaled = slice(0, max(effect.linear_parameters, 1))
+    lower = np.array([parameter.lower for parameter in parameters[scaled]])
+    upper = np.array([parameter.upper for parameter in parameters[scaled]])
+    if rng.random() < 0.5 and (-point[scaled] >= lower).all():
+        point[scaled] *= -1.0
+    limits = np.where(point[scaled] > 0.0, upper, lower)
+    is_nonzero = point[scaled] != 0.0
+    max_factor = min(
+        2.0**_MAX_DOUBLINGS, float(np.min(limits[is_nonzero] / point[scaled][is_nonzero], initial=inf))
+    )
+    without_effect = surrogates.simulate()
 
-    def injected(factor: float) -> Injection:
+    def make_injection(factor: float) -> Injection:
         values = point.copy()
-        values[sized] *= factor
-        changed = (source.simulate(effect, values.tolist()) - at_rest)[: source.estimation_samples]
-        with np.errstate(over="ignore", invalid="ignore"):  # what explodes is too much
-            misfit = float(np.sqrt(np.mean(changed**2))) / max(source.sigma, np.finfo(float).tiny)
-        size = float(np.linalg.norm(values[sized]))
+        values[scaled] *= factor
+        simulated = surrogates.simulate(effect, values.tolist())
+        change = (simulated - without_effect)[: surrogates.estimation_samples]
+        with np.errstate(over="ignore", invalid="ignore"):  # a simulation that diverges has infinite misfit
+            misfit = float(np.sqrt(np.mean(change**2))) / max(surrogates.sigma, np.finfo(float).tiny)
+        size = float(np.linalg.norm(values[scaled]))
         return Injection(
             *(effect.name, tuple(values.tolist()), size, parameters[0].unit),
             misfit if np.isfinite(misfit) else inf,
         )
 
-    low = min(1.0, farthest)
-    while injected(low).misfit >= STRENGTHS[0] and low > 2.0**-_DOUBLINGS:
+    low = min(1.0, max_factor)
+    while make_injection(low).misfit >= STRENGTHS[0] and low > 2.0**-_MAX_DOUBLINGS:
         low /= 2
-    found: list[Injection] = []
-    for wanted in STRENGTHS:
-        if found and found[-1].misfit >= wanted:
-            continue  # it has leapt over this one
+    injections: list[Injection] = []
+    for misfit in STRENGTHS:
+        if injections and injections[-1].misfit >= misfit:
+            continue  # the previous injection already exceeds this misfit
         high = low
-        while (there := injected(high)).misfit < wanted:
-            if high >= farthest:
-                return tuple(found)
-            low, high = high, min(2 * high, farthest)
-        for _ in range(_HALVINGS):
+        while (injection := make_injection(high)).misfit < misfit:
+            if high >= max_factor:
+                return tuple(injections)
+            low, high = high, min(2 * high, max_factor)
+        for _ in range(_BISECTIONS):
             middle = float(np.sqrt(low * high))
-            tried = injected(middle)
-            if tried.misfit < wanted:
+            tried = make_injection(middle)
+            if tried.misfit < misfit:
                 low = middle
             else:
-                high, there = middle, tried
-        if there.misfit == inf:
-            return tuple(found)
-        found.append(there)
+                high, injection = middle, tried
+        if injection.misfit == inf:
+            return tuple(injections)
+        injections.append(injection)
         low = high
-    return tuple(found)
+    return tuple(injections)
 
 
-def _fading(noise: NoiseModel, samples: int) -> NoiseModel:
-    """Return a noise that forgets within a record: one that was fitted to a drift may not, or may explode."""
+def _limit_poles(noise: NoiseModel, samples: int) -> NoiseModel:
+    """Limit the time constants of a noise model to a fraction of the record.
+
+    A model that was fitted to a drift may have a pole on or outside the unit circle.
+    """
     if noise.order == 0:
         return noise
-    slowest = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
-    most = 1.0 - _MEMORIES / samples
-    if slowest <= most:
+    largest_pole = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
+    limit = 1.0 - _MIN_TIME_CONSTANTS / samples
+    if largest_pole <= limit:
         return noise
-    return replace(noise, coefficients=noise.coefficients * (most / slowest) ** np.arange(1, noise.order + 1))
+    factors = (limit / largest_pole) ** np.arange(1, noise.order + 1)
+    return replace(noise, coefficients=noise.coefficients * factors)

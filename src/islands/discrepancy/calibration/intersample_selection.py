@@ -1,7 +1,7 @@
-"""How a core is solved: what its input does between samples, and in how fine steps; before anything else.
+"""Selection of the intersample behaviour and the step size of a simulator, before effects are screened.
 
-Both imitate physics where they are wrong: a hold that is not the record's looks like a delay, too coarse a
-step like damping.
+Errors of either imitate physics: a wrong intersample behaviour looks like a delay, too coarse a step looks
+like damping.
 """
 
 from dataclasses import replace
@@ -13,38 +13,41 @@ from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 
-#: Steps a sample at the most, and the change that finer ones may make, in what is left over.
-FINEST, NOTICED = 32, 0.05
+#: Maximum number of steps per sample.
+MAX_OVERSAMPLING = 32
 
-#: By how much another hold has to fit better, in minus twice the log-likelihood.
-BETTER = 10.0
+#: Largest accepted RMS change of the output when the step is halved, relative to the RMS of the residual.
+MAX_STEP_ERROR = 0.05
+
+#: Least decrease of minus twice the log-likelihood for which another intersample behaviour is selected.
+MIN_IMPROVEMENT = 10.0
 
 
 def select_intersample(fit: CalibrationResult, target: Target) -> Simulator:
-    """Return the core of a fit, solved as the record asks for it."""
+    """Return the simulator of a fit with the intersample behaviour and the step size that suit the record."""
     simulator = fit.simulation.simulator
     if not simulator.is_continuous_time:
         return simulator
-    inner, now = (
+    inner, current = (
         (simulator.simulator, simulator.intersample)
         if isinstance(simulator, ResampledSimulator)
         else (simulator, InterSample.FOH)
     )
-    held = {}
-    for hold in (now, *(each for each in InterSample if each != now)):
-        fine = _fine_enough(inner, hold, fit)
-        again = calibrate(_solved(fit.simulation, fine), target, fit.values)
-        held[hold] = (again.score, fine)
-    best = min(held, key=lambda hold: held[hold][0])
-    return held[best if held[best][0] < held[now][0] - BETTER else now][1]
+    tried = {}
+    for intersample in (current, *(each for each in InterSample if each != current)):
+        candidate = _refine_steps(inner, intersample, fit)
+        refitted = calibrate(_with_simulator(fit.simulation, candidate), target, fit.values)
+        tried[intersample] = (refitted.score, candidate)
+    best = min(tried, key=lambda intersample: tried[intersample][0])
+    return tried[best if tried[best][0] < tried[current][0] - MIN_IMPROVEMENT else current][1]
 
 
 def same_discretisation(one: Simulator, other: Simulator) -> bool:
-    """Tell whether two cores are solved in the same way."""
-    return _way(one) == _way(other)
+    """Return whether two simulators have the same intersample behaviour and the same step size."""
+    return _get_discretisation(one) == _get_discretisation(other)
 
 
-def _way(simulator: Simulator) -> tuple[InterSample, int]:
+def _get_discretisation(simulator: Simulator) -> tuple[InterSample, int]:
     return (
         (simulator.intersample, simulator.oversampling)
         if isinstance(simulator, ResampledSimulator)
@@ -52,20 +55,26 @@ def _way(simulator: Simulator) -> tuple[InterSample, int]:
     )
 
 
-def _solved(simulation: ExtendedSimulator, simulator: Simulator) -> ExtendedSimulator:
+def _with_simulator(simulation: ExtendedSimulator, simulator: Simulator) -> ExtendedSimulator:
     return replace(simulation, simulator=simulator)
 
 
-def _fine_enough(inner: Simulator, hold: InterSample, fit: CalibrationResult) -> Simulator:
-    """Halve the step until that changes nothing beside what is left over."""
-    seen = NOTICED * float(np.sqrt(fit.mean_square))
-    times = 1
-    coarse = _solved(fit.simulation, ResampledSimulator(inner, hold, times)).simulate(fit.values)
-    while times < FINEST:
-        finer = _solved(fit.simulation, ResampledSimulator(inner, hold, 2 * times)).simulate(fit.values)
+def _refine_steps(inner: Simulator, intersample: InterSample, fit: CalibrationResult) -> Simulator:
+    """Halve the step until the change of the output is small compared with the residual."""
+    accepted = MAX_STEP_ERROR * float(np.sqrt(fit.mean_square))
+    oversampling = 1
+    resampled = ResampledSimulator(inner, intersample, oversampling)
+    coarse = _with_simulator(fit.simulation, resampled).simulate(fit.values)
+    while oversampling < MAX_OVERSAMPLING:
+        resampled = ResampledSimulator(inner, intersample, 2 * oversampling)
+        fine = _with_simulator(fit.simulation, resampled).simulate(fit.values)
         with np.errstate(over="ignore", invalid="ignore"):
-            change = float(np.sqrt(np.mean((finer - coarse) ** 2)))
-        if change < seen:
+            change = float(np.sqrt(np.mean((fine - coarse) ** 2)))
+        if change < accepted:
             break
-        times, coarse = 2 * times, finer
-    return inner if times == 1 and hold == InterSample.FOH else ResampledSimulator(inner, hold, times)
+        oversampling, coarse = 2 * oversampling, fine
+    return (
+        inner
+        if oversampling == 1 and intersample == InterSample.FOH
+        else ResampledSimulator(inner, intersample, oversampling)
+    )

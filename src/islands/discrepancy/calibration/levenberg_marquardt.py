@@ -1,4 +1,4 @@
-"""Calibration: the values with which a simulation comes closest to a record, by Levenberg and Marquardt."""
+"""Calibration of a simulation's parameters to a record by the Levenberg-Marquardt method."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,28 +10,34 @@ from islands.discrepancy.calibration.noise_model import NoiseModel, fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
-#: Steps at the most, tries of each, and what one has to gain in minus twice the log-likelihood.
-STEPS, TRIES, WORTH = 25, 6, 0.02
+#: Maximum number of accepted steps.
+MAX_ITERATIONS = 25
 
-#: Part of a parameter's scale that a derivative steps.
-STEP = 1e-2
+#: Maximum number of damping values tried per step.
+MAX_DAMPING_TRIALS = 6
+
+#: The iteration ends at a step that decreases minus twice the log-likelihood by less than this.
+MIN_DECREASE = 0.02
+
+#: Finite-difference step, as a fraction of the scale of a parameter.
+DIFFERENCE_STEP = 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """What a simulation is held against.
+    """Measured output, and the weighting under which a simulation is compared with it.
 
     Attributes
     ----------
     y : ndarray, shape (samples,)
         The measured output.
     estimation_part : ndarray of bool, shape (samples,)
-        What estimation may see.
+        Samples used for estimation.
     noise : NoiseModel or None
-        What residuals are whitened by; None takes them as they are.
+        Noise model that whitens residuals; None to leave them unweighted.
     prior_std : mapping
-        Relative standard deviations of the core's parameters about their nominal values; who is not named is
-        free.
+        Relative standard deviations of the simulator's parameters about their nominal values. Parameters that
+        are not in it are free.
     effective_samples : float or None
         Effective sample size of the estimation part if the residual is model error; None if it is noise,
         white or coloured.
@@ -44,30 +50,30 @@ class Target:
     effective_samples: float | None = None
 
     def select(self, signal: Signal) -> Signal:
-        """Return the samples of a signal that are seen, whitened."""
+        """Return the whitened signal over the estimation part."""
         return (signal if self.noise is None else self.noise.whiten(signal))[self.estimation_part]
 
     def residual(self, simulated: Signal) -> Signal:
-        """Return what is left of the samples that are seen, whitened."""
+        """Return the whitened residual over the estimation part."""
         return self.select(self.y - simulated)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationResult:
-    """A simulation with values, held against a record.
+    """A simulation with parameter values, and its residual on a record.
 
     Attributes
     ----------
     simulation : ExtendedSimulator
     values : ndarray, shape (parameters,)
     output : ndarray, shape (samples,)
-        Of the whole record.
+        Simulated output over the whole record.
     mean_square : float
-        Of the residual over the samples that estimation saw.
+        Mean square of the residual over the estimation part.
     noise : NoiseModel
-        Of that residual.
+        Noise model of that residual.
     penalty : float
-        Squares of the deviations from tolerances.
+        Sum of the squared deviations from the nominal values, in prior standard deviations.
     """
 
     simulation: ExtendedSimulator
@@ -79,56 +85,58 @@ class CalibrationResult:
 
     @property
     def score(self) -> float:
-        """Minus twice the log-likelihood, the noise's memory counted, effects' values not yet paid for."""
+        """Minus twice the log-likelihood under the noise model plus the prior; without penalty on effects."""
         return self.noise.minus_twice_log_likelihood + self.penalty
 
 
 def calibrate(
-    simulation: ExtendedSimulator, target: Target, start: Signal, steps: int = STEPS
+    simulation: ExtendedSimulator, target: Target, start: Signal, max_iterations: int = MAX_ITERATIONS
 ) -> CalibrationResult:
-    """Fit a simulation's values from a start."""
+    """Fit the parameters of a simulation, beginning at ``start``."""
     lower, upper = simulation.bounds
-    pull, nominal = prior_precision(simulation, target.prior_std)
+    inverse_std, nominal = prior_precision(simulation, target.prior_std)
     scales = simulation.scales
     values = np.clip(start, lower, upper)
     output = simulation.simulate(values)
     residual = target.residual(output)
-    cost = _cost(residual, pull * (values - nominal))
+    cost = _compute_cost(residual, inverse_std * (values - nominal))
     damping = 1e-3
-    # What is rounding alone cannot be fitted: a record may be what the simulation has made.
-    exact = residual.size * (np.finfo(float).eps * float(np.max(np.abs(target.y)))) ** 2
-    for _ in range(steps if values.size and np.isfinite(cost) else 0):
-        if float(residual @ residual) <= exact:
+    # Residuals at the level of rounding cannot be fitted: the record may be an output of the simulation.
+    rounding = residual.size * (np.finfo(float).eps * float(np.max(np.abs(target.y)))) ** 2
+    for _ in range(max_iterations if values.size and np.isfinite(cost) else 0):
+        if float(residual @ residual) <= rounding:
             break
-        jacobian = _jacobian(simulation, target, values, output)
+        jacobian = _compute_jacobian(simulation, target, values, output)
         weight = residual.size / max(float(residual @ residual), np.finfo(float).tiny)
-        hessian = weight * (jacobian.T @ jacobian) + np.diag((pull * scales) ** 2)
-        slope = weight * (jacobian.T @ residual) - scales * pull**2 * (values - nominal)
-        for _ in range(TRIES):
-            curved = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
-            moved = np.clip(values + np.linalg.lstsq(curved, slope, rcond=None)[0] * scales, lower, upper)
-            output_there = simulation.simulate(moved)
-            residual_there = target.residual(output_there)
-            cost_there = _cost(residual_there, pull * (moved - nominal))
-            if cost_there < cost:
+        hessian = weight * (jacobian.T @ jacobian) + np.diag((inverse_std * scales) ** 2)
+        slope = weight * (jacobian.T @ residual) - scales * inverse_std**2 * (values - nominal)
+        for _ in range(MAX_DAMPING_TRIALS):
+            damped = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
+            new_values = np.clip(
+                values + np.linalg.lstsq(damped, slope, rcond=None)[0] * scales, lower, upper
+            )
+            new_output = simulation.simulate(new_values)
+            new_residual = target.residual(new_output)
+            new_cost = _compute_cost(new_residual, inverse_std * (new_values - nominal))
+            if new_cost < cost:
                 break
             damping = max(8 * damping, 1e-6)
         else:
             break
-        gained = cost - cost_there
-        values, output, residual, cost = moved, output_there, residual_there, cost_there
+        decrease = cost - new_cost
+        values, output, residual, cost = new_values, new_output, new_residual, new_cost
         damping /= 5
-        if gained < WORTH:
+        if decrease < MIN_DECREASE:
             break
     return evaluate_fit(simulation, target, values)
 
 
 def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) -> CalibrationResult:
-    """Hold a simulation against a record with values as they are."""
+    """Compare a simulation with a record at the given values, without fitting."""
     output = simulation.simulate(values)
     residual = (target.y - output)[target.estimation_part]
-    pull, nominal = prior_precision(simulation, target.prior_std)
-    penalty = float(np.sum((pull * (values - nominal)) ** 2))
+    inverse_std, nominal = prior_precision(simulation, target.prior_std)
+    penalty = float(np.sum((inverse_std * (values - nominal)) ** 2))
     mean_square = float(np.mean(residual**2))
     noise = (
         fit_ar_noise(residual)
@@ -138,46 +146,66 @@ def evaluate_fit(simulation: ExtendedSimulator, target: Target, values: Signal) 
     return CalibrationResult(simulation, values, output, mean_square, noise, penalty)
 
 
-def covariance(fit: CalibrationResult, target: Target) -> NDArray[np.float64]:
-    """Return the covariance of a fit's values, shape (parameters, parameters): the noise's memory counts."""
+def estimate_covariance(fit: CalibrationResult, target: Target) -> NDArray[np.float64]:
+    """Estimate the covariance of the fitted values under the noise model of the fit.
+
+    Returns
+    -------
+    ndarray, shape (parameters, parameters)
+    """
     simulation = fit.simulation
     whitened = Target(target.y, target.estimation_part, fit.noise, target.prior_std)
     scales = simulation.scales
-    jacobian = _jacobian(simulation, whitened, fit.values, fit.output)
-    pull, _ = prior_precision(simulation, target.prior_std)
-    worth = fit.noise.effective_samples / np.count_nonzero(target.estimation_part)
-    information = worth * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((pull * scales) ** 2)
+    jacobian = _compute_jacobian(simulation, whitened, fit.values, fit.output)
+    inverse_std, _ = prior_precision(simulation, target.prior_std)
+    weight = fit.noise.effective_samples / np.count_nonzero(target.estimation_part)
+    information = weight * (jacobian.T @ jacobian) / fit.noise.variance + np.diag((inverse_std * scales) ** 2)
     inverse: NDArray[np.float64] = np.linalg.pinv(information, hermitian=True) * np.outer(scales, scales)
     return inverse
 
 
 def prior_precision(simulation: ExtendedSimulator, tolerance: Mapping[str, float]) -> tuple[Signal, Signal]:
-    """Return one over each value's standard deviation, 0 where it is free; and where it is pulled to."""
+    """Return the prior of a simulation's values.
+
+    Returns
+    -------
+    ndarray, shape (parameters,)
+        Inverse of the prior standard deviation of each value; 0 if the value is free.
+    ndarray, shape (parameters,)
+        Nominal values, the means of the prior.
+    """
     nominal = simulation.nominal
-    pull = np.zeros(nominal.size)
-    for place, parameter in enumerate(simulation.simulator.parameters):
+    inverse_std = np.zeros(nominal.size)
+    for index, parameter in enumerate(simulation.simulator.parameters):
         if parameter.name in tolerance:
-            pull[place] = 1.0 / (tolerance[parameter.name] * abs(parameter.nominal))
-    return pull, nominal
+            inverse_std[index] = 1.0 / (tolerance[parameter.name] * abs(parameter.nominal))
+    return inverse_std, nominal
 
 
-def _jacobian(
+def _compute_jacobian(
     simulation: ExtendedSimulator, target: Target, values: Signal, output: Signal
 ) -> NDArray[np.float64]:
-    """Return how the samples seen change with each scaled value, whitened, shape (seen, parameters)."""
+    """Compute the derivatives of the whitened output with respect to each scaled value.
+
+    Returns
+    -------
+    ndarray, shape (estimation samples, parameters)
+    """
     _, upper = simulation.bounds
     columns = np.empty((int(np.count_nonzero(target.estimation_part)), values.size))
-    for place, scale in enumerate(simulation.scales):
-        step = STEP if values[place] + STEP * scale <= upper[place] else -STEP
-        moved = values.copy()
-        moved[place] += step * scale
-        columns[:, place] = target.select((simulation.simulate(moved) - output) / step)
-    # Where a step explodes nothing is known of that direction.
+    for index, scale in enumerate(simulation.scales):
+        step = (
+            DIFFERENCE_STEP if values[index] + DIFFERENCE_STEP * scale <= upper[index] else -DIFFERENCE_STEP
+        )
+        shifted = values.copy()
+        shifted[index] += step * scale
+        columns[:, index] = target.select((simulation.simulate(shifted) - output) / step)
+    # A simulation that diverges at the shifted value gives no information about that direction.
     return np.nan_to_num(columns, nan=0.0)
 
 
-def _cost(residual: Signal, pulled: Signal) -> float:
+def _compute_cost(residual: Signal, prior_residual: Signal) -> float:
     squares = max(float(residual @ residual), np.finfo(float).tiny)
     if np.isnan(squares):
         return float("inf")
-    return residual.size * float(np.log(squares)) + float(pulled @ pulled)
+    return residual.size * float(np.log(squares)) + float(prior_residual @ prior_residual)

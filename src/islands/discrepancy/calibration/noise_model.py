@@ -1,4 +1,4 @@
-"""Noise that remembers: an autoregression of what is left, its order by BIC, and what that leaves."""
+"""Autoregressive noise model, with its order selected by BIC."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ import scipy
 
 from islands.discrepancy.interfaces.effect import Signal
 
-#: The highest order that is tried.
-HIGHEST = 3
+#: Maximum order of the autoregression.
+MAX_ORDER = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,9 +19,9 @@ class NoiseModel:
     ----------
     coefficients : ndarray, shape (order,)
     variance : float
-        Of ``e``.
+        Variance of the innovations ``e``.
     effective_samples : float
-        Of the residual, as many as know nothing of each other.
+        Effective sample size of the residual.
     """
 
     coefficients: Signal
@@ -30,63 +30,65 @@ class NoiseModel:
 
     @property
     def order(self) -> int:
-        """How far it remembers."""
+        """Order of the autoregression; 0 for white noise."""
         return int(self.coefficients.size)
 
     @property
     def minus_twice_log_likelihood(self) -> float:
-        """Its fit, punished for its order as BIC does; up to a constant of the record."""
+        """Minus twice the log-likelihood plus the BIC penalty on the order, up to an additive constant."""
         return self.effective_samples * float(np.log(self.variance)) + self.order * float(
             np.log(self.effective_samples)
         )
 
     def whiten(self, signal: Signal) -> Signal:
-        """Take out of a signal what this noise remembers."""
+        """Filter a signal with the inverse of the noise model."""
         if self.order == 0:
             return signal
         whitened: Signal = scipy.signal.lfilter(np.concatenate([[1.0], -self.coefficients]), [1.0], signal)
         return whitened
 
 
-def fit_ar_noise(residual: Signal, highest: int = HIGHEST) -> NoiseModel:
-    """Fit an autoregression by least squares; the order is BIC's.
+def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER) -> NoiseModel:
+    """Fit an autoregression by least squares and select its order by BIC.
 
     Parameters
     ----------
     residual : ndarray, shape (samples,)
-        Of one recording, without gaps.
+        Residual of a single recording without gaps.
+    max_order : int
+        Maximum order of the autoregression.
     """
-    found: NoiseModel | None = None
+    best: NoiseModel | None = None
     n = residual.size
-    if np.isnan(residual).any():  # of a simulation that explodes
+    if np.isnan(residual).any():  # the simulation has diverged
         return NoiseModel(np.zeros(0), float("inf"), n)
-    later = residual[highest:]
-    # The same equations for every order: all lags' inner products at once.
-    lagged = np.column_stack([residual[highest - lag : n - lag] for lag in range(1, highest + 1)])
+    later = residual[max_order:]
+    # All orders use the same equations, so that the inner products of all lags are computed once.
+    lagged = np.column_stack([residual[max_order - lag : n - lag] for lag in range(1, max_order + 1)])
     gram, moment, energy = lagged.T @ lagged, lagged.T @ later, float(later @ later)
-    for order in range(highest + 1):
+    for order in range(max_order + 1):
         coefficients: Signal = np.zeros(0)
-        left = energy
+        remaining = energy
         if order:
             coefficients = np.asarray(np.linalg.lstsq(gram[:order, :order], moment[:order], rcond=None)[0])
-            left = energy - float(coefficients @ moment[:order])
-        variance = max(left / later.size, np.finfo(float).tiny)
-        tried = NoiseModel(coefficients, variance, n)
-        if found is None or tried.minus_twice_log_likelihood < found.minus_twice_log_likelihood:
-            found = tried
-    assert found is not None
-    return found
+            remaining = energy - float(coefficients @ moment[:order])
+        variance = max(remaining / later.size, np.finfo(float).tiny)
+        candidate = NoiseModel(coefficients, variance, n)
+        if best is None or candidate.minus_twice_log_likelihood < best.minus_twice_log_likelihood:
+            best = candidate
+    assert best is not None
+    return best
 
 
 def white_noise(mean_square: float, samples: float) -> NoiseModel:
-    """Return noise that does not remember."""
+    """Return a model of white noise, given its mean square and the effective sample size."""
     return NoiseModel(np.zeros(0), max(mean_square, np.finfo(float).tiny), samples)
 
 
-def effective_samples(residual: Signal) -> float:
-    """Return how many samples that know nothing of each other a residual is worth: n over the sum of rho^2.
+def estimate_effective_samples(residual: Signal) -> float:
+    """Estimate the effective sample size of a residual: n over the sum of rho^2, and at least 10.
 
-    Bartlett's: the variance of a mean square, of a stationary normal residual.
+    Bartlett's formula for the variance of the mean square of a stationary normal residual.
     """
     n = residual.size
     centred = residual - residual.mean()

@@ -1,4 +1,4 @@
-"""Preparation: whether a record can be analysed, which part of it, at which scales, and for which effects."""
+"""Preparation of a diagnosis: checks of the record, estimation part, context and applicable effects."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,11 +14,11 @@ from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError, SettingsError
 
-#: Part of the record that nothing but the gain ever sees: its end.
-LOCKED = 0.25
+#: Fraction of the record, at its end, that is used for nothing but the hold-out gain.
+HOLDOUT_FRACTION = 0.25
 
-#: The fewest samples that are worth an analysis.
-FEWEST = 200
+#: Minimum number of samples of a record.
+MIN_SAMPLES = 200
 
 
 def select_effects(
@@ -27,7 +27,7 @@ def select_effects(
     tolerance: Mapping[str, float],
     catalogue: Sequence[Effect] = EFFECTS,
 ) -> list[Effect]:
-    """Return the effects of a catalogue that can enter a simulation and that a record could show.
+    """Return the effects of a catalogue that the simulator supports and the record can show.
 
     Raises
     ------
@@ -35,18 +35,18 @@ def select_effects(
         Two effects of the catalogue have the same name.
     """
     names = [effect.name for effect in catalogue]
-    if twice := sorted({name for name in names if names.count(name) > 1}):
+    if duplicates := sorted({name for name in names if names.count(name) > 1}):
         raise SettingsError(
-            f"effects need different names, and {', '.join(twice)} is given twice: rename one"
+            f"effects need different names, and {', '.join(duplicates)} is given twice: rename one"
         )
-    trusted = {each.name for each in simulator.parameters if not each.initial} <= tolerance.keys()
+    has_full_prior = {each.name for each in simulator.parameters if not each.initial} <= tolerance.keys()
     effects = [
         effect
         for effect in catalogue
         if effect.site in simulator.sites
         and (effect.site != Site.CORE or effect.name in simulator.supported_effects)
         and effect.name not in simulator.built_in_effects
-        and (trusted or not effect.is_gain)
+        and (has_full_prior or not effect.is_gain)
         and effect.is_applicable(context)
     ]
     effects += simulator.state_effects
@@ -54,7 +54,13 @@ def select_effects(
 
 
 def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapping[str, float]:
-    """Return tolerances, once it is known that the simulation has such parameters."""
+    """Return a copy of the tolerances after checking them.
+
+    Raises
+    ------
+    SettingsError
+        A tolerance is not between 0 and 1, or the simulator has no parameter of that name.
+    """
     names = [parameter.name for parameter in simulator.parameters]
     for name, value in tolerance.items():
         if name not in names:
@@ -62,30 +68,39 @@ def validate_prior(tolerance: Mapping[str, float], simulator: Simulator) -> Mapp
                 f"{simulator.name} has no parameter {name!r}: it has {', '.join(names) or 'none'}"
             )
         if not 0.0 < value < 1.0:
-            raise SettingsError(f"the tolerance of {name} is a part of its value, like 0.02; got {value:g}")
+            raise SettingsError(
+                f"the tolerance of {name} is a fraction of its value, such as 0.02; got {value:g}"
+            )
     return dict(tolerance)
 
 
 def estimation_part(record: Dataset) -> Dataset:
-    """Return the part of a record that estimation may see: its end is locked away."""
-    return record[: int((1.0 - LOCKED) * record.samples)]
+    """Return the part of a record that is used for estimation, without the hold-out part at its end."""
+    return record[: int((1.0 - HOLDOUT_FRACTION) * record.samples)]
 
 
 def count_fitted_samples(record: Dataset) -> int:
-    """Return how many samples estimation sees, once it is known that the record can be used."""
-    if record.samples < FEWEST:
+    """Return the number of samples used for estimation, after checking that the record is usable.
+
+    Raises
+    ------
+    RecordError
+        The record is too short, has several segments, gaps, a constant signal or a channel equal to the
+        input.
+    """
+    if record.samples < MIN_SAMPLES:
         raise RecordError(
-            f"the record has {record.samples} samples, and a diagnosis takes {FEWEST} at least: give a "
+            f"the record has {record.samples} samples, and a diagnosis takes {MIN_SAMPLES} at least: give a "
             "longer one"
         )
     if len(record.segments) > 1:
-        raise RecordError("the record is several recordings: diagnose one after the other")
+        raise RecordError("the record consists of several recordings: diagnose them one by one")
     if np.isnan(record.y).any():
         raise RecordError("the measured output has gaps: repair them, or select rows without any")
     fitted = estimation_part(record).samples
     for name, signal in zip((*record.input_names, record.output_name), (*record.u.T, record.y), strict=True):
         if np.ptp(signal[:fitted]) == 0.0:
-            raise RecordError(f"column {name} is constant: a diagnosis needs signals that move")
+            raise RecordError(f"column {name} is constant: a diagnosis needs signals that vary")
     for name, signal in zip(record.input_names[1:], record.u.T[1:], strict=True):
         if np.array_equal(signal, record.u[:, 0]):
             raise RecordError(f"channel {name} is the input itself: leave it out")
@@ -93,13 +108,24 @@ def count_fitted_samples(record: Dataset) -> int:
 
 
 def make_context(record: Dataset, simulator: Simulator, fitted: int) -> SimulationContext:
-    """Return what drives a simulation, and the scales of a record."""
+    """Make the context of a simulation: its input, and the scales of the record.
+
+    Parameters
+    ----------
+    fitted : int
+        Number of samples used for estimation.
+
+    Raises
+    ------
+    RecordError
+        The simulation diverges on the input.
+    """
     names, units = record.input_names, record.input_units
     context = SimulationContext(
         u=np.ascontiguousarray(record.u[:, 0]),
         dt=record.dt,
         channels={
-            name: np.ascontiguousarray(record.u[:, place]) for place, name in enumerate(names) if place
+            name: np.ascontiguousarray(record.u[:, index]) for index, name in enumerate(names) if index
         },
         units=dict(zip(names[1:], units[1:], strict=True)),
         input_peak=float(np.max(np.abs(record.u[:, 0]))),

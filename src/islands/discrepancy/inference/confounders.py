@@ -1,8 +1,8 @@
-"""Likeness: a cause that does the same as another on the average, and what tells the two apart.
+"""Confounders: effects with the same mean response as another one, and the evidence that separates both.
 
-An input that moves in slips follows a play of half the breakaway on the average. When each slip comes depends
-on all before it, so that no simulation of it is in step with a record. But how its neighbours go together is
-known: where the input moves slowly, samples of the same slip are out by nearly the same.
+The mean response of stick-slip motion is a play of half the breakaway. The instant of each slip depends on
+all earlier ones, so that no simulation predicts it. The serial correlation of the slips is known, though:
+while the input moves slowly, all samples of one slip have nearly the same error.
 """
 
 from dataclasses import dataclass
@@ -15,74 +15,76 @@ from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.screening import transfer_parameters
 from islands.discrepancy.interfaces.effect import Effect, Signal
 
-#: Parts of its strength that the other is simulated with: each comes at instants of its own.
-INSTANTS = tuple(np.linspace(0.9, 1.1, 9).tolist())
+#: Factors on the strength of the confounder in its simulations; each moves the slips to other instants.
+STRENGTH_FACTORS = tuple(np.linspace(0.9, 1.1, 9).tolist())
 
-#: Parts of what the other leaves beside that may still be there after calibration, one as likely as another.
-STAYS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+#: Fractions of the expected serial correlation that may remain after calibration, with equal prior
+#: probability.
+REMAINING_FRACTIONS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 
-#: Shifts of a residual, in parts of its length, that are too small to be another one.
-NEAR = 0.05
+#: Circular shifts below this fraction of the length are too small to give an independent signal.
+MIN_SHIFT_FRACTION = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Confounder:
-    """Another cause in the place of one.
+    """An effect with the same mean response as an effect of a fit.
 
     Attributes
     ----------
     effect : Effect
-        The other cause.
+        The confounder.
     factor : float
-        Its values are so many times the one's.
-    gained : float
-        What the residual says for it, in minus twice the log-likelihood; below zero against it.
-    beside : float
-        Mean square of what it does beside.
+        Factor from the values of the effect to those of the confounder.
+    score_gain : float
+        Evidence of the residual for the confounder, in minus twice the log-likelihood; negative against it.
+    excess_mean_square : float
+        Mean square of the part of its response that the effect does not have.
     """
 
     effect: Effect
     factor: float
-    gained: float
-    beside: float
+    score_gain: float
+    excess_mean_square: float
 
 
 def find_confounder(fit: CalibrationResult, effect: Effect, target: Target) -> Confounder | None:
-    """Return what an effect of a fit is like on the average, if there is such."""
+    """Return the confounder of an effect of a fit; None if it has none or the fit includes both."""
     simulation = fit.simulation
     if effect.confounded_with is None or effect.confounded_with[0] in simulation.effects:
         return None
-    other, times = effect.confounded_with
-    rest = (each for each in simulation.effects if each is not effect)
-    there = simulation.with_effects(catalogue_order((*rest, other)))
-    values = transfer_parameters(fit.values, simulation, there)
-    beside, together = 0.0, np.zeros(np.count_nonzero(target.estimation_part) - 1)
-    for part in INSTANTS:
-        values[there.get_slice(other)] = part * times * fit.values[simulation.get_slice(effect)]
-        left = (there.simulate(values) - fit.output)[target.estimation_part]
-        beside += float(np.mean(left**2)) / len(INSTANTS)
-        together += _neighbours(left) / len(INSTANTS)
-    seen = _neighbours((target.y - fit.output)[target.estimation_part])
-    return Confounder(other, times, _told(seen - seen.mean(), together - together.mean()), beside)
+    other, factor = effect.confounded_with
+    remaining = (each for each in simulation.effects if each is not effect)
+    replaced = simulation.with_effects(catalogue_order((*remaining, other)))
+    values = transfer_parameters(fit.values, simulation, replaced)
+    excess_mean_square, expected = 0.0, np.zeros(np.count_nonzero(target.estimation_part) - 1)
+    for strength in STRENGTH_FACTORS:
+        values[replaced.get_slice(other)] = strength * factor * fit.values[simulation.get_slice(effect)]
+        excess = (replaced.simulate(values) - fit.output)[target.estimation_part]
+        excess_mean_square += float(np.mean(excess**2)) / len(STRENGTH_FACTORS)
+        expected += _multiply_neighbours(excess) / len(STRENGTH_FACTORS)
+    measured = _multiply_neighbours((target.y - fit.output)[target.estimation_part])
+    ratio = _log_likelihood_ratio(measured - measured.mean(), expected - expected.mean())
+    return Confounder(other, factor, ratio, excess_mean_square)
 
 
-def _neighbours(signal: Signal) -> Signal:
+def _multiply_neighbours(signal: Signal) -> Signal:
     return np.array(signal[1:] * signal[:-1])
 
 
-def _told(seen: Signal, expected: Signal) -> float:
-    """Return by how much likelier it is to see what is expected than nothing of it.
+def _log_likelihood_ratio(measured: Signal, expected: Signal) -> float:
+    """Return twice the log-likelihood ratio of the expected signal being present against absent.
 
-    Its spread is that of the same signal shifted in time.
+    The standard deviation of the estimated amplitude is that over circular shifts of the measured signal.
     """
     size = float(expected @ expected)
     if size == 0.0:
         return 0.0
-    spectrum = np.conj(np.fft.rfft(expected)) * np.fft.rfft(seen)
-    shifted = np.fft.irfft(spectrum, seen.size) / size
-    near = int(NEAR * seen.size)
-    spread = float(np.std(shifted[near:-near]))
-    if spread == 0.0:
+    spectrum = np.conj(np.fft.rfft(expected)) * np.fft.rfft(measured)
+    amplitudes = np.fft.irfft(spectrum, measured.size) / size
+    min_shift = int(MIN_SHIFT_FRACTION * measured.size)
+    std = float(np.std(amplitudes[min_shift:-min_shift]))
+    if std == 0.0:
         return 0.0
-    stays = (2 * STAYS * shifted[0] - STAYS**2) / spread**2
-    return 2.0 * float(scipy.special.logsumexp(stays / 2) - np.log(STAYS.size))
+    ratios = (2 * REMAINING_FRACTIONS * amplitudes[0] - REMAINING_FRACTIONS**2) / std**2
+    return 2.0 * float(scipy.special.logsumexp(ratios / 2) - np.log(REMAINING_FRACTIONS.size))

@@ -1,4 +1,4 @@
-"""The decisive experiment: what would tell apart two causes that a record cannot."""
+"""Experiment design: an experiment that discriminates between causes that the record cannot distinguish."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,47 +9,62 @@ from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResul
 from islands.discrepancy.inference.screening import ScreenedEffect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 
-#: How many standard deviations apart two causes have to be for a choice at twenty to one, and how much faster
-#: an excitation may get.
-NEEDED, FASTER = 2.7, (2, 4, 8, 16)
+#: Distance of two simulations in standard deviations of the noise that gives odds of twenty to one.
+REQUIRED_DISTANCE = 2.7
+
+#: Factors by which the excitation may be faster.
+SPEED_FACTORS = (2, 4, 8, 16)
 
 
-def suggest_experiment(best: CalibrationResult, instead: Sequence[ScreenedEffect]) -> str:
-    """Say what would tell a simulation from the nearest one with another cause.
+def suggest_experiment(best: CalibrationResult, alternatives: Sequence[ScreenedEffect]) -> str:
+    """Suggest an experiment that discriminates between a simulation and its alternatives.
 
-    The same input is played faster, each simulation as it was fitted: what they differ by then, in noise.
+    Each fitted simulation is driven by the same input at higher speeds, and the difference of the outputs is
+    compared with the noise.
+
+    Returns
+    -------
+    str
+        One sentence for each alternative; empty if the record distinguishes all of them.
     """
-    sayings = []
-    for rung in instead:
-        ours = ", ".join(effect.name for effect in best.simulation.effects)
-        here = _apart(best, rung.fit, 1)
-        if here >= NEEDED:
+    suggestions = []
+    for alternative in alternatives:
+        names = ", ".join(effect.name for effect in best.simulation.effects)
+        distance = _compute_distance(best, alternative.fit, 1)
+        if distance >= REQUIRED_DISTANCE:
             continue
-        needs = next((times for times in FASTER if _apart(best, rung.fit, times) >= NEEDED), None)
-        longer = (NEEDED / max(here, 1e-3)) ** 2
+        speed = next(
+            (
+                factor
+                for factor in SPEED_FACTORS
+                if _compute_distance(best, alternative.fit, factor) >= REQUIRED_DISTANCE
+            ),
+            None,
+        )
+        length = (REQUIRED_DISTANCE / max(distance, 1e-3)) ** 2
         advice = (
-            f"play the same input {needs} times as fast, sampled as often for each swing"
-            if needs is not None
-            else f"a record {longer:.0f} times as long would do"
-            if longer < 1000
-            else "no faster input of this form tells them apart; measure between the two places instead"
+            f"play the same input {speed} times as fast, with as many samples per cycle"
+            if speed is not None
+            else f"a record {length:.0f} times as long is enough"
+            if length < 1000
+            else "no faster input of this form distinguishes them; measure between the two places instead"
         )
-        sayings.append(
-            f"{ours} or {rung.effect.name}: this record's signal-to-noise for telling them is {here:.1f}, it "
-            f"takes {NEEDED}: {advice}"
+        suggestions.append(
+            f"{names} or {alternative.effect.name}: this record separates them by {distance:.1f} standard "
+            f"deviations of the noise, and {REQUIRED_DISTANCE} are needed: {advice}"
         )
-    return "; ".join(sayings)
+    return "; ".join(suggestions)
 
 
-def _apart(one: CalibrationResult, other: CalibrationResult, times: int) -> float:
-    """Return how many standard deviations of noise two simulations are apart when all happens faster."""
-    signals = [
+def _compute_distance(one: CalibrationResult, other: CalibrationResult, speed: int) -> float:
+    """Return the distance of two simulations at a higher speed, in standard deviations of the noise."""
+    outputs = [
         ExtendedSimulator(
             fit.simulation.simulator,
             fit.simulation.effects,
-            replace(fit.simulation.context, dt=fit.simulation.context.dt / times),
+            replace(fit.simulation.context, dt=fit.simulation.context.dt / speed),
         ).simulate(fit.values)
         for fit in (one, other)
     ]
-    difference = one.noise.whiten(signals[0] - signals[1])
+    difference = one.noise.whiten(outputs[0] - outputs[1])
     return float(np.sqrt(np.sum(difference**2) / one.noise.variance))

@@ -1,4 +1,4 @@
-"""What an extension is worth: errors before and after on samples that nothing else has seen."""
+"""Hold-out validation: errors of a simulation with and without effects on samples that were not fitted."""
 
 from dataclasses import dataclass, replace
 
@@ -8,15 +8,24 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
 from islands.discrepancy.interfaces.effect import Signal
 
-#: Blocks of a record, parts of them that are left out of a fit in turn, and draws of a bootstrap.
-BLOCKS, FOLDS, DRAWS = 36, 3, 1000
+#: Number of blocks of a record, the units of the bootstrap and the cross-validation.
+BLOCKS = 36
 
-#: Quantile of the held-out gain that has to be above zero.
-LOW = 0.05
+#: Number of folds of the cross-validation.
+FOLDS = 3
 
-#: An event, such as a peak that is cut, comes in few blocks, and a bootstrap may draw none of them. It is
-#: enough that blocks gain so much, in minus twice the log-likelihood, and lose no more than a part of it.
-EVENT, LOST = 20.0, 0.1
+#: Number of bootstrap samples.
+BOOTSTRAP_SAMPLES = 1000
+
+#: Quantile of the bootstrapped gain that serves as its lower bound.
+LOWER_QUANTILE = 0.05
+
+#: Gain that is accepted without a bootstrap, in minus twice the log-likelihood. An event such as a clipped
+#: peak falls into few blocks, and a bootstrap sample may contain none of them.
+MIN_EVENT_GAIN = 20.0
+
+#: Largest loss of other blocks for which that holds, as a fraction of the gains.
+MAX_LOSS_FRACTION = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,17 +38,17 @@ class ErrorMetrics:
 
 @dataclass(frozen=True, slots=True)
 class HoldoutGain:
-    """Errors over the locked part of a record.
+    """Errors over the hold-out part of a record.
 
     Attributes
     ----------
     before, after, noise_floor : ErrorMetrics
-        Of the simulation calibrated without the effects, of the one with them, and of noise alone: an upper
-        bound.
+        Errors of the simulation calibrated without the effects, of the one with them, and of noise alone (an
+        upper bound).
     reduction_percent : float
-        By how much the RMSE is smaller.
+        Reduction of the RMSE.
     ci95 : tuple of float
-        Of that, by a bootstrap of blocks.
+        95 % confidence interval of the reduction, from a block bootstrap.
     """
 
     before: ErrorMetrics
@@ -50,71 +59,84 @@ class HoldoutGain:
 
 
 def measure_gain(
-    record: Dataset, before: Signal, after: Signal, locked: slice, floor: float, rng: np.random.Generator
+    record: Dataset, before: Signal, after: Signal, holdout: slice, floor: float, rng: np.random.Generator
 ) -> HoldoutGain:
-    """Measure a gain, once."""
-    y = record.y[locked]
-    spread = float(np.ptp(y)) or 1.0
-    errors = [np.array(y - simulated[locked]) for simulated in (before, after)]
-    squares = [_by_block(each**2, BLOCKS) for each in errors]
-    drawn = rng.integers(0, BLOCKS, (DRAWS, BLOCKS))
+    """Measure the reduction of the error on the hold-out part.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (samples,)
+        Outputs of the simulation without and with the effects, over the whole record.
+    holdout : slice
+        The hold-out part.
+    floor : float
+        RMSE of noise alone.
+    """
+    y = record.y[holdout]
+    output_range = float(np.ptp(y)) or 1.0
+    errors = [np.array(y - simulated[holdout]) for simulated in (before, after)]
+    squares = [_sum_by_block(each**2, BLOCKS) for each in errors]
+    drawn = rng.integers(0, BLOCKS, (BOOTSTRAP_SAMPLES, BLOCKS))
     reductions = 100 * (1 - np.sqrt(squares[1][drawn].sum(axis=1) / squares[0][drawn].sum(axis=1)))
     low, high = np.quantile(reductions, [0.025, 0.975])
     rmse = [float(np.sqrt(np.mean(each**2))) for each in errors]
-    mape = [100 * float(np.mean(np.abs(each))) / spread for each in errors]
-    # Of normal noise the mean absolute value is sqrt(2 / pi) of the standard deviation.
-    quiet = ErrorMetrics(floor, 100 * floor * float(np.sqrt(2 / np.pi)) / spread)
+    mape = [100 * float(np.mean(np.abs(each))) / output_range for each in errors]
+    # The mean absolute value of normal noise is sqrt(2 / pi) of its standard deviation.
+    noise_floor = ErrorMetrics(floor, 100 * floor * float(np.sqrt(2 / np.pi)) / output_range)
     return HoldoutGain(
         ErrorMetrics(rmse[0], mape[0]),
         ErrorMetrics(rmse[1], mape[1]),
-        quiet,
+        noise_floor,
         100 * (1 - rmse[1] / rmse[0]),
         (float(low), float(high)),
     )
 
 
-def measure_holdout_gain(
+def cross_validate_gain(
     before: CalibrationResult,
-    as_given: bool,
+    keep_values: bool,
     after: CalibrationResult,
     target: Target,
     fitted: int,
     rng: np.random.Generator,
 ) -> float:
-    """Return a low bound of what an extension gains on blocks that both were fitted without.
+    """Return a lower bound on the gain of an extension over blocks that were left out of the fits.
 
-    In minus twice the log-likelihood. The first block is always fitted: the state at the record's beginning
-    is not known otherwise.
+    The unit is minus twice the log-likelihood. The first block is always fitted, since the initial state is
+    unknown otherwise.
 
     Parameters
     ----------
-    as_given : bool
-        What was before keeps its values.
+    keep_values : bool
+        Whether ``before`` keeps its values instead of being calibrated to each fold.
+    fitted : int
+        Number of samples used for estimation.
     """
     block = np.arange(target.y.size) * BLOCKS // fitted
     fold = rng.permutation(np.arange(1, BLOCKS)) % FOLDS
     gains = []
     for each in range(FOLDS):
-        out = np.arange(1, BLOCKS)[fold == each]
-        cut = replace(
-            target, noise=after.noise, estimation_part=target.estimation_part & ~np.isin(block, out)
+        left_out = np.arange(1, BLOCKS)[fold == each]
+        training = replace(
+            target, noise=after.noise, estimation_part=target.estimation_part & ~np.isin(block, left_out)
         )
-        old = before if as_given else calibrate(before.simulation, cut, before.values)
-        new = calibrate(after.simulation, cut, after.values)
-        missed = [after.noise.whiten(target.y - fit.output) ** 2 for fit in (old, new)]
-        gains += [float(np.sum((missed[0] - missed[1])[block == number])) for number in out]
-    worth = after.noise.effective_samples / np.count_nonzero(target.estimation_part)
-    return _low(worth * np.array(gains) / after.noise.variance, rng)
+        old = before if keep_values else calibrate(before.simulation, training, before.values)
+        new = calibrate(after.simulation, training, after.values)
+        squares = [after.noise.whiten(target.y - fit.output) ** 2 for fit in (old, new)]
+        gains += [float(np.sum((squares[0] - squares[1])[block == number])) for number in left_out]
+    weight = after.noise.effective_samples / np.count_nonzero(target.estimation_part)
+    return _bound_gain(weight * np.array(gains) / after.noise.variance, rng)
 
 
-def _low(gains: Signal, rng: np.random.Generator) -> float:
-    won, lost = float(gains[gains > 0.0].sum()), -float(gains[gains < 0.0].sum())
-    if won - lost > EVENT and lost < LOST * won:
-        return won - lost
-    drawn = rng.integers(0, gains.size, (DRAWS, gains.size))
-    return float(np.quantile(gains[drawn].sum(axis=1), LOW))
+def _bound_gain(gains: Signal, rng: np.random.Generator) -> float:
+    """Return a lower bound on the sum of the gains of all blocks."""
+    gain, loss = float(gains[gains > 0.0].sum()), -float(gains[gains < 0.0].sum())
+    if gain - loss > MIN_EVENT_GAIN and loss < MAX_LOSS_FRACTION * gain:
+        return gain - loss
+    drawn = rng.integers(0, gains.size, (BOOTSTRAP_SAMPLES, gains.size))
+    return float(np.quantile(gains[drawn].sum(axis=1), LOWER_QUANTILE))
 
 
-def _by_block(squares: Signal, blocks: int) -> Signal:
+def _sum_by_block(squares: Signal, blocks: int) -> Signal:
     edges = np.linspace(0, squares.size, blocks + 1).astype(int)
     return np.add.reduceat(squares, edges[:-1])

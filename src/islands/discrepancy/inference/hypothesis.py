@@ -1,4 +1,4 @@
-"""An explanation: a simulation with effects that a record asks for, and what could stand in their place."""
+"""Hypothesis: a simulation with the effects that explain a record, and the alternatives to each effect."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
 from islands.discrepancy.effects import catalogue_order
 from islands.discrepancy.inference.screening import (
-    EQUAL,
+    SCORE_TIE,
     ScreenedEffect,
     bic_penalty,
     screen_effects,
@@ -20,17 +20,17 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """A simulation with the effects that explain a record best.
+    """A calibrated simulation with a set of effects.
 
     Attributes
     ----------
     fit : CalibrationResult
     cost : float
-        Its score with every effect's values paid for: less is better.
+        Score of the fit plus the BIC penalties of its effects; less is better.
     effects : tuple of Effect
-        The most important first.
+        The effects, the most important first.
     alternatives : tuple of Alternatives
-        Of each effect; empty where they were not asked for.
+        Alternatives to each effect; empty if they were not computed.
     """
 
     fit: CalibrationResult
@@ -40,57 +40,58 @@ class Hypothesis:
 
     @property
     def rank(self) -> int:
-        """Its cost, to what can be told apart: equal ones stand in the order in which they were found."""
-        return round(self.cost / EQUAL)
+        """The cost in units of `SCORE_TIE`; hypotheses of equal rank keep their order."""
+        return round(self.cost / SCORE_TIE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alternatives:
-    """What could stand in the place of an effect.
+    """Effects that could replace one effect of a hypothesis.
 
     Attributes
     ----------
     without : Hypothesis
-        All the others, fitted anew.
+        The hypothesis without the effect, refitted.
     screened : sequence of ScreenedEffect
-        Each effect beside them, the best first.
+        Every other effect added to that hypothesis, the best first.
     """
 
     without: Hypothesis
     screened: Sequence[ScreenedEffect]
 
 
-def with_effect(before: Hypothesis, rung: ScreenedEffect) -> Hypothesis:
-    """Return an explanation with a rung's effect in it."""
-    cost = before.cost - rung.score_gain(before.fit)
-    return Hypothesis(rung.fit, cost, (*before.effects, rung.effect))
+def with_effect(hypothesis: Hypothesis, screened: ScreenedEffect) -> Hypothesis:
+    """Return a hypothesis with one more effect."""
+    cost = hypothesis.cost - screened.score_gain(hypothesis.fit)
+    return Hypothesis(screened.fit, cost, (*hypothesis.effects, screened.effect))
 
 
-def refit(found: Hypothesis, target: Target) -> Hypothesis:
-    """Return an explanation, fitted anew where that is better."""
-    fit = calibrate(found.fit.simulation, target, found.fit.values)
-    other = Hypothesis(fit, found.cost + fit.score - found.fit.score, found.effects)
-    return other if other.rank < found.rank else found
+def refit(hypothesis: Hypothesis, target: Target) -> Hypothesis:
+    """Calibrate a hypothesis to a target, and return it unchanged if that does not improve its rank."""
+    fit = calibrate(hypothesis.fit.simulation, target, hypothesis.fit.values)
+    refitted = Hypothesis(fit, hypothesis.cost + fit.score - hypothesis.fit.score, hypothesis.effects)
+    return refitted if refitted.rank < hypothesis.rank else hypothesis
 
 
-def without_effect(found: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
-    """Return an explanation without one of its effects, fitted anew."""
-    fit = found.fit
-    left = tuple(each for each in found.effects if each is not effect)
-    simulation = fit.simulation.with_effects(catalogue_order(left))
-    alone = calibrate(simulation, target, transfer_parameters(fit.values, fit.simulation, simulation))
-    if not np.isfinite(alone.score):  # with the others' values it explodes: the effect held it in check
-        alone = calibrate(simulation, target, simulation.nominal)
-    return Hypothesis(alone, alone.score + (found.cost - fit.score) - bic_penalty(effect, fit), left)
+def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hypothesis:
+    """Return a hypothesis without one of its effects, refitted."""
+    fit = hypothesis.fit
+    remaining = tuple(each for each in hypothesis.effects if each is not effect)
+    simulation = fit.simulation.with_effects(catalogue_order(remaining))
+    refitted = calibrate(simulation, target, transfer_parameters(fit.values, fit.simulation, simulation))
+    if not np.isfinite(refitted.score):  # the simulation diverges at these values without the effect
+        refitted = calibrate(simulation, target, simulation.nominal)
+    cost = refitted.score + (hypothesis.cost - fit.score) - bic_penalty(effect, fit)
+    return Hypothesis(refitted, cost, remaining)
 
 
 def find_alternatives(
-    found: Hypothesis, target: Target, effects: Sequence[Effect], spread: ParallelMap = map
+    hypothesis: Hypothesis, target: Target, effects: Sequence[Effect], parallel_map: ParallelMap = map
 ) -> tuple[Alternatives, ...]:
-    """Take each effect out, and try all others in its place."""
-    rivals = []
-    for effect in found.effects:
-        without = without_effect(found, effect, target)
+    """Remove each effect in turn and screen all others as its replacement."""
+    alternatives = []
+    for effect in hypothesis.effects:
+        without = without_effect(hypothesis, effect, target)
         others = [each for each in effects if each not in without.effects]
-        rivals.append(Alternatives(without, screen_effects(without.fit, target, others, spread)))
-    return tuple(rivals)
+        alternatives.append(Alternatives(without, screen_effects(without.fit, target, others, parallel_map)))
+    return tuple(alternatives)

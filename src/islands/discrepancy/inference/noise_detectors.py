@@ -1,4 +1,4 @@
-"""Detectors of what sampling and noise do to a record: quantisation, outliers, coloured noise, and others."""
+"""Detectors of sampling and noise artefacts: quantisation, held samples, outliers, coloured noise."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
 @dataclass(frozen=True, slots=True)
 class NoiseFinding:
-    """What a detector has found.
+    """Result of a detector.
 
     Attributes
     ----------
     parameters : mapping
         Values by name, each with its unit.
     score_gain : float
-        Minus twice the log-likelihood that naming it is worth, paid for as BIC does.
+        Decrease of minus twice the log-likelihood, less the BIC penalty.
     """
 
     parameters: Mapping[str, tuple[float, str]]
@@ -27,20 +27,21 @@ class NoiseFinding:
 
 @dataclass(frozen=True, slots=True)
 class NoiseDetector:
-    """An entry of the catalogue that changes no simulation.
+    """An entry of the catalogue that describes sampling or noise and does not change the simulation.
 
     Attributes
     ----------
     name : str
     summary : str
-        What it is, in one sentence.
+        One sentence with the form of the artefact, without a period.
     family : str
     detect : callable
-        ``(y, residual, scene) -> Detection or None``: the measured output and what the best simulation leaves
-        of it, both over the fitted samples.
+        ``(y, residual, context) -> NoiseFinding or None``: the measured output and the residual of the best
+        simulation, both over the estimation part; None if nothing is detected.
     source : str
+        Publication that describes the artefact.
     excluded_by : tuple of str
-        Detectors before it that leave the same traces.
+        Earlier detectors whose artefacts have the same symptoms.
     similar_to, distinguished_by : str
         As in `Effect`.
     """
@@ -55,31 +56,31 @@ class NoiseDetector:
     distinguished_by: str = ""
 
 
-#: Samples for each level from which on the levels are a lattice.
-_CROWDED = 3.0
+#: Minimum number of samples per distinct output value at which the values count as quantisation levels.
+_MIN_SAMPLES_PER_LEVEL = 3.0
 
 #: Median absolute deviation of normal noise in standard deviations.
 _MAD = 0.6745
 
-#: Least step of a lattice that matters, relative to the standard deviation of the residual.
-_QUANTISATION_COARSE = 0.5
+#: Minimum quantisation step that matters, in standard deviations of the residual.
+_MIN_QUANTISATION_STEP = 0.5
 
 
 def _detect_quantisation(y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
     levels = np.unique(y)
-    if levels.size < 3 or y.size < _CROWDED * levels.size:
+    if levels.size < 3 or y.size < _MIN_SAMPLES_PER_LEVEL * levels.size:
         return None
     step = float(np.min(np.diff(levels)))
-    places = (y - levels[0]) / step
-    off = float(np.max(np.abs(places - np.round(places))))
-    if off > 1e-3 or step < _QUANTISATION_COARSE * float(np.std(residual)):
+    multiples = (y - levels[0]) / step
+    deviation = float(np.max(np.abs(multiples - np.round(multiples))))
+    if deviation > 1e-3 or step < _MIN_QUANTISATION_STEP * float(np.std(residual)):
         return None
     return NoiseFinding({"step": (step, context.output_unit)}, float(y.size))
 
 
 QUANTISATION = NoiseDetector(
     "quantisation",
-    "The output lies on a lattice: the converter's or the file's resolution",
+    "The output is quantised to the resolution of the converter or the file",
     "data",
     _detect_quantisation,
     "Widrow and Kollar, Quantization Noise, section 1",
@@ -88,18 +89,21 @@ QUANTISATION = NoiseDetector(
 )
 
 
-#: Equal neighbours that make a burst, and bursts that are no chance.
-_HELD_SAMPLES_RUN, _HELD_SAMPLES_BURSTS = 3, 2
+#: Minimum number of equal successive samples in a burst.
+_MIN_BURST_LENGTH = 3
+
+#: Minimum number of bursts.
+_MIN_BURSTS = 2
 
 
 def _detect_held_samples(y: Signal, _residual: Signal, context: SimulationContext) -> NoiseFinding | None:
-    if y.size >= _CROWDED * np.unique(y).size:
+    if y.size >= _MIN_SAMPLES_PER_LEVEL * np.unique(y).size:
         return None
-    same = np.concatenate([[False], np.diff(y) == 0.0, [False]])
-    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    is_repeated = np.concatenate([[False], np.diff(y) == 0.0, [False]])
+    edges = np.flatnonzero(np.diff(is_repeated.astype(np.int8)))
     lengths = edges[1::2] - edges[::2] + 1
-    bursts = lengths[lengths >= _HELD_SAMPLES_RUN]
-    if bursts.size < _HELD_SAMPLES_BURSTS:
+    bursts = lengths[lengths >= _MIN_BURST_LENGTH]
+    if bursts.size < _MIN_BURSTS:
         return None
     share = float(np.sum(bursts - 1)) / y.size
     return NoiseFinding(
@@ -110,7 +114,7 @@ def _detect_held_samples(y: Signal, _residual: Signal, context: SimulationContex
 
 HELD_SAMPLES = NoiseDetector(
     "held-samples",
-    "Bursts of repeated values: samples that were lost, and the last one sent again",
+    "Bursts of repeated values: lost samples were replaced by the last received one",
     "data",
     _detect_held_samples,
     "Little and Rubin, Statistical Analysis with Missing Data",
@@ -119,24 +123,28 @@ HELD_SAMPLES = NoiseDetector(
 )
 
 
-#: Scaled median deviations beyond which a sample is none of the others, and the least number of them.
-_OUTLIERS_FAR, _OUTLIERS_LEAST = 5.5, 3
+#: Distance beyond which a sample is an outlier, in robust standard deviations.
+_OUTLIER_DISTANCE = 5.5
+
+#: Minimum number of outliers.
+_MIN_OUTLIERS = 3
 
 
 def _detect_outliers(_y: Signal, residual: Signal, context: SimulationContext) -> NoiseFinding | None:
-    left = fit_ar_noise(residual).whiten(residual)
-    scale = float(np.median(np.abs(left - np.median(left)))) / _MAD
+    whitened = fit_ar_noise(residual).whiten(residual)
+    scale = float(np.median(np.abs(whitened - np.median(whitened)))) / _MAD
     if scale == 0.0:
         return None
-    far = np.abs(left) / scale
-    count = int(np.count_nonzero(far > _OUTLIERS_FAR))
-    if count < _OUTLIERS_LEAST:
+    distance = np.abs(whitened) / scale
+    count = int(np.count_nonzero(distance > _OUTLIER_DISTANCE))
+    if count < _MIN_OUTLIERS:
         return None
-    usual = left[far <= _OUTLIERS_FAR]
-    n = left.size
-    gained = n * float(np.log(np.mean(left**2)) - np.log(np.mean(usual**2))) - 2 * count * float(np.log(n))
-    size = float(np.median(np.abs(left[far > _OUTLIERS_FAR])))
-    return NoiseFinding({"share": (count / n, ""), "size": (size, context.output_unit)}, gained)
+    inliers = whitened[distance <= _OUTLIER_DISTANCE]
+    n = whitened.size
+    decrease = n * float(np.log(np.mean(whitened**2)) - np.log(np.mean(inliers**2)))
+    score_gain = decrease - 2 * count * float(np.log(n))
+    size = float(np.median(np.abs(whitened[distance > _OUTLIER_DISTANCE])))
+    return NoiseFinding({"share": (count / n, ""), "size": (size, context.output_unit)}, score_gain)
 
 
 OUTLIERS = NoiseDetector(
@@ -151,32 +159,32 @@ OUTLIERS = NoiseDetector(
 )
 
 
-#: Strengths that are tried, relative to the largest output.
-_HETEROSCEDASTIC_NOISE_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
+#: Candidate strengths, relative to the largest absolute output.
+_HETEROSCEDASTIC_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
 
 
 def _detect_heteroscedastic_noise(
     y: Signal, residual: Signal, context: SimulationContext
 ) -> NoiseFinding | None:
     noise = fit_ar_noise(residual)
-    left = noise.whiten(residual)
+    whitened = noise.whiten(residual)
     size = np.abs(y) / np.max(np.abs(y))
-    n = left.size
-    # A few outliers at large outputs look the same: squares are limited to four deviations.
-    scale = float(np.median(np.abs(left))) / _MAD
-    if scale == 0.0:  # most of it is no noise at all
+    n = whitened.size
+    # A few outliers at large outputs have the same effect, so that squares are clipped at four deviations.
+    scale = float(np.median(np.abs(whitened))) / _MAD
+    if scale == 0.0:  # most of the residual is exactly zero
         return None
-    squares = np.minimum(left**2, (4 * scale * (1.0 + size)) ** 2)
+    squares = np.minimum(whitened**2, (4 * scale * (1.0 + size)) ** 2)
     costs = [
         n * float(np.log(np.mean(squares / (1.0 + k * size) ** 2))) + 2 * float(np.sum(np.log1p(k * size)))
-        for k in _HETEROSCEDASTIC_NOISE_STRENGTHS
+        for k in _HETEROSCEDASTIC_STRENGTHS
     ]
     best = int(np.argmin(costs))
-    gained = costs[0] - costs[best] - float(np.log(n))
-    if gained <= 0.0:
+    score_gain = costs[0] - costs[best] - float(np.log(n))
+    if score_gain <= 0.0:
         return None
-    strength = float(_HETEROSCEDASTIC_NOISE_STRENGTHS[best]) / float(np.max(np.abs(y)))
-    return NoiseFinding({"k": (strength, f"1/{context.output_unit}")}, gained)
+    strength = float(_HETEROSCEDASTIC_STRENGTHS[best]) / float(np.max(np.abs(y)))
+    return NoiseFinding({"k": (strength, f"1/{context.output_unit}")}, score_gain)
 
 
 HETEROSCEDASTIC_NOISE = NoiseDetector(
@@ -191,19 +199,19 @@ HETEROSCEDASTIC_NOISE = NoiseDetector(
 )
 
 
-def _detect_coloured_noise(_y: Signal, residual: Signal, _scene: SimulationContext) -> NoiseFinding | None:
+def _detect_coloured_noise(_y: Signal, residual: Signal, _context: SimulationContext) -> NoiseFinding | None:
     noise = fit_ar_noise(residual)
     if noise.order == 0:
         return None
     white = residual.size * float(np.log(np.mean(residual**2)))
-    gained = white - noise.minus_twice_log_likelihood
+    score_gain = white - noise.minus_twice_log_likelihood
     pole = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -noise.coefficients])))))
-    return NoiseFinding({"pole": (pole, ""), "order": (float(noise.order), "")}, gained)
+    return NoiseFinding({"pole": (pole, ""), "order": (float(noise.order), "")}, score_gain)
 
 
 COLOURED_NOISE = NoiseDetector(
     "coloured-noise",
-    "Noise that remembers, where the best simulation leaves nothing else",
+    "Coloured noise in the residual of the best simulation",
     "data",
     _detect_coloured_noise,
     "Ljung, System Identification, 2nd ed., section 4",
@@ -213,7 +221,7 @@ COLOURED_NOISE = NoiseDetector(
 )
 
 
-#: Detectors by name, in the order in which they are tried.
+#: Detectors by name, in the order in which they run.
 DETECTORS: Mapping[str, NoiseDetector] = {
     detector.name: detector
     for detector in (QUANTISATION, HELD_SAMPLES, OUTLIERS, HETEROSCEDASTIC_NOISE, COLOURED_NOISE)

@@ -1,4 +1,4 @@
-"""What is left over: whether a residual still knows the input, the output, the rate or the time."""
+"""Residual analysis: dependence of a residual on the input, the output and their rates."""
 
 from collections.abc import Mapping
 
@@ -8,61 +8,68 @@ from numpy.typing import NDArray
 from islands.discrepancy.calibration.noise_model import fit_ar_noise
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
-#: Circular shifts that a map is compared with, and standard deviations beyond which it is no chance.
-SHIFTS, FLAGGED = 200, 4.5
+#: Number of random circular shifts that give the null distribution of a map.
+SHIFTS = 200
+
+#: Distance from the null distribution above which a dependence is significant, in standard deviations.
+MIN_DISTANCE = 4.5
 
 
-def describe_remainder(
+def find_residual_structure(
     residual: Signal, simulated: Signal, context: SimulationContext, rng: np.random.Generator
 ) -> Mapping[str, float]:
-    """Return maps in which a residual is no chance, each with its distance in standard deviations.
+    """Return the maps on which a residual depends, each with its distance in standard deviations.
 
-    The residual is averaged over cells of input, rate, direction and output, and so is the same residual
-    shifted in time, which knows none of them: whatever stationary noise it is, it would do as well.
+    The whitened residual is averaged over cells of input, rate, direction and output. The null distribution
+    comes from circular shifts of the residual, which keep its autocorrelation and remove its dependence on
+    the maps.
 
     Parameters
     ----------
     residual, simulated : ndarray, shape (samples,)
-        Over the fitted samples, from the first on.
+        Signals over the estimation part.
     """
     n = residual.size
-    left = fit_ar_noise(residual).whiten(residual)
-    left = left - left.mean()
-    if not left.any():
+    whitened = fit_ar_noise(residual).whiten(residual)
+    whitened = whitened - whitened.mean()
+    if not whitened.any():
         return {}
     shifts = rng.integers(n // 20, n - n // 20, SHIFTS)
-    found = {}
-    for name, cells in _maps(context.u[:n], simulated, context.dt).items():
-        shifted = np.log([_explained(np.roll(left, shift), cells) for shift in shifts])
-        distance = (float(np.log(_explained(left, cells))) - float(shifted.mean())) / float(shifted.std())
-        if distance > FLAGGED:
-            found[name] = distance
-    return found
+    distances = {}
+    for name, cells in _make_maps(context.u[:n], simulated, context.dt).items():
+        null = np.log([_explained_squares(np.roll(whitened, shift), cells) for shift in shifts])
+        distance = (float(np.log(_explained_squares(whitened, cells))) - float(null.mean())) / float(
+            null.std()
+        )
+        if distance > MIN_DISTANCE:
+            distances[name] = distance
+    return distances
 
 
-def _explained(signal: Signal, cells: NDArray[np.int64]) -> float:
-    """Return the squares that the cells' means explain."""
+def _explained_squares(signal: Signal, cells: NDArray[np.int64]) -> float:
+    """Return the sum of squares that the means of the cells explain."""
     sums, counts = np.bincount(cells, weights=signal), np.bincount(cells)
     return float(np.sum(sums**2 / np.maximum(counts, 1)))
 
 
-def _maps(u: Signal, y: Signal, dt: float) -> Mapping[str, NDArray[np.int64]]:
+def _make_maps(u: Signal, y: Signal, dt: float) -> Mapping[str, NDArray[np.int64]]:
+    """Return the cell index of every sample, by name of the map."""
     rate = np.gradient(u, dt)
-    bend = np.gradient(rate, dt)
-    along = (rate > 0.0).astype(np.int64)
+    acceleration = np.gradient(rate, dt)
+    direction = (rate > 0.0).astype(np.int64)
     return {
-        "input": _cells(u, 24),
-        "rate": _cells(rate, 24),
-        "output": _cells(y, 32),
-        "acceleration": _cells(bend, 24),
-        "input and direction": 2 * _cells(u, 16) + along,
-        "input and rate": 8 * _cells(u, 8) + _cells(rate, 8),
-        "output and direction": 2 * _cells(y, 16) + along,
-        "output and acceleration": 8 * _cells(y, 8) + _cells(bend, 8),
+        "input": _assign_cells(u, 24),
+        "rate": _assign_cells(rate, 24),
+        "output": _assign_cells(y, 32),
+        "acceleration": _assign_cells(acceleration, 24),
+        "input and direction": 2 * _assign_cells(u, 16) + direction,
+        "input and rate": 8 * _assign_cells(u, 8) + _assign_cells(rate, 8),
+        "output and direction": 2 * _assign_cells(y, 16) + direction,
+        "output and acceleration": 8 * _assign_cells(y, 8) + _assign_cells(acceleration, 8),
     }
 
 
-def _cells(signal: Signal, count: int) -> NDArray[np.int64]:
-    """Return the cell of every sample, cells being equally full."""
+def _assign_cells(signal: Signal, count: int) -> NDArray[np.int64]:
+    """Return the cell index of every sample; all cells hold the same number of samples."""
     edges = np.quantile(signal, np.linspace(0.0, 1.0, count + 1)[1:-1])
     return np.searchsorted(edges, signal).astype(np.int64)

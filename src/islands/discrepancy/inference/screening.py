@@ -1,13 +1,15 @@
-"""The ladder: a simulation extended by each effect in turn, each as good as it can be, best first."""
+"""Screening: a simulation extended by each effect in turn, calibrated and sorted by score."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter, itemgetter
+from typing import TypeAlias
 
 import numpy as np
 
 from islands.discrepancy.calibration.levenberg_marquardt import (
-    STEP,
+    DIFFERENCE_STEP,
     CalibrationResult,
     Target,
     calibrate,
@@ -19,24 +21,30 @@ from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.simulators.extended import ExtendedSimulator, invalid_effect_error
 
-#: Points of a grid that a fit begins from, the steps that each may take before one is chosen, and how far a
-#: strength is carried from its grid's value.
-STARTS, FIRST_STEPS, FARTHEST = 3, 6, 5.0
+#: Maximum number of starting points per effect that are calibrated.
+MAX_STARTS = 3
 
-#: Scores that are less apart are equal: of effects that do the same the one that the catalogue has first goes
-#: first, and those of one simulation alone last.
-EQUAL = 0.5
+#: Iterations of each start before the best one is calibrated to convergence.
+FIRST_ITERATIONS = 6
 
-#: Effects that are fitted beside others, though by their responses alone none would pay.
-PROMISING = 5
+#: Largest factor by which the strength of a starting point is scaled.
+MAX_SCALING = 5.0
 
-#: A simulation to be fitted, and where that begins.
-Fit = tuple[ExtendedSimulator, Sequence[Signal]]
+#: Scores that differ by less than this are ties. Ties keep the catalogue order, in which effects that belong
+#: to one simulator come last.
+SCORE_TIE = 0.5
+
+#: Minimum number of effects that are calibrated in addition to others, even if their linear responses promise
+#: no gain.
+MIN_CALIBRATED_EFFECTS = 5
+
+#: A simulation to be calibrated, and its starting points.
+CalibrationTask: TypeAlias = tuple[ExtendedSimulator, Sequence[Signal]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScreenedEffect:
-    """A simulation with one more effect.
+    """A simulation with one additional effect.
 
     Attributes
     ----------
@@ -48,168 +56,182 @@ class ScreenedEffect:
     fit: CalibrationResult
 
     def score_gain(self, base: CalibrationResult) -> float:
-        """Return by how much it is better than without the effect, its values paid for."""
+        """Return the decrease of the score relative to ``base``, less the BIC penalty of the effect."""
         return base.score - self.fit.score - bic_penalty(self.effect, base)
 
 
 def bic_penalty(effect: Effect, base: CalibrationResult) -> float:
-    """Return what an effect's values have to gain, as BIC has it: log n for each."""
+    """Return the BIC penalty of an effect: log n for each of its degrees of freedom."""
     values = len(effect.parameters(base.simulation.context)) + effect.extra_degrees_of_freedom
     return values * float(np.log(base.noise.effective_samples))
 
 
 def screen_effects(
-    base: CalibrationResult, target: Target, effects: Iterable[Effect], spread: ParallelMap = map
+    base: CalibrationResult, target: Target, effects: Iterable[Effect], parallel_map: ParallelMap = map
 ) -> list[ScreenedEffect]:
-    """Extend a simulation by each effect in turn; return the rungs, the best first.
+    """Extend a simulation by each effect in turn and calibrate it; return the best first.
 
     Parameters
     ----------
-    spread : ParallelMap
-        Fits the effects, side by side perhaps.
+    parallel_map : ParallelMap
+        Calibrates the extended simulations.
     """
-    space = _Projection(base, target)
-    screened = []
+    projection = _Projection(base, target)
+    candidates = []
     for effect in effects:
         simulation = base.simulation.with_effects(catalogue_order((*base.simulation.effects, effect)))
-        starts = _starts(base, simulation, effect, target, space)
+        starts = _find_starts(base, simulation, effect, target, projection)
         if starts:
-            screened.append((starts[0][0], effect, simulation, [values for _, values in starts]))
+            candidates.append((starts[0][0], effect, simulation, [values for _, values in starts]))
     if base.simulation.effects and target.effective_samples is None:
-        # Beside what is there already, the most promising ones alone are worth a fit.
-        screened.sort(key=lambda each: each[0])
-        screened = [
-            each
-            for place, each in enumerate(screened)
-            if place < PROMISING or space.gained(each[0]) > bic_penalty(each[1], base)
+        # If the simulation has effects already, only the most promising further ones are worth a calibration.
+        candidates.sort(key=lambda candidate: candidate[0])
+        candidates = [
+            candidate
+            for index, candidate in enumerate(candidates)
+            if index < MIN_CALIBRATED_EFFECTS
+            or projection.score_decrease(candidate[0]) > bic_penalty(candidate[1], base)
         ]
-    found = spread(partial(_fitted, target), [(simulation, starts) for _, _, simulation, starts in screened])
-    rungs = [
-        ScreenedEffect(effect, min((evaluate_fit(simulation, target, values) for values in ends), key=_score))
-        for (_, effect, simulation, _), ends in zip(screened, found, strict=True)
+    calibrated = parallel_map(
+        partial(_calibrate_from_starts, target),
+        [(simulation, starts) for _, _, simulation, starts in candidates],
+    )
+    screened = [
+        ScreenedEffect(
+            effect,
+            min((evaluate_fit(simulation, target, values) for values in ends), key=attrgetter("score")),
+        )
+        for (_, effect, simulation, _), ends in zip(candidates, calibrated, strict=True)
     ]
-    return sorted(rungs, key=lambda rung: -round(rung.score_gain(base) / EQUAL))
+    return sorted(screened, key=lambda each: -round(each.score_gain(base) / SCORE_TIE))
 
 
-def _fitted(target: Target, asked: Fit) -> list[Signal]:
-    """Fit from every start a few steps far, and from the best one to the end; return the values."""
-    simulation, starts = asked
+def _calibrate_from_starts(target: Target, task: CalibrationTask) -> list[Signal]:
+    """Calibrate a few iterations from every start, then the best one to convergence; return the values."""
+    simulation, starts = task
     if target.effective_samples is not None:
-        # Where the form is wrong there are many minima, and the first steps do not tell which is the best.
+        # Model error causes many minima, and the first iterations do not show which is the best.
         return [calibrate(simulation, target, start).values for start in starts]
-    fits = [calibrate(simulation, target, start, steps=FIRST_STEPS) for start in starts]
-    return [calibrate(simulation, target, min(fits, key=_score).values).values]
+    fits = [calibrate(simulation, target, start, max_iterations=FIRST_ITERATIONS) for start in starts]
+    return [calibrate(simulation, target, min(fits, key=attrgetter("score")).values).values]
 
 
-def is_same_fit(asked: Fit) -> Hashable:
-    """Return what two fits of a simulation to a target have in common if they are the same."""
-    simulation, starts = asked
+def make_task_key(task: CalibrationTask) -> Hashable:
+    """Return a key that is equal for tasks with equal results, given the same simulator and target."""
+    simulation, starts = task
     return tuple(effect.name for effect in simulation.effects), *(start.tobytes() for start in starts)
 
 
-def _score(fit: CalibrationResult) -> float:
-    return fit.score
-
-
 def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSimulator) -> Signal:
-    """Return the values of a simulation for one with other effects; what is new does nothing yet."""
-    moved = new.nominal
-    own = len(old.simulator.parameters)
-    moved[:own] = values[:own]
+    """Return the values of a simulation for one with other effects; new effects have their nominal values."""
+    transferred = new.nominal
+    count = len(old.simulator.parameters)
+    transferred[:count] = values[:count]
     for effect in new.effects:
         if effect in old.effects:
-            moved[new.get_slice(effect)] = values[old.get_slice(effect)]
-    return moved
+            transferred[new.get_slice(effect)] = values[old.get_slice(effect)]
+    return transferred
 
 
 class _Projection:
-    """What is left of a response when the base's own values have explained what they can."""
+    """Projection of responses onto the complement of what the parameters of the base can reproduce.
+
+    The parameters act through their linearised, whitened responses. The prior of each parameter is one more
+    observation.
+    """
 
     def __init__(self, base: CalibrationResult, target: Target) -> None:
         simulation, values = base.simulation, base.values
         self._target, self._values = target, values.size
         self._sigma = float(np.std(target.residual(base.output))) or 1.0
-        pull, nominal = prior_precision(simulation, target.prior_std)
+        inverse_std, nominal = prior_precision(simulation, target.prior_std)
         columns = []
-        for place, scale in enumerate(simulation.scales):
-            moved = values.copy()
-            moved[place] += STEP * scale
-            # A tolerance is one more observation of its value.
-            held = np.zeros(values.size)
-            held[place] = pull[place] * scale
-            columns.append(self._observed((simulation.simulate(moved) - base.output) / STEP, held))
+        for index, scale in enumerate(simulation.scales):
+            shifted = values.copy()
+            shifted[index] += DIFFERENCE_STEP * scale
+            prior = np.zeros(values.size)
+            prior[index] = inverse_std[index] * scale
+            columns.append(self._stack((simulation.simulate(shifted) - base.output) / DIFFERENCE_STEP, prior))
         self._basis = np.linalg.qr(np.column_stack(columns))[0] if columns else None
-        # Of a value that a fit has moved from where its tolerance wants it, that is left to be explained.
-        self.residual = self._left(self._observed(target.y - base.output, pull * (nominal - values)))
+        # The deviation of calibrated values from their prior is part of the residual to be explained.
+        self.residual = self._project(self._stack(target.y - base.output, inverse_std * (nominal - values)))
         self._samples = base.noise.effective_samples
 
-    def gained(self, remains: float) -> float:
-        """Return by how much minus twice the log-likelihood falls where so many squares remain."""
-        return self._samples * float(np.log(float(self.residual @ self.residual) / max(remains, 1e-300)))
+    def score_decrease(self, remaining: float) -> float:
+        """Return the decrease of minus twice the log-likelihood, given the remaining sum of squares."""
+        return self._samples * float(np.log(float(self.residual @ self.residual) / max(remaining, 1e-300)))
 
     def __call__(self, response: Signal) -> Signal:
-        return self._left(self._observed(response, np.zeros(self._values)))
+        return self._project(self._stack(response, np.zeros(self._values)))
 
-    def _left(self, seen: Signal) -> Signal:
-        return seen if self._basis is None else seen - self._basis @ (self._basis.T @ seen)
+    def _project(self, stacked: Signal) -> Signal:
+        return stacked if self._basis is None else stacked - self._basis @ (self._basis.T @ stacked)
 
-    def _observed(self, response: Signal, held: Signal) -> Signal:
-        return np.concatenate([self._target.select(response) / self._sigma, held])
+    def _stack(self, response: Signal, prior: Signal) -> Signal:
+        return np.concatenate([self._target.select(response) / self._sigma, prior])
 
 
-def _points(effect: Effect, simulation: ExtendedSimulator, residual: Signal) -> Sequence[tuple[float, ...]]:
-    """Return where a search for an effect begins."""
+def _get_starting_points(
+    effect: Effect, simulation: ExtendedSimulator, residual: Signal
+) -> Sequence[tuple[float, ...]]:
+    """Return the starting points of an effect after checking them."""
     part = simulation.get_slice(effect)
     try:
         points = effect.starting_points(simulation.context, residual)
     except Exception as error:
-        raise invalid_effect_error(effect, f"its grid fails: {type(error).__name__}: {error}") from error
+        raise invalid_effect_error(
+            effect, f"its starting points fail: {type(error).__name__}: {error}"
+        ) from error
     if any(len(point) != part.stop - part.start for point in points):
         raise invalid_effect_error(
-            effect, f"its grid has to give {part.stop - part.start} values at each point"
+            effect, f"each of its starting points needs {part.stop - part.start} values"
         )
     return points
 
 
-def _starts(
-    base: CalibrationResult, simulation: ExtendedSimulator, effect: Effect, target: Target, space: _Projection
+def _find_starts(
+    base: CalibrationResult,
+    simulation: ExtendedSimulator,
+    effect: Effect,
+    target: Target,
+    projection: _Projection,
 ) -> list[tuple[float, Signal]]:
-    """Return the points of an effect's grid that explain most, its strength fitted to what is left.
+    """Return the starting points that explain most, each with its strength fitted to the residual.
 
-    Each stands behind the squares that remain with it.
+    Returns
+    -------
+    list of (float, ndarray)
+        Remaining sum of squares and parameter values, the smallest sum first.
     """
     part = simulation.get_slice(effect)
     lower, upper = simulation.bounds
-    at_rest = transfer_parameters(base.values, base.simulation, simulation)
-    tried = []
-    for point in _points(effect, simulation, target.y - base.output):
-        values = at_rest.copy()
+    without_effect = transfer_parameters(base.values, base.simulation, simulation)
+    starts = []
+    for point in _get_starting_points(effect, simulation, target.y - base.output):
+        values = without_effect.copy()
         values[part] = point
-        response = space(simulation.simulate(values) - base.output)
-        with np.errstate(over="ignore", invalid="ignore"):  # what explodes is no start
+        response = projection(simulation.simulate(values) - base.output)
+        with np.errstate(over="ignore", invalid="ignore"):  # a point that diverges is no start
             size = float(response @ response)
         if not np.isfinite(size) or size == 0.0:
             continue
-        points = [(_squares(space.residual - response), values)]
+        variants = [(_sum_squares(projection.residual - response), values)]
         if effect.linear_parameters:
-            along = np.clip(float(response @ space.residual) / size, -FARTHEST, FARTHEST)
+            factor = np.clip(float(response @ projection.residual) / size, -MAX_SCALING, MAX_SCALING)
             values = values.copy()
-            values[part.start : part.start + effect.linear_parameters] *= along
+            values[part.start : part.start + effect.linear_parameters] *= factor
             values = np.clip(values, lower, upper)
-            response = space(simulation.simulate(values) - base.output)
-            points.append((_squares(space.residual - response), values))
-        remains, values = min(points, key=_first)
-        if np.isfinite(remains):
-            tried.append((remains, values))
-    tried.sort(key=_first)
-    return tried[:STARTS]
+            response = projection(simulation.simulate(values) - base.output)
+            variants.append((_sum_squares(projection.residual - response), values))
+        remaining, values = min(variants, key=itemgetter(0))
+        if np.isfinite(remaining):
+            starts.append((remaining, values))
+    starts.sort(key=itemgetter(0))
+    return starts[:MAX_STARTS]
 
 
-def _squares(left: Signal) -> float:
+def _sum_squares(signal: Signal) -> float:
+    """Return the sum of squares; infinite if the signal has diverged."""
     with np.errstate(over="ignore", invalid="ignore"):
-        remains = float(left @ left)
-    return remains if np.isfinite(remains) else float("inf")
-
-
-def _first(point: tuple[float, Signal]) -> float:
-    return point[0]
+        squares = float(signal @ signal)
+    return squares if np.isfinite(squares) else float("inf")

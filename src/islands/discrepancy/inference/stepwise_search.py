@@ -1,4 +1,4 @@
-"""The search for causes: single effects and combinations, a few of them followed at a time."""
+"""Stepwise regression over effects: beam search, refinement by swaps and backward elimination."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,150 +16,168 @@ from islands.discrepancy.inference.hypothesis import (
     with_effect,
     without_effect,
 )
-from islands.discrepancy.inference.screening import EQUAL, ScreenedEffect, screen_effects
+from islands.discrepancy.inference.screening import SCORE_TIE, ScreenedEffect, screen_effects
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.evolution.progress import ProgressCallback
 
-#: The least that an effect has to gain, in minus twice the log-likelihood: six is one to twenty.
-LEAST = 6.0
+#: Minimum score gain of an effect, in minus twice the log-likelihood: six is a likelihood ratio of twenty.
+MIN_GAIN = 6.0
 
-#: Combinations that are followed at a time, effects in one, and effects that pairs begin with.
-BEAM, MOST, SEEDS = 3, 3, 6
+#: Number of hypotheses that are followed at the same time.
+BEAM_WIDTH = 3
 
-#: Fits with the memory of the noise that the one before has left, at the most.
-REFITS = 6
+#: Maximum number of effects of a hypothesis.
+MAX_EFFECTS = 3
+
+#: Number of single effects from which pairs are built.
+PAIR_SEEDS = 6
+
+#: Maximum number of refits with the noise model of the previous fit.
+MAX_REFITS = 6
 
 
 def stepwise_search(
     base: CalibrationResult,
-    first: Sequence[ScreenedEffect],
+    screened: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
     progress: ProgressCallback,
-    spread: ParallelMap = map,
+    parallel_map: ParallelMap = map,
     pairs: bool = False,
 ) -> tuple[Hypothesis, Target]:
-    """Return the best explanation, and what it was held against.
+    """Return the best hypothesis, and the target with its noise model.
 
-    From the simulation alone, effect after effect, as long as that pays. What the noise remembers is
-    estimated anew with each: before, the causes that were not yet found were a part of it.
+    The search adds one effect after another to the simulation, as long as the cost decreases by enough. It
+    estimates the noise model again after each step, since effects that were not found before were part of the
+    noise.
 
     Parameters
     ----------
     base : CalibrationResult
-        The simulation alone.
-    first : sequence of ScreenedEffect
-        Its ladder.
+        The simulation without effects.
+    screened : sequence of ScreenedEffect
+        Effects screened on ``base``, the best first.
     pairs : bool
-        The first of two need not pay alone: two causes may hide each other.
+        Whether the first effect of a pair may have an insufficient gain of its own: two causes may mask each
+        other.
     """
     best = Hypothesis(base, base.score, ())
-    followed = [best]
-    most = MOST + 1 if pairs else MOST
-    while followed and _causes(followed[0]) < most:
-        alone = not followed[0].effects
-        if not alone:
-            progress(f"effects beside {' and '.join(effect.name for effect in followed[0].effects)}")
-        least = LEAST if alone else _further(target, effects)
-        further: dict[frozenset[str], Hypothesis] = {}
-        for each in followed:
-            others = [effect for effect in effects if effect not in each.effects]
-            rungs = first if alone else screen_effects(each.fit, target, others, spread)
-            for rung in rungs[: SEEDS if alone and pairs else BEAM]:
-                found = with_effect(each, rung)
+    beam = [best]
+    max_effects = MAX_EFFECTS + 1 if pairs else MAX_EFFECTS
+    while beam and _count_causes(beam[0]) < max_effects:
+        is_first = not beam[0].effects
+        if not is_first:
+            progress(f"effects in addition to {' and '.join(effect.name for effect in beam[0].effects)}")
+        min_gain = MIN_GAIN if is_first else _get_min_further_gain(target, effects)
+        width = PAIR_SEEDS if is_first and pairs else BEAM_WIDTH
+        extended: dict[frozenset[str], Hypothesis] = {}
+        for hypothesis in beam:
+            others = [effect for effect in effects if effect not in hypothesis.effects]
+            candidates = (
+                screened if is_first else screen_effects(hypothesis.fit, target, others, parallel_map)
+            )
+            for candidate in candidates[:width]:
+                found = with_effect(hypothesis, candidate)
                 key = frozenset(effect.name for effect in found.effects)
-                pays = (alone and pairs) or found.cost < each.cost - least
-                if pays and (key not in further or found.cost < further[key].cost):
-                    further[key] = found
-        followed = sorted(further.values(), key=attrgetter("rank"))[: SEEDS if alone and pairs else BEAM]
-        followed, there = _remembered(followed, target)
-        if followed and followed[0].cost < best.cost - least:
-            best, target = followed[0], there
-        elif not (alone and pairs):
+                is_accepted = (is_first and pairs) or found.cost < hypothesis.cost - min_gain
+                if is_accepted and (key not in extended or found.cost < extended[key].cost):
+                    extended[key] = found
+        beam = sorted(extended.values(), key=attrgetter("rank"))[:width]
+        beam, new_target = _refit_with_ar_noise(beam, target)
+        if beam and beam[0].cost < best.cost - min_gain:
+            best, target = beam[0], new_target
+        elif not (is_first and pairs):
             break
-    return refine_by_swaps(best, target, effects, progress, spread, most)
+    return refine_by_swaps(best, target, effects, progress, parallel_map, max_effects)
 
 
-def _causes(found: Hypothesis) -> int:
-    """Count causes: that the form of an identified model is wrong stands beside them."""
-    return sum(effect.cause != model_form.CORE_SHAPE for effect in found.effects)
+def _count_causes(hypothesis: Hypothesis) -> int:
+    """Count the effects of a hypothesis, not counting the model-form error of an identified model."""
+    return sum(effect.cause != model_form.CORE_SHAPE for effect in hypothesis.effects)
 
 
-def _remembered(followed: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
-    """Fit explanations anew, whitened by what the best of them has left."""
-    for _ in range(REFITS if followed and target.effective_samples is None else 0):
-        before = followed[0].cost
-        target = replace(target, noise=followed[0].fit.noise)
-        followed = sorted((refit(each, target) for each in followed), key=attrgetter("rank"))
-        if followed[0].cost > before - EQUAL:
+def _refit_with_ar_noise(beam: list[Hypothesis], target: Target) -> tuple[list[Hypothesis], Target]:
+    """Refit hypotheses, whitened by the noise model of the best one, until its cost stops decreasing."""
+    for _ in range(MAX_REFITS if beam and target.effective_samples is None else 0):
+        before = beam[0].cost
+        target = replace(target, noise=beam[0].fit.noise)
+        beam = sorted((refit(each, target) for each in beam), key=attrgetter("rank"))
+        if beam[0].cost > before - SCORE_TIE:
             break
-    return followed, target
+    return beam, target
 
 
 def refine_by_swaps(
-    found: Hypothesis,
+    hypothesis: Hypothesis,
     target: Target,
     effects: Sequence[Effect],
     progress: ProgressCallback,
-    spread: ParallelMap = map,
-    most: int = MOST,
+    parallel_map: ParallelMap = map,
+    max_effects: int = MAX_EFFECTS,
 ) -> tuple[Hypothesis, Target]:
-    """Leave out what is not needed, put what explains more in an effect's place, and add what pays beside it.
+    """Refine a hypothesis: remove effects that are not needed, replace effects by better ones, and add more.
 
-    What came first may mislead, and be left out again: then there may be more to find. Scores fall with
-    every step, so that there is a last one.
+    The first effects of a stepwise search may be wrong and become redundant, and after their removal others
+    may be worth adding. The cost decreases with every step, so that the refinement ends.
 
     Parameters
     ----------
-    found : Hypothesis
-        Beside all its effects together nothing pays, or they are as many as may be.
+    hypothesis : Hypothesis
+        A hypothesis to which no single effect is worth adding, or which has the maximum number of effects.
     """
-    complete = found.effects
-    least = _further(target, effects)
-    found = _thinned(found, target, least)
-    while found.effects:
-        rivals: tuple[Alternatives, ...] = ()
-        further = []
-        if len(found.effects) > 1:
-            progress("what else could be the cause")
-            rivals = find_alternatives(found, target, effects, spread)
-            further = [with_effect(each.without, rung) for each in rivals for rung in each.screened[:1]]
-        if len(found.effects) < len(complete) and _causes(found) < most:
-            others = [effect for effect in effects if effect not in found.effects]
-            beside = [
-                with_effect(found, rung) for rung in screen_effects(found.fit, target, others, spread)[:1]
+    complete = hypothesis.effects
+    min_gain = _get_min_further_gain(target, effects)
+    hypothesis = _eliminate_backward(hypothesis, target, min_gain)
+    while hypothesis.effects:
+        alternatives: tuple[Alternatives, ...] = ()
+        candidates = []
+        if len(hypothesis.effects) > 1:
+            progress("screening alternative causes")
+            alternatives = find_alternatives(hypothesis, target, effects, parallel_map)
+            candidates = [
+                with_effect(each.without, screened) for each in alternatives for screened in each.screened[:1]
             ]
-            further += [each for each in beside if each.cost < found.cost - least]
-        best = min(further, key=attrgetter("rank"), default=found)
-        if best.cost > found.cost - EQUAL:
-            return replace(found, alternatives=rivals), target
-        if set(best.effects) == set(found.effects) and best.cost > found.cost - LEAST:
-            # The same with slightly better values: no other names would come of going round again.
-            return replace(found, fit=best.fit, cost=best.cost, alternatives=rivals), target
+        if len(hypothesis.effects) < len(complete) and _count_causes(hypothesis) < max_effects:
+            others = [effect for effect in effects if effect not in hypothesis.effects]
+            larger = [
+                with_effect(hypothesis, screened)
+                for screened in screen_effects(hypothesis.fit, target, others, parallel_map)[:1]
+            ]
+            candidates += [each for each in larger if each.cost < hypothesis.cost - min_gain]
+        best = min(candidates, key=attrgetter("rank"), default=hypothesis)
+        if best.cost > hypothesis.cost - SCORE_TIE:
+            return replace(hypothesis, alternatives=alternatives), target
+        if set(best.effects) == set(hypothesis.effects) and best.cost > hypothesis.cost - MIN_GAIN:
+            # Same effects with slightly better values: another pass would not find others.
+            refined = replace(hypothesis, fit=best.fit, cost=best.cost, alternatives=alternatives)
+            return refined, target
         complete = best.effects
-        (found,), target = _remembered([_thinned(best, target, least)], target)
-    return found, target
+        (hypothesis,), target = _refit_with_ar_noise([_eliminate_backward(best, target, min_gain)], target)
+    return hypothesis, target
 
 
-def _further(target: Target, effects: Sequence[Effect]) -> float:
-    """Return what an effect has to gain beside another: any of them could be the one that does so by chance.
+def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
+    """Return the minimum score gain of an effect that is added to others.
 
-    Where the form is wrong it is no chance, and pairs are found by less.
+    It includes a correction for multiple comparisons, since any of the effects could gain by chance. Under
+    model error there is no correction: gains are not due to chance, and pairs need a lower threshold.
     """
-    return LEAST if target.effective_samples is not None else LEAST + 2.0 * float(np.log(len(effects)))
+    return MIN_GAIN if target.effective_samples is not None else MIN_GAIN + 2.0 * float(np.log(len(effects)))
 
 
-def _thinned(found: Hypothesis, target: Target, least: float) -> Hypothesis:
-    """Leave out what is not needed any more beside what came later, and put the most important first.
+def _eliminate_backward(hypothesis: Hypothesis, target: Target, min_gain: float) -> Hypothesis:
+    """Remove effects that are redundant given the others, and sort the rest, the most important first.
 
-    The last one as well: its own values and the noise's memory, found with it, may do without.
+    The last effect may go as well: refitted values and the noise model estimated with it may make it
+    unnecessary.
     """
-    while found.effects:
-        without = {effect.name: without_effect(found, effect, target) for effect in found.effects}
+    while hypothesis.effects:
+        without = {effect.name: without_effect(hypothesis, effect, target) for effect in hypothesis.effects}
         cheapest = min(without.values(), key=attrgetter("rank"))
-        if cheapest.cost - found.cost >= (least if len(found.effects) > 1 else LEAST):
-            ranked = sorted(found.effects, key=lambda effect: -without[effect.name].cost)
-            return Hypothesis(found.fit, found.cost, tuple(ranked))
-        found = cheapest
-    return found
+        threshold = min_gain if len(hypothesis.effects) > 1 else MIN_GAIN
+        if cheapest.cost - hypothesis.cost >= threshold:
+            ranked = sorted(hypothesis.effects, key=lambda effect: -without[effect.name].cost)
+            return Hypothesis(hypothesis.fit, hypothesis.cost, tuple(ranked))
+        hypothesis = cheapest
+    return hypothesis

@@ -1,8 +1,8 @@
-"""Evidence: the causes that explain a record best, what they leave, and whether that may be called a name.
+"""Search strategies: the residual is either coloured noise or model error.
 
-It is gathered by the noise: what is left is taken for an autoregression. A simulation whose form is wrong
-leaves more than that, and whatever whitens it would win: then it is gathered by misfit, each sample counting
-for as much as it says that its neighbours have not said.
+The first strategy models the residual as an autoregression. A simulation whose form is wrong leaves more than
+that, and any effect that whitens the residual would be selected. The second strategy therefore fits the
+unweighted residual and counts its effective sample size.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,49 +16,51 @@ from islands.discrepancy.calibration.levenberg_marquardt import (
     calibrate,
     evaluate_fit,
 )
-from islands.discrepancy.calibration.noise_model import effective_samples
+from islands.discrepancy.calibration.noise_model import estimate_effective_samples
 from islands.discrepancy.inference.hypothesis import Hypothesis
 from islands.discrepancy.inference.noise_floor import explainable_variance, noise_variance_from_periods
-from islands.discrepancy.inference.residual_structure import describe_remainder
-from islands.discrepancy.inference.screening import ScreenedEffect, is_same_fit, screen_effects
-from islands.discrepancy.inference.stepwise_search import LEAST, stepwise_search
+from islands.discrepancy.inference.residual_structure import find_residual_structure
+from islands.discrepancy.inference.screening import ScreenedEffect, make_task_key, screen_effects
+from islands.discrepancy.inference.stepwise_search import MIN_GAIN, stepwise_search
 from islands.discrepancy.inference.verdict import (
     Verdict,
+    choose_reference_fit,
     classify,
     explained_fraction,
-    reference_variance,
     validate_out_of_sample,
 )
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.parallel import ParallelMap, memoised_map
 from islands.evolution.progress import ProgressCallback
 
-#: Share of the misfit that a single effect has to explain for pairs to be looked for: of noise none does.
-WORTHWHILE = 0.1
+#: Fraction of the misfit that some single effect has to explain before pairs are searched for; no effect
+#: explains as much of noise.
+MIN_SINGLE_FRACTION = 0.1
 
-#: Part of a residual's mean square that a flexible reference would not explain by chance.
-NOTICEABLE = 0.05
+#: Fraction of the residual's mean square that a flexible reference model does not explain by chance.
+MIN_REMAINDER_FRACTION = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchOutcome:
-    """What was found, and against what.
+    """Result of a search, with the evidence for its verdict.
 
     Attributes
     ----------
     base : CalibrationResult
-        The simulation alone.
-    screened : tuple of ScreenedEffect
-        Its ladder.
+        The simulation without effects.
+    screened : sequence of ScreenedEffect
+        Effects screened on ``base``, the best first.
     target : Target
-        What all was held against.
+        Target of the last calibration.
     hypothesis : Hypothesis
     noise_floor : float
-        Mean square that no simulation is expected to be below.
+        Expected lower bound on the mean square of the residual, for any simulation.
     is_noise_floor_measured : bool
-        It is known from periods that repeat; else it is an upper bound, by what a flexible fit foretells.
+        Whether the noise floor is measured from repeated periods; otherwise it is an upper bound from the
+        flexible reference model.
     residual_structure : mapping of str to float
-        Maps in which what is left is no chance.
+        Maps in which the residual is not random, with their distance in standard deviations.
     verdict : Verdict
     """
 
@@ -74,28 +76,28 @@ class SearchOutcome:
 
 def search_with_ar_noise(
     base: CalibrationResult,
-    rungs: Sequence[ScreenedEffect],
+    screened: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
     progress: ProgressCallback,
-    spread: ParallelMap,
+    parallel_map: ParallelMap,
 ) -> SearchOutcome:
-    """Look for what explains a record, what is left being noise that may remember.
+    """Search for effects under the assumption that the residual is white or autoregressive noise.
 
     Parameters
     ----------
-    base, rungs : CalibrationResult, sequence of ScreenedEffect
-        The simulation alone, and its ladder by plain least squares.
+    base, screened : CalibrationResult, sequence of ScreenedEffect
+        The simulation without effects, and the effects screened on it by ordinary least squares.
     """
-    memory = best_single(base, rungs).noise
-    if memory.order:
-        # Once more, with what the noise remembers taken out: plain least squares would fit that as well.
-        progress("the noise remembers: once more with that taken out")
-        target = replace(target, noise=memory)
+    noise = best_single(base, screened).noise
+    if noise.order:
+        # Ordinary least squares would fit the coloured noise as well.
+        progress("the noise is coloured: repeating with whitened residuals")
+        target = replace(target, noise=noise)
         base = calibrate(base.simulation, target, base.values)
-        rungs = screen_effects(base, target, effects, spread)
-    found, target = stepwise_search(base, rungs, target, effects, progress, spread)
-    return _unjudged(base, rungs, target, found)
+        screened = screen_effects(base, target, effects, parallel_map)
+    hypothesis, target = stepwise_search(base, screened, target, effects, progress, parallel_map)
+    return _make_outcome(base, screened, target, hypothesis)
 
 
 def search_with_model_error(
@@ -103,61 +105,73 @@ def search_with_model_error(
     target: Target,
     effects: Sequence[Effect],
     progress: ProgressCallback,
-    spread: ParallelMap,
+    parallel_map: ParallelMap,
 ) -> SearchOutcome:
-    """Look for what explains a record's misfit, whatever is left being of the simulation's form."""
-    progress("the form is wrong: once more by the misfit alone")
-    rungs: Sequence[ScreenedEffect] = ()
-    found = Hypothesis(base, base.score, ())
-    spread = memoised_map(
-        spread, is_same_fit
-    )  # how many samples count changes what a fit is worth, and not the fit
+    """Search for effects under the assumption that the residual is model error."""
+    progress("the residual is model error: repeating with unweighted residuals")
+    screened: Sequence[ScreenedEffect] = ()
+    hypothesis = Hypothesis(base, base.score, ())
+    # The effective sample size changes the score of a fit, but not the fit: both passes share results.
+    parallel_map = memoised_map(parallel_map, make_task_key)
     for _ in range(2):
-        # Neighbours say less that is new the more misfit there is: counted anew with the best causes in.
-        target = replace(target, effective_samples=effective_samples(target.residual(found.fit.output)))
+        # Model error correlates neighbouring samples: the second pass counts them with the best effects
+        # included.
+        residual = target.residual(hypothesis.fit.output)
+        target = replace(target, effective_samples=estimate_effective_samples(residual))
         base = evaluate_fit(base.simulation, target, base.values)
-        rungs = screen_effects(base, target, effects, spread)
-        if not any(explained_fraction(base, rung.fit, 0.0) > WORTHWHILE for rung in rungs):
+        screened = screen_effects(base, target, effects, parallel_map)
+        if not any(explained_fraction(base, each.fit, 0.0) > MIN_SINGLE_FRACTION for each in screened):
             break
-        found, _ = stepwise_search(base, rungs, target, effects, progress, spread, pairs=True)
-        if not found.effects:
+        hypothesis, _ = stepwise_search(base, screened, target, effects, progress, parallel_map, pairs=True)
+        if not hypothesis.effects:
             break
-    return _unjudged(base, rungs, target, found)
+    return _make_outcome(base, screened, target, hypothesis)
 
 
-def assess_evidence(evidence: SearchOutcome, fitted: int, rng: np.random.Generator) -> SearchOutcome:
-    """Drop what does not foretell samples that were not fitted, look at what is left, and decide."""
-    base, target = evidence.base, evidence.target
-    found = validate_out_of_sample(evidence.hypothesis, base, target, fitted, rng)
-    context, output = found.fit.simulation.context, found.fit.output[:fitted]
+def assess_evidence(outcome: SearchOutcome, fitted: int, rng: np.random.Generator) -> SearchOutcome:
+    """Remove effects that fail cross-validation, analyse the residual, and classify the outcome.
+
+    Parameters
+    ----------
+    fitted : int
+        Number of samples used for estimation.
+    """
+    base, target = outcome.base, outcome.target
+    hypothesis = validate_out_of_sample(outcome.hypothesis, base, target, fitted, rng)
+    context, output = hypothesis.fit.simulation.context, hypothesis.fit.output[:fitted]
     residual = target.y[:fitted] - output
-    left = explainable_variance(residual, context.u[:fitted], output, rng)
-    maps = describe_remainder(residual, output, context, rng)
+    explainable = explainable_variance(residual, context.u[:fitted], output, rng)
+    structure = find_residual_structure(residual, output, context, rng)
     mean_square = float(np.mean(residual**2))
-    repeated = noise_variance_from_periods(context.u[:fitted], target.y[:fitted])
-    floor = max(mean_square - left, 0.0) if repeated is None else repeated
-    remains = bool(maps) or left > NOTICEABLE * mean_square
-    # By misfit nobody knows which part of it is noise: half of all of it has to be explained.
-    explained_share = explained_fraction(
-        reference_variance(found, base, target), found.fit, floor if target.effective_samples is None else 0.0
+    measured_floor = noise_variance_from_periods(context.u[:fitted], target.y[:fitted])
+    floor = max(mean_square - explainable, 0.0) if measured_floor is None else measured_floor
+    has_remainder = bool(structure) or explainable > MIN_REMAINDER_FRACTION * mean_square
+    # Under model error the noise floor is unknown: the fraction refers to the whole misfit.
+    explained = explained_fraction(
+        choose_reference_fit(hypothesis, base, target),
+        hypothesis.fit,
+        floor if target.effective_samples is None else 0.0,
     )
-    verdict = classify(explained_share, bool(found.effects), remains, target.effective_samples is not None)
+    verdict = classify(
+        explained, bool(hypothesis.effects), has_remainder, target.effective_samples is not None
+    )
     return replace(
-        evidence,
-        hypothesis=found,
+        outcome,
+        hypothesis=hypothesis,
         noise_floor=floor,
-        is_noise_floor_measured=repeated is not None,
-        residual_structure=maps,
+        is_noise_floor_measured=measured_floor is not None,
+        residual_structure=structure,
         verdict=verdict,
     )
 
 
-def best_single(base: CalibrationResult, rungs: Sequence[ScreenedEffect]) -> CalibrationResult:
-    """Return the first rung's simulation where it pays, else the one without."""
-    return rungs[0].fit if rungs and rungs[0].score_gain(base) > LEAST else base
+def best_single(base: CalibrationResult, screened: Sequence[ScreenedEffect]) -> CalibrationResult:
+    """Return the fit with the best single effect if its gain is sufficient, otherwise the fit without."""
+    return screened[0].fit if screened and screened[0].score_gain(base) > MIN_GAIN else base
 
 
-def _unjudged(
-    base: CalibrationResult, rungs: Sequence[ScreenedEffect], target: Target, found: Hypothesis
+def _make_outcome(
+    base: CalibrationResult, screened: Sequence[ScreenedEffect], target: Target, hypothesis: Hypothesis
 ) -> SearchOutcome:
-    return SearchOutcome(base, rungs, target, found, 0.0, False, {}, Verdict.UNKNOWN)
+    """Return an outcome that has not been assessed yet."""
+    return SearchOutcome(base, screened, target, hypothesis, 0.0, False, {}, Verdict.UNKNOWN)

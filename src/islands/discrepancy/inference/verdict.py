@@ -1,4 +1,4 @@
-"""The decision: whether an explanation may be called one, and how sure each of its names is."""
+"""Verdict: whether effects explain a residual, with which confidence, and which others explain it as well."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ import numpy as np
 from islands.discrepancy.calibration.levenberg_marquardt import (
     CalibrationResult,
     Target,
-    covariance,
+    estimate_covariance,
     evaluate_fit,
 )
 from islands.discrepancy.inference.confounders import Confounder, find_confounder
-from islands.discrepancy.inference.holdout import measure_holdout_gain
+from islands.discrepancy.inference.holdout import cross_validate_gain
 from islands.discrepancy.inference.hypothesis import (
     Alternatives,
     Hypothesis,
@@ -21,25 +21,30 @@ from islands.discrepancy.inference.hypothesis import (
     without_effect,
 )
 from islands.discrepancy.inference.screening import ScreenedEffect
-from islands.discrepancy.inference.stepwise_search import LEAST
+from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.effect import Effect, Signal
 from islands.discrepancy.interfaces.parallel import ParallelMap
 
-#: Share of the explainable misfit that names have to explain, and from which on a remainder is no more than
-#: one.
-SHARE, MOST = 0.5, 0.9
+#: Minimum fraction of the explainable misfit that the effects have to explain.
+MIN_EXPLAINED_FRACTION = 0.5
 
-#: Names within so much of the best cannot be told from it, and confidences are so many times cooler than
-#: scores: untempered they say 0.97 where 0.72 is true.
-EQUIVALENT, TEMPER = 9.0, 2.0
+#: The same if the residual still has structure: the rest is then small enough to be called a remainder.
+MIN_EXPLAINED_FRACTION_WITH_REMAINDER = 0.9
 
-#: Part of what a cause does beside, which no simulation is in step with, that every further name has to
-#: explain.
-BESIDE = 0.1
+#: Effects whose scores are within this margin of the named one cannot be distinguished from it.
+EQUIVALENCE_MARGIN = 9.0
+
+#: Temperature of the softmax from scores to confidences: without it, a confidence of 0.97 is right in 0.72 of
+#: the cases.
+CONFIDENCE_TEMPERATURE = 2.0
+
+#: Minimum decrease of the mean square by each further effect, relative to the part of a confounder's response
+#: that no simulation reproduces.
+MIN_CONFOUNDED_FRACTION = 0.1
 
 
 class Verdict(StrEnum):
-    """What an analysis comes to."""
+    """Verdict of a diagnosis."""
 
     NOTHING = "nothing"
     NAMED = "named"
@@ -49,14 +54,14 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A parameter that was found.
+    """An estimated parameter of an effect.
 
     Attributes
     ----------
     value : float
     unit : str
     ci95 : tuple of float or None
-        Where it lies with 95 percent probability, if the simulation is right; None where nothing tells.
+        95 % confidence interval, given that the extended simulation is right; None if it is unknown.
     """
 
     value: float
@@ -66,21 +71,21 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A cause that was named.
+    """A named cause of the discrepancy.
 
     Attributes
     ----------
     name, family : str
-        Of the catalogue.
+        Name and family in the catalogue.
     confidence : float
-        Among the causes that would explain the same, from 0 to 1.
+        Confidence among the alternative causes, from 0 to 1.
     equivalents : tuple of str
-        Names that this record cannot tell from it.
+        Names of the causes that the record cannot distinguish from this one.
     parameters : mapping of str to Value
     score : float
-        What it gains, in minus twice the log-likelihood, its values paid for.
+        Score gain in minus twice the log-likelihood, less the BIC penalty.
     explained_fraction : float or None
-        Share of the explainable misfit that goes with it; None for what is no misfit of the mean.
+        Fraction of the explainable misfit that the cause explains; None for a property of the noise.
     """
 
     name: str
@@ -93,134 +98,157 @@ class Finding:
 
 
 def validate_out_of_sample(
-    found: Hypothesis, base: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
+    hypothesis: Hypothesis, base: CalibrationResult, target: Target, fitted: int, rng: np.random.Generator
 ) -> Hypothesis:
-    """Leave out what does not foretell samples that were not fitted: without that gain there is no name.
+    """Remove effects, the least important first, until the rest has a cross-validated gain.
 
-    Beside a cause that no simulation is in step with, leave out what may be a part of that.
+    If a confounder is more likely than one of the effects, also remove further effects that may only fit the
+    part of its response that no simulation reproduces.
     """
-    while found.effects:
-        before = reference_variance(found, base, target)
-        if measure_holdout_gain(before, before is not base, found.fit, target, fitted, rng) > 0.0:
+    while hypothesis.effects:
+        reference = choose_reference_fit(hypothesis, base, target)
+        keep_values = reference is not base
+        if cross_validate_gain(reference, keep_values, hypothesis.fit, target, fitted, rng) > 0.0:
             break
-        found = without_effect(found, found.effects[-1], target)
-    beside = _beside(found, target)
-    for effect in found.effects[:0:-1] if beside else ():
-        without = without_effect(found, effect, target)
-        less = without.fit.mean_square - found.fit.mean_square
-        if less < BESIDE * beside and effect.family != "scale":
-            found = without
-    return found
+        hypothesis = without_effect(hypothesis, hypothesis.effects[-1], target)
+    excess = _sum_confounder_excess(hypothesis, target)
+    for effect in hypothesis.effects[:0:-1] if excess else ():
+        without = without_effect(hypothesis, effect, target)
+        decrease = without.fit.mean_square - hypothesis.fit.mean_square
+        if decrease < MIN_CONFOUNDED_FRACTION * excess and effect.family != "scale":
+            hypothesis = without
+    return hypothesis
 
 
-def _beside(found: Hypothesis, target: Target) -> float:
-    """Return the mean square of what causes do beside that no simulation is in step with."""
-    others = (find_confounder(found.fit, effect, target) for effect in found.effects)
-    return sum(other.beside for other in others if other is not None and other.gained > LEAST)
+def _sum_confounder_excess(hypothesis: Hypothesis, target: Target) -> float:
+    """Return the mean square of the parts of likely confounders' responses that no simulation reproduces."""
+    confounders = (find_confounder(hypothesis.fit, effect, target) for effect in hypothesis.effects)
+    return sum(
+        confounder.excess_mean_square
+        for confounder in confounders
+        if confounder is not None and confounder.score_gain > MIN_GAIN
+    )
 
 
-def reference_variance(found: Hypothesis, base: CalibrationResult, target: Target) -> CalibrationResult:
-    """Return what an explanation is held against: the simulation, calibrated.
+def choose_reference_fit(
+    hypothesis: Hypothesis, base: CalibrationResult, target: Target
+) -> CalibrationResult:
+    """Return the fit that a hypothesis is compared with: the calibrated simulation without effects.
 
-    Calibration takes up a gain, or a parameter that is off: these are held against the simulation as given.
+    Calibration absorbs a wrong gain or parameter. A hypothesis that has only such effects is therefore
+    compared with the simulation at its nominal values.
     """
-    if all(effect.family == "scale" for effect in found.effects):
+    if all(effect.family == "scale" for effect in hypothesis.effects):
         return evaluate_fit(base.simulation, target, base.simulation.nominal)
     return base
 
 
 def explained_fraction(before: CalibrationResult, after: CalibrationResult, floor: float) -> float:
-    """Return the share of the explainable misfit that is gone; ``floor`` is the noise's mean square."""
+    """Return the fraction of the misfit above the mean square ``floor`` of the noise that is explained."""
     misfit = before.mean_square - floor
     if misfit <= 0.0:
         return 0.0
     return float(np.clip((before.mean_square - after.mean_square) / misfit, 0.0, 1.0))
 
 
-def classify(explained: float, named: bool, remains: bool, by_misfit: bool) -> Verdict:
-    """Return the verdict on names that explain a share, where something remains or not.
+def classify(explained: float, has_effects: bool, has_remainder: bool, is_model_error: bool) -> Verdict:
+    """Return the verdict on effects that explain a fraction of the misfit.
 
-    By misfit a form that is wrong may remain: a share of more than half is all that is asked for.
+    Under model error a remainder is expected, so that `MIN_EXPLAINED_FRACTION` is enough.
     """
-    if not named:
-        return Verdict.UNKNOWN if remains or by_misfit else Verdict.NOTHING
-    if explained < (MOST if remains and not by_misfit else SHARE):
+    if not has_effects:
+        return Verdict.UNKNOWN if has_remainder or is_model_error else Verdict.NOTHING
+    required = (
+        MIN_EXPLAINED_FRACTION_WITH_REMAINDER
+        if has_remainder and not is_model_error
+        else MIN_EXPLAINED_FRACTION
+    )
+    if explained < required:
         return Verdict.UNKNOWN
-    return Verdict.REMAINDER if remains else Verdict.NAMED
+    return Verdict.REMAINDER if has_remainder else Verdict.NAMED
 
 
 def describe_effects(
-    found: Hypothesis,
+    hypothesis: Hypothesis,
     base: CalibrationResult,
-    first: Sequence[ScreenedEffect],
+    screened: Sequence[ScreenedEffect],
     target: Target,
     effects: Sequence[Effect],
     floor: float,
-    spread: ParallelMap = map,
+    parallel_map: ParallelMap = map,
 ) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
-    """Say what was found, and which other rungs could stand in the place of one.
+    """Return the findings of a hypothesis, and the alternatives that the record cannot distinguish from them.
 
-    Each effect is taken out, and all others are tried in its place.
+    Each effect is removed in turn, and all others are screened as its replacement.
 
     Parameters
     ----------
-    base, first : CalibrationResult, sequence of ScreenedEffect
-        The simulation alone and its ladder: what is left, and has been tried, where one effect was found.
+    base, screened : CalibrationResult, sequence of ScreenedEffect
+        The simulation without effects and the effects screened on it; they are the alternatives if the
+        hypothesis has a single effect.
+    floor : float
+        Mean square of the noise.
     """
-    named, instead = [], []
-    deviations = np.sqrt(np.maximum(np.diag(covariance(found.fit, target)), 0.0))
-    if len(found.effects) == 1:
-        rivals: Sequence[Alternatives] = (Alternatives(Hypothesis(base, base.score, ()), first),)
+    findings, equivalents = [], []
+    deviations = np.sqrt(np.maximum(np.diag(estimate_covariance(hypothesis.fit, target)), 0.0))
+    if len(hypothesis.effects) == 1:
+        alternatives: Sequence[Alternatives] = (Alternatives(Hypothesis(base, base.score, ()), screened),)
     else:
-        rivals = found.alternatives or find_alternatives(found, target, effects, spread)
-    for effect, each in zip(found.effects, rivals, strict=True):
-        without, rungs = each.without, each.screened
-        scores = {rung.effect.cause: rung.score_gain(without.fit) for rung in reversed(rungs)}
-        own = max(scores.get(effect.cause, 0.0), without.cost - found.cost)
-        scores[effect.cause] = own
-        name, family, values = effect.cause, effect.family, _values(found.fit, effect, deviations)
-        if (other := find_confounder(found.fit, effect, target)) is not None:
-            scores[other.effect.cause] = own + other.gained
-            if other.gained > 0.0:
-                name, family = other.effect.cause, other.effect.family
-                values = _times(other, values, found.fit)
-        equal = {each for each, score in scores.items() if score > scores[name] - EQUIVALENT} - {name}
-        instead += [rung for rung in rungs if rung.effect.cause in equal]
-        named.append(
+        alternatives = hypothesis.alternatives or find_alternatives(hypothesis, target, effects, parallel_map)
+    for effect, alternative in zip(hypothesis.effects, alternatives, strict=True):
+        without = alternative.without
+        scores = {each.effect.cause: each.score_gain(without.fit) for each in reversed(alternative.screened)}
+        score = max(scores.get(effect.cause, 0.0), without.cost - hypothesis.cost)
+        scores[effect.cause] = score
+        name, family, values = effect.cause, effect.family, _get_values(hypothesis.fit, effect, deviations)
+        if (confounder := find_confounder(hypothesis.fit, effect, target)) is not None:
+            scores[confounder.effect.cause] = score + confounder.score_gain
+            if confounder.score_gain > 0.0:
+                name, family = confounder.effect.cause, confounder.effect.family
+                values = _scale_values(confounder, values, hypothesis.fit)
+        equal = {each for each, score in scores.items() if score > scores[name] - EQUIVALENCE_MARGIN} - {name}
+        equivalents += [each for each in alternative.screened if each.effect.cause in equal]
+        reference = choose_reference_fit(hypothesis, without.fit, target)
+        findings.append(
             Finding(
                 name,
                 family,
-                _confidence(scores[name], scores),
+                _compute_confidence(scores[name], scores),
                 tuple(sorted(equal, key=lambda name: -scores[name])),
                 values,
                 scores[name],
-                explained_fraction(reference_variance(found, without.fit, target), found.fit, floor),
+                explained_fraction(reference, hypothesis.fit, floor),
             )
         )
-    return tuple(named), tuple(instead)
+    return tuple(findings), tuple(equivalents)
 
 
-def _confidence(own: float, scores: Mapping[str, float]) -> float:
-    rivals = (*scores.values(), 0.0)  # and nothing at all
-    return 1.0 / sum(float(np.exp(min(score - own, 0.0) / (2 * TEMPER))) for score in rivals)
+def _compute_confidence(score: float, scores: Mapping[str, float]) -> float:
+    alternatives = (*scores.values(), 0.0)  # 0: no effect at all
+    return 1.0 / sum(
+        float(np.exp(min(other - score, 0.0) / (2 * CONFIDENCE_TEMPERATURE))) for other in alternatives
+    )
 
 
-def _times(other: Confounder, values: Mapping[str, Value], fit: CalibrationResult) -> Mapping[str, Value]:
-    """Return the values of a cause in the place of one that it is like."""
-    parameters = other.effect.parameters(fit.simulation.context)
-    found = {}
+def _scale_values(
+    confounder: Confounder, values: Mapping[str, Value], fit: CalibrationResult
+) -> Mapping[str, Value]:
+    """Return the values of a confounder, given those of the effect that it replaces."""
+    parameters = confounder.effect.parameters(fit.simulation.context)
+    scaled = {}
     for parameter, each in zip(parameters, values.values(), strict=True):
         low, high = each.ci95 or (each.value, each.value)
-        reach = None if each.ci95 is None else (other.factor * low, other.factor * high)
-        found[parameter.name] = Value(other.factor * each.value, parameter.unit, reach)
-    return found
+        ci95 = None if each.ci95 is None else (confounder.factor * low, confounder.factor * high)
+        scaled[parameter.name] = Value(confounder.factor * each.value, parameter.unit, ci95)
+    return scaled
 
 
-def _values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
+def _get_values(fit: CalibrationResult, effect: Effect, deviations: Signal) -> Mapping[str, Value]:
+    """Return the values of an effect with their confidence intervals, given all standard deviations."""
     part = fit.simulation.get_slice(effect)
-    found = {}
-    for place in range(part.start, part.stop):
-        parameter, value = fit.simulation.parameters[place], float(fit.values[place])
-        reach = 1.96 * float(deviations[place])
-        found[parameter.name] = Value(value, parameter.unit, (value - reach, value + reach))
-    return found
+    values = {}
+    for index in range(part.start, part.stop):
+        parameter, value = fit.simulation.parameters[index], float(fit.values[index])
+        half_width = 1.96 * float(deviations[index])
+        values[parameter.name] = Value(value, parameter.unit, (value - half_width, value + half_width))
+    return values

@@ -1,4 +1,4 @@
-"""Work that may be done side by side: a function of each of some arguments, in their order."""
+"""Parallel map: a function applied to each of several arguments, with the results in order."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import Protocol, TypeVar
@@ -8,26 +8,26 @@ R = TypeVar("R")
 
 
 class ParallelMap(Protocol):
-    """Calls a function with each of some arguments; yields what it returns in their order, as `map` does.
+    """Apply a function to each argument and yield the results in the order of the arguments, like `map`.
 
-    `map` itself is one. Others do it on several cores: the result is the same.
+    The built-in `map` is one implementation. Others use several cores and give the same results.
     """
 
     def __call__(self, function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-        """Call it."""
+        """Apply the function to each argument."""
 
 
-def memoised_map(spread: ParallelMap, same: Callable[[A], Hashable]) -> ParallelMap:
-    """Return a spread that remembers what came of its arguments; what is the ``same`` is not done again.
+def memoised_map(parallel_map: ParallelMap, key: Callable[[A], Hashable]) -> ParallelMap:
+    """Return a map that caches results by the key of the argument.
 
-    For calls of one function, or of some that return the same.
+    All calls of the returned map must use the same function, or functions with equal results.
     """
-    known: dict[Hashable, object] = {}
+    results: dict[Hashable, object] = {}
 
-    def remembering(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-        asked = [(same(each), each) for each in arguments]
-        new = {key: each for key, each in asked if key not in known}
-        known.update(zip(new, spread(function, new.values()), strict=True))
-        return (known[key] for key, _ in asked)  # type: ignore[misc]
+    def cached_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+        keyed = [(key(argument), argument) for argument in arguments]
+        missing = {each: argument for each, argument in keyed if each not in results}
+        results.update(zip(missing, parallel_map(function, missing.values()), strict=True))
+        return (results[each] for each, _ in keyed)  # type: ignore[misc]
 
-    return remembering  # type: ignore[return-value]
+    return cached_map  # type: ignore[return-value]
