@@ -1,4 +1,4 @@
-"""The command diagnose: what it writes, what it says, what it refuses."""
+"""Command ``islands diagnose``: result document, report, self-test and rejected options."""
 
 import json
 import re
@@ -25,10 +25,10 @@ COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--channel"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record in which the sensor follows a temperature, and what is said of it; no figure is drawn."""
+    """A record with a temperature-dependent sensor, and its diagnosis without figures."""
     base = tmp_path_factory.mktemp("diagnosis")
-    hidden = inject(["thermal-drift"], np.random.default_rng(4), seconds=6.0, band=(1.0, 4.0))
-    write_record(hidden.record, base / "piezo.csv")
+    faulty = inject(["thermal-drift"], np.random.default_rng(4), seconds=6.0, band=(1.0, 4.0))
+    write_record(faulty.record, base / "piezo.csv")
     with undrawn_figures():
         succeed(
             *("diagnose", base / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo"),
@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return base
 
 
-def test_one_command_names_what_the_simulation_lacks(folder: Path) -> None:
+def test_diagnose_names_the_missing_effect(folder: Path) -> None:
     document = json.loads((folder / "out/discrepancy.json").read_text())
     assert document["verdict"] == "named"
     assert [effect["name"] for effect in document["effects"]] == ["thermal-drift"]
@@ -56,7 +56,7 @@ def test_one_command_names_what_the_simulation_lacks(folder: Path) -> None:
     assert [each["name"] for each in extended["effects"]] == ["thermal-drift"]
 
 
-def test_the_report_is_one_file_that_says_it_in_words(folder: Path) -> None:
+def test_report_is_a_single_file_with_a_summary(folder: Path) -> None:
     text = (folder / "out/report.html").read_text()
     assert "thermal-drift: k = " in text
     assert "which nothing else has\nseen" in text
@@ -65,64 +65,68 @@ def test_the_report_is_one_file_that_says_it_in_words(folder: Path) -> None:
 
 
 @pytest.mark.ci
-def test_the_figures_of_the_report_are_drawn(beside: Path) -> None:
+def test_report_contains_the_figures(offset_record: Path) -> None:
     succeed(
-        *("diagnose", beside / "record.csv", "--input", "u_V", "--output", "y_um"),
-        *("--simulation", "column:theirs_um", "--out", beside / "drawn"),
+        *("diagnose", offset_record / "record.csv", "--input", "u_V", "--output", "y_um"),
+        *("--simulation", "column:theirs_um", "--out", offset_record / "drawn"),
     )
     drawn = re.findall(
-        r'src="data:image/svg\+xml;base64,([^"]+)"', (beside / "drawn/report.html").read_text()
+        r'src="data:image/svg\+xml;base64,([^"]+)"', (offset_record / "drawn/report.html").read_text()
     )
     assert len(drawn) == 4
     assert min(map(len, drawn)) > 10_000
 
 
 @pytest.fixture(scope="module")
-def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short record with somebody else's simulation in a column, which lacks an offset."""
+def offset_record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short record and a recorded simulation without the offset of the record."""
     base = tmp_path_factory.mktemp("self-test")
     write_offset(base / "record.csv")
     return base
 
 
-def self_tested(base: Path, out: str, *options: object) -> tuple[str, dict]:
-    """Diagnose with a self-test; return what was said, and the document."""
+def run_self_test(base: Path, out: str, *options: object) -> tuple[str, dict]:
+    """Diagnose with a self-test; return the printed text and the document."""
     with undrawn_figures():
-        said = succeed(
+        text = succeed(
             *("diagnose", base / "record.csv", "--input", "u_V", "--output", "y_um"),
             *("--simulation", "column:theirs_um", "--self-test", *options, "--out", base / out),
         )
-    return said, json.loads((base / out / "discrepancy.json").read_text())
+    return text, json.loads((base / out / "discrepancy.json").read_text())
 
 
-def answered(_analyse: object, probes: Sequence[SurrogateCase]) -> Iterator[SurrogateOutcome]:
-    """Answer probes without an analysis: what is larger than a third of the noise is named."""
-    for probe in probes:
-        named = probe.injection is not None and probe.injection.misfit > 0.33
+def stub_map(_function: object, cases: Sequence[SurrogateCase]) -> Iterator[SurrogateOutcome]:
+    """Return outcomes without diagnoses: misfits above a third of the noise are recognised."""
+    for case in cases:
+        named = case.injection is not None and case.injection.misfit > 0.33
         yield SurrogateOutcome("offset" if named else NOTHING, named, 1.0)
 
 
 def quick_self_test(
-    found: Diagnosis, core: Simulator, tolerance: dict, seed: int, _run: ParallelMap, **asked: Any
+    found: Diagnosis, simulator: Simulator, tolerance: dict, seed: int, _map: ParallelMap, **options: Any
 ) -> SelfTest:
-    return self_test(found, core, tolerance, seed, answered, **asked)
+    return self_test(found, simulator, tolerance, seed, stub_map, **options)
 
 
 @pytest.mark.parametrize(
     ("clean", "effects", "quick"),
     [
-        pytest.param(40, None, True, id="answered"),
+        pytest.param(40, None, True, id="stub"),
         pytest.param(4, ("offset",), False, id="small", marks=pytest.mark.ci),
         pytest.param(40, None, False, id="whole", marks=pytest.mark.nightly),
     ],
 )
-def test_a_self_test_says_what_the_record_could_show(
-    beside: Path, clean: int, effects: tuple[str, ...] | None, quick: bool, monkeypatch: pytest.MonkeyPatch
+def test_self_test_reports_detection_limits_and_false_alarms(
+    offset_record: Path,
+    clean: int,
+    effects: tuple[str, ...] | None,
+    quick: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tested = partial(quick_self_test if quick else self_test, effects=effects, clean=clean)
+    tested = partial(quick_self_test if quick else self_test, effects=effects, clean_surrogates=clean)
     monkeypatch.setattr("islands_api.cli.commands.diagnose.self_test", tested)
     out = f"self-test-{clean}-{quick}"
-    said, document = self_tested(beside, out, "--workers", 1)
+    printed, document = run_self_test(offset_record, out, "--workers", 1)
     assert [effect["name"] for effect in document["effects"]] == ["offset"]
     limits = document["detection_limits"]
     assert set(effects or ("offset", "viscous", "jump", "sensor-lag")) <= set(limits)
@@ -137,28 +141,28 @@ def test_a_self_test_says_what_the_record_could_show(
     assert alarms["value"] < 0.2
     assert document["p_value"] == pytest.approx(1 / (clean + 1))
     assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == clean
-    assert f"Of {clean} records like this one with nothing wrong in them" in said
-    text = (beside / out / "report.html").read_text()
+    assert f"Of {clean} records like this one with nothing wrong in them" in printed
+    text = (offset_record / out / "report.html").read_text()
     assert "smallest strength that was named" in text
     assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
 
 
 @pytest.mark.nightly
-def test_a_self_test_is_the_same_on_all_cores(beside: Path) -> None:
-    (_, alone), (_, together) = (
-        self_tested(beside, f"workers-{workers}", "--workers", workers) for workers in (1, 2)
+def test_self_test_does_not_depend_on_the_number_of_workers(offset_record: Path) -> None:
+    (_, serial), (_, parallel) = (
+        run_self_test(offset_record, f"workers-{workers}", "--workers", workers) for workers in (1, 2)
     )
     for name in ("detection_limits", "false_alarm_rate", "p_value", "confusion"):
-        assert together[name] == alone[name]
+        assert parallel[name] == serial[name]
 
 
-def test_a_result_is_not_written_over_unasked(folder: Path) -> None:
-    asked = ("diagnose", folder / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo")
-    assert "holds a result already" in fail(*asked, "--out", folder / "out")
+def test_existing_result_is_not_overwritten_without_force(folder: Path) -> None:
+    command = ("diagnose", folder / "piezo.csv", *COLUMNS, "--simulation", "bouc-wen-piezo")
+    assert "holds a result already" in fail(*command, "--out", folder / "out")
 
 
 @pytest.mark.parametrize(
-    ("options", "why"),
+    ("options", "message"),
     [
         (("--simulation", "pendulum"), "unknown simulation 'pendulum': take one of bouc-wen-piezo"),
         (("--simulation", "bouc-wen-piezo:none.json"), "none.json cannot be read as JSON"),
@@ -169,10 +173,10 @@ def test_a_result_is_not_written_over_unasked(folder: Path) -> None:
         (("--simulation", "bouc-wen-piezo", "--input", "T_K"), "is driven by one input"),
     ],
 )
-def test_an_impossible_diagnosis_is_refused_in_a_line(
-    folder: Path, options: tuple[str, ...], why: str
+def test_invalid_option_is_rejected_with_a_one_line_message(
+    folder: Path, options: tuple[str, ...], message: str
 ) -> None:
-    said = fail("diagnose", folder / "piezo.csv", *COLUMNS, *options, "--out", folder / "other")
-    assert why in said
-    assert "Traceback" not in said
+    text = fail("diagnose", folder / "piezo.csv", *COLUMNS, *options, "--out", folder / "other")
+    assert message in text
+    assert "Traceback" not in text
     assert not (folder / "other").exists()

@@ -1,27 +1,28 @@
-"""Something is hidden in data, and an identified model is held against it: its own form is wrong as well.
+"""Blind trials with an identified model, which has a model-form error in addition to the injected effect.
 
-The model is identified on the record that something is hidden in.
+The model is identified on the record with the injected effect.
 """
 
 import pytest
 
 from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
 
-#: Seconds of a record at the nightly level, and of a short one.
-SECONDS, SHORT = 15.0, 6.0
+#: Duration of a record at the nightly level, in seconds.
+SECONDS = 15.0
+
+#: Duration of a short record, in seconds.
+SHORT = 6.0
 
 ci, nightly = pytest.mark.ci, pytest.mark.nightly
 
 
-def outcome(
-    *effects: str, seed: int, seconds: float, band: tuple[float, float] | None = None
-) -> TrialOutcome:
+def run(*effects: str, seed: int, seconds: float, band: tuple[float, float] | None = None) -> TrialOutcome:
     return run_trial(Trial(effects, seed, band=band, seconds=seconds, core="narx"))
 
 
 @pytest.mark.parametrize("seconds", [pytest.param(SHORT, marks=ci), pytest.param(SECONDS, marks=nightly)])
-def test_on_a_clean_record_the_model_s_form_is_wrong_and_nothing_else(seconds: float) -> None:
-    found = outcome(seed=802, seconds=seconds)
+def test_clean_record_only_yields_the_model_form_error(seconds: float) -> None:
+    found = run(seed=802, seconds=seconds)
     assert found.verdict == "named"
     assert found.form
     assert not found.named
@@ -36,8 +37,8 @@ def test_on_a_clean_record_the_model_s_form_is_wrong_and_nothing_else(seconds: f
         pytest.param("offset", SECONDS, marks=nightly),
     ],
 )
-def test_a_hidden_effect_is_told_from_the_model_s_form(name: str, seconds: float) -> None:
-    found = outcome(name, seed=803, seconds=seconds, band=(1.0, 4.0))
+def test_injected_effect_is_separated_from_the_model_form_error(name: str, seconds: float) -> None:
+    found = run(name, seed=803, seconds=seconds, band=(1.0, 4.0))
     assert found.verdict in ("named", "named with remainder")
     assert found.first_right, (found.named, found.candidates)
     assert found.form

@@ -1,4 +1,4 @@
-"""The self-test: surrogates are what they are said to be, and its answers hang on the seed alone."""
+"""Self-test: surrogates, detection limits, false-alarm rate, and dependence on the seed alone."""
 
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -33,160 +33,174 @@ from islands.discrepancy.surrogates import (
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.trial import TOLERANCE
 
-CORE = BoucWenPiezoSimulator()
-FEW = ("offset", "jump")
+SIMULATOR = BoucWenPiezoSimulator()
+
+#: Effects that most tests inject.
+INJECTED = ("offset", "jump")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _small_reference() -> Iterator[None]:
-    """Look with few random waves for what a residual still holds: that takes half of an analysis' time."""
+def _few_random_features() -> Iterator[None]:
+    """Use few random features for the noise floor, which takes half of the time of a diagnosis."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(noise_floor, "WAVES", 20)
+        patch.setattr(noise_floor, "RANDOM_FEATURES", 20)
         yield
 
 
-def clean() -> Diagnosis:
-    return diagnose(inject([], np.random.default_rng(5), 6.0).record, CORE, TOLERANCE)
+def diagnose_clean_record() -> Diagnosis:
+    return diagnose(inject([], np.random.default_rng(5), 6.0).record, SIMULATOR, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
-def source() -> Surrogates:
-    return make_surrogates(clean(), CORE, TOLERANCE)
+def surrogates() -> Surrogates:
+    return make_surrogates(diagnose_clean_record(), SIMULATOR, TOLERANCE)
 
 
 @pytest.fixture(scope="module")
-def diagnosis(source: Surrogates, offered: Sequence[Effect]) -> Diagnosis:
-    """Of a record with dry friction in it."""
-    friction = next(each for each in offered if each.name == "coulomb-friction")
-    return diagnose(source.draw_record(SurrogateCase(steps(source, friction)[-1], 11)), CORE, TOLERANCE)
+def diagnosis(surrogates: Surrogates, effects: Sequence[Effect]) -> Diagnosis:
+    """Diagnosis of a record with dry friction."""
+    friction = next(each for each in effects if each.name == "coulomb-friction")
+    return diagnose(
+        surrogates.draw_record(SurrogateCase(make_injections(surrogates, friction)[-1], 11)),
+        SIMULATOR,
+        TOLERANCE,
+    )
 
 
 @pytest.fixture(scope="module")
-def offered(source: Surrogates) -> list[Effect]:
-    return list(source.effects.values())
+def effects(surrogates: Surrogates) -> list[Effect]:
+    return list(surrogates.effects.values())
 
 
 @pytest.fixture(scope="module")
-def column(source: Surrogates) -> tuple[Diagnosis, RecordedOutput]:
-    """A clean record beside somebody else's simulation of it: that takes a tenth of the time."""
-    core = RecordedOutput("theirs", source.simulate())
-    return diagnose(source.draw_record(SurrogateCase(None, 12)), core), core
+def column(surrogates: Surrogates) -> tuple[Diagnosis, RecordedOutput]:
+    """A clean record and its recorded simulation, which takes a tenth of the time."""
+    simulator = RecordedOutput("theirs", surrogates.simulate())
+    return diagnose(surrogates.draw_record(SurrogateCase(None, 12)), simulator), simulator
 
 
 @pytest.fixture(scope="module")
 def tested(column: tuple[Diagnosis, RecordedOutput]) -> SelfTest:
-    return self_test(*column, seed=3, effects=FEW, clean=1)
+    return self_test(*column, seed=3, effects=INJECTED, clean_surrogates=1)
 
 
-def steps(source: Surrogates, effect: Effect, seed: int = 0) -> tuple[Injection, ...]:
-    return injection_strengths(source, effect, np.random.default_rng(seed))
+def make_injections(surrogates: Surrogates, effect: Effect, seed: int = 0) -> tuple[Injection, ...]:
+    return injection_strengths(surrogates, effect, np.random.default_rng(seed))
 
 
-def test_a_surrogate_is_the_simulation_and_noise_as_the_record_has_it() -> None:
-    hiding = inject([], np.random.default_rng(5), 6.0, 0.8, apart=False)
-    core = RecordedOutput("theirs", hiding.nominal)
-    found = diagnose(hiding.record, core)
-    source = make_surrogates(found, core, {})
-    drawn = [source.draw_record(SurrogateCase(None, seed)) for seed in range(12)]
+def test_surrogate_is_the_simulation_plus_noise_of_the_record() -> None:
+    faulty = inject([], np.random.default_rng(5), 6.0, 0.8, apart=False)
+    simulator = RecordedOutput("theirs", faulty.nominal)
+    found = diagnose(faulty.record, simulator)
+    surrogates = make_surrogates(found, simulator, {})
+    drawn = [surrogates.draw_record(SurrogateCase(None, seed)) for seed in range(12)]
     assert all(np.array_equal(each.u, found.record.u) for each in drawn)
-    noise = [each.y - source.simulate() for each in drawn]
-    assert np.std(noise) == pytest.approx(source.sigma, rel=0.15)
+    noise = [each.y - surrogates.simulate() for each in drawn]
+    assert np.std(noise) == pytest.approx(surrogates.sigma, rel=0.15)
     assert np.mean([fit_ar_noise(each).coefficients[0] for each in noise]) == pytest.approx(
         found.best.noise.coefficients[0], abs=0.1
     )
 
 
 @pytest.mark.ci
-def test_what_was_named_is_taken_off(diagnosis: Diagnosis) -> None:
+def test_clean_surrogates_do_not_contain_the_named_effect(diagnosis: Diagnosis) -> None:
     assert [each.name for each in diagnosis.effects] == ["coulomb-friction"]
-    source = make_surrogates(diagnosis, CORE, TOLERANCE)
-    assert source.sigma < 0.3 * np.sqrt(diagnosis.base.mean_square)
-    assert np.std(diagnosis.best.output - source.simulate()) > 3 * source.sigma
-    assert diagnose_surrogate(source, SurrogateCase(None, 1)).named == NOTHING
+    surrogates = make_surrogates(diagnosis, SIMULATOR, TOLERANCE)
+    assert surrogates.sigma < 0.3 * np.sqrt(diagnosis.base.mean_square)
+    assert np.std(diagnosis.best.output - surrogates.simulate()) > 3 * surrogates.sigma
+    assert diagnose_surrogate(surrogates, SurrogateCase(None, 1)).named == NOTHING
 
 
-def test_to_inject_nothing_leaves_the_surrogate(source: Surrogates, offered: Sequence[Effect]) -> None:
-    clean = source.draw_record(SurrogateCase(None, 7)).y
-    for effect in offered:
-        nominal = tuple(each.nominal for each in effect.parameters(source.simulation.context))
+def test_injection_at_nominal_values_does_not_change_the_surrogate(
+    surrogates: Surrogates, effects: Sequence[Effect]
+) -> None:
+    clean = surrogates.draw_record(SurrogateCase(None, 7)).y
+    for effect in effects:
+        nominal = tuple(each.nominal for each in effect.parameters(surrogates.simulation.context))
         nothing = Injection(effect.name, nominal, 0.0, "", 0.0)
-        assert np.array_equal(source.draw_record(SurrogateCase(nothing, 7)).y, clean), effect.name
+        assert np.array_equal(surrogates.draw_record(SurrogateCase(nothing, 7)).y, clean), effect.name
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.ci)])
-def test_a_stronger_injection_has_a_larger_misfit(
-    source: Surrogates, offered: Sequence[Effect], seed: int
+def test_stronger_injection_has_a_larger_misfit(
+    surrogates: Surrogates, effects: Sequence[Effect], seed: int
 ) -> None:
-    clean = source.draw_record(SurrogateCase(None, 7)).y
-    for effect in offered:
-        found = steps(source, effect, seed)
+    clean = surrogates.draw_record(SurrogateCase(None, 7)).y
+    for effect in effects:
+        found = make_injections(surrogates, effect, seed)
         assert found, effect.name
         sizes = [each.strength for each in found]
         misfits = [each.misfit for each in found]
         assert sizes == sorted(set(sizes)), effect.name
         assert misfits == sorted(set(misfits)), effect.name
-        parameters = effect.parameters(source.simulation.context)
+        parameters = effect.parameters(surrogates.simulation.context)
         for each in found:
             assert all(p.lower <= v <= p.upper for p, v in zip(parameters, each.values, strict=True))
-            changed = (source.draw_record(SurrogateCase(each, 7)).y - clean)[: source.estimation_samples]
-            assert np.sqrt(np.mean(changed**2)) == pytest.approx(each.misfit * source.sigma), effect.name
+            changed = (surrogates.draw_record(SurrogateCase(each, 7)).y - clean)[
+                : surrogates.estimation_samples
+            ]
+            assert np.sqrt(np.mean(changed**2)) == pytest.approx(each.misfit * surrogates.sigma), effect.name
 
 
-def test_misfits_are_those_of_the_ladder_where_nothing_leaps(
-    source: Surrogates, offered: Sequence[Effect]
+def test_misfits_of_a_continuous_response_are_the_given_ones(
+    surrogates: Surrogates, effects: Sequence[Effect]
 ) -> None:
-    offset = next(each for each in offered if each.name == "offset")
-    assert [each.misfit for each in steps(source, offset)] == pytest.approx(list(STRENGTHS), rel=0.02)
+    offset = next(each for each in effects if each.name == "offset")
+    assert [each.misfit for each in make_injections(surrogates, offset)] == pytest.approx(
+        list(STRENGTHS), rel=0.02
+    )
 
 
-def test_strengths_that_a_response_leaps_over_are_left_out(
-    source: Surrogates, offered: Sequence[Effect]
+def test_misfits_that_a_response_jumps_over_are_skipped(
+    surrogates: Surrogates, effects: Sequence[Effect]
 ) -> None:
-    offset = next(each for each in offered if each.name == "offset")
+    offset = next(each for each in effects if each.name == "offset")
 
-    def leaping(y: Signal, values: Signal, _scene: SimulationContext) -> Signal:
-        return y + source.sigma * (0.15 if abs(values[0]) < 1.0 else 2.0 if abs(values[0]) < 2.0 else np.inf)
+    def jump(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
+        return y + surrogates.sigma * (
+            0.15 if abs(values[0]) < 1.0 else 2.0 if abs(values[0]) < 2.0 else np.inf
+        )
 
-    found = steps(source, replace(offset, form=leaping))
+    found = make_injections(surrogates, replace(offset, form=jump))
     assert [each.misfit for each in found] == pytest.approx([0.15, 2.0])
 
 
 @pytest.mark.ci
-def test_a_limit_is_a_strength_that_is_named(diagnosis: Diagnosis) -> None:
-    found = self_test(diagnosis, CORE, TOLERANCE, 3, effects=("coulomb-friction",), clean=0)
+def test_detection_limit_is_a_strength_that_is_recognised(diagnosis: Diagnosis) -> None:
+    found = self_test(diagnosis, SIMULATOR, TOLERANCE, 3, effects=("coulomb-friction",), clean_surrogates=0)
     friction = found.detection_limits["coulomb-friction"]
     assert friction is not None
     assert friction.unit == "um"
     assert STRENGTHS[0] < friction.misfit < STRENGTHS[-2]
-    # What is in the record was found there, and is above its limit.
+    # The friction in the record was found, so that it is above the limit.
     assert friction.strength < abs(diagnosis.effects[0].parameters["F"].value)
     assert found.confusion["coulomb-friction", "coulomb-friction"] >= 1
     assert found.confusion["coulomb-friction", NOTHING] >= 1
 
 
 @pytest.mark.ci
-def test_what_is_within_a_tolerance_has_no_limit(diagnosis: Diagnosis) -> None:
+def test_parameter_within_its_tolerance_has_no_detection_limit(diagnosis: Diagnosis) -> None:
     wide = dict.fromkeys(TOLERANCE, 0.5)
-    found = self_test(diagnosis, CORE, wide, 3, effects=("wrong-parameter:beta",), clean=0)
+    found = self_test(diagnosis, SIMULATOR, wide, 3, effects=("wrong-parameter:beta",), clean_surrogates=0)
     assert found.detection_limits == {"wrong-parameter:beta": None}
     assert found.false_alarm_rate.trials == 0
     assert found.p_value == 1.0
 
 
 def backwards(
-    function: Callable[[SurrogateCase], SurrogateOutcome], probes: Sequence[SurrogateCase], /
+    function: Callable[[SurrogateCase], SurrogateOutcome], cases: Sequence[SurrogateCase], /
 ) -> Iterable[SurrogateOutcome]:
-    """Carry out probes in another process's order: copies of them, the last first."""
-    function, probes = pickle.loads(pickle.dumps((function, probes)))
-    return reversed([function(probe) for probe in reversed(probes)])
+    """Evaluate pickled copies of the cases, the last one first."""
+    function, cases = pickle.loads(pickle.dumps((function, cases)))
+    return reversed([function(case) for case in reversed(cases)])
 
 
 @pytest.mark.ci
-def test_the_same_seed_has_the_same_result_in_any_order(
+def test_result_does_not_depend_on_the_order_of_evaluation(
     column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
     assert any(tested.detection_limits.values())
-    again = self_test(*column, seed=3, run=backwards, effects=FEW, clean=1)
+    again = self_test(*column, seed=3, parallel_map=backwards, effects=INJECTED, clean_surrogates=1)
     assert again.detection_limits == tested.detection_limits
     assert again.false_alarm_rate == tested.false_alarm_rate
     assert again.p_value == tested.p_value
@@ -194,90 +208,92 @@ def test_the_same_seed_has_the_same_result_in_any_order(
 
 
 @pytest.mark.ci
-def test_another_seed_has_another_result(column: tuple[Diagnosis, RecordedOutput], tested: SelfTest) -> None:
-    other = self_test(*column, seed=4, effects=FEW[-1:], clean=0)
-    assert other.detection_limits[FEW[-1]] != tested.detection_limits[FEW[-1]]
+def test_result_depends_on_the_seed(column: tuple[Diagnosis, RecordedOutput], tested: SelfTest) -> None:
+    other = self_test(*column, seed=4, effects=INJECTED[-1:], clean_surrogates=0)
+    assert other.detection_limits[INJECTED[-1]] != tested.detection_limits[INJECTED[-1]]
 
 
-def test_an_effects_result_does_not_hang_on_the_others(
+def test_detection_limit_does_not_depend_on_other_effects(
     column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
-    alone = self_test(*column, seed=3, effects=FEW[-1:], clean=0)
-    assert alone.detection_limits == {FEW[-1]: tested.detection_limits[FEW[-1]]}
+    alone = self_test(*column, seed=3, effects=INJECTED[-1:], clean_surrogates=0)
+    assert alone.detection_limits == {INJECTED[-1]: tested.detection_limits[INJECTED[-1]]}
 
 
-def answering(
-    called: str, score: float, recognised: bool = False
-) -> Callable[..., Iterable[SurrogateOutcome]]:
-    return lambda _function, probes: [SurrogateOutcome(called, recognised, score) for _ in probes]
+def stub_map(named: str, score: float, recognised: bool = False) -> Callable[..., Iterable[SurrogateOutcome]]:
+    """Return a map that gives the same outcome for every case."""
+    return lambda _function, cases: [SurrogateOutcome(named, recognised, score) for _ in cases]
 
 
-def test_p_is_one_in_n_and_one_where_the_record_beats_all(diagnosis: Diagnosis) -> None:
+def test_p_value_counts_surrogates_as_good_as_the_record(diagnosis: Diagnosis) -> None:
     best = replace(diagnosis, candidates=(Candidate("delay", 3.0, 0.1), Candidate("offset", 50.0, 0.5)))
     for score, p in ((49.9, 1 / 21), (50.0, 1.0)):
-        found = self_test(best, CORE, TOLERANCE, 0, answering(NOTHING, score), (), 20)
+        found = self_test(best, SIMULATOR, TOLERANCE, 0, stub_map(NOTHING, score), (), 20)
         assert found.p_value == pytest.approx(p)
 
 
-@pytest.mark.parametrize(("called", "value"), [("delay", 1.0), (NOTHING, 0.0), (UNKNOWN, 0.0)])
-def test_a_false_alarm_is_a_name(diagnosis: Diagnosis, called: str, value: float) -> None:
-    found = self_test(diagnosis, CORE, TOLERANCE, 0, answering(called, 0.0), (), 20)
+@pytest.mark.parametrize(("named", "value"), [("delay", 1.0), (NOTHING, 0.0), (UNKNOWN, 0.0)])
+def test_false_alarm_is_a_named_cause(diagnosis: Diagnosis, named: str, value: float) -> None:
+    found = self_test(diagnosis, SIMULATOR, TOLERANCE, 0, stub_map(named, 0.0), (), 20)
     assert found.false_alarm_rate == estimate_rate(int(20 * value), 20)
     assert found.false_alarm_rate.value == value
-    assert found.confusion == {(NOTHING, called): 20}
+    assert found.confusion == {(NOTHING, named): 20}
 
 
-def test_the_limit_is_where_naming_begins(diagnosis: Diagnosis, source: Surrogates) -> None:
-    """Whichever step it is, four probes find it at the most."""
+def test_detection_limit_is_the_smallest_recognised_strength(
+    diagnosis: Diagnosis, surrogates: Surrogates
+) -> None:
+    """The bisection takes at most four surrogates."""
     for first in range(len(STRENGTHS) + 1):
-        asked = []
+        evaluated = []
 
-        def run(
+        def evaluate(
             _function: object,
-            probes: Sequence[SurrogateCase],
+            cases: Sequence[SurrogateCase],
             first: int = first,
-            asked: list[SurrogateCase] = asked,
+            evaluated: list[SurrogateCase] = evaluated,
         ) -> Iterable[SurrogateOutcome]:
-            asked += probes
-            for probe in probes:
-                assert probe.injection is not None
-                named = first < len(STRENGTHS) and probe.injection.misfit > 0.9 * STRENGTHS[first]
-                yield SurrogateOutcome("offset" if named else NOTHING, named, 0.0)
+            evaluated += cases
+            for case in cases:
+                assert case.injection is not None
+                is_named = first < len(STRENGTHS) and case.injection.misfit > 0.9 * STRENGTHS[first]
+                yield SurrogateOutcome("offset" if is_named else NOTHING, is_named, 0.0)
 
-        found = self_test(diagnosis, CORE, TOLERANCE, 0, run, ("offset",), 0)
+        found = self_test(diagnosis, SIMULATOR, TOLERANCE, 0, evaluate, ("offset",), 0)
         limit = found.detection_limits["offset"]
         if first == len(STRENGTHS):
             assert limit is None
         else:
             assert limit is not None
             assert limit.misfit == pytest.approx(STRENGTHS[first], rel=0.02)
-        assert len(asked) <= 4
+        assert len(evaluated) <= 4
 
 
-def test_who_waits_is_told_how_far_it_is(diagnosis: Diagnosis) -> None:
-    told: list[tuple[str, float | None]] = []
+def test_progress_counts_the_completed_analyses(diagnosis: Diagnosis) -> None:
+    reports: list[tuple[str, float | None]] = []
     self_test(
-        *(diagnosis, CORE, TOLERANCE, 0, answering(NOTHING, 0.0), ("offset",), 2),
-        progress=lambda message, fraction=None: told.append((message, fraction)),
+        *(diagnosis, SIMULATOR, TOLERANCE, 0, stub_map(NOTHING, 0.0), ("offset",), 2),
+        progress=lambda message, fraction=None: reports.append((message, fraction)),
     )
-    assert told == [(f"{ended} of 6 analyses", ended / 6) for ended in range(1, 7)]
+    assert reports == [(f"{ended} of 6 analyses", ended / 6) for ended in range(1, 7)]
 
 
-def test_noise_that_was_fitted_to_a_drift_stays_finite(diagnosis: Diagnosis) -> None:
-    left = np.concatenate(
+def test_noise_model_fitted_to_a_drift_is_stable(diagnosis: Diagnosis) -> None:
+    drift = np.concatenate(
         [1e-3 * 1.02 ** np.arange(diagnosis.estimation_samples), np.zeros(diagnosis.record.samples)]
     )
-    left = left[: diagnosis.record.samples]
-    record = replace(diagnosis.record, y=diagnosis.best.output + left)
+    drift = drift[: diagnosis.record.samples]
+    record = replace(diagnosis.record, y=diagnosis.best.output + drift)
     assert (
-        np.abs(np.roots([1.0, *-fit_ar_noise(left[: diagnosis.estimation_samples]).coefficients])).max() > 1.0
+        np.abs(np.roots([1.0, *-fit_ar_noise(drift[: diagnosis.estimation_samples]).coefficients])).max()
+        > 1.0
     )
-    source = make_surrogates(replace(diagnosis, record=record), CORE, TOLERANCE)
-    assert np.abs(np.roots([1.0, *-source.noise.coefficients])).max() < 1.0
-    assert np.isfinite(source.draw_record(SurrogateCase(None, 0)).y).all()
+    surrogates = make_surrogates(replace(diagnosis, record=record), SIMULATOR, TOLERANCE)
+    assert np.abs(np.roots([1.0, *-surrogates.noise.coefficients])).max() < 1.0
+    assert np.isfinite(surrogates.draw_record(SurrogateCase(None, 0)).y).all()
 
 
-def test_bounds_are_those_of_clopper_and_pearson() -> None:
+def test_confidence_interval_is_clopper_pearson() -> None:
     assert estimate_rate(0, 40).ci95 == pytest.approx((0.0, 0.0881), abs=1e-4)
     assert estimate_rate(2, 40).ci95 == pytest.approx((0.0061, 0.1692), abs=1e-4)
     assert estimate_rate(40, 40).ci95[1] == 1.0

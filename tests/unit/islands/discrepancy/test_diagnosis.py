@@ -1,4 +1,4 @@
-"""A diagnosis: what it names, what it refuses, what it does not see, and that it is the same each time."""
+"""Diagnosis: findings, rejected input, hold-out part and reproducibility."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset, join
-from islands.discrepancy.calibration.preparation import FEWEST, LOCKED
+from islands.discrepancy.calibration.preparation import HOLDOUT_FRACTION, MIN_SAMPLES
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
@@ -28,13 +28,13 @@ def found(record: Dataset) -> Diagnosis:
     return diagnose(record, BoucWenPiezoSimulator(), TOLERANCE)
 
 
-def changed(record: Dataset, column: int, values: object) -> Dataset:
+def with_input(record: Dataset, column: int, values: object) -> Dataset:
     u = np.array(record.u)
     u[:, column] = values
     return replace(record, u=u)
 
 
-def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: Diagnosis) -> None:
+def test_injected_drag_is_named_with_its_strength_and_gain(found: Diagnosis) -> None:
     assert found.verdict == Verdict.NAMED
     (finding,) = found.effects
     assert (finding.name, finding.family) == ("quadratic-drag", "shape")
@@ -54,14 +54,14 @@ def test_what_was_hidden_is_named_with_its_strength_and_what_it_is_worth(found: 
 
 
 @pytest.mark.ci
-def test_the_same_question_has_the_same_answer(record: Dataset, found: Diagnosis) -> None:
+def test_diagnosis_is_reproducible(record: Dataset, found: Diagnosis) -> None:
     again = diagnose(record, BoucWenPiezoSimulator(), TOLERANCE)
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
 
 
-def test_what_is_locked_away_is_seen_by_the_gain_alone(record: Dataset, found: Diagnosis) -> None:
+def test_holdout_part_only_changes_the_gain(record: Dataset, found: Diagnosis) -> None:
     y = np.array(record.y)
-    fitted = int((1 - LOCKED) * record.samples)
+    fitted = int((1 - HOLDOUT_FRACTION) * record.samples)
     y[fitted:] += 1.0
     other = diagnose(replace(record, y=y), BoucWenPiezoSimulator(), TOLERANCE)
     assert (other.effects, other.candidates, other.verdict) == (
@@ -79,21 +79,21 @@ def clean() -> Dataset:
     return inject([], np.random.default_rng(9), seconds=6.0).record
 
 
-#: A simulation with two parameters that are far from those of the records.
-OFF = BoucWenPiezoSimulator(BoucWenPiezo(dp=1.3, A=0.7))
+#: A simulator with two parameters far from those of the records.
+DETUNED = BoucWenPiezoSimulator(BoucWenPiezo(dp=1.3, A=0.7))
 
 
-def test_a_parameter_without_a_tolerance_is_calibrated_and_no_discrepancy(clean: Dataset) -> None:
-    assert diagnose(clean, OFF).verdict == Verdict.NOTHING
+def test_parameter_without_a_tolerance_is_calibrated(clean: Dataset) -> None:
+    assert diagnose(clean, DETUNED).verdict == Verdict.NOTHING
 
 
-def test_a_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> None:
-    trusted = diagnose(clean, OFF, TOLERANCE)
-    assert {each.name for each in trusted.effects} <= {"wrong-parameter", "sensor-gain", "input-gain"}
-    assert trusted.effects
+def test_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> None:
+    found = diagnose(clean, DETUNED, TOLERANCE)
+    assert {each.name for each in found.effects} <= {"wrong-parameter", "sensor-gain", "input-gain"}
+    assert found.effects
 
 
-def test_a_column_is_a_simulation(record: Dataset) -> None:
+def test_recorded_output_can_be_diagnosed(record: Dataset) -> None:
     simulated = np.array(BoucWenPiezoSimulator().simulate(*_nominal(record)))
     drifted = replace(
         record, y=simulated + 0.5 * record.time / record.time[-1] + 0.01 * np.sin(37.0 * record.time**2)
@@ -107,43 +107,43 @@ def _nominal(record: Dataset) -> tuple:
     from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context
 
     core = BoucWenPiezoSimulator()
-    scene = make_context(record, core, count_fitted_samples(record))
-    return np.array([each.nominal for each in core.parameters]), scene.u, scene, {}, ()
+    context = make_context(record, core, count_fitted_samples(record))
+    return np.array([each.nominal for each in core.parameters]), context.u, context, {}, ()
 
 
-REFUSED = {
-    "short": (lambda record: record[: FEWEST - 1], f"a diagnosis takes {FEWEST} at least"),
-    "still": (lambda record: changed(record, 0, 1.0), "column u_V is constant"),
-    "still channel": (lambda record: changed(record, 2, 1.0), "column w_V is constant"),
-    "twin": (
-        lambda record: changed(record, 1, record.u[:, 0]),
+UNUSABLE = {
+    "too short": (lambda record: record[: MIN_SAMPLES - 1], f"a diagnosis takes {MIN_SAMPLES} at least"),
+    "constant input": (lambda record: with_input(record, 0, 1.0), "column u_V is constant"),
+    "constant channel": (lambda record: with_input(record, 2, 1.0), "column w_V is constant"),
+    "channel equal to the input": (
+        lambda record: with_input(record, 1, record.u[:, 0]),
         "channel T_K is the input itself: leave it out",
     ),
     "gaps": (lambda record: replace(record, y=np.where(record.time > 3, record.y, np.nan)), "has gaps"),
-    "several": (lambda record: join((record, record)), "diagnose one after the other"),
+    "several recordings": (lambda record: join((record, record)), "diagnose them one by one"),
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_record_that_cannot_be_used_is_refused(record: Dataset, case: str) -> None:
-    spoil, why = REFUSED[case]
-    with pytest.raises(RecordError, match=why):
+@pytest.mark.parametrize("case", UNUSABLE)
+def test_unusable_record_is_rejected(record: Dataset, case: str) -> None:
+    spoil, message = UNUSABLE[case]
+    with pytest.raises(RecordError, match=message):
         diagnose(spoil(record), BoucWenPiezoSimulator())
 
 
 @pytest.mark.parametrize(
-    ("tolerance", "why"),
+    ("tolerance", "message"),
     [
         ({"mass": 0.1}, "has no parameter 'mass': it has A, beta, gamma, dp"),
-        ({"dp": 0.0}, "a part of its value, like 0.02; got 0"),
-        ({"dp": 2.0}, "a part of its value"),
+        ({"dp": 0.0}, "a fraction of its value, such as 0.02; got 0"),
+        ({"dp": 2.0}, "a fraction of its value"),
     ],
 )
-def test_a_tolerance_that_cannot_be_is_refused(record: Dataset, tolerance: dict, why: str) -> None:
-    with pytest.raises(SettingsError, match=why):
+def test_invalid_tolerance_is_rejected(record: Dataset, tolerance: dict, message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
         diagnose(record, BoucWenPiezoSimulator(), tolerance)
 
 
-def test_a_simulation_that_diverges_is_refused(record: Dataset) -> None:
+def test_diverging_simulation_is_rejected(record: Dataset) -> None:
     with pytest.raises(RecordError, match="diverges on this input"), np.errstate(all="ignore"):
         diagnose(record, BoucWenPiezoSimulator(BoucWenPiezo(gamma=-5.0)))

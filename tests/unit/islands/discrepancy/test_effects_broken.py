@@ -1,4 +1,4 @@
-"""An entry of the catalogue that does not do what it says is named, with what to do about it."""
+"""Invalid effects: the error names the effect, the reason and the file."""
 
 from dataclasses import replace
 
@@ -21,48 +21,51 @@ def record() -> Dataset:
     return recorded(u, y)
 
 
-def raises(*_arguments: object) -> None:
+def fail(*_arguments: object) -> None:
     raise RuntimeError("out of order")
 
 
-GOOD = CATALOGUE["offset"]
-BROKEN: dict[str, tuple[Effect, str]] = {
-    "its form raises": (replace(GOOD, form=raises), "its form fails: RuntimeError: out of order"),
-    "its form gives another length": (
-        replace(GOOD, form=lambda y, _values, _scene: y[:-1]),
+VALID = CATALOGUE["offset"]
+INVALID: dict[str, tuple[Effect, str]] = {
+    "form raises": (replace(VALID, form=fail), "its form fails: RuntimeError: out of order"),
+    "form changes the length": (
+        replace(VALID, form=lambda y, _values, _context: y[:-1]),
         r"its form gives \(599,\) for \(600,\)",
     ),
-    "its form gives no numbers": (
-        replace(GOOD, form=lambda y, _values, _scene: ["a"] * y.size),
+    "form returns texts": (
+        replace(VALID, form=lambda y, _values, _context: ["a"] * y.size),
         "its form fails: ValueError",
     ),
-    "its grid raises": (replace(GOOD, starting_points=raises), "its grid fails: RuntimeError: out of order"),
-    "its grid has too many values": (
-        replace(GOOD, starting_points=lambda _scene, _residual: ((1.0, 2.0),)),
-        "its grid has to give 1 values at each point",
+    "starting points raise": (
+        replace(VALID, starting_points=fail),
+        "its starting points fail: RuntimeError: out of order",
     ),
-    "its grid has none": (
-        replace(GOOD, starting_points=lambda _scene, _residual: ((),)),
-        "its grid has to give 1 values",
+    "starting points with too many values": (
+        replace(VALID, starting_points=lambda _context, _residual: ((1.0, 2.0),)),
+        "each of its starting points needs 1 values",
     ),
-    "its map of the input raises": (replace(CATALOGUE["delay"], form=raises), "its form fails"),
+    "starting points without values": (
+        replace(VALID, starting_points=lambda _context, _residual: ((),)),
+        "each of its starting points needs 1 values",
+    ),
+    "input map raises": (replace(CATALOGUE["delay"], form=fail), "its form fails"),
 }
 
 
-@pytest.mark.parametrize("case", BROKEN)
-def test_a_broken_effect_is_named(record: Dataset, case: str) -> None:
-    effect, why = BROKEN[case]
-    with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {why}") as refused:
+@pytest.mark.parametrize("case", INVALID)
+def test_error_names_the_invalid_effect(record: Dataset, case: str) -> None:
+    effect, message = INVALID[case]
+    with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {message}") as raised:
         diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
-    assert str(refused.value).endswith(".py or take it out of the catalogue")
+    assert str(raised.value).endswith(".py or take it out of the catalogue")
 
 
-def test_a_grid_without_points_leaves_an_effect_out(record: Dataset) -> None:
-    effect = replace(GOOD, starting_points=lambda _scene, _residual: ())
+def test_effect_without_starting_points_is_skipped(record: Dataset) -> None:
+    effect = replace(VALID, starting_points=lambda _context, _residual: ())
     found = diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
     assert {each.name for each in found.candidates} <= {"jump"}
 
 
-def test_effects_of_one_name_are_refused(record: Dataset) -> None:
+def test_effects_with_equal_names_are_rejected(record: Dataset) -> None:
     with pytest.raises(SettingsError, match="offset is given twice: rename one"):
-        diagnose(record, BoucWenPiezoSimulator(), catalogue=(GOOD, CATALOGUE["jump"], GOOD))
+        diagnose(record, BoucWenPiezoSimulator(), catalogue=(VALID, CATALOGUE["jump"], VALID))

@@ -52,7 +52,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No figure is drawn, and few random waves look for what a residual still holds."""
-    monkeypatch.setattr(noise_floor, "WAVES", 20)
+    monkeypatch.setattr(noise_floor, "RANDOM_FEATURES", 20)
     with undrawn_figures():
         yield
 

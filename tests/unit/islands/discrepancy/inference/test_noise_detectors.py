@@ -1,67 +1,70 @@
-"""Detectors: each finds what was done to a record's samples, and nothing where nothing was done."""
+"""Noise detectors: each finds its artefact, and none reports anything on a clean record."""
 
 import numpy as np
 import pytest
 import scipy
 
 from islands.discrepancy.inference.noise_detectors import DETECTORS
-from islands.discrepancy.inference.stepwise_search import LEAST
+from islands.discrepancy.inference.stepwise_search import MIN_GAIN
 from islands.discrepancy.interfaces.effect import SimulationContext
 
-SAMPLES, SIGMA = 4000, 0.14
+SAMPLES = 4000
+
+#: Standard deviation of the noise.
+SIGMA = 0.14
 
 
-def scene() -> SimulationContext:
+def make_context() -> SimulationContext:
     u = np.zeros(SAMPLES)
     return SimulationContext(u, 0.01, {}, {}, 40.0, 45.0, "V", "um", 40.0)
 
 
-def clean(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def make_clean_record(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     mean = 45 * np.sin(2 * np.pi * 0.37 * np.arange(SAMPLES) * 0.01)
     return mean, mean + SIGMA * rng.standard_normal(SAMPLES)
 
 
-def rounded(rng: np.random.Generator, _mean: np.ndarray, y: np.ndarray) -> np.ndarray:
+def quantise(rng: np.random.Generator, _mean: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.round(y / (2 * SIGMA)) * 2 * SIGMA
 
 
-def held(rng: np.random.Generator, _mean: np.ndarray, y: np.ndarray) -> np.ndarray:
+def hold_samples(rng: np.random.Generator, _mean: np.ndarray, y: np.ndarray) -> np.ndarray:
     y = y.copy()
     for first in rng.integers(10, SAMPLES - 20, 5):
         y[first : first + 8] = y[first]
     return y
 
 
-def spiked(rng: np.random.Generator, _mean: np.ndarray, y: np.ndarray) -> np.ndarray:
+def add_outliers(rng: np.random.Generator, _mean: np.ndarray, y: np.ndarray) -> np.ndarray:
     y = y.copy()
     y[rng.choice(SAMPLES, 8, replace=False)] += 12 * SIGMA * rng.choice([-1, 1], 8)
     return y
 
 
-def louder(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np.ndarray:
+def scale_noise(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np.ndarray:
     return mean + (y - mean) * (1 + 2 * np.abs(mean) / 45)
 
 
-def coloured(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np.ndarray:
+def colour_noise(rng: np.random.Generator, mean: np.ndarray, y: np.ndarray) -> np.ndarray:
     return mean + scipy.signal.lfilter([np.sqrt(1 - 0.8**2)], [1.0, -0.8], y - mean)
 
 
-DONE = {
-    "quantisation": rounded,
-    "held-samples": held,
-    "outliers": spiked,
-    "heteroscedastic-noise": louder,
-    "coloured-noise": coloured,
+ARTEFACTS = {
+    "quantisation": quantise,
+    "held-samples": hold_samples,
+    "outliers": add_outliers,
+    "heteroscedastic-noise": scale_noise,
+    "coloured-noise": colour_noise,
 }
 
 
-def said(y: np.ndarray, residual: np.ndarray) -> set[str]:
+def detect_all(y: np.ndarray, residual: np.ndarray) -> set[str]:
     found = {}
     for name, detector in DETECTORS.items():
-        detection = detector.detect(y, residual, scene())
+        detection = detector.detect(y, residual, make_context())
         if (
             detection is not None
-            and detection.score_gain > LEAST
+            and detection.score_gain > MIN_GAIN
             and not found.keys() & set(detector.excluded_by)
         ):
             found[name] = detection
@@ -69,19 +72,19 @@ def said(y: np.ndarray, residual: np.ndarray) -> set[str]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("name", DONE)
-def test_what_was_done_is_found_and_nothing_else(name: str, seed: int) -> None:
+@pytest.mark.parametrize("name", ARTEFACTS)
+def test_only_the_detector_of_the_artefact_reports(name: str, seed: int) -> None:
     rng = np.random.default_rng([seed, len(name)])
-    mean, y = clean(rng)
-    y = DONE[name](rng, mean, y)
-    assert said(y, y - mean) == {name}
+    mean, y = make_clean_record(rng)
+    y = ARTEFACTS[name](rng, mean, y)
+    assert detect_all(y, y - mean) == {name}
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_on_a_clean_record_they_are_silent(seed: int) -> None:
-    mean, y = clean(np.random.default_rng(seed))
-    assert said(y, y - mean) == set()
+def test_detectors_report_nothing_on_a_clean_record(seed: int) -> None:
+    mean, y = make_clean_record(np.random.default_rng(seed))
+    assert detect_all(y, y - mean) == set()
 
 
-def test_every_detector_is_tried() -> None:
-    assert DONE.keys() == DETECTORS.keys()
+def test_artefacts_cover_every_detector() -> None:
+    assert ARTEFACTS.keys() == DETECTORS.keys()

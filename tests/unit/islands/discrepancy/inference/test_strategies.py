@@ -1,4 +1,4 @@
-"""Evidence by misfit: two causes of a simulation whose form is wrong."""
+"""Search under model error: two causes in a simulation whose form is wrong."""
 
 import numpy as np
 import pytest
@@ -15,11 +15,14 @@ from islands.io.simulator_spec.factory import make_simulator
 from islands.io.simulator_spec.specification import PhysicalSpec
 from support.simulated_records import recorded
 
-#: Level at which the upper tank overflows, and what the pump brings beside what it is told.
-RIM, BESIDE = 4.0, 0.8
+#: Level at which the upper tank overflows.
+RIM = 4.0
 
-#: What is looked for beside the tanks' own effects: at the fast level, and at the nightly level.
-RIVALS = (
+#: Constant flow of the pump in addition to its command.
+LEAK = 0.8
+
+#: Effects searched for in addition to those of the tanks: at the fast level, and at the nightly level.
+CATALOGUES = (
     ("offset",),
     pytest.param(
         ("delay", "input-saturation", "exponential-creep", "output-saturation", "offset"),
@@ -28,53 +31,53 @@ RIVALS = (
 )
 
 
-def overflowing(rim: float, beside: float, samples: int = 400, dt: float = 4.0) -> Dataset:
-    """Integrate two tanks in small Euler steps; a part of what goes over the upper rim is caught below."""
+def simulate_overflow(rim: float, leak: float, samples: int = 400, dt: float = 4.0) -> Dataset:
+    """Integrate two tanks in small Euler steps; a part of the upper tank's overflow enters the lower tank."""
     rng = np.random.default_rng(12)
     pump = np.repeat(rng.uniform(0.5, 5.5, samples // 30 + 1), 30)[:samples]
     pump = np.convolve(pump, np.ones(15) / 15, "same")
-    upper, lower, y, often = 2.0, 2.0, [], 40
+    upper, lower, y, steps = 2.0, 2.0, [], 40
     for k in range(samples):
         y.append(lower)
-        for step in range(often):
-            told = pump[k] + (pump[min(k + 1, samples - 1)] - pump[k]) * step / often
+        for step in range(steps):
+            command = pump[k] + (pump[min(k + 1, samples - 1)] - pump[k]) * step / steps
             through, out = 0.06 * np.sqrt(upper), 0.05 * np.sqrt(lower)
-            upper += dt / often * (0.03 * (told + beside) - through)
+            upper += dt / steps * (0.03 * (command + leak) - through)
             over = max(upper - rim, 0.0)
             upper -= over
-            lower = max(lower + dt / often * (through - out) + 0.4 * over, 0.0)
+            lower = max(lower + dt / steps * (through - out) + 0.4 * over, 0.0)
     return recorded(pump, np.array(y) + 0.01 * rng.standard_normal(samples), dt, ("V", "V"))
 
 
-@pytest.fixture(scope="module", params=RIVALS, ids=len)
-def weighed(request):
-    record = overflowing(RIM, BESIDE)
+@pytest.fixture(scope="module", params=CATALOGUES, ids=len)
+def assessed(request):
+    record = simulate_overflow(RIM, LEAK)
     core = make_simulator(PhysicalSpec(kind="cascaded-tanks"), record)
     fitted = count_fitted_samples(record)
-    alone = ExtendedSimulator(core, (), make_context(record, core, fitted))
+    simulation = ExtendedSimulator(core, (), make_context(record, core, fitted))
     target = Target(record.y, np.arange(record.samples) < fitted, None, {})
-    base = calibrate(alone, target, alone.nominal)
+    base = calibrate(simulation, target, simulation.nominal)
     effects = [*core.state_effects, *(CATALOGUE[name] for name in request.param)]
-    evidence = search_with_model_error(base, target, effects, ignore_progress, map)
-    return record, fitted, evidence, assess_evidence(evidence, fitted, np.random.default_rng(0))
+    outcome = search_with_model_error(base, target, effects, ignore_progress, map)
+    return record, fitted, outcome, assess_evidence(outcome, fitted, np.random.default_rng(0))
 
 
-def test_both_causes_are_found(weighed) -> None:
-    record, fitted, _, evidence = weighed
-    causes = {effect.name for effect in evidence.hypothesis.effects}
+def test_overflow_is_found_and_reduces_the_error(assessed) -> None:
+    record, fitted, _, outcome = assessed
+    causes = {effect.name for effect in outcome.hypothesis.effects}
     assert "state-clip:upper" in causes
-    assert evidence.verdict in (Verdict.NAMED, Verdict.REMAINDER)
+    assert outcome.verdict in (Verdict.NAMED, Verdict.REMAINDER)
     locked = slice(fitted, record.samples)
     before, after = (
         float(np.sqrt(np.mean((record.y - fit.output)[locked] ** 2)))
-        for fit in (evidence.base, evidence.hypothesis.fit)
+        for fit in (outcome.base, outcome.hypothesis.fit)
     )
     assert after < 0.2 * before
 
 
-def test_neighbours_count_for_less_where_the_form_is_wrong(weighed) -> None:
-    _, fitted, evidence, _ = weighed
-    assert evidence.target.effective_samples is not None
-    assert 10.0 <= evidence.target.effective_samples < fitted
-    assert evidence.base.noise.order == 0
-    assert evidence.base.noise.effective_samples == evidence.target.effective_samples
+def test_model_error_reduces_the_effective_sample_size(assessed) -> None:
+    _, fitted, outcome, _ = assessed
+    assert outcome.target.effective_samples is not None
+    assert 10.0 <= outcome.target.effective_samples < fitted
+    assert outcome.base.noise.order == 0
+    assert outcome.base.noise.effective_samples == outcome.target.effective_samples
