@@ -59,7 +59,7 @@ def stepwise_search(
     screened : sequence of ScreenedEffect
         Effects screened on ``base``, the best first.
     pairs : bool
-        Whether the first effect of a pair may have an insufficient gain of its own: two causes may mask each
+        Whether the first effect of a pair may have an insufficient gain alone: two causes may mask each
         other.
     """
     best = Hypothesis(base, base.score, ())
