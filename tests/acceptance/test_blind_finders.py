@@ -178,10 +178,10 @@ def test_with_names_exchanged_in_the_catalogue_the_true_finder_fails(
         trials_module, "diagnose", partial(trials_module.diagnose, catalogue=tuple(wrong.values()))
     )
     with pytest.raises(AssertionError):
-        checks.test_a_hidden_effect_is_found_in_a_short_record(name)
+        checks.test_injected_effect_is_named_in_a_short_record(name)
 
 
 def test_without_effects_in_the_catalogue_the_true_finder_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trials_module, "diagnose", partial(trials_module.diagnose, catalogue=()))
     with pytest.raises(AssertionError):
-        checks.test_a_hidden_effect_is_found_in_a_short_record("jump")
+        checks.test_injected_effect_is_named_in_a_short_record("jump")

@@ -189,7 +189,7 @@ def estimate_rate(count: int, of: int) -> DetectionRate:
 
 
 def _derive_rng(seed: int, name: str, turn: int = 0) -> np.random.Generator:
-    """Return a random generator for a name, so that its draws do not depend on which others are tested."""
+    """Return a random generator for a name; its draws do not depend on which other effects are tested."""
     return np.random.default_rng([seed, turn, *map(ord, name)])
 
 

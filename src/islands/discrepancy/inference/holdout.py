@@ -24,7 +24,8 @@ LOWER_QUANTILE = 0.05
 #: peak falls into few blocks, and a bootstrap sample may contain none of them.
 MIN_EVENT_GAIN = 20.0
 
-#: Largest loss of other blocks for which that holds, as a fraction of the gains.
+#: Largest total loss of the blocks that lose for which the bootstrap is skipped, relative to the total gain
+#: of the others.
 MAX_LOSS_FRACTION = 0.1
 
 

@@ -144,7 +144,7 @@ def choose_reference_fit(
 
 
 def explained_fraction(before: CalibrationResult, after: CalibrationResult, floor: float) -> float:
-    """Return the fraction of the misfit above the mean square ``floor`` of the noise that is explained."""
+    """Return the explained fraction of the misfit above ``floor``, the mean square of the noise."""
     misfit = before.mean_square - floor
     if misfit <= 0.0:
         return 0.0
