@@ -43,7 +43,7 @@ def suggest_experiment(best: CalibrationResult, alternatives: Sequence[ScreenedE
         )
         length = (REQUIRED_DISTANCE / max(distance, 1e-3)) ** 2
         advice = (
-            f"play the same input {speed} times as fast, with as many samples per cycle"
+            f"play the same input {speed} times as fast, sampled as often per period"
             if speed is not None
             else f"a record {length:.0f} times as long is enough"
             if length < 1000
