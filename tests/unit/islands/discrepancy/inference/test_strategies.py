@@ -19,7 +19,7 @@ from support.simulated_records import recorded
 RIM = 4.0
 
 #: Constant flow of the pump in addition to its command.
-LEAK = 0.8
+EXTRA_FLOW = 0.8
 
 #: Effects searched for in addition to those of the tanks: at the fast level, and at the nightly level.
 CATALOGUES = (
@@ -31,7 +31,7 @@ CATALOGUES = (
 )
 
 
-def simulate_overflow(rim: float, leak: float, samples: int = 400, dt: float = 4.0) -> Dataset:
+def simulate_overflow(rim: float, extra_flow: float, samples: int = 400, dt: float = 4.0) -> Dataset:
     """Integrate two tanks in small Euler steps; a part of the upper tank's overflow enters the lower tank."""
     rng = np.random.default_rng(12)
     pump = np.repeat(rng.uniform(0.5, 5.5, samples // 30 + 1), 30)[:samples]
@@ -42,7 +42,7 @@ def simulate_overflow(rim: float, leak: float, samples: int = 400, dt: float = 4
         for step in range(steps):
             command = pump[k] + (pump[min(k + 1, samples - 1)] - pump[k]) * step / steps
             through, out = 0.06 * np.sqrt(upper), 0.05 * np.sqrt(lower)
-            upper += dt / steps * (0.03 * (command + leak) - through)
+            upper += dt / steps * (0.03 * (command + extra_flow) - through)
             over = max(upper - rim, 0.0)
             upper -= over
             lower = max(lower + dt / steps * (through - out) + 0.4 * over, 0.0)
@@ -51,7 +51,7 @@ def simulate_overflow(rim: float, leak: float, samples: int = 400, dt: float = 4
 
 @pytest.fixture(scope="module", params=CATALOGUES, ids=len)
 def assessed(request):
-    record = simulate_overflow(RIM, LEAK)
+    record = simulate_overflow(RIM, EXTRA_FLOW)
     core = make_simulator(PhysicalSpec(kind="cascaded-tanks"), record)
     fitted = count_fitted_samples(record)
     simulation = ExtendedSimulator(core, (), make_context(record, core, fitted))
