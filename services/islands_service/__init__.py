@@ -1,1 +1,1 @@
-"""The workshop: runs searches on more than one process."""
+"""Job service: queue, store and Ray runtime. Read `domain.job` first, then `coordinator.coordinator`."""

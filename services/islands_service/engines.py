@@ -1,4 +1,4 @@
-"""The table of engines: how a search may be carried out."""
+"""Table of search engines: serial and Ray."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
@@ -31,7 +31,7 @@ def ray_engine(address: str | None = None, progress: ProgressCallback = print) -
     ClusterError
         The address does not answer, or Ray does not start.
     """
-    # Ray takes a quarter of a second to import, and only this engine needs it.
+    # Importing Ray takes a quarter of a second, and only this engine needs it.
     from islands_service.runtime.cluster import cluster  # noqa: PLC0415
     from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
 
@@ -39,6 +39,7 @@ def ray_engine(address: str | None = None, progress: ProgressCallback = print) -
         yield RayEngine(progress)
 
 
+#: Opens an engine, given the address of a cluster (None for this machine) and a callback for messages.
 EngineFactory = Callable[[str | None, ProgressCallback], AbstractContextManager[Engine]]
 
 #: Engines by name.

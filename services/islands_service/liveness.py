@@ -1,4 +1,4 @@
-"""The lifeline between the supervisor and a child: the child says that it lives, and ends when told to."""
+"""Heartbeat pipe between the supervisor and its child processes, and cooperative shutdown."""
 
 import os
 import signal
@@ -7,21 +7,21 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
-#: Seconds between two signs of life.
+#: Seconds between two heartbeats.
 EVERY = 0.5
 
 
 def send_heartbeat(descriptor: int | None) -> None:
-    """Tell the supervisor that this process lives; without a descriptor there is none to tell."""
+    """Write a heartbeat to the pipe of the supervisor. Do nothing without a descriptor."""
     if descriptor is not None:
-        # A pipe that is full has been told often enough; a supervisor that is gone has taken us with it.
+        # A full pipe holds enough heartbeats. A broken pipe means that the supervisor has exited.
         with suppress(BlockingIOError, BrokenPipeError):
             os.write(descriptor, b".")
 
 
 @contextmanager
 def watch_supervisor(descriptor: int | None) -> Iterator[None]:
-    """Give signs of life from a thread of its own, as long as the block lasts."""
+    """Send heartbeats from a background thread while the block runs."""
     over = Event()
 
     def beat() -> None:
@@ -29,7 +29,7 @@ def watch_supervisor(descriptor: int | None) -> Iterator[None]:
         while not over.wait(EVERY):
             send_heartbeat(descriptor)
 
-    thread = Thread(target=beat, name="lifeline", daemon=True)
+    thread = Thread(target=beat, name="heartbeat pipe", daemon=True)
     thread.start()
     try:
         yield
@@ -39,10 +39,10 @@ def watch_supervisor(descriptor: int | None) -> Iterator[None]:
 
 
 class StopRequest:
-    """The wish to stop: signal handlers and threads make it, the main thread waits for it.
+    """Stop request, set by signal handlers and threads, awaited by the main thread.
 
-    Not an `Event`: what sets one in a signal handler waits for ever where the signal has interrupted `wait`,
-    which holds the lock. A queue's ``put`` may interrupt its own ``get``.
+    An `Event` would deadlock: `Event.set` in a signal handler waits for the lock that the interrupted
+    `Event.wait` holds. `SimpleQueue.put` is reentrant and may interrupt `get`.
     """
 
     def __init__(self) -> None:
@@ -50,17 +50,17 @@ class StopRequest:
         self._bell: SimpleQueue[None] = SimpleQueue()
 
     def request(self) -> None:
-        """Make the wish; again and at any moment, also from a signal handler."""
+        """Request the stop. Safe to call repeatedly and from a signal handler."""
         self._requested = True
         self._bell.put(None)
 
     @property
     def requested(self) -> bool:
-        """Whether it has been made: it is not taken back."""
+        """Whether a stop was requested. A request cannot be withdrawn."""
         return self._requested
 
     def wait(self, seconds: float) -> bool:
-        """Wait until it is made, or for so long; whether it is."""
+        """Wait for the request, at most the given time; return whether a stop was requested."""
         if not self._requested:
             with suppress(Empty):
                 self._bell.get(timeout=seconds)
@@ -68,6 +68,6 @@ class StopRequest:
 
 
 def stop_on_signals(stopping: StopRequest) -> None:
-    """Turn SIGTERM and Ctrl-C into a wish to stop. Ray takes SIGTERM for itself: call it again after Ray."""
+    """Turn SIGTERM and Ctrl-C into a stop request. Repeat it after `ray.init`, which replaces handlers."""
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.request())

@@ -1,4 +1,4 @@
-"""Logs: one line an event on standard error, as text for people or as JSON for machines."""
+"""Logging: one line per event on standard error, as text or JSON."""
 
 import logging
 import sys
@@ -8,7 +8,7 @@ from structlog.typing import Processor
 
 
 def configure_logs(form: str, role: str) -> None:
-    """Log in a form, ``text`` or ``json``, every line with the role; libraries' warnings likewise."""
+    """Log as ``text`` or ``json`` and add the role to every line; warnings of libraries likewise."""
     shared: list[Processor] = [
         structlog.contextvars.merge_contextvars,
         structlog.processors.add_log_level,

@@ -1,4 +1,4 @@
-"""Settings of the service: the only reader of the environment. Every field is ``ISLANDS_`` and its name."""
+"""Settings of the service, read from environment variables. Each field is ``ISLANDS_`` and its name."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from islands.errors import SettingsError
 
-#: Addresses that nobody else can reach.
+#: Addresses that only this machine can reach.
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -18,50 +18,52 @@ Count = Annotated[int, Field(ge=1)]
 
 
 class ServiceSettings(BaseSettings):
-    """What can be set, for all roles. Bytes, seconds, and counts.
+    """Settings of all roles. Sizes are in bytes, times in seconds.
 
     Attributes
     ----------
     data_dir
-        Uploads, results, and the database unless another one is given.
+        Folder of uploads and results, and of the database unless ``database`` is given.
     database
         ``postgresql+psycopg://USER:PASSWORD@HOST/NAME``; by default SQLite in the data folder.
     host, port
         Address that the service listens on.
     ray_address
-        ``HOST:PORT`` of a Ray cluster; by default a Ray on this machine is started.
+        ``HOST:PORT`` of a Ray cluster; by default a Ray head is started on this machine.
     coordinators
         Number of jobs that run at the same time.
     lease
-        Seconds after which a coordinator that says nothing has lost its job; at least one.
+        Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
+        one.
     checkpoint_every
-        Seconds between two checkpoints: what a crash may cost.
+        Time between two checkpoints: the most work that a crash can lose.
     max_upload, max_unpacked
-        The largest file that is taken, and what it may unpack to.
+        Largest upload, and largest size that it may unpack to.
     inspection_memory, inspection_seconds
-        What the process that reads an uploaded file may use.
+        Memory and time budget of the process that reads an uploaded file.
     max_stored
-        What the data sets of one owner may take.
+        Largest total size of the data sets of one owner.
     max_active
-        Jobs of one owner that wait or run.
+        Queued and running jobs of one owner.
     max_evaluations
-        Individuals that one job may ask for.
+        Individuals that one job may evaluate.
     max_islands
-        Islands that one job may ask for.
+        Islands of one job.
     retention
-        Seconds after which a finished job is forgotten; 0 keeps it for ever.
+        Time after which a finished job is deleted; 0 keeps it for ever.
     rate, burst
-        Requests a second of one key, and how many more at once; 0 does not limit.
+        Requests per second of one key, and the size of a burst above that; a rate of 0 disables the limit.
     tls_certificate, tls_key
         PEM files for HTTPS.
     log_format
         Format of log messages: ``text`` or ``json``.
     telemetry
-        Where traces go, OTLP over HTTP: ``http://collector:4318/v1/traces``. Needs the extra ``telemetry``.
+        OTLP endpoint over HTTP for traces: ``http://collector:4318/v1/traces``. Needs the extra
+        ``telemetry``.
     lifeline
-        The file descriptor on which a child of ``islands serve`` says that it lives.
+        File descriptor of the heartbeat pipe to ``islands serve``, set for its children.
     require_keys
-        Ask for a key on a loopback address, too: behind a proxy, say.
+        Require a key on a loopback address too, for example behind a proxy.
     """
 
     model_config = SettingsConfigDict(env_prefix="ISLANDS_", frozen=True, extra="ignore")
@@ -94,17 +96,17 @@ class ServiceSettings(BaseSettings):
 
     @property
     def url(self) -> str:
-        """The database's URL."""
+        """URL of the database."""
         return self.database or f"sqlite:///{(self.data_dir / 'islands.db').absolute()}"
 
     @property
     def blobs(self) -> Path:
-        """The folder of blobs."""
+        """Folder of the blobs."""
         return self.data_dir / "blobs"
 
     @property
     def ray_address_file(self) -> Path:
-        """Where the Ray on this machine says how it is reached."""
+        """File in which the Ray head on this machine stores its address."""
         return self.data_dir / "ray-address"
 
     @property
@@ -118,22 +120,22 @@ class ServiceSettings(BaseSettings):
         return self.require_keys or not self.on_loopback
 
     def environment(self) -> dict[str, str]:
-        """Return the environment of a child that shall have the same settings."""
-        ours = {
+        """Return environment variables that give a child process the same settings."""
+        settings = {
             f"ISLANDS_{name.upper()}": str(value)
             for name, value in self.model_dump(mode="json", exclude={"lifeline"}).items()
             if value is not None
         }
-        return {**os.environ, **ours}
+        return {**os.environ, **settings}
 
 
 def service_settings(**given: object) -> ServiceSettings:
-    """Read the settings: what is given, else the environment, else the default.
+    """Read the settings: arguments precede environment variables, and those precede defaults.
 
     Raises
     ------
     SettingsError
-        A value is out of its range: the message names it.
+        A value is out of range. The message names the setting.
     """
     try:
         return ServiceSettings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]

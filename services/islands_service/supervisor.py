@@ -1,7 +1,7 @@
-"""The supervisor: starts the roles as its children, and again when they end or hang. Standard library alone.
+"""Supervisor: starts the roles as child processes and restarts them if they end or hang.
 
-It owns the data folder: a second one on the same folder is refused. Children that it started end with it,
-however it ends.
+It uses only the standard library. It locks the data folder, so that a second supervisor on the same folder is
+refused. Its children end with it, even if it is killed.
 """
 
 import ctypes
@@ -21,53 +21,71 @@ from typing import IO
 from islands.errors import IslandsError
 from islands_service.liveness import StopRequest, stop_on_signals
 
-#: Seconds between two looks at the children.
-_LOOK = 0.05
+#: Seconds between two checks of the children.
+_POLL_SECONDS = 0.05
 
-#: Seconds that a child waits for its next start after an end: at first, and at the most. One that has lived
-#: for `_PROVEN` seconds is started again at once.
-_BACKOFF, _MOST_BACKOFF, _PROVEN = 0.2, 2.5, 10.0
+#: Seconds before a child is started again after its first exit; doubled with every further one.
+_FIRST_BACKOFF = 0.2
 
-#: Seconds that everything else waits for the API: on two cores Ray's start would double its own.
-_API_FIRST = 2.0
+#: Longest wait before a child is started again, in seconds.
+_MAX_BACKOFF = 2.5
 
-#: Seconds that a child has until its first sign of life: Ray is read from a slow disk, a database is locked.
-_STARTING = 120.0
+#: Seconds of run time after which an exit is followed by an immediate restart.
+_STABLE_AFTER = 10.0
 
-#: Seconds that a child has to end by itself.
-_GRACE = 15.0
+#: Seconds for which the other roles wait for the API. On two cores a concurrent start of Ray doubles its
+#: start-up.
+_API_HEAD_START = 2.0
 
-#: Exit status of a child that cannot run with these settings: starting it again would not help, unless it has
-#: run with them before.
+#: Seconds until the first heartbeat of a child: Ray may be read from a slow disk, a database may be locked.
+_STARTUP_TIMEOUT = 120.0
+
+#: Seconds that the children have to end by themselves.
+_SHUTDOWN_GRACE = 15.0
+
+#: Exit status of a child that cannot run with these settings. It is not restarted, unless it has run with
+#: them before.
 MISCONFIGURED = 2
+
+#: Option of Linux's prctl: the signal that a process receives when its parent ends.
 
 #: Linux: a process is sent this signal when its parent ends.
 _PR_SET_PDEATHSIG = 1
 
 
 class DataDirLockedError(IslandsError):
-    """Another ``islands serve`` has the data folder."""
+    """Another ``islands serve`` has locked the data folder."""
 
 
 @dataclass(slots=True, eq=False)
 class Role:
-    """What runs as a child.
+    """Child process of the supervisor.
 
     Attributes
     ----------
     name : str
     command : sequence of str
     patience : float
-        Seconds without a sign of life after which it is taken for hanging, once it has given one; until then
-        it is starting, and may take longer.
+        Seconds without a heartbeat after which the process counts as hanging. Before the first heartbeat it
+        is starting, which may take longer.
     orphaned : signal
-        What it is sent when the supervisor is lost.
+        Signal that the process receives if the supervisor ends.
     needs : tuple of str
-        Roles that it cannot go on without: it is started again with them.
+        Roles that it cannot run without: if one of them ends, this one is restarted, too.
     address : Path, optional
-        The file in which it says how it is reached: that holds no more when it has ended.
-    worked : bool
-        It has given signs of life, and ended, before.
+        File in which the process stores its address. It is deleted when the process has ended.
+    process : Popen, optional
+        The running process; None while it waits for its next start.
+    pipe : int
+        File descriptor from which heartbeats are read; -1 if the process does not run.
+    last_heartbeat : float, optional
+        Time of the last heartbeat; None before the first one.
+    started_at, start_at : float
+        Time of the last start, and the earliest time of the next one.
+    backoff : float
+        Seconds before the start that follows the next exit.
+    has_run : bool
+        Whether an earlier process of this role has sent a heartbeat.
     """
 
     name: str
@@ -77,17 +95,17 @@ class Role:
     needs: tuple[str, ...] = ()
     address: Path | None = None
     process: "subprocess.Popen[bytes] | None" = None
-    signs: int = -1
-    heard: float | None = None
-    started: float = 0.0
+    pipe: int = -1
+    last_heartbeat: float | None = None
+    started_at: float = 0.0
     start_at: float = 0.0
-    backoff: float = _BACKOFF
-    worked: bool = False
+    backoff: float = _FIRST_BACKOFF
+    has_run: bool = False
 
 
 @contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
-    """Own a data folder: the lock ends with the process, however that ends.
+    """Lock a data folder. The operating system releases the lock when the process ends.
 
     Raises
     ------
@@ -110,57 +128,63 @@ def folder_lock(folder: Path) -> Iterator[None]:
 
 
 def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str] = sys.stderr) -> int:
-    """Run roles until SIGTERM or Ctrl-C, then end them in the order in which they were given.
+    """Run roles until SIGTERM or Ctrl-C, then end them in the given order.
 
     Parameters
     ----------
     roles : sequence of Role
-        The first one is started first, and the others when it has given a sign of life.
+        The first role starts first, the others after its first heartbeat.
     environment : mapping
-        The children's.
+        Environment of the children.
 
     Returns
     -------
     int
-        0, or `MISCONFIGURED` where a child says that it cannot run so, and never has.
+        0, or `MISCONFIGURED` if a child exits with this status before it has ever run.
     """
     stopping = StopRequest()
     stop_on_signals(stopping)
-    # Ray asks whoever talks to it for a token.
+    # Ray requires a token of every client.
     environment = {"RAY_AUTH_TOKEN": secrets.token_hex(16), **environment}
     began = monotonic()
     status = 0
     try:
-        while not stopping.wait(_LOOK) and status == 0:
+        while not stopping.wait(_POLL_SECONDS) and status == 0:
             now = monotonic()
-            waiting = roles[0].heard is None and now - began < _API_FIRST
+            waiting = roles[0].last_heartbeat is None and now - began < _API_HEAD_START
             for role in roles[:1] if waiting else roles:
-                status = _tend(role, roles, environment, now, log) or status
+                status = _check_role(role, roles, environment, now, log) or status
     finally:
-        _end(roles, log)
+        _shut_down(roles, log)
     return status
 
 
-def _tend(role: Role, roles: Sequence[Role], environment: Mapping[str, str], now: float, log: IO[str]) -> int:
-    """Start a role that is to run, end it where it hangs, and take note of its end."""
+def _check_role(
+    role: Role, roles: Sequence[Role], environment: Mapping[str, str], now: float, log: IO[str]
+) -> int:
+    """Start a role that is due, kill it if it hangs, handle its exit; return a final status or 0."""
     if role.process is None:
         if now >= role.start_at:
             _start(role, environment)
         return 0
-    _listen(role, now)
+    _read_heartbeats(role, now)
     if role.process.poll() is None:
-        since, patience = (role.started, _STARTING) if role.heard is None else (role.heard, role.patience)
-        if now - since > patience:
-            _say(log, f"{role.name} has said nothing for {now - since:.1f} s: it is started again")
+        since, timeout = (
+            (role.started_at, _STARTUP_TIMEOUT)
+            if role.last_heartbeat is None
+            else (role.last_heartbeat, role.patience)
+        )
+        if now - since > timeout:
+            _print(log, f"{role.name} has sent no heartbeat for {now - since:.1f} s: it is started again")
             role.process.kill()
         return 0
-    code, worked = role.process.returncode, role.worked
-    _ended(role, now)
-    # Where it has worked with these settings, a key has expired, or a port was taken meanwhile: that can be
-    # mended while the jobs go on.
-    if code == MISCONFIGURED and not worked:
+    code, has_run = role.process.returncode, role.has_run
+    _handle_exit(role, now)
+    # If it has run with these settings, the cause can be repaired while jobs run: an expired key, a port in
+    # use.
+    if code == MISCONFIGURED and not has_run:
         return MISCONFIGURED
-    _say(log, f"{role.name} ended ({code}): it is started again")
+    _print(log, f"{role.name} ended ({code}): it is started again")
     for other in roles:
         if role.name in other.needs and other.process is not None:
             other.process.kill()
@@ -168,51 +192,51 @@ def _tend(role: Role, roles: Sequence[Role], environment: Mapping[str, str], now
 
 
 def _start(role: Role, environment: Mapping[str, str]) -> None:
-    signs, says = os.pipe()
-    os.set_blocking(signs, False)
-    os.set_blocking(says, False)
+    reading, writing = os.pipe()
+    os.set_blocking(reading, False)
+    os.set_blocking(writing, False)
     role.process = subprocess.Popen(
         role.command,
-        env={**environment, "ISLANDS_LIFELINE": str(says)},
+        env={**environment, "ISLANDS_LIFELINE": str(writing)},
         stdin=subprocess.DEVNULL,
-        pass_fds=(says,),
-        # A Ctrl-C in the terminal is for us: we tell the children, each in its turn.
+        pass_fds=(writing,),
+        # A Ctrl-C in the terminal must reach the supervisor alone, which ends the children in order.
         start_new_session=True,
-        preexec_fn=lambda: _follow(role.orphaned),  # noqa: PLW1509 - this process has one thread
+        preexec_fn=lambda: _set_parent_death_signal(role.orphaned),  # noqa: PLW1509 - this process has one thread
     )
-    os.close(says)
-    role.signs, role.heard, role.started = signs, None, monotonic()
+    os.close(writing)
+    role.pipe, role.last_heartbeat, role.started_at = reading, None, monotonic()
 
 
-def _follow(orphaned: signal.Signals) -> None:
+def _set_parent_death_signal(number: signal.Signals) -> None:
     with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, orphaned)
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
-def _listen(role: Role, now: float) -> None:
+def _read_heartbeats(role: Role, now: float) -> None:
     with suppress(BlockingIOError):
-        if os.read(role.signs, 4096):
-            role.heard = now
+        if os.read(role.pipe, 4096):
+            role.last_heartbeat = now
 
 
-def _ended(role: Role, now: float) -> None:
+def _handle_exit(role: Role, now: float) -> None:
     assert role.process is not None
-    # Whom it has left behind: Ray's processes look only once a minute whether they are still wanted.
+    # Kill the remaining processes of the group: Ray's check only once a minute whether their parent lives.
     with suppress(ProcessLookupError):
         os.killpg(role.process.pid, signal.SIGKILL)
-    os.close(role.signs)
+    os.close(role.pipe)
     if role.address is not None:
         role.address.unlink(missing_ok=True)
-    proven = now - role.started > _PROVEN
-    role.start_at = now if proven else now + role.backoff
-    role.backoff = _BACKOFF if proven else min(2.0 * role.backoff, _MOST_BACKOFF)
-    role.worked = role.worked or role.heard is not None
-    role.process, role.signs = None, -1
+    stable = now - role.started_at > _STABLE_AFTER
+    role.start_at = now if stable else now + role.backoff
+    role.backoff = _FIRST_BACKOFF if stable else min(2.0 * role.backoff, _MAX_BACKOFF)
+    role.has_run = role.has_run or role.last_heartbeat is not None
+    role.process, role.pipe = None, -1
 
 
-def _end(roles: Sequence[Role], log: IO[str]) -> None:
-    """End all children: they drain and keep what they have; who takes too long is ended."""
-    until = monotonic() + _GRACE
+def _shut_down(roles: Sequence[Role], log: IO[str]) -> None:
+    """End all children in order, so that they can store their state; kill those that take too long."""
+    until = monotonic() + _SHUTDOWN_GRACE
     for role in roles:
         if role.process is None:
             continue
@@ -220,11 +244,11 @@ def _end(roles: Sequence[Role], log: IO[str]) -> None:
         try:
             role.process.wait(max(0.1, until - monotonic()))
         except subprocess.TimeoutExpired:
-            _say(log, f"{role.name} does not end: it is ended")
+            _print(log, f"{role.name} does not end: it is killed")
             role.process.kill()
             role.process.wait()
-        _ended(role, monotonic())
+        _handle_exit(role, monotonic())
 
 
-def _say(log: IO[str], line: str) -> None:
+def _print(log: IO[str], line: str) -> None:
     print(f"islands serve: {line}", file=log, flush=True)

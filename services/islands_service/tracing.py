@@ -1,4 +1,4 @@
-"""Traces for OpenTelemetry, where they are wanted: a span a request, and one an attempt at a job."""
+"""Optional OpenTelemetry traces: one span per request and one per attempt at a job."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,28 +9,28 @@ from islands.errors import SettingsError
 
 
 class Traces:
-    """Sends spans to a collector, or nowhere.
+    """Exporter of spans; does nothing without an endpoint.
 
     Parameters
     ----------
     endpoint : str
-        Of OTLP over HTTP, ``http://collector:4318/v1/traces``; "" for none.
+        URL of a collector that accepts OTLP over HTTP, ``http://collector:4318/v1/traces``; empty to disable.
     role : str
-        Who sends.
+        Process that sends, part of the service name.
 
     Raises
     ------
     SettingsError
-        Traces are wanted, and their extra is not installed.
+        An endpoint is given, but the extra ``telemetry`` is not installed.
     """
 
     def __init__(self, endpoint: str, role: str) -> None:
-        #: OpenTelemetry's provider of tracers; None where no traces are wanted.
+        #: Tracer provider of OpenTelemetry; None without an endpoint.
         self.provider: Any = _provider(endpoint, role) if endpoint else None
 
     @contextmanager
     def span(self, name: str, **attributes: Any) -> Iterator[None]:
-        """Trace what happens in the block."""
+        """Record the block as a span."""
         if self.provider is None:
             yield
             return
@@ -38,7 +38,7 @@ class Traces:
             yield
 
     def close(self) -> None:
-        """Send what has not been sent yet."""
+        """Send the remaining spans."""
         if self.provider is not None:
             self.provider.shutdown()
 
@@ -48,7 +48,7 @@ def _provider(endpoint: str, role: str) -> Any:
         raise SettingsError(
             "traces (ISLANDS_TELEMETRY) need an extra: install it with pip install 'islands[telemetry]'"
         )
-    # Only who wants traces waits for these.
+    # These imports are slow, and only needed with an endpoint.
     from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter  # noqa: PLC0415
     from opentelemetry.sdk.resources import Resource  # noqa: PLC0415
     from opentelemetry.sdk.trace import TracerProvider  # noqa: PLC0415

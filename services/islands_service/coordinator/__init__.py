@@ -1,1 +1,1 @@
-"""The coordinator: leases jobs, drives their islands, checkpoints, and writes down what they brought."""
+"""Coordinator process: leases jobs and runs them on Ray. Read `coordinator` first."""

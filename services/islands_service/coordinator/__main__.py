@@ -1,4 +1,4 @@
-"""``python -m islands_service.coordinator``: one coordinator, a child of ``islands serve`` or alone."""
+"""``python -m islands_service.coordinator``: run a coordinator, alone or under ``islands serve``."""
 
 import argparse
 import os
@@ -15,7 +15,8 @@ from islands_service.settings import service_settings
 
 def main() -> int:
     """Run until SIGTERM or SIGINT."""
-    # Sums depend on how many threads add them up, and a job's result must not. NumPy is not imported yet.
+    # Floating-point sums depend on the number of BLAS threads, and results must not. NumPy is not imported
+    # yet.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     parser = argparse.ArgumentParser(prog="python -m islands_service.coordinator", description=__doc__)
     parser.add_argument(

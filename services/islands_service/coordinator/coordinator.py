@@ -1,7 +1,7 @@
-"""The coordinator's loop: claim a job, carry it out, write down how it ended; and again."""
+"""Main loop of the coordinator: claim a job, run it, store its outcome."""
 
 import traceback
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
 from functools import partial
 from time import monotonic, time
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import structlog
 
 from islands.errors import IslandsError
-from islands_service.coordinator.heartbeat import CoordinatorStopping, Heartbeat, JobCancelled
+from islands_service.coordinator.heartbeat import CoordinatorStopping, HangGuard, Heartbeat, JobCancelled
 from islands_service.domain.job import (
     DISCREPANCY,
     IDENTIFICATION,
@@ -30,52 +30,59 @@ from islands_service.store.database import StoreError
 from islands_service.tracing import Traces
 
 if TYPE_CHECKING:
-    from islands.evolution.archipelago import Archipelago
-    from islands.evolution.engine import ArchipelagoEpoch, Engine, Stop
-    from islands.evolution.problem import Problem
+    from islands.evolution.engine import Engine
 
 log = structlog.get_logger()
 
-#: Seconds between two looks for a job, and between two tries to reach a store that is away.
-LOOK, RETRY = 0.2, 0.5
+#: Seconds between two attempts to claim a job.
+POLL_SECONDS = 0.2
 
-#: Seconds that the Ray on this machine may take to start.
-PATIENCE = 60.0
+#: Seconds between two attempts to reach an unavailable store.
+RETRY_SECONDS = 0.5
 
-#: Seconds between two looks for what may be forgotten, and how old a blob without a name has to be.
-SWEEP_EVERY, ORPHAN = 600.0, 3600.0
+#: Seconds that the Ray head on this machine may take to start.
+RAY_STARTUP_TIMEOUT = 60.0
 
-#: Carries out a job: lease, store, blobs, engine, a check that ends it, seconds between checkpoints.
-Work = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], JobOutcome]
+#: Seconds between two sweeps of expired jobs and unreferenced blobs.
+SWEEP_INTERVAL = 600.0
+
+#: Seconds after which a blob that no row references is deleted.
+ORPHAN_AGE = 3600.0
+
+#: Runs a job, given the lease, the store, the blobs, an engine, a function that raises if the job must end,
+#: and the least number of seconds between checkpoints.
+JobRunner = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], JobOutcome]
 
 
-def _identification(*arguments: object) -> JobOutcome:
-    # The search's own imports take half a second: a job is claimed before that.
+def _run_identification(*arguments: object) -> JobOutcome:
+    # These imports take half a second: claim the job before them.
     from islands_service.coordinator.identification_job import identification  # noqa: PLC0415
 
     return identification(*arguments)  # type: ignore[arg-type]
 
 
-def _discrepancy(*arguments: object) -> JobOutcome:
+def _run_diagnosis(*arguments: object) -> JobOutcome:
     from islands_service.coordinator.diagnosis_job import discrepancy  # noqa: PLC0415
 
     return discrepancy(*arguments)  # type: ignore[arg-type]
 
 
-#: How every kind of job is carried out.
-WORK: Mapping[str, Work] = MappingProxyType({IDENTIFICATION: _identification, DISCREPANCY: _discrepancy})
+#: Runner of each kind of job.
+JOB_RUNNERS: Mapping[str, JobRunner] = MappingProxyType(
+    {IDENTIFICATION: _run_identification, DISCREPANCY: _run_diagnosis}
+)
 
 
 class Coordinator:
-    """Carries out jobs, one at a time, on a Ray that it stays connected to.
+    """Runs jobs one at a time on a Ray cluster to which it stays connected.
 
     Parameters
     ----------
     settings : ServiceSettings
     name : str
-        No two living coordinators have the same.
+        Unique among the running coordinators.
     stopping : StopRequest
-        Set to have it stop: its job goes back to the queue, with its last checkpoint.
+        Ends the loop. The current job is released with its last checkpoint.
     """
 
     def __init__(self, settings: ServiceSettings, name: str, stopping: StopRequest) -> None:
@@ -84,69 +91,69 @@ class Coordinator:
         self._blobs = Blobs(settings.blobs)
         self._traces = Traces(settings.telemetry, "coordinator")
         self._ray = ExitStack()
-        self._connected = self._away = False
-        self._sweep_at = monotonic() + LOOK
+        self._connected = self._store_away = False
+        self._sweep_at = monotonic() + POLL_SECONDS
 
     def run(self) -> None:
-        """Go on until told to stop.
+        """Process jobs until a stop is requested.
 
         Raises
         ------
         ClusterError
-            The cluster is lost: a new process finds the next one.
+            The connection to the cluster is lost. Only a new process can connect to another one.
         """
         log.info("coordinator started", name=self._name)
         with self._store, self._ray, closing(self._traces):
             while not self._stopping.requested:
-                if self._ready():
-                    self._next()
+                if self._can_claim():
+                    self._claim_next()
 
-    def _ready(self) -> bool:
-        """Tell whether jobs may be claimed: not while a cluster of somebody else's does not answer."""
+    def _can_claim(self) -> bool:
+        """Return whether jobs may be claimed: not while a configured external cluster does not answer."""
         if self._settings.ray_address is not None and not self._connected:
             try:
                 self._connect()
             except ClusterError as error:
                 log.warning("no cluster", reason=str(error))
-                self._stopping.wait(10 * RETRY)
+                self._stopping.wait(10 * RETRY_SECONDS)
         return self._connected or self._settings.ray_address is None
 
-    def _next(self) -> None:
+    def _claim_next(self) -> None:
         try:
-            self._sweep_now_and_then()
+            self._sweep_if_due()
             lease = self._store.leases.claim(self._name, self._settings.lease)
             if lease is None:
                 self._idle()
         except StoreError as error:
-            if not self._away:
+            if not self._store_away:
                 log.warning("store unavailable", reason=str(error))
-            self._away = True
-            self._stopping.wait(RETRY)
+            self._store_away = True
+            self._stopping.wait(RETRY_SECONDS)
         else:
-            if self._away:
+            if self._store_away:
                 log.info("store back")
-            self._away = False
+            self._store_away = False
             if lease is not None:
-                self._carry_out(lease)
+                self._process(lease)
 
     def _idle(self) -> None:
-        if not self._connected and self._address() is not None:
+        if not self._connected and self._find_address() is not None:
             self._connect()
-        self._stopping.wait(LOOK)
+        self._stopping.wait(POLL_SECONDS)
 
-    def _carry_out(self, lease: Lease) -> None:
+    def _process(self, lease: Lease) -> None:
         attributes = {"job": lease.job.id, "attempt": lease.job.attempt}
         with (
             structlog.contextvars.bound_contextvars(**attributes),
             self._traces.span(lease.job.kind, **attributes),
         ):
             log.info("job claimed", kind=lease.job.kind)
-            began = monotonic()
+            started = monotonic()
             try:
                 with Heartbeat(self._store, lease, self._settings.lease, self._stopping) as heartbeat:
-                    outcome = self._outcome(lease, heartbeat)
+                    outcome = self._run_job(lease, heartbeat)
                     self._finish(lease, outcome, heartbeat)
-                log.info("job finished", state=outcome.state, seconds=round(monotonic() - began, 3))
+                log.info("job finished", state=outcome.state, seconds=round(monotonic() - started, 3))
             except LeaseLostError as error:
                 log.warning("lease lost", reason=str(error))
             except CoordinatorStopping:
@@ -154,21 +161,21 @@ class Coordinator:
             except StoreError as error:
                 log.warning("job given back", reason=str(error))
                 self._release(lease)
-                self._stopping.wait(RETRY)
+                self._stopping.wait(RETRY_SECONDS)
             except ClusterError as error:
                 log.error("cluster lost", reason=str(error))
                 self._release(lease, attempted=self._connected)
                 raise
 
-    def _outcome(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
+    def _run_job(self, lease: Lease, heartbeat: Heartbeat) -> JobOutcome:
         try:
             heartbeat.check()
             self._wait_for_ray(lease, heartbeat)
-            return WORK[lease.job.kind](
+            return JOB_RUNNERS[lease.job.kind](
                 lease,
                 self._store,
                 self._blobs,
-                _Watched(self._engine(lease), heartbeat),
+                HangGuard(self._make_engine(lease), heartbeat),
                 partial(self._check, heartbeat),
                 self._settings.checkpoint_every,
             )
@@ -177,7 +184,7 @@ class Coordinator:
         except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError):
             raise
         except IslandsError as error:
-            return JobOutcome(JobState.FAILED, problem=problem_of(error))
+            return JobOutcome(JobState.FAILED, problem=make_problem(error))
         except Exception as error:
             log.error("job failed", trace=traceback.format_exc())
             return JobOutcome(
@@ -190,47 +197,48 @@ class Coordinator:
             )
 
     def _check(self, heartbeat: Heartbeat) -> None:
-        """Return if a job is to go on: see `Heartbeat.check`."""
+        """Raise the reason why a job must end; see `Heartbeat.check`."""
         heartbeat.check()
-        # A job that runs for days leaves a checkpoint every few seconds.
+        # A job that runs for days writes a checkpoint every few seconds, so replaced ones are deleted
+        # meanwhile.
         try:
-            self._sweep_now_and_then()
+            self._sweep_if_due()
         except (StoreError, OSError) as error:
             log.warning("sweep failed", reason=str(error))
 
     def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
-        """Write down how a job ended; a store that is away or full is waited for: the work is done."""
+        """Store the outcome of a job; retry while the store is unavailable or full."""
         while True:
             try:
                 return self._store.leases.finish(lease, outcome)
             except StoreError as error:
                 log.warning("cannot finish yet", reason=str(error))
-                # Whoever cancels it now is too late.
+                # A cancellation request that arrives now is too late.
                 with suppress(JobCancelled):
                     heartbeat.check()
-                self._stopping.wait(RETRY)
+                self._stopping.wait(RETRY_SECONDS)
 
     def _release(self, lease: Lease, attempted: bool = False) -> None:
         try:
             self._store.leases.release(lease, attempted)
             log.info("job released")
         except (LeaseLostError, StoreError) as error:
-            # It is taken over when its lease has run out.
+            # Another coordinator claims the job after the lease has expired.
             log.warning("job not released", reason=str(error))
 
     def _wait_for_ray(self, lease: Lease, heartbeat: Heartbeat) -> None:
         if self._connected:
             return
         self._store.leases.report(lease, ProgressReport({"phase": "starting", "note": "waiting for Ray"}))
-        until = monotonic() + PATIENCE
-        while self._address() is None:
+        until = monotonic() + RAY_STARTUP_TIMEOUT
+        while self._find_address() is None:
             heartbeat.check()
             if monotonic() > until:
-                raise ClusterError(f"Ray has not started within {PATIENCE:.0f} s")
-            self._stopping.wait(LOOK)
+                raise ClusterError(f"Ray has not started within {RAY_STARTUP_TIMEOUT:.0f} s")
+            self._stopping.wait(POLL_SECONDS)
         self._connect()
 
-    def _address(self) -> str | None:
+    def _find_address(self) -> str | None:
         if self._settings.ray_address is not None:
             return self._settings.ray_address
         try:
@@ -242,13 +250,13 @@ class Coordinator:
         from islands.facade.warm_up import warm_up  # noqa: PLC0415
         from islands_service.runtime.cluster import cluster  # noqa: PLC0415
 
-        self._ray.enter_context(cluster(self._address()))
+        self._ray.enter_context(cluster(self._find_address()))
         stop_on_signals(self._stopping)
         self._connected = True
-        log.info("connected to Ray", address=self._address())
+        log.info("connected to Ray", address=self._find_address())
         warm_up(lambda line: log.info("kernels", note=line))
 
-    def _engine(self, lease: Lease) -> "Engine":
+    def _make_engine(self, lease: Lease) -> "Engine":
         from islands_service.runtime.actor_pool import kill_stale_actors  # noqa: PLC0415
         from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
 
@@ -260,40 +268,29 @@ class Coordinator:
 
         return RayEngine(warn, f"{lease.job.id}.{lease.epoch}")
 
-    def _sweep_now_and_then(self) -> None:
+    def _sweep_if_due(self) -> None:
         if monotonic() > self._sweep_at:
-            self._sweep_at = monotonic() + SWEEP_EVERY
+            self._sweep_at = monotonic() + SWEEP_INTERVAL
             self._sweep()
 
     def _sweep(self) -> None:
         if self._settings.retention:
             self._store.retention.delete_expired(self._settings.retention)
-        # The time first, then the names, then the files: what is named after this is younger than an hour.
-        before = time() - ORPHAN
+        # Read the clock before the references, and those before the files: a blob that is referenced only
+        # after the query is younger than the limit.
+        before = time() - ORPHAN_AGE
         removed = self._blobs.sweep(self._store.retention.named_blobs(), before)
         log.info("swept", blobs=removed)
 
 
-class _Watched:
-    """An engine whose search ends this process where it hangs."""
-
-    def __init__(self, engine: "Engine", heartbeat: Heartbeat) -> None:
-        self._engine, self._heartbeat = engine, heartbeat
-
-    def run(self, problem: "Problem", start: "Archipelago", stop: "Stop") -> Generator["ArchipelagoEpoch"]:
-        """See `islands.evolution.engine.Engine`."""
-        with self._heartbeat.search():
-            yield from self._engine.run(problem, start, stop)
-
-
-def problem_of(error: IslandsError) -> dict[str, str]:
-    """Describe why a job failed, for its owner."""
-    kind = PROBLEMS.get(type(error).__name__, "job-failed")
+def make_problem(error: IslandsError) -> dict[str, str]:
+    """Describe to the owner of a job why it failed."""
+    kind = PROBLEM_TYPES.get(type(error).__name__, "job-failed")
     return {"type": kind, "title": "The job failed", "detail": str(error)}
 
 
-#: The types of problems that a job's own input can cause.
-PROBLEMS: Mapping[str, str] = MappingProxyType(
+#: Problem types of errors that the input of a job can cause, by class name.
+PROBLEM_TYPES: Mapping[str, str] = MappingProxyType(
     {
         "RecordError": "invalid-record",
         "SettingsError": "invalid-settings",

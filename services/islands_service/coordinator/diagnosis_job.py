@@ -1,4 +1,4 @@
-"""A discrepancy job: what a simulation gets wrong about a record, its report, and the simulation mended."""
+"""Discrepancy job: diagnose a simulation, write the report and the extended simulation."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -14,7 +14,7 @@ from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
 from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import discrepancy_of
-from islands_service.intake.job_inputs import record_and_columns
+from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise
 from islands_service.runtime.parallel_map import ray_map
 from islands_service.store import Store
@@ -31,62 +31,62 @@ def discrepancy(
     _engine: Engine,
     check: Callable[[], None],
     _every: float,
-    spread: ParallelMap | None = None,
+    map_cases: ParallelMap | None = None,
 ) -> JobOutcome:
-    """Carry out a discrepancy job. It takes seconds to minutes: interrupted, it begins anew.
+    """Run a discrepancy job. It takes seconds to minutes and has no checkpoints.
 
     Parameters
     ----------
     check : callable
-        Raises what ends the job before its time.
-    spread : ParallelMap, optional
-        Fits the effects; by default on the Ray that this process is connected to.
+        Raises the reason if the job must end early.
+    map_cases : ParallelMap, optional
+        Fits the effects; by default on the Ray cluster to which this process is connected.
 
     Raises
     ------
     IslandsError
-        The record or the simulation cannot be used, or what ``check`` raises.
+        The record or the simulation is unusable, or any error that ``check`` raises.
     """
-    began = monotonic()
+    started = monotonic()
 
     def report(message: str, _fraction: float | None = None, /) -> None:
         check()
         try:
             store.leases.report(lease, ProgressReport({"phase": message}))
         except StoreError as error:
-            # The analysis goes on: the next line tells where it is.
+            # Continue the analysis. The next line reports the progress.
             log.warning("report failed", job=lease.job.id, reason=str(error))
 
     spec = discrepancy_of(lease.job.spec)
     stored = store.datasets.get(lease.job.owner, spec.dataset)
     report("reading the record")
-    record, columns = record_and_columns(spec, stored, blobs)
+    record, columns = read_record_and_columns(spec, stored, blobs)
     simulator = make_simulator(spec.simulation, record, columns)
-    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, spread or ray_map())
-    report("a formula for what has no name")
-    proposal = explain_residual(found, spec.seed)
-    wall_s = monotonic() - began
+    found = diagnose(record, simulator, spec.tolerance, spec.seed, report, map_cases or ray_map())
+    report("a formula for the unexplained residual")
+    formula = explain_residual(found, spec.seed)
+    wall_s = monotonic() - started
     report("writing the report")
-    artefacts = {REPORT: blobs.write(diagnosis_report(stored.name, found, proposal=proposal))}
+    artefacts = {REPORT: blobs.write(diagnosis_report(stored.name, found, proposal=formula))}
     if found.gain is not None:
         artefacts[EXTENDED] = blobs.write(extended_json(found.best, found.record).encode())
-    document = diagnosis_document(found, wall_s, proposal=proposal)
+    document = diagnosis_document(found, wall_s, proposal=formula)
     return JobOutcome(
         JobState.SUCCEEDED,
         document,
-        summary=_summary(found, proposal, simulator.name, wall_s),
+        summary=_summary(found, formula, simulator.name, wall_s),
         artefacts=artefacts,
     )
 
 
 def _summary(
-    found: Diagnosis, proposal: ResidualFormula | None, simulated: str, wall_s: float
+    found: Diagnosis, formula: ResidualFormula | None, simulation: str, wall_s: float
 ) -> dict[str, object]:
     return {
-        "simulation": simulated,
+        "simulation": simulation,
         "verdict": str(found.verdict),
         "effects": [finding.name for finding in found.effects],
         "reduction_percent": None if found.gain is None else found.gain.reduction_percent,
-        "words": summarise(found, proposal),
+        "words": summarise(found, formula),
         "wall_s": wall_s,
     }

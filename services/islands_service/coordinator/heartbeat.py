@@ -1,11 +1,12 @@
-"""The heartbeat of a lease: says that the coordinator lives, and hears whether it is to go on."""
+"""Heartbeat of a lease: renews the lease and reports whether the job may continue."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import monotonic
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import structlog
 
@@ -15,45 +16,50 @@ from islands_service.liveness import StopRequest
 from islands_service.store import Store
 from islands_service.store.database import StoreError
 
+if TYPE_CHECKING:
+    from islands.evolution.archipelago import Archipelago
+    from islands.evolution.engine import ArchipelagoEpoch, Engine, Stop
+    from islands.evolution.problem import Problem
+
 log = structlog.get_logger()
 
-#: Beats in the time of a lease: some may come late, and a wish to cancel is heard soon.
-BEATS = 10
+#: Renewals in the duration of a lease. Several may be late, and a cancellation request is noticed soon.
+RENEWALS_PER_LEASE = 10
 
-#: Seconds that a cancelled job's coordinator has to let go of it; then it is cancelled over its head.
-GRACE = 1.0
+#: Seconds that a cancelled job has to end by itself. Then the heartbeat stores the cancellation.
+CANCEL_GRACE = 1.0
 
-#: Seconds after which a search that does not ask whether it is to go on hangs. It asks many times a second;
-#: a checkpoint of a thousand islands takes half a minute.
-HANGS = 600.0
+#: Seconds without a call of `Heartbeat.check` after which a search counts as hanging. A search checks many
+#: times a second; a checkpoint of a thousand islands takes half a minute.
+HANG_TIMEOUT = 600.0
 
 
-class JobCancelled(IslandsError):  # noqa: N818 - ends a job, and is no error
+class JobCancelled(IslandsError):  # noqa: N818 - control flow, not an error
     """The owner has cancelled the job."""
 
 
-class CoordinatorStopping(IslandsError):  # noqa: N818 - ends a process, and is no error
-    """The coordinator is to stop: its job goes on elsewhere."""
+class CoordinatorStopping(IslandsError):  # noqa: N818 - control flow, not an error
+    """The coordinator is stopping. The job continues on another one."""
 
 
 class Heartbeat:
-    """Beats in a thread of its own, as long as the block lasts.
+    """Context manager that renews a lease from a background thread.
 
     Parameters
     ----------
     store : Store
     lease : Lease
     seconds : float
-        Of the lease.
+        Duration of the lease.
     stopping : StopRequest
-        Set when the coordinator is to stop.
+        Stop request of the coordinator.
     """
 
     def __init__(self, store: Store, lease: Lease, seconds: float, stopping: StopRequest) -> None:
         self._store, self._lease, self._seconds, self._stopping = store, lease, seconds, stopping
         self._over = Event()
         self._lost = self._cancelled = False
-        self._asked: float | None = None
+        self._checked_at: float | None = None
         self._thread = Thread(target=self._beat, name="heartbeat", daemon=True)
 
     def __enter__(self) -> "Heartbeat":
@@ -71,55 +77,68 @@ class Heartbeat:
         self._thread.join()
 
     def check(self) -> None:
-        """Return if the job is to go on.
+        """Raise the reason why the job must end; return if it may continue.
 
         Raises
         ------
         LeaseLostError, JobCancelled, CoordinatorStopping
         """
-        if self._asked is not None:
-            self._asked = monotonic()
+        if self._checked_at is not None:
+            self._checked_at = monotonic()
         if self._lost:
-            raise LeaseLostError(f"job {self._lease.job.id} is not ours any more")
+            raise LeaseLostError(f"the lease of job {self._lease.job.id} is lost")
         if self._cancelled:
             raise JobCancelled(f"job {self._lease.job.id} is cancelled")
         if self._stopping.requested:
-            raise CoordinatorStopping("the coordinator is to stop")
+            raise CoordinatorStopping("the coordinator is stopping")
 
     @contextmanager
     def search(self) -> Iterator[None]:
-        """End this process if nobody checks for long within the block: a call of Ray's may never come back.
+        """End the process if `check` is not called for `HANG_TIMEOUT` within the block.
 
-        Reading before a search, and refining after it, take long without a check where the record is long.
+        A call of Ray may block for ever. Reading before a search and refinement after it are outside the
+        block, because both take long without a check if the record is long.
         """
-        self._asked = monotonic()
+        self._checked_at = monotonic()
         try:
             yield
         finally:
-            self._asked = None
+            self._checked_at = None
 
     def _beat(self) -> None:
         waited = 0.0
-        while not self._over.wait(self._seconds / BEATS):
-            self._end_hanging()
+        while not self._over.wait(self._seconds / RENEWALS_PER_LEASE):
+            self._exit_if_hanging()
             if self._lost:
                 continue
             try:
                 self._cancelled = self._store.leases.renew(self._lease, self._seconds) or self._cancelled
-                waited += self._seconds / BEATS if self._cancelled else 0.0
-                if waited > GRACE:
-                    # Something long that asks nobody, a refinement perhaps: its result comes too late.
+                waited += self._seconds / RENEWALS_PER_LEASE if self._cancelled else 0.0
+                if waited > CANCEL_GRACE:
+                    # The job is in a long step without checks, such as a refinement: discard its result.
                     self._store.leases.finish(self._lease, JobOutcome(JobState.CANCELLED))
                     self._lost = True
             except LeaseLostError:
                 self._lost = True
             except StoreError as error:
-                # The lease may run out meanwhile: then the next beat is told so.
+                # The lease may expire meanwhile. Then the next renewal raises `LeaseLostError`.
                 log.warning("heartbeat failed", job=self._lease.job.id, reason=str(error))
 
-    def _end_hanging(self) -> None:
-        asked = self._asked
-        if asked is not None and monotonic() - asked > HANGS:
-            log.error("search hangs", job=self._lease.job.id, seconds=round(monotonic() - asked))
-            # The thread that hangs cannot be told. Whoever has the job next goes on from its checkpoint.
+    def _exit_if_hanging(self) -> None:
+        checked_at = self._checked_at
+        if checked_at is not None and monotonic() - checked_at > HANG_TIMEOUT:
+            log.error("search hangs", job=self._lease.job.id, seconds=round(monotonic() - checked_at))
+            # A blocked thread cannot be interrupted. The next coordinator continues from the last checkpoint.
             os._exit(1)
+
+
+class HangGuard:
+    """Engine wrapper that ends the process if the search hangs."""
+
+    def __init__(self, engine: "Engine", heartbeat: Heartbeat) -> None:
+        self._engine, self._heartbeat = engine, heartbeat
+
+    def run(self, problem: "Problem", start: "Archipelago", stop: "Stop") -> Generator["ArchipelagoEpoch"]:
+        """Run the wrapped engine."""
+        with self._heartbeat.search():
+            yield from self._engine.run(problem, start, stop)

@@ -1,4 +1,4 @@
-"""An identification as a job: the search on Ray, its checkpoints, and what it brought."""
+"""Identification job: the search on Ray, its progress, its checkpoints and its result."""
 
 import gzip
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from islands.io.result_folder import result_document
 from islands.model.equations import equation
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import identification_of
-from islands_service.intake.job_inputs import record_and_validation
+from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreError
@@ -36,33 +36,33 @@ log = structlog.get_logger()
 #: Seconds between two reports of progress.
 REPORT_EVERY = 0.5
 
-#: Part of a run that may go into checkpoints: of a thousand islands one takes half a minute.
+#: Largest fraction of a run that checkpoints may take: one of a thousand islands takes half a minute.
 CHECKPOINT_SHARE = 0.05
 
 
 def identification(
     lease: Lease, store: Store, blobs: Blobs, engine: Engine, check: Callable[[], None], every: float
 ) -> JobOutcome:
-    """Carry out an identification, from its last checkpoint on.
+    """Run an identification job from its last checkpoint.
 
     Parameters
     ----------
     check : callable
-        Raises what ends the job before its time.
+        Raises the reason if the job must end early.
     every : float
-        Seconds between two checkpoints, at least.
+        Least number of seconds between two checkpoints.
 
     Raises
     ------
     IslandsError
-        The record or the settings cannot be used, the cluster failed, or what ``check`` raises.
+        The record or the settings are unusable, the cluster failed, or any error that ``check`` raises.
     """
     job = lease.job
     spec = identification_of(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
-    record, validation = record_and_validation(spec, datasets, blobs)
-    start, spent = _stored(job, blobs)
-    watch = _Watch(lease, store, blobs, check, every, start, spent)
+    record, validation = read_record_and_validation(spec, datasets, blobs)
+    start, spent = _load_checkpoint(job, blobs)
+    reporter = _ProgressReporter(lease, store, blobs, check, every, start, spent)
 
     def stop() -> bool:
         check()
@@ -73,18 +73,18 @@ def identification(
         validation,
         preset=spec.preset,
         seed=spec.seed,
-        progress=watch,
+        progress=reporter,
         stop=stop,
         start=start,
         engine=engine,
         **spec.changes,
     )
-    watch.flush()
-    return outcome_of(result.with_wall_time(watch.spent).search_result)
+    reporter.flush()
+    return make_outcome(result.with_wall_time(reporter.spent).search_result)
 
 
-def outcome_of(found: SearchResult) -> JobOutcome:
-    """Return what is stored of findings."""
+def make_outcome(found: SearchResult) -> JobOutcome:
+    """Return the part of a search result that the store keeps."""
     document = result_document(found)
     models = document.pop("models")
     best = models[0]
@@ -102,8 +102,8 @@ def outcome_of(found: SearchResult) -> JobOutcome:
     return JobOutcome(JobState.SUCCEEDED, document, tuple(zip(models, files, strict=True)), summary)
 
 
-def _stored(job: Job, blobs: Blobs) -> tuple[SearchState | None, float]:
-    """Return where a job stood at its last checkpoint, and the seconds that it had taken."""
+def _load_checkpoint(job: Job, blobs: Blobs) -> tuple[SearchState | None, float]:
+    """Return the search state at the last checkpoint of a job, and the seconds spent until then."""
     if job.checkpoint is None:
         return None, 0.0
     text = gzip.decompress(blobs.read(job.checkpoint)).decode()
@@ -111,8 +111,8 @@ def _stored(job: Job, blobs: Blobs) -> tuple[SearchState | None, float]:
     return state_from_document(archipelago, about), float(about["wall_s"])
 
 
-class _Watch:
-    """Tells the store how far a search is, and keeps checkpoints."""
+class _ProgressReporter:
+    """Progress callback that stores progress, history and checkpoints of a search."""
 
     def __init__(
         self,
@@ -126,52 +126,53 @@ class _Watch:
     ) -> None:
         self._lease, self._store, self._blobs = lease, store, blobs
         self._check, self._every = check, every
-        self._began = monotonic() - spent
+        self._started_at = monotonic() - spent
         self._first = (monotonic(), 0 if start is None else start.evaluations)
-        # Points that are told for good: the last one of a history is replaced while nothing gets better.
-        self._told = 0 if start is None else len(start.history) - 1
-        self._report_at = self._checkpoint_at = monotonic()  # the first populations are kept at once
+        # Number of final points that are stored. The last point of a history is replaced until the best
+        # improves.
+        self._stored_points = 0 if start is None else len(start.history) - 1
+        self._report_at = self._checkpoint_at = monotonic()  # store the first populations immediately
         self._last: tuple[SearchState, Settings] | None = None
 
     @property
     def spent(self) -> float:
-        """Seconds that the job has taken, in all attempts."""
-        return monotonic() - self._began
+        """Seconds spent on the job, over all attempts."""
+        return monotonic() - self._started_at
 
     def __call__(self, state: SearchState, settings: Settings) -> None:
         self._check()
         self._last = state, settings
         if monotonic() >= min(self._report_at, self._checkpoint_at):
-            self._tell(state, settings)
+            self._report(state, settings)
 
     def flush(self) -> None:
-        """Tell what has not been told yet; a store that is away is waited for."""
-        while self._last is not None and not self._tell(*self._last):
+        """Store the last state. Retry while the store is unavailable."""
+        while self._last is not None and not self._report(*self._last):
             self._check()
             sleep(REPORT_EVERY)
 
-    def _tell(self, state: SearchState, settings: Settings) -> bool:
-        """Tell how far the search is; return whether that could be told."""
-        began = monotonic()
+    def _report(self, state: SearchState, settings: Settings) -> bool:
+        """Store the progress of the search; return whether the store accepted it."""
+        started = monotonic()
         points, after = self._points(state)
         report = ProgressReport(self._progress(state, settings), points, after=after)
         try:
-            if began >= self._checkpoint_at:
+            if started >= self._checkpoint_at:
                 report = replace(report, checkpoint=self._blobs.write(self._checkpoint(state)))
             self._store.leases.report(self._lease, report)
         except StoreError as error:
-            # The search goes on: what could not be told now is told with the next report.
+            # Continue the search. The next report contains the same points.
             log.warning("report failed", job=self._lease.job.id, reason=str(error))
             self._report_at = monotonic() + REPORT_EVERY
             if report.checkpoint is not None:
-                # One that nobody could be told of stays on the disk until a sweep.
+                # The unreferenced checkpoint stays on disk until a sweep: do not write another one at once.
                 self._checkpoint_at = monotonic() + self._every
             return False
-        self._told = len(state.history) - 1
+        self._stored_points = len(state.history) - 1
         now = monotonic()
         self._report_at = now + REPORT_EVERY
         if report.checkpoint is not None:
-            self._checkpoint_at = now + max(self._every, (now - began) / CHECKPOINT_SHARE)
+            self._checkpoint_at = now + max(self._every, (now - started) / CHECKPOINT_SHARE)
         return True
 
     def _progress(self, state: SearchState, settings: Settings) -> dict[str, Any]:
@@ -193,8 +194,8 @@ class _Watch:
         }
 
     def _points(self, state: SearchState) -> tuple[tuple[Any, ...], int]:
-        new = history_document(state.history[self._told :])
-        after = state.history[self._told - 1].generation if self._told else -1
+        new = history_document(state.history[self._stored_points :])
+        after = state.history[self._stored_points - 1].generation if self._stored_points else -1
         return tuple((*point[:3], tuple(point[3])) for point in new), after
 
     def _checkpoint(self, state: SearchState) -> bytes:

@@ -1,1 +1,1 @@
-"""Jobs and their specifications as values, without a database. Read `jobs` first."""
+"""Jobs and their specifications as values, without a database. Read `job` first."""

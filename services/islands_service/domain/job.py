@@ -1,4 +1,4 @@
-"""Jobs: what somebody asks for, and the states that it goes through. Pure values; the store keeps them.
+"""Jobs and their states, as values without behaviour.
 
 ::
 
@@ -10,10 +10,10 @@
               '--- release ---'                               |
               '------------------ resume ---------------------'
 
-* claim: a coordinator takes a lease of the job; it may take over a running one whose lease has expired.
-* release: the coordinator is told to stop; the job goes on elsewhere, from its last checkpoint.
-* cancel: a queued job is cancelled at once, a running one as soon as its coordinator has let go of it.
-* resume: a job that failed or was cancelled goes on from its last checkpoint, if it has one.
+* claim: a coordinator takes a lease of the job. It may take over a running job whose lease has expired.
+* release: a stopping coordinator returns the job, which continues elsewhere from its last checkpoint.
+* cancel: a queued job is cancelled at once, a running one as soon as its coordinator has stopped it.
+* resume: a failed or cancelled job is queued again and continues from its last checkpoint, if it has one.
 """
 
 import json
@@ -26,7 +26,7 @@ from islands.errors import IslandsError
 
 
 class JobState(StrEnum):
-    """Where a job stands."""
+    """State of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -35,63 +35,70 @@ class JobState(StrEnum):
     CANCELLED = "cancelled"
 
 
-#: States in which nothing happens any more, unless somebody resumes the job.
+#: States of finished jobs. Only a resume changes them.
 TERMINAL = (JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED)
 
-#: States in which a job takes up room in its owner's quota.
+#: States that count towards the quota of the owner.
 ACTIVE = (JobState.QUEUED, JobState.RUNNING)
 
-#: States that a job may be resumed from.
+#: States from which a job can be resumed.
 RESUMABLE = (JobState.FAILED, JobState.CANCELLED)
 
-#: Kinds of jobs: the entries of ``WORK`` in `islands_service.coordinator.coordinator`.
-IDENTIFICATION, DISCREPANCY = "identification", "discrepancy"
+#: Kind of a job that identifies a model; a key of ``JOB_RUNNERS`` in
+#: `islands_service.coordinator.coordinator`.
+IDENTIFICATION = "identification"
 
-#: Artefacts of a result: the page that says it all, and of a discrepancy the simulation with its effects.
-REPORT, EXTENDED = "report.html", "extended.json"
+#: Kind of a job that diagnoses a simulation.
+DISCREPANCY = "discrepancy"
 
-#: The greatest and the least priority.
+#: Artefact with the HTML report of a result.
+REPORT = "report.html"
+
+#: Artefact of a discrepancy job with the simulation extended by the effects found.
+EXTENDED = "extended.json"
+
+#: Valid priorities.
 PRIORITIES = range(-100, 101)
 
 
 class JobNotFoundError(IslandsError):
-    """There is no such job for this owner."""
+    """The owner has no such job."""
 
 
 class JobStateError(IslandsError):
-    """A job's state does not allow what is asked: the message says which state it is in."""
+    """The state of a job does not allow the operation. The message names the state."""
 
 
 class IdempotencyError(IslandsError):
-    """An idempotency key was used before, with another request."""
+    """An idempotency key was used before with a different request."""
 
 
 class QuotaError(IslandsError):
-    """An owner has as many jobs, or as much data, as it may have."""
+    """An owner has reached the limit of active jobs or of stored data."""
 
 
 class LeaseLostError(IslandsError):
-    """The job is another coordinator's by now, or finished: whoever gets this writes nothing more."""
+    """The lease is no longer valid: the job was claimed again, or is finished. The holder must not write."""
 
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """What somebody asks for.
+    """Request for a job.
 
     Attributes
     ----------
     owner : str
-        Who will see the job.
+        Owner of the job.
     spec : mapping
-        What determines the result: see `islands_service.domain.job_spec`.
+        Specification that determines the result: see `islands_service.domain.job_spec`.
     kind : str
         `IDENTIFICATION` or `DISCREPANCY`.
     name : str
-        For people.
+        Display name.
     priority : int
-        Higher ones go first; one of `PRIORITIES`.
+        Jobs of higher priority run first; one of `PRIORITIES`.
     idempotency_key : str, optional
-        The same key with the same request is the same job.
+        A repeated request with the same key returns the same job.
     """
 
     owner: str
@@ -103,31 +110,31 @@ class Submission:
 
     @property
     def request(self) -> str:
-        """The request as text: two that are equal ask for the same."""
+        """The request as canonical text: equal texts are equal requests."""
         asked = {"kind": self.kind, "spec": self.spec, "name": self.name, "priority": self.priority}
         return json.dumps(asked, sort_keys=True)
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A job as the store has it.
+    """A job as it is stored.
 
     Attributes
     ----------
     version : int
-        Rises with every change that a watcher sees; the number of the job's last event.
+        Number of the last event; raised by every change that clients can see.
     attempt : int
-        How often a coordinator has taken it.
+        Number of times that a coordinator has claimed the job.
     progress : mapping or None
-        What the coordinator told last.
+        Last progress report.
     checkpoint : str or None
-        The blob that it goes on from.
+        Blob from which the job continues.
     summary : mapping or None
-        The result at a glance.
+        Main figures of the result.
     problem : mapping or None
-        Why it failed.
+        Reason of the failure.
     created, updated, started, finished : float
-        Seconds since 1970, by the database's clock.
+        Seconds since 1970 by the clock of the database.
     """
 
     id: str
@@ -152,14 +159,14 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Lease:
-    """A coordinator's right to a job, as long as no other one has a newer lease.
+    """Right of a coordinator to a job, valid until a newer lease exists.
 
     Attributes
     ----------
     job : Job
-        As it was when it was claimed.
+        The job at the time of the claim.
     epoch : int
-        Rises with every claim: what is written under an older one is refused.
+        Fencing token, raised by every claim: writes with an older epoch are rejected.
     """
 
     job: Job
@@ -168,7 +175,7 @@ class Lease:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a job; ``number`` is the job's version after it."""
+    """An event of a job; ``number`` is the version of the job after it."""
 
     job: str
     number: int
@@ -179,18 +186,18 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class JobOutcome:
-    """How a job ended, and what it brought.
+    """Final state of a job, and its result.
 
     Attributes
     ----------
     state : JobState
         One of `TERMINAL`.
     document : mapping, optional
-        The result without its models.
+        Result document without its models.
     models : tuple of (mapping, str)
-        Every model's entry of the result, and its model file.
+        Entry in the result document, and model file, of each model.
     artefacts : mapping of str to str
-        What belongs to the result beside the document, by name: blobs.
+        Further files of the result: blobs by name.
     summary, problem : mapping, optional
         See `Job`.
     """
@@ -205,18 +212,18 @@ class JobOutcome:
 
 @dataclass(frozen=True, slots=True)
 class ProgressReport:
-    """What a coordinator tells of a running job.
+    """Progress of a running job.
 
     Attributes
     ----------
     progress : mapping
-        For whoever watches.
+        Shown to clients.
     points : tuple
         Points of the history: generation, evaluations, best by size, best by island.
     checkpoint : str, optional
-        A new blob to go on from; None leaves the one that is there.
+        New blob from which the job can continue; None keeps the previous one.
     after : int
-        The generation behind which the points take the place of those that are there.
+        The points replace all stored points after this generation.
     """
 
     progress: Mapping[str, Any]

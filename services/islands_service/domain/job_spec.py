@@ -1,4 +1,4 @@
-"""What a job says: everything that determines its result, checked as far as it can be without the data."""
+"""Specifications of jobs: everything that determines the result, validated without the data."""
 
 import inspect
 import re
@@ -27,7 +27,7 @@ from islands.model.candidate_library import candidates
 S = TypeVar("S", bound=BaseModel)
 
 
-def _rows(text: str) -> str:
+def _check_rows(text: str) -> str:
     if not re.fullmatch(_ROWS, text):
         raise ValueError(f"cannot read the rows {text[:40]!r}: write START:STOP, for example 0:5000")
     return text
@@ -35,8 +35,10 @@ def _rows(text: str) -> str:
 
 _ROWS = r"^(-?[0-9]{1,12})?:(-?[0-9]{1,12})?$"
 
-#: ``START:STOP``; either may be left out, and a negative one counts from the end.
-Rows = Annotated[str, AfterValidator(_rows), Field(json_schema_extra={"pattern": _ROWS}, examples=["0:5000"])]
+#: ``START:STOP``; either may be omitted, and a negative number counts from the end.
+Rows = Annotated[
+    str, AfterValidator(_check_rows), Field(json_schema_extra={"pattern": _ROWS}, examples=["0:5000"])
+]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Seconds = Annotated[FiniteFloat, Field(gt=0.0)]
 Seed = Annotated[int, Field(ge=0, lt=2**63, description="The same seed gives the same result, bit for bit.")]
@@ -44,7 +46,7 @@ DatasetId = Annotated[
     str, Field(pattern=r"^[0-9A-Za-z_-]{1,48}$", examples=["9f86d081884c7d659a2feaa0c55ad015-csv"])
 ]
 
-#: The most that a setting may be over REST, where it would take memory rather than time: what it is for.
+#: Largest values over REST of settings that would otherwise cost memory rather than time.
 LIMITS = {
     "population": 100_000,
     "generations": 1_000_000,
@@ -58,12 +60,18 @@ LIMITS = {
     "max_evaluations": 10**15,
 }
 
-#: The most entries of a list, the deepest back-shift, and the longest text.
-_ENTRIES, SHIFT, _TEXT = 64, 1000, 20_000
+#: Largest number of entries of a list.
+_MAX_ENTRIES = 64
+
+#: Largest back-shift, in samples.
+MAX_SHIFT = 1000
+
+#: Largest number of characters of a text.
+_MAX_TEXT = 20_000
 
 
-def _described() -> dict[str, str]:
-    """Take the meaning of every setting from where it stands: the docstring of `Settings`."""
+def _read_descriptions() -> dict[str, str]:
+    """Return the description of every setting from the docstring of `Settings`."""
     text = inspect.cleandoc(Settings.__doc__ or "").partition("----------\n")[2]
     found = {}
     for names, meaning in re.findall(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)+)", text, re.MULTILINE):
@@ -72,8 +80,8 @@ def _described() -> dict[str, str]:
     return found
 
 
-def _changes() -> type[BaseModel]:
-    described = _described()
+def _make_settings_model() -> type[BaseModel]:
+    described = _read_descriptions()
     types: dict[str, Any] = {
         each.name: (
             each.type | None,  # type: ignore[operator]
@@ -86,18 +94,18 @@ def _changes() -> type[BaseModel]:
         __config__=ConfigDict(
             extra="forbid",
             frozen=True,
-            allow_inf_nan=False,  # JSON has none, and no answer could show the job
+            allow_inf_nan=False,  # JSON cannot represent them, so no response could contain the job
             title="Settings that differ from the preset's",
         ),
         **types,
     )
 
 
-SettingsChanges = _changes()
+SettingsChanges = _make_settings_model()
 
 
 class Part(BaseModel):
-    """A data set of its own, or rows of one."""
+    """A data set, or a range of its rows."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -105,8 +113,8 @@ class Part(BaseModel):
     rows: Rows | None = None
 
 
-#: What a sampling time is given for.
-_DT = "Sampling time in seconds, where the record does not tell it."
+#: Description of the field ``dt``.
+_DT = "Sampling time in seconds, if the record does not contain it."
 
 
 class Identification(BaseModel):
@@ -122,7 +130,8 @@ class Identification(BaseModel):
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples that estimate; all by default.")
     validation: Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)] | Part = Field(
-        default=0.25, description="The share of the record's end that selects among models, or a data set."
+        default=0.25,
+        description="The fraction at the end of the record that selects the models, or a data set.",
     )
     preset: str = Field(default="hysteresis", json_schema_extra={"enum": list(PRESETS)})
     seed: Seed = 0
@@ -130,42 +139,42 @@ class Identification(BaseModel):
 
     @property
     def changes(self) -> dict[str, Any]:
-        """The settings that differ from the preset's."""
+        """Settings that differ from those of the preset."""
         given: Mapping[str, Any] = self.settings.model_dump(exclude_none=True)  # type: ignore[attr-defined]
         return dict(given)
 
     @property
     def datasets(self) -> tuple[str, ...]:
-        """The data sets that the job reads."""
+        """Data sets that the job reads."""
         return (self.dataset, *([self.validation.dataset] if isinstance(self.validation, Part) else []))
 
 
-def _one(given: Any) -> Any:
+def _check_single(given: Any) -> Any:
     if isinstance(given, list | tuple):
         raise ValueError("a simulation is driven by one input: give the others as channels")
     return given
 
 
 class Discrepancy(BaseModel):
-    """Find out what a simulation gets wrong about a record."""
+    """Diagnose the discrepancy between a simulation and a record."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     dataset: DatasetId = Field(description="The record: the id of an uploaded data set.")
-    input: Annotated[Name, BeforeValidator(_one)] = Field(
+    input: Annotated[Name, BeforeValidator(_check_single)] = Field(
         description="Column that drives the simulation.", examples=["u_V"]
     )
     output: Name = Field(description="Column that was measured.", examples=["y_um"])
     channels: Annotated[tuple[Name, ...], Field(max_length=15, examples=[["T_K"]])] = Field(
-        default=(), description="Columns that may couple in, a temperature perhaps."
+        default=(), description="Columns that may influence the output, for example a temperature."
     )
     dt: Seconds | None = Field(default=None, description=_DT)
-    rows: Rows | None = Field(default=None, description="Samples to look at; all by default.")
-    simulation: SimulationSpec = Field(description="What is held against the record.")
+    rows: Rows | None = Field(default=None, description="Samples to analyse; all by default.")
+    simulation: SimulationSpec = Field(description="Simulation to compare with the record.")
     tolerance: Annotated[dict[Name, Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)]], Field(max_length=100)] = (
         Field(
             default_factory=dict,
-            description="How well parameters are known: relative standard deviations, by name.",
+            description="Relative standard deviations of the known parameters, by name.",
             examples=[{"dp": 0.01}],
         )
     )
@@ -173,38 +182,38 @@ class Discrepancy(BaseModel):
 
     @property
     def recorded_columns(self) -> tuple[str, ...]:
-        """The column that is the simulation, where one is."""
+        """Column that contains a recorded simulation, if there is one."""
         return (core.column,) if isinstance(core := innermost(self.simulation), ColumnSpec) else ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The columns that are read beside the output, the one that drives the simulation first."""
+        """Columns to read in addition to the output; the first one drives the simulation."""
         return (self.input, *self.channels, *self.recorded_columns)
 
 
 def identification_of(document: Mapping[str, Any]) -> Identification:
-    """Read an identification as it is stored.
+    """Parse a stored identification job.
 
     Raises
     ------
     SettingsError
-        It was written by another version of islands.
+        The job was written by another version of islands.
     """
-    return _read(Identification, document)
+    return _parse(Identification, document)
 
 
 def discrepancy_of(document: Mapping[str, Any]) -> Discrepancy:
-    """Read a discrepancy job as it is stored.
+    """Parse a stored discrepancy job.
 
     Raises
     ------
     SettingsError
-        It was written by another version of islands.
+        The job was written by another version of islands.
     """
-    return _read(Discrepancy, document)
+    return _parse(Discrepancy, document)
 
 
-def _read(form: type[S], document: Mapping[str, Any]) -> S:
+def _parse(form: type[S], document: Mapping[str, Any]) -> S:
     try:
         return form.model_validate(document)
     except ValidationError as error:
@@ -216,25 +225,25 @@ def _read(form: type[S], document: Mapping[str, Any]) -> S:
 
 
 def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations: int) -> Settings:
-    """Return the settings of a job that a stranger may ask for.
+    """Return the search settings of a job from an untrusted client.
 
     Raises
     ------
     SettingsError
-        A setting is unknown or out of range, or asks for more than this service gives.
+        A setting is unknown or out of range, or exceeds a limit of this service.
     """
     changes = spec.changes
     for name, most in {**LIMITS, "islands": max_islands}.items():
-        # Before anything is made of them: a million islands would take the memory of this process.
+        # Check before building anything: a million islands would exhaust the memory of this process.
         if changes.get(name, 0) > most:
             raise SettingsError(f"{name} is at most {most} on this service, got {changes[name]}")
     for name, value in changes.items():
-        if isinstance(value, str) and len(value) > _TEXT:
-            raise SettingsError(f"{name} has {len(value)} characters, and {_TEXT} is the most")
-        if isinstance(value, tuple) and len(value) > _ENTRIES:
-            raise SettingsError(f"{name} has {len(value)} entries, and {_ENTRIES} is the most")
-    if any(shift > SHIFT for shift in changes.get("shifts", ())):
-        raise SettingsError(f"back-shifts are at most {SHIFT} on this service, got {changes['shifts']}")
+        if isinstance(value, str) and len(value) > _MAX_TEXT:
+            raise SettingsError(f"{name} has {len(value)} characters, and {_MAX_TEXT} is the most")
+        if isinstance(value, tuple) and len(value) > _MAX_ENTRIES:
+            raise SettingsError(f"{name} has {len(value)} entries, and {_MAX_ENTRIES} is the most")
+    if any(shift > MAX_SHIFT for shift in changes.get("shifts", ())):
+        raise SettingsError(f"back-shifts are at most {MAX_SHIFT} on this service, got {changes['shifts']}")
     settings = resolve_settings(spec.preset, changes)
     asked = settings.population * (settings.generations + 1) * settings.islands
     if asked > max_evaluations:
@@ -249,5 +258,5 @@ def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations
 
 @lru_cache
 def _check_library(name: str, degree: int, lags: int, inputs: int) -> None:
-    """Refuse what the search would refuse when it poses its problem."""
+    """Raise the error of an invalid candidate library before the search does."""
     candidates(name, degree, lags, inputs)

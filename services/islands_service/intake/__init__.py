@@ -1,1 +1,1 @@
-"""Checks before a job is stored: specification, file, inputs. Read `job_validation` first."""
+"""Validation of jobs and files before they are stored. Read `job_validation` first."""

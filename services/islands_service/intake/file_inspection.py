@@ -1,6 +1,6 @@
-"""Inspection of a stranger's file: read in a process of its own that may take only so much.
+"""Inspection of an untrusted file in a subprocess with limited memory and time.
 
-A file that makes its reader take all memory, or turn in circles, ends that process and nothing else.
+A file that exhausts memory, or makes its reader loop, ends only this process.
 """
 
 import asyncio
@@ -18,33 +18,33 @@ from islands.errors import RecordError
 if TYPE_CHECKING:
     from islands.io.records import Preview
 
-#: What the process sees of the environment: nothing that could be worth stealing.
+#: Environment of the process, without any secret.
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
-#: The most columns of a record: what is said of them is kept, and shown in every list.
-_COLUMNS = 1000
+#: Largest number of columns of a record: their descriptions are stored, and shown in every list.
+_MAX_COLUMNS = 1000
 
-#: The longest name of a column: a job could not say a longer one (`islands_service.domain.job_spec.Name`).
-_NAME = 200
+#: Longest name of a column: a job cannot contain a longer one (`islands_service.domain.job_spec.Name`).
+_MAX_NAME = 200
 
-#: Characters of such a name that are shown.
+#: Characters of a longer name in a message.
 _SHOWN = 40
 
-#: Files that it may have open at once.
-_FILES = 64
+#: Largest number of open files.
+_MAX_FILES = 64
 
-#: Exit status of a process that has answered with what is wrong with the file.
+#: Exit status if the file is unusable and the reason is on standard output.
 _REFUSED = 3
 
 
 @dataclass(frozen=True, slots=True)
 class InspectionRequest:
-    """What is asked about a file.
+    """Parameters of an inspection.
 
     Attributes
     ----------
     inputs, output : tuple of str, str or None
-        Columns to read as a job would; without an output the file is only described.
+        Columns to read in the same way as a job; without an output the file is only described.
     dt, rows : float, str or None
         As in a job of `islands_service.domain.job_spec`.
     """
@@ -56,24 +56,24 @@ class InspectionRequest:
 
 
 async def inspect_file(
-    path: Path, asked: InspectionRequest, memory: int, seconds: float
+    path: Path, request: InspectionRequest, memory: int, seconds: float
 ) -> Mapping[str, Any]:
-    """Describe a file, and read from it what is asked.
+    """Describe a file, and read the requested columns.
 
     Parameters
     ----------
     memory, seconds
-        What the process that reads may take: bytes of address space, and time.
+        Limits of the subprocess: bytes of address space, and time.
 
     Returns
     -------
     mapping
-        A `islands.io.records.preview.Preview` as a document.
+        An `islands.io.records.preview.Preview` as a document.
 
     Raises
     ------
     RecordError
-        The file cannot be read, or not as asked.
+        The file or the requested columns cannot be read.
     """
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "islands_service.intake.file_inspection"),
@@ -82,10 +82,10 @@ async def inspect_file(
         stderr=PIPE,
         env=_ENVIRONMENT,
     )
-    request = {"path": str(path), "memory": memory, "seconds": seconds, "asked": asdict(asked)}
+    message = {"path": str(path), "memory": memory, "seconds": seconds, "asked": asdict(request)}
     try:
         async with asyncio.timeout(seconds):
-            answer, complaint = await process.communicate(json.dumps(request).encode())
+            answer, complaint = await process.communicate(json.dumps(message).encode())
     except TimeoutError:
         raise RecordError(
             f"{path.name} takes longer than {seconds:.0f} s to read: give a shorter record, or NPZ "
@@ -103,58 +103,58 @@ async def inspect_file(
         )
         raise RecordError(
             f"{path.name} cannot be read within {memory / 1e9:.1f} GB of memory and {seconds:.0f} s "
-            f"({reason}): it is damaged, or unpacks to more than this service takes"
+            f"({reason}): it is damaged, or unpacks to more than this service accepts"
         )
     return dict(json.loads(answer))
 
 
 def main() -> None:
-    """Inspect the file that standard input names, and answer on standard output."""
-    request = json.load(sys.stdin)
-    _limit(request["memory"], request["seconds"])
-    # After the limits: whatever these do, they do it within them.
+    """Inspect the file named on standard input, and write the result to standard output."""
+    message = json.load(sys.stdin)
+    _limit(message["memory"], message["seconds"])
+    # Import after the limits are set, so that the imported code is subject to them.
     from islands.io.records import read_record  # noqa: PLC0415
     from islands.io.records.preview import preview  # noqa: PLC0415
     from islands.io.records.row_range import parse_rows  # noqa: PLC0415
 
-    asked = InspectionRequest(**request["asked"])
+    request = InspectionRequest(**message["asked"])
     try:
-        found = preview(request["path"])
-        # First: what is said of the columns asked for lists those that there are.
-        _refuse_unreadable(found, request["path"])
-        if asked.inputs and asked.output is not None:
-            read_record(request["path"], asked.inputs, asked.output, asked.dt, parse_rows(asked.rows))
+        found = preview(message["path"])
+        # Check this first: a message about missing columns lists the existing ones.
+        _check_readable(found, message["path"])
+        if request.inputs and request.output is not None:
+            read_record(message["path"], request.inputs, request.output, request.dt, parse_rows(request.rows))
         else:
-            _refuse_unusable({column.name: column.problem for column in found.columns}, asked)
+            _check_usable({column.name: column.problem for column in found.columns}, request)
     except RecordError as error:
         json.dump({"error": str(error)}, sys.stdout)
         sys.exit(_REFUSED)
     json.dump(asdict(found), sys.stdout)
 
 
-def _refuse_unreadable(found: "Preview", path: str) -> None:
-    """Refuse a file that no job could ever read anything from, or that nobody could look through."""
-    if len(found.columns) > _COLUMNS:
+def _check_readable(found: "Preview", path: str) -> None:
+    """Reject a file that no job could read, or that has too many columns to display."""
+    if len(found.columns) > _MAX_COLUMNS:
         raise RecordError(
-            f"{Path(path).name} has {len(found.columns)} columns, and {_COLUMNS} is the most: leave out what "
-            "is not needed"
+            f"{Path(path).name} has {len(found.columns)} columns, and {_MAX_COLUMNS} is the most: leave out "
+            "what is not needed"
         )
     for column in found.columns:
-        if len(column.name) > _NAME:
+        if len(column.name) > _MAX_NAME:
             raise RecordError(
                 f"{Path(path).name} has a column {column.name[:_SHOWN]}... whose name has {len(column.name)} "
-                f"characters, and {_NAME} is the most: give it a shorter one"
+                f"characters, and {_MAX_NAME} is the most: give it a shorter one"
             )
     if not found.samples:
         problems = [column.problem for column in found.columns if column.problem]
-        raise RecordError(problems[0] if problems else f"{Path(path).name} holds no column: export it anew")
+        raise RecordError(problems[0] if problems else f"{Path(path).name} has no columns: export it again")
 
 
-def _refuse_unusable(problems: Mapping[str, str], asked: InspectionRequest) -> None:
-    """Refuse columns by what a preview says of each: a job that would read them is not known yet."""
+def _check_usable(problems: Mapping[str, str], request: InspectionRequest) -> None:
+    """Reject columns with a problem in the preview, if the job that would read them is not known yet."""
     from islands.io.records.column_names import find_column  # noqa: PLC0415
 
-    for name in (*asked.inputs, *([] if asked.output is None else [asked.output])):
+    for name in (*request.inputs, *([] if request.output is None else [request.output])):
         source = find_column(name, problems)
         if source not in problems:
             raise RecordError(f"the record has no column {name}; it has {', '.join(problems)}")
@@ -168,7 +168,7 @@ def _limit(memory: int, seconds: float) -> None:
         (resource.RLIMIT_AS, memory),
         (resource.RLIMIT_CPU, whole),
         (resource.RLIMIT_FSIZE, 0),
-        (resource.RLIMIT_NOFILE, _FILES),
+        (resource.RLIMIT_NOFILE, _MAX_FILES),
         (resource.RLIMIT_CORE, 0),
     ):
         resource.setrlimit(kind, (most, most))

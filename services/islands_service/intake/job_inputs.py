@@ -1,4 +1,4 @@
-"""Records of jobs: from uploaded data sets to what the core identifies."""
+"""Reading of the records of jobs from uploaded data sets."""
 
 import tempfile
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from islands_service.store.datasets import StoredDataset
 
 @contextmanager
 def link_blob(blob: Path, name: str) -> Iterator[Path]:
-    """Give a blob its owner's name for it: messages speak of that, and its suffix chooses the reader.
+    """Provide a blob under its file name, which appears in messages and whose suffix selects the reader.
 
     Raises
     ------
@@ -30,15 +30,15 @@ def link_blob(blob: Path, name: str) -> Iterator[Path]:
         yield link
 
 
-def record_and_validation(
+def read_record_and_validation(
     spec: Identification, datasets: dict[str, StoredDataset], blobs: Blobs
 ) -> tuple[Dataset, Dataset | float]:
-    """Read what a job estimates from, and what it validates with.
+    """Read the estimation record of a job, and its validation record or fraction.
 
     Raises
     ------
     RecordError
-        A record cannot be used as the job says.
+        A record cannot be used as specified.
     BlobNotFoundError
         The data folder has lost a file.
     """
@@ -54,15 +54,15 @@ def record_and_validation(
     return record, spec.validation
 
 
-def record_and_columns(
+def read_record_and_columns(
     spec: Discrepancy, stored: StoredDataset, blobs: Blobs
 ) -> tuple[Dataset, dict[str, NDArray[np.float64]]]:
-    """Read what a simulation is held against, and beside it the column that is the simulation, if one is.
+    """Read the record of a discrepancy job, and the column of a recorded simulation, if there is one.
 
     Raises
     ------
     RecordError
-        The record cannot be used as the job says.
+        The record cannot be used as specified.
     BlobNotFoundError
         The data folder has lost a file.
     """

@@ -1,4 +1,4 @@
-"""Admission: what a job must be before it is accepted. What is wrong is said now, not by a failed job."""
+"""Validation of a job before it is accepted, so that invalid jobs are rejected instead of failing later."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from islands.io.records.validation import check_choice
 from islands.io.simulator_spec.specification import PARAMETERS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_spec import (
     LIMITS,
-    SHIFT,
+    MAX_SHIFT,
     Discrepancy,
     Identification,
     Part,
@@ -26,14 +26,17 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from islands_service.store.datasets import StoredDataset
 
-#: The most characters of a simulation, which stands in every list of jobs; and of all terms of a model with
-#: their powers written out, since that is what reading them takes.
-_SIMULATION, _WRITTEN_OUT = 50_000, 200_000
+#: Largest number of characters of a simulation, which is part of every list of jobs.
+_MAX_SIMULATION = 50_000
+
+#: Largest number of characters of the terms of a model with written-out powers, which bounds the cost of
+#: parsing.
+_MAX_WRITTEN_OUT = 200_000
 
 
 @dataclass(frozen=True, slots=True)
 class PendingInspection:
-    """A data set that has to be read once more, as the job would, to know whether that works."""
+    """A data set whose preview is not sufficient, and the columns to read before the job is accepted."""
 
     dataset: StoredDataset
     request: InspectionRequest
@@ -42,49 +45,51 @@ class PendingInspection:
 def validate_job(
     spec: Identification | Discrepancy, owner: str, store: Store, settings: ServiceSettings
 ) -> tuple[PendingInspection, ...]:
-    """Refuse a job that could only fail; return what the previews of its data sets leave open.
+    """Reject a job that can only fail; return the inspections that its data sets still need.
 
     Raises
     ------
     SettingsError
-        A setting is unknown, out of range, or asks for more than this service gives.
+        A setting is unknown, out of range, or exceeds a limit of this service.
     DatasetNotFoundError
-        A data set is not there, or belongs to somebody else.
+        The owner has no such data set.
     RecordError
-        A column is not there, or cannot be used.
+        A column is missing or unusable.
     ModelError
-        What is to be held against a record is no model.
+        The simulation contains an invalid model.
     """
-    doubts = []
+    pending = []
     for part in _parts(spec, settings):
         dataset = store.datasets.get(owner, part.dataset)
-        if not _plain(spec, part, dataset.preview, dataset.name):
-            doubts.append(
+        if not _is_readable(spec, part, dataset.preview, dataset.name):
+            pending.append(
                 PendingInspection(dataset, InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows))
             )
-    return tuple(doubts)
+    return tuple(pending)
 
 
 def _parts(spec: Identification | Discrepancy, settings: ServiceSettings) -> list[Part]:
-    return _of_discrepancy(spec) if isinstance(spec, Discrepancy) else _of_identification(spec, settings)
+    if isinstance(spec, Discrepancy):
+        return _check_discrepancy(spec)
+    return _check_identification(spec, settings)
 
 
-def _of_identification(spec: Identification, settings: ServiceSettings) -> list[Part]:
-    """Check what an identification asks for; return what it reads."""
+def _check_identification(spec: Identification, settings: ServiceSettings) -> list[Part]:
+    """Check the settings of an identification; return the data that it reads."""
     resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
     parts = [Part(dataset=spec.dataset, rows=spec.rows)]
     if isinstance(spec.validation, Part):
         parts.append(spec.validation)
         if len(set(spec.datasets)) == 1 and overlap(*(parse_rows(part.rows) for part in parts)):
             raise SettingsError(
-                "the validation shares samples with those that estimate: say with rows START:STOP which "
-                "samples do either, or take another data set"
+                "the validation shares samples with those that estimate: give rows START:STOP for each, or "
+                "take another data set for the validation"
             )
     return parts
 
 
-def _of_discrepancy(spec: Discrepancy) -> list[Part]:
-    """Check what a discrepancy job asks for; return what it reads."""
+def _check_discrepancy(spec: Discrepancy) -> list[Part]:
+    """Check the simulation and the columns of a discrepancy job; return the data that it reads."""
     _check_simulation(spec)
     if spec.input in spec.channels:
         raise RecordError(f"channel {spec.input} is the input itself: leave it out")
@@ -98,46 +103,48 @@ def _of_discrepancy(spec: Discrepancy) -> list[Part]:
 
 
 def _check_simulation(spec: Discrepancy) -> None:
-    """Refuse a model that is none, and a simulation that would take the machine.
+    """Reject an invalid model, and a simulation that would exhaust the memory or the time of this process.
 
-    What else one can get wrong is said at the beginning of the job: to make one takes the kernels.
+    Further errors are reported when the job starts, because making a simulator needs the kernels.
     """
-    asked = spec.simulation
-    if (size := len(json.dumps(asked.model_dump()))) > _SIMULATION:
+    simulation = spec.simulation
+    if (size := len(json.dumps(simulation.model_dump()))) > _MAX_SIMULATION:
         raise SettingsError(
-            f"the simulation has {size} characters, and {_SIMULATION} is the most on this service"
+            f"the simulation has {size} characters, and {_MAX_SIMULATION} is the most on this service"
         )
-    core = innermost(asked)
+    core = innermost(simulation)
     if isinstance(core, PhysicalSpec):
-        _check_parameters(core, spec.tolerance if core is asked else {})
+        _check_parameters(core, spec.tolerance if core is simulation else {})
     if not isinstance(core, ModelSpec):
         return
     terms = core.model.get("terms")
-    # Before it is read: a power of a power of a power takes all memory. What is no list is refused there.
+    # Check before parsing: nested powers would exhaust memory. A value that is no list is rejected by the
+    # parser.
     if isinstance(terms, list):
         if len(terms) > LIMITS["max_terms"]:
             raise SettingsError(
                 f"{core.name} has {len(terms)} terms, and {LIMITS['max_terms']} is the most on this service"
             )
-        if sum(map(_written_out, terms)) > _WRITTEN_OUT:
+        if sum(map(_written_out_length, terms)) > _MAX_WRITTEN_OUT:
             raise SettingsError(f"{core.name} has terms that are too long, or of too high a degree")
     model = model_from_json(json.dumps(core.model), core.name)
-    if model.maximum_lag > SHIFT:
+    if model.maximum_lag > MAX_SHIFT:
         raise SettingsError(
-            f"{core.name} reaches {model.maximum_lag} samples back, and {SHIFT} is the most on this service"
+            f"{core.name} reaches {model.maximum_lag} samples back, and {MAX_SHIFT} is the most on this "
+            "service"
         )
 
 
 def _check_parameters(core: PhysicalSpec, tolerance: Mapping[str, float]) -> None:
-    """Refuse parameters that a system does not have; where it begins is known of a record alone."""
+    """Reject unknown parameters. Initial values are not checked, since their number depends on the record."""
     known = PARAMETERS[core.kind]
     for name in (*core.parameters, *tolerance):
         if name not in known and not name.startswith("initial "):
             raise SettingsError(f"{core.kind} has no parameter {name!r}: it has {', '.join(known)}")
 
 
-def _written_out(term: Any) -> int:
-    """Return how many characters a term has at the most when it is written without powers."""
+def _written_out_length(term: Any) -> int:
+    """Return an upper bound of the number of characters of a term that is written without powers."""
     text = term.get("regressor") if isinstance(term, dict) else None
     if not isinstance(text, str):
         return 0
@@ -145,10 +152,12 @@ def _written_out(term: Any) -> int:
     return len(text) * prod(max(1, int(each)) if re.fullmatch("[0-9]{1,3}", each) else 99 for each in powers)
 
 
-def _plain(spec: Identification | Discrepancy, part: Part, preview: Mapping[str, Any], name: str) -> bool:
-    """Tell whether a preview alone says that a record can be read: all of it, with its own sampling time.
+def _is_readable(
+    spec: Identification | Discrepancy, part: Part, preview: Mapping[str, Any], name: str
+) -> bool:
+    """Return whether the preview proves that the whole record can be read with its own sampling time.
 
-    A preview looks at each column by itself: what speaks against using them together leaves a doubt.
+    A preview describes each column separately. If the combination may fail, the answer is False.
     """
     columns = {column["name"]: column for column in preview["columns"]}
     sources = [find_column(given, tuple(columns)) for given in spec.inputs]

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: plain words first, numbers under them, figures; one HTML file."""
+"""HTML report of a diagnosis in a single file: sentences, numbers and figures."""
 
 import base64
 import io
@@ -12,65 +12,66 @@ from islands.figures.discrepancy import DISCREPANCY_FIGURES
 from islands.figures.style import save
 from islands_service.reports.identification_report import TEMPLATES
 
-#: What a verdict means.
+#: Sentence for each verdict.
 _VERDICTS = {
-    Verdict.NOTHING: "Nothing significant: within this record's noise the simulation is right.",
-    Verdict.NAMED: "The simulation lacks something that has a name.",
-    Verdict.REMAINDER: "The simulation lacks something that has a name, and a little more that has none.",
-    Verdict.UNKNOWN: "The simulation is wrong, but by none of the causes that are known here.",
+    Verdict.NOTHING: "No significant discrepancy: the simulation is correct within the noise of this record.",
+    Verdict.NAMED: "The simulation lacks known effects, which explain the discrepancy.",
+    Verdict.REMAINDER: "The simulation lacks known effects, which explain most of the discrepancy.",
+    Verdict.UNKNOWN: "The simulation is wrong, and no known effect explains the discrepancy.",
 }
 
-#: What figures show, in the order of a report.
+#: Captions of the figures, in the order of the report.
 _CAPTIONS = {
-    "over-time": "Where it errs: measured, simulated, extended",
+    "over-time": "Measured, simulated and extended output, and the residuals",
     "loops": "Output over input, and the residual over the input",
-    "residual": "What the residual still knows, before and after",
-    "ladder": "What each effect would gain",
+    "residual": "Structure of the residual before and after",
+    "ladder": "Gain of each effect alone",
 }
 
 
-#: What it means where only sampling and noise have got a name.
-_NOISE = "Nothing significant: within this record's noise, which has a name, the simulation is right."
+#: Sentence for a record in which only sampling and noise effects were found.
+_NOISE = "No significant discrepancy: the simulation is correct within the noise, whose kind was identified."
 
 
 def summarise(found: Diagnosis, proposal: ResidualFormula | None = None) -> str:
-    """Say a diagnosis in a few plain lines."""
+    """Summarise a diagnosis as plain text."""
     lines = [_verdict(found)]
     lines += [f"  {_finding(finding)}" for finding in found.effects]
     if found.verdict == Verdict.UNKNOWN:
         nearest = ", ".join(candidate.name for candidate in found.candidates[:3])
         dependence = ", ".join(found.residual_structure) or "its own past"
-        lines.append(f"  nearest: {nearest}; what is left depends on: {dependence}")
+        lines.append(f"  nearest: {nearest}; the residual depends on: {dependence}")
     if found.gain is not None:
         gain, unit = found.gain, found.record.output_unit
         low, high = gain.ci95
         lines.append(
-            f"On data that nothing else has seen the RMSE falls from {gain.before.rmse:.3g} to "
+            f"On held-out data the RMSE falls from {gain.before.rmse:.3g} to "
             f"{gain.after.rmse:.3g} {unit}, by {gain.reduction_percent:.1f} % ({low:.1f} to {high:.1f}); "
-            f"noise alone is {gain.noise_floor.rmse:.3g} {unit}, {_floor(found)}."
+            f"the noise floor is {gain.noise_floor.rmse:.3g} {unit}, {_floor(found)}."
         )
     if found.suggested_experiment:
-        lines.append(f"To tell apart what this record cannot: {found.suggested_experiment}.")
+        lines.append(f"Suggested experiment to separate confounded effects: {found.suggested_experiment}.")
     if proposal is not None:
         lines.append(
-            f"What is left follows, to {100 * proposal.explains:.0f} % on such data: {proposal.formula}"
+            f"This formula explains {100 * proposal.explains:.0f} % of the residual on held-out data: "
+            f"{proposal.formula}"
         )
     return "\n".join(lines)
 
 
 def _verdict(found: Diagnosis) -> str:
-    quiet = found.verdict == Verdict.NAMED and all(
+    only_noise = found.verdict == Verdict.NAMED and all(
         finding.explained_fraction is None for finding in found.effects
     )
-    return _NOISE if quiet else _VERDICTS[found.verdict]
+    return _NOISE if only_noise else _VERDICTS[found.verdict]
 
 
 def _floor(found: Diagnosis) -> str:
-    """Say how well the noise is known."""
+    """Say how the noise floor was determined."""
     return (
-        "as repeated periods show"
+        "measured from repeated periods"
         if found.is_noise_floor_measured
-        else "at the most: how much of what is left is noise, a record without repeated periods cannot tell"
+        else "an upper bound, because the record has no repeated periods"
     )
 
 
@@ -85,29 +86,30 @@ def _finding(finding: Finding) -> str:
         if finding.explained_fraction is None
         else f", {100 * finding.explained_fraction:.0f} % of the misfit"
     )
-    or_else = f"; cannot be told from {', '.join(finding.equivalents)}" if finding.equivalents else ""
-    return f"{finding.name}: {values}; confidence {finding.confidence:.2f}{share}{or_else}"
+    confounded = f"; confounded with {', '.join(finding.equivalents)}" if finding.equivalents else ""
+    return f"{finding.name}: {values}; confidence {finding.confidence:.2f}{share}{confounded}"
 
 
 def summarise_self_test(tested: SelfTest) -> str:
-    """Say in a few plain lines what the analysis can do on a record."""
+    """Summarise the false-alarm rate and the detection limits on a record as plain text."""
     alarms, limits = tested.false_alarm_rate, tested.detection_limits
     low, high = (100 * each for each in alarms.ci95)
     shown = sum(limit is not None for limit in limits.values())
-    # So few records cannot show that it is rarer.
+    # The number of records bounds the p-value from below.
     least = "at most " if tested.p_value * (alarms.trials + 1) < 1.5 else ""
     named = alarms.value * alarms.trials
     return (
         f"Of {alarms.trials} records like this one with nothing wrong in them {named:.0f} got "
-        f"a name: {100 * alarms.value:.1f} % false alarms ({low:.1f} to {high:.1f}). Chance alone makes a "
-        f"candidate as good as this record's best with a probability of {least}{tested.p_value:.2g}.\n"
-        f"Of {len(limits)} effects this record could show {shown}, up to a misfit of {STRENGTHS[-1]:g} times "
-        "the noise."
+        f"a name: {100 * alarms.value:.1f} % false alarms ({low:.1f} to {high:.1f}). A correct simulation "
+        "yields a candidate as good as the best one of this record with a probability of "
+        f"{least}{tested.p_value:.2g}.\n"
+        f"Of {len(limits)} effects, {shown} can be detected on this record, up to a misfit of "
+        f"{STRENGTHS[-1]:g} times the noise."
     )
 
 
 def _limits(tested: SelfTest) -> list[tuple[str, str, str]]:
-    """Return a row for each effect: its name, the smallest strength that was named, and its misfit."""
+    """Return for each effect its name, the smallest detected strength, and the misfit at this strength."""
     return [
         (name, f"not up to {STRENGTHS[-1]:g} times the noise", "")
         if limit is None
@@ -117,16 +119,16 @@ def _limits(tested: SelfTest) -> list[tuple[str, str, str]]:
 
 
 def _amount(value: float, unit: str) -> str:
-    """Say a strength with its unit: what has none is a part of something."""
+    """Format a strength with its unit; one without a unit is a fraction, shown in per cent."""
     return f"{value:.3g} {unit.replace('/', ' per ')}" if unit else f"{100 * value:.3g} %"
 
 
 def _mistaken(tested: SelfTest) -> list[tuple[str, str, int]]:
-    """Return what was called something else than it is, and how often; overlooked is not that."""
+    """Return injected effect, named effect and count of each confusion, without missed effects."""
     return [
-        (hidden, called, times)
-        for (hidden, called), times in tested.confusion.items()
-        if called not in (hidden, NOTHING)
+        (injected, named, count)
+        for (injected, named), count in tested.confusion.items()
+        if named not in (injected, NOTHING)
     ]
 
 
@@ -138,11 +140,11 @@ def diagnosis_report(
     Parameters
     ----------
     name : str
-        Of the record.
+        Name of the record.
     tested : SelfTest, optional
-        What the analysis can do on it.
+        Detection limits and false-alarm rate on the record.
     proposal : ResidualFormula, optional
-        A formula for what has no name.
+        Formula for the unexplained residual.
     """
     figures = [(_CAPTIONS[each], _inline(draw(found))) for each, draw in DISCREPANCY_FIGURES.items()]
     text = TEMPLATES.get_template("diagnosis.html").render(

@@ -1,7 +1,7 @@
 """Figures of a finished job: ``python -m islands_service.reports.figure_worker JOB``.
 
-Drawing takes seconds and must not delay requests, so it has a process. Standard output is meant for the
-owner of the job, standard error for the operator.
+Rendering takes seconds and must not delay requests, so it runs in a separate process. Messages on standard
+output are for the owner of the job, those on standard error for the operator.
 """
 
 import argparse
@@ -27,46 +27,47 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands_service.domain.job import REPORT, Job
 from islands_service.domain.job_spec import identification_of
-from islands_service.intake.job_inputs import record_and_validation
+from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.reports.identification_report import identification_report
 from islands_service.settings import ServiceSettings, service_settings
 from islands_service.store import Store
 from islands_service.store.blobs import BlobNotFoundError, Blobs
 from islands_service.store.database import StorageFullError, StoreError
 
-#: Samples of a simulation that are handed out as numbers: a screen shows no more.
-POINTS = 4000
+#: Largest number of samples of a simulation that is returned as numbers: a screen shows no more.
+MAX_POINTS = 4000
 
-#: Bytes of address space for the libraries and the figures, beside what the records take, and seconds of all
-#: cores together.
-_MEMORY, _SECONDS = 8_000_000_000, 600
+#: Bytes of address space for the libraries and the figures, in addition to the records.
+_MEMORY = 8_000_000_000
+
+#: Seconds of CPU time, all cores together.
+_CPU_SECONDS = 600
 
 
 def main() -> int:
-    """Draw what is asked for, all figures of a model or all of the search, and keep it."""
+    """Render and store all figures of a model or of the search."""
     command = "python -m islands_service.reports.figure_worker"
     parser = argparse.ArgumentParser(prog=command, description=__doc__)
     parser.add_argument("job")
     parser.add_argument("--owner", required=True)
     parser.add_argument("--rank", type=int, help="a model's; without it, the figures of the search")
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     settings = service_settings()
     _limit(settings)
     blobs = Blobs(settings.blobs)
     try:
         with Store(settings.url) as store:
-            job = store.jobs.get(asked.owner, asked.job)
-            found = read_search_result(job, store, blobs, asked.rank)
-            made = (
-                render_figures(job, found) if asked.rank is None else render_model_figures(found, asked.rank)
-            )
-            store.results.keep(asked.job, {name: blobs.write(data) for name, data in made.items()})
+            job = store.jobs.get(arguments.owner, arguments.job)
+            found = read_search_result(job, store, blobs, arguments.rank)
+            rank = arguments.rank
+            made = render_figures(job, found) if rank is None else render_model_figures(found, rank)
+            store.results.keep(arguments.job, {name: blobs.write(data) for name, data in made.items()})
     except StorageFullError as error:
-        return _failed(error, ENOSPC)
+        return _report_failure(error, ENOSPC)
     except StoreError as error:
-        return _failed(error, EAGAIN)
+        return _report_failure(error, EAGAIN)
     except BlobNotFoundError as error:
-        return _failed(error, ENODATA)
+        return _report_failure(error, ENODATA)
     except IslandsError as error:
         print(error)
         return EINVAL
@@ -74,31 +75,31 @@ def main() -> int:
 
 
 def _limit(settings: ServiceSettings) -> None:
-    # A record and what it is validated on were each read within what an inspection may take.
+    # The record and the validation record were each read within the memory limit of an inspection.
     for kind, most in (
         (resource.RLIMIT_AS, 2 * settings.inspection_memory + _MEMORY),
-        (resource.RLIMIT_CPU, _SECONDS),
+        (resource.RLIMIT_CPU, _CPU_SECONDS),
         (resource.RLIMIT_CORE, 0),
     ):
         resource.setrlimit(kind, (most, most))
 
 
-def _failed(error: IslandsError, status: int) -> int:
+def _report_failure(error: IslandsError, status: int) -> int:
     print(error, file=sys.stderr)
     return status
 
 
 def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -> SearchResult:
-    """Put a finished job's findings together again, with the model of a rank or with all.
+    """Rebuild the search result of a finished job, with the model of a rank or with all models.
 
     Raises
     ------
     IslandsError
-        The job, its data or the model is not there any more.
+        The job, its data or the model no longer exists.
     """
     spec = identification_of(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
-    record, validation = record_and_validation(spec, datasets, blobs)
+    record, validation = read_record_and_validation(spec, datasets, blobs)
     split = split_data(record, validation)
     settings = resolve_settings(spec.preset, spec.changes)
     document = store.results.document(job.id)
@@ -129,17 +130,17 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStat
 
 
 def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
-    """Draw the figures of a search and write its report, by the names of their artefacts."""
+    """Render the figures and the report of a search; return them by artefact name."""
     made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](found)) for name in search_figures(found)}
     best = {f"{name}.svg": _svg(draw(found.models[0], found.split)) for name, draw in FIGURES.items()}
     return {**made, REPORT: identification_report(job.name or job.id, found, {**best, **made})}
 
 
 def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
-    """Draw a model's figures, and simulate it, by the names of their artefacts."""
+    """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
     made = {f"{rank}/{name}.svg": _svg(draw(entry, found.split)) for name, draw in FIGURES.items()}
-    made[f"{rank}/free-run.json"] = _simulated(entry, found)
+    made[f"{rank}/free-run.json"] = _free_run_document(entry, found)
     return made
 
 
@@ -149,11 +150,11 @@ def _svg(figure: Any) -> bytes:
     return stream.getvalue()
 
 
-def _simulated(entry: RankedModel, found: SearchResult) -> bytes:
-    """Return the validation data and the model's free run over it, thinned for a screen."""
+def _free_run_document(entry: RankedModel, found: SearchResult) -> bytes:
+    """Return the validation data and the free run of a model as JSON, downsampled to `MAX_POINTS`."""
     data = found.split.validation
     simulated = free_run(entry.model, data, entry.assessment.warm_up)
-    every = max(1, -(-data.samples // POINTS))
+    every = max(1, -(-data.samples // MAX_POINTS))
     kept = slice(None, None, every)
     time = data.start + data.dt * np.arange(data.samples)
     document = {

@@ -1,4 +1,4 @@
-"""The Ray to run on: one of our own on this machine's cores, or a cluster by its address."""
+"""Connection to Ray: a local instance on the cores of this machine, or a cluster by its address."""
 
 import logging
 import os
@@ -24,24 +24,27 @@ from ray.exceptions import (
 
 from islands_service.runtime.errors import ClusterError
 
-#: Bytes of shared memory for objects of our own Ray: the record, and what islands send to each other.
-OBJECT_STORE = 200_000_000
+#: Bytes of shared memory of a local Ray: it holds the record and the migrants.
+OBJECT_STORE_BYTES = 200_000_000
 
-#: Where the names of actors count.
+#: Ray namespace of the names of actors.
 NAMESPACE = "islands"
 
-#: Seconds that a cluster may take to answer.
-_KNOCK = 5.0
+#: Seconds that a cluster may take to accept a connection.
+_CONNECT_TIMEOUT = 5.0
 
-#: What the folders of our own Rays begin with, and the lock in them that says that somebody is there.
-_PREFIX, _LOCK = "islands-ray-", "lock"
+#: Prefix of the temporary folders of local Ray instances.
+_PREFIX = "islands-ray-"
 
-#: A socket's path has at most 107 characters, and Ray adds about seventy to its folder's.
-_SOCKET_ROOM = 30
+#: Lock file in such a folder, held while the instance runs.
+_LOCK = "lock"
+
+#: Longest path of the parent folder: a socket path has at most 107 characters, and Ray appends about seventy.
+_MAX_PARENT_LENGTH = 30
 
 
-#: What says that a machine failed rather than the search: what was asked of it is asked once more.
-LOST = (
+#: Errors of a failed machine or process rather than of the search. The computation is repeated.
+LOSS_ERRORS = (
     RayActorError,
     ObjectLostError,
     WorkerCrashedError,
@@ -53,29 +56,31 @@ LOST = (
 
 @contextmanager
 def cluster(address: str | None = None) -> Iterator[None]:
-    """Connect to a cluster, or start a Ray of our own that ends with the block and leaves nothing behind.
+    """Connect to a cluster, or start a local Ray that ends with the block and removes its files.
 
     Parameters
     ----------
     address : str, optional
-        ``HOST:PORT`` of a cluster's head; without one a Ray is started on this machine.
+        ``HOST:PORT`` of the head of a cluster; by default a local Ray is started.
 
     Raises
     ------
     ClusterError
-        The address does not answer, no Ray starts here, or this process has one already.
+        The address does not answer, Ray does not start here, or this process is already connected to Ray.
     """
     if ray.is_initialized():
-        raise ClusterError("this process is on a Ray already: leave that first, or run on it by its address")
+        raise ClusterError(
+            "this process is already connected to Ray: disconnect first, or give the address of that cluster"
+        )
     logging.getLogger("ray").setLevel(logging.CRITICAL)
-    with _own() if address is None else _connected(address):
+    with _local_ray() if address is None else _remote_cluster(address):
         yield
 
 
 @contextmanager
-def _connected(address: str) -> Iterator[None]:
+def _remote_cluster(address: str) -> Iterator[None]:
     try:
-        _knock(address)
+        _check_reachable(address)
         ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
     except (OSError, RuntimeError, ValueError, RayError) as error:
         raise ClusterError(
@@ -88,23 +93,23 @@ def _connected(address: str) -> Iterator[None]:
         ray.shutdown()
 
 
-def _prune(parent: Path) -> None:
-    """Remove the folders of runs that were killed: a lock ends with the process that holds it."""
+def _remove_stale_folders(parent: Path) -> None:
+    """Remove the folders of killed runs: their locks were released when the processes ended."""
     for folder in parent.glob(f"{_PREFIX}*"):
         with suppress(Timeout, OSError), FileLock(folder / _LOCK, timeout=0):
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _knock(address: str) -> None:
-    """Raise an error where nobody is at home: Ray would try for minutes."""
+def _check_reachable(address: str) -> None:
+    """Raise an error if nothing listens at the address: Ray would retry for minutes."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal():
         raise ValueError("an address is HOST:PORT")
-    socket.create_connection((host, int(port)), timeout=_KNOCK).close()
+    socket.create_connection((host, int(port)), timeout=_CONNECT_TIMEOUT).close()
 
 
-def _cpus() -> int:
-    """Return the cores that this process may use: fewer than the machine's in a container, or when pinned."""
+def _count_cpus() -> int:
+    """Return the number of cores that a container or an affinity mask leaves to this process."""
     cores = len(os.sched_getaffinity(0))
     with suppress(OSError, ValueError):
         quota, period = map(int, Path("/sys/fs/cgroup/cpu.max").read_text().split())
@@ -113,30 +118,32 @@ def _cpus() -> int:
 
 
 @contextmanager
-def _own() -> Iterator[None]:
-    # Ray's processes listen on all interfaces: nobody else may talk to them.
+def _local_ray() -> Iterator[None]:
+    # Ray's processes listen on all interfaces: the token keeps other users out.
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
     parent = Path(tempfile.gettempdir())
-    if len(str(parent)) > _SOCKET_ROOM:
+    if len(str(parent)) > _MAX_PARENT_LENGTH:
         parent = Path("/tmp")
-    _prune(parent)
+    _remove_stale_folders(parent)
     folder = tempfile.mkdtemp(prefix=_PREFIX, dir=parent)
     lock = FileLock(Path(folder) / _LOCK)
     with lock:
         try:
-            # Without "local" Ray would attach to any cluster that it finds on the machine.
+            # Without "local" Ray would attach to any cluster on the machine.
             ray.init(
                 address="local",
                 namespace=NAMESPACE,
-                num_cpus=_cpus(),
-                object_store_memory=OBJECT_STORE,
+                num_cpus=_count_cpus(),
+                object_store_memory=OBJECT_STORE_BYTES,
                 include_dashboard=False,
                 log_to_driver=False,
                 configure_logging=False,
                 _temp_dir=folder,
             )
         except (OSError, RuntimeError, ValueError, RayError) as error:
-            raise ClusterError(f"no Ray starts on this machine ({error}): try --engine serial") from error
+            raise ClusterError(
+                f"Ray does not start on this machine ({error}): try --engine serial"
+            ) from error
         try:
             yield
         finally:

@@ -1,7 +1,7 @@
-"""The itinerary: which island's epoch may be sent off, and when an archipelago is complete.
+"""Schedule of a search on many actors: which epochs may be submitted, and when an archipelago is complete.
 
-An island waits for the epoch before of those that it receives from, and for nobody else: there is no barrier.
-It knows generations and values, and neither actors nor Ray.
+An island waits only for the previous epochs of the islands that it receives from: there is no barrier. The
+scheduler handles generations and values, and is independent of actors and Ray.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,11 +13,11 @@ from islands.evolution.engine import make_topology
 from islands.evolution.epoch import IslandEpoch, next_stop, select_migrants
 from islands.evolution.problem import Problem
 
-#: What is kept of an island's epoch.
+#: Data that is kept of an island's epoch.
 T = TypeVar("T")
 
-#: Epochs that an island may be ahead of the last complete archipelago: it evens out faster and slower ones.
-AHEAD = 3
+#: Epochs that an island may be ahead of the last complete archipelago. It evens out differences in speed.
+MAX_EPOCHS_AHEAD = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,28 +30,32 @@ class EpochTask:
 
 
 class EpochScheduler(Generic[T]):
-    """Keeps what has been sent and what has come back of a search.
+    """Tracks the submitted and the completed epochs of a search.
 
-    Whatever is sent may stand on what has not come back yet: Ray hands it over when it is there.
+    A submitted task may depend on epochs that are not complete yet: Ray passes their values on when they are.
 
     Parameters
     ----------
     problem : Problem
     start : Archipelago
     keep : callable
-        From an epoch, what is kept of it: of the start it is made here.
+        Returns the data to keep of an epoch; also applied to the start.
     ahead : int
         Epochs that an island may be ahead of the last complete archipelago.
     """
 
     def __init__(
-        self, problem: Problem, start: Archipelago, keep: Callable[[IslandEpoch], T], ahead: int = AHEAD
+        self,
+        problem: Problem,
+        start: Archipelago,
+        keep: Callable[[IslandEpoch], T],
+        ahead: int = MAX_EPOCHS_AHEAD,
     ) -> None:
         self._settings, self._ahead = problem.settings, ahead
         self.sources = make_topology(problem, start).sources
         self.completed_generation = start.generation
         self._sent = [start.generation] * len(start.islands)
-        #: What is known of every island by generation, from the last complete archipelago on.
+        #: Kept data of each island by generation, from the last complete archipelago on.
         self.known: list[dict[int, T]] = []
         for island in start.islands:
             leaving = select_migrants(island, problem.settings_of(island.index))
@@ -59,11 +63,11 @@ class EpochScheduler(Generic[T]):
 
     @property
     def finished(self) -> bool:
-        """Whether the last generation is complete."""
+        """Whether the archipelago of the last generation is complete."""
         return self.completed_generation >= self._settings.generations
 
     def ready_tasks(self) -> Iterator[EpochTask]:
-        """Yield the legs that may be sent off, and take each for sent; those of earlier epochs come first."""
+        """Yield the tasks that may be submitted, earlier epochs first, and mark each as submitted."""
         begin, end = self.completed_generation, self._next_stop(self.completed_generation)
         for _ in range(self._ahead):
             for island, sent in enumerate(self._sent):
@@ -74,17 +78,17 @@ class EpochScheduler(Generic[T]):
                 return
             begin, end = end, self._next_stop(end)
 
-    def reschedule(self, leg: EpochTask) -> None:
-        """Take a leg, and what was sent of its island after it, for not sent."""
-        self._sent[leg.island] = max(self.completed_generation, min(self._sent[leg.island], leg.begin))
+    def reschedule(self, task: EpochTask) -> None:
+        """Mark a lost task, and the later tasks of its island, as not submitted."""
+        self._sent[task.island] = max(self.completed_generation, min(self._sent[task.island], task.begin))
 
-    def complete(self, leg: EpochTask, epoch: T) -> None:
-        """Take note of what a leg brought."""
-        if leg.end > self.completed_generation:
-            self.known[leg.island][leg.end] = epoch
+    def complete(self, task: EpochTask, epoch: T) -> None:
+        """Store the result of a task."""
+        if task.end > self.completed_generation:
+            self.known[task.island][task.end] = epoch
 
     def completed_epochs(self) -> Iterator[tuple[T, ...]]:
-        """Yield what all islands brought, epoch by epoch as far as it is complete."""
+        """Yield the results of all islands for each epoch that is now complete, in order."""
         while not self.finished:
             end = self._next_stop(self.completed_generation)
             if not all(end in known for known in self.known):

@@ -1,6 +1,6 @@
-"""The actor that carries islands: it holds the record, warm caches, and nothing that is not a copy.
+"""Ray actor that runs islands. It holds the record, warm caches and copies of islands.
 
-An island enters as a value and leaves as a value. Who loses an actor loses time.
+Islands are passed and returned by value, so that the loss of an actor costs only time.
 """
 
 from importlib.metadata import version
@@ -18,12 +18,12 @@ from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack
 
 
 class IslandActor:
-    """Carries islands of one problem, one epoch a call.
+    """Runs islands of one problem, one epoch per call.
 
     Parameters
     ----------
     problem : Problem
-        From the object store: all actors of a machine read one copy of its record.
+        From the object store: all actors of a machine share one copy of its record.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -32,20 +32,20 @@ class IslandActor:
         self._name = str(ray.get_runtime_context().get_actor_id())
 
     def prepare(self) -> str:
-        """Make what the epochs need; what is wrong with the problem is raised here. Return our version."""
+        """Compile kernels, build the evaluator, and return the version of islands."""
         warm_up(lambda _line: None)
         self._evaluator = Evaluator(self._problem.record, self._problem.settings)
         return version("islands")
 
     @ray.method(concurrency_group="watch")
     def wait_until_killed(self) -> None:
-        """Never return: who waits for this learns of the actor's death."""
+        """Block for ever. The reference to this call fails when the actor dies."""
         Event().wait()
 
     @ray.method(num_returns=2)
     def advance(self, before: PackedEpoch, *arriving: Population) -> tuple[PackedEpoch, Population]:
-        """Carry an island from where it stood to its next stop; return that, and who emigrates."""
-        # Nobody tells it to stop: a search that ends kills its actors, and misses nothing.
+        """Run an island from its last stop to the next one; return the packed epoch and the emigrants."""
+        # A search that ends kills its actors, so no stop function is needed.
         epoch = run_epoch(self._island(before), arriving, self._evaluator, self._problem, lambda: False)
         assert epoch is not None
         report = pack_epoch(epoch, self._name, self._evaluator.memory)
@@ -53,6 +53,6 @@ class IslandActor:
         return report, epoch.emigrants
 
     def _island(self, before: PackedEpoch) -> Island:
-        """Unpack an island, unless it is the one that was packed here last."""
+        """Return an island, unpacked unless it is the one that was packed here last."""
         packed, island = self._islands.pop(before.index, (b"", None))
         return island if island is not None and packed == before.packed else unpack_island(before)

@@ -1,7 +1,7 @@
-"""Reports: what an actor says of an island's epoch.
+"""Epochs of islands as actors return them, with the island pickled.
 
-The island itself is packed. The coordinator passes it on and keeps it, and unpacks it where somebody looks:
-an island of five hundred takes it six milliseconds, and everything else one.
+The driver forwards and keeps the pickled island, and unpickles it only on access. Unpickling an island of
+five hundred individuals takes six milliseconds, everything else one.
 """
 
 import pickle
@@ -17,21 +17,21 @@ from islands.evolution.island import Island, StepInfo
 
 @dataclass(frozen=True, slots=True)
 class PackedEpoch:
-    """What is known of an island at the end of an epoch.
+    """Result of an island's epoch.
 
     Attributes
     ----------
     index : int
-        The island's.
+        Index of the island.
     packed : bytes
-        The island.
+        The pickled island.
     emigrants : tuple of Individual
     steps : tuple of StepInfo
         As in `islands.evolution.epoch.IslandEpoch`.
     actor : str
-        Whose caches these are.
+        Id of the actor that ran the epoch.
     caches : mapping
-        What the caches of the actor take.
+        Memory of the caches of this actor.
     """
 
     index: int
@@ -43,19 +43,19 @@ class PackedEpoch:
 
 
 def pack_epoch(epoch: IslandEpoch, actor: str = "", caches: Caches | None = None) -> PackedEpoch:
-    """Pack what an epoch brought."""
+    """Pickle the island of an epoch and keep the rest."""
     packed = pickle.dumps(epoch.island, pickle.HIGHEST_PROTOCOL)
     return PackedEpoch(epoch.island.index, packed, epoch.emigrants, epoch.steps, actor, caches or {})
 
 
 def unpack_island(report: PackedEpoch) -> Island:
-    """Return a report's island. It comes from an actor of our own, never from a stranger."""
+    """Unpickle the island of an epoch. The bytes come from our own actors, never from an untrusted source."""
     island: Island = pickle.loads(report.packed)
     return island
 
 
 class PackedIslands(Sequence[Island]):
-    """The islands of reports, each unpacked when it is first looked at; equal to the tuple of them."""
+    """Sequence of the islands of packed epochs, each unpickled at its first access."""
 
     def __init__(self, reports: Sequence[PackedEpoch]) -> None:
         self._reports = tuple(reports)

@@ -1,4 +1,4 @@
-"""A pool of cores: calls of one function with many arguments, side by side on Ray."""
+"""Parallel map on Ray: ordered results of one function called with many arguments."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -18,54 +18,54 @@ R = TypeVar("R")
 
 @contextmanager
 def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator[ParallelMap]:
-    """Hold a pool open.
+    """Provide a parallel map on a Ray cluster while the block runs.
 
     Parameters
     ----------
     workers : int or None
-        Calls at a time; None: as many as there are cores.
+        Concurrent calls; None for one per core.
     address : str or None
-        ``HOST:PORT`` of a cluster; None starts a Ray on this machine.
+        ``HOST:PORT`` of a cluster; None starts a local Ray.
 
     Raises
     ------
     ClusterError
-        There is no Ray, or it failed. What the function itself raises is raised as it is.
+        Ray is unavailable or failed. Errors of the function itself are raised unchanged.
     """
     with cluster(address):
         yield ray_map(workers)
 
 
 def ray_map(workers: int | None = None) -> ParallelMap:
-    """Return a pool on the Ray that this process is connected to when it is called.
+    """Return a parallel map on the Ray cluster to which this process is connected when it is called.
 
-    It raises a `ClusterError` where that is none.
+    The map raises a `ClusterError` if the process is not connected.
     """
-    task: Any = ray.remote(num_cpus=1, max_retries=3)(_called)
+    task: Any = ray.remote(num_cpus=1, max_retries=3)(_call)
 
-    def side_by_side(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
-        if not ray.is_initialized():  # Ray would start one of its own
-            raise ClusterError("this process is on no Ray: connect it first")
+    def parallel_map(function: Callable[[A], R], arguments: Iterable[A], /) -> Iterator[R]:
+        if not ray.is_initialized():  # otherwise Ray would start a local instance
+            raise ClusterError("this process is not connected to Ray: connect it first")
         shared, upcoming = ray.put(function), iter(arguments)
-        asked = [task.remote(shared, argument) for argument in islice(upcoming, workers)]
-        out = set(asked)
-        # The list grows while it is gone through.
-        for reference in asked:
-            while reference in out:
-                done, _ = ray.wait(list(out), num_returns=1)
-                out -= set(done)
+        submitted = [task.remote(shared, argument) for argument in islice(upcoming, workers)]
+        pending = set(submitted)
+        # The list grows during the iteration.
+        for reference in submitted:
+            while reference in pending:
+                done, _ = ray.wait(list(pending), num_returns=1)
+                pending -= set(done)
                 more = [task.remote(shared, argument) for argument in islice(upcoming, len(done))]
-                asked += more
-                out |= set(more)
+                submitted += more
+                pending |= set(more)
             try:
                 yield ray.get(reference)
             except RayTaskError as error:
                 raise error.cause from error
             except RayError as error:
-                raise ClusterError(f"Ray failed in a way that nobody can go on from: {error}") from error
+                raise ClusterError(f"Ray failed, and the computation cannot continue: {error}") from error
 
-    return side_by_side
+    return parallel_map
 
 
-def _called(function: Callable[[A], R], argument: A) -> R:
+def _call(function: Callable[[A], R], argument: A) -> R:
     return function(argument)

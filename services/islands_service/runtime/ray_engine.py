@@ -1,4 +1,4 @@
-"""The engine on Ray: sends islands' epochs to actors, and replays from values what gets lost."""
+"""Search engine on Ray: submits epochs of islands to actors and repeats those that are lost."""
 
 from collections.abc import Generator
 from time import sleep
@@ -11,78 +11,78 @@ from islands.evolution.engine import ArchipelagoEpoch, Caches, Stop
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands_service.runtime.actor_pool import IslandActorPool
-from islands_service.runtime.cluster import LOST
+from islands_service.runtime.cluster import LOSS_ERRORS
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.packed_epoch import PackedEpoch, PackedIslands, pack_epoch
 
-#: Seconds between two looks at whether the search is to stop.
-_LOOK = 0.1
+#: Seconds to wait for a result between two checks of the stop function.
+_POLL_SECONDS = 0.1
 
-#: The report of an epoch, and its emigrants, wherever they are.
+#: References to the packed epoch of an island and to its emigrants.
 References = tuple["ray.ObjectRef[PackedEpoch]", "ray.ObjectRef"]
 
 
 class RayEngine:
-    """Runs every island on an actor of the cluster that this process is connected to.
+    """Runs islands on actors of the Ray cluster to which this process is connected.
 
     Parameters
     ----------
     progress : ProgressCallback
-        Takes a line for the user when an actor is lost, or has to wait for a CPU.
+        Receives a message for the user if an actor is lost or must wait for a CPU.
     title : str
-        What the names of the actors begin with: ``<job>.<lease epoch>``.
+        Prefix of the names of the actors: ``<job>.<lease epoch>``.
     """
 
     def __init__(self, progress: ProgressCallback = ignore_progress, title: str = "") -> None:
         self._progress, self._title = progress, title
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
-        """See `islands.evolution.engine.Engine`."""
-        itinerary = EpochScheduler(problem, start, pack_epoch)
-        if itinerary.finished:
+        """Yield the epochs of a search; see `islands.evolution.engine.Engine`."""
+        scheduler = EpochScheduler(problem, start, pack_epoch)
+        if scheduler.finished:
             return
-        crew = IslandActorPool(problem, len(start.islands), self._progress, self._title)
+        pool = IslandActorPool(problem, len(start.islands), self._progress, self._title)
         try:
-            yield from _carried_out(itinerary, crew, stop)
+            yield from _run_epochs(scheduler, pool, stop)
         except RayError as error:
-            raise ClusterError(f"Ray failed in a way that nobody can go on from: {error}") from error
+            raise ClusterError(f"Ray failed, and the search cannot continue: {error}") from error
         finally:
-            crew.shutdown()
+            pool.shutdown()
 
 
-def _carried_out(
-    itinerary: EpochScheduler[PackedEpoch], crew: IslandActorPool, stop: Stop
+def _run_epochs(
+    scheduler: EpochScheduler[PackedEpoch], pool: IslandActorPool, stop: Stop
 ) -> Generator[ArchipelagoEpoch]:
-    voyage = _Voyage(itinerary, crew)
-    while not (itinerary.finished or stop()):
-        if crew.maintain():
-            voyage.send()
-        voyage.wait()
-        for reports in itinerary.completed_epochs():
+    in_flight = _InFlight(scheduler, pool)
+    while not (scheduler.finished or stop()):
+        if pool.maintain():
+            in_flight.submit()
+        in_flight.wait()
+        for reports in scheduler.completed_epochs():
             if stop():
                 return
-            crew.reset_losses()
-            voyage.forget()
+            pool.reset_losses()
+            in_flight.drop_old_references()
             yield ArchipelagoEpoch(
                 Archipelago(PackedIslands(reports)),
                 tuple(report.steps for report in reports),
-                voyage.memory,
+                in_flight.memory,
             )
 
 
-class _Voyage:
-    """What is on its way: references to values that actors hold, or are about to make."""
+class _InFlight:
+    """Submitted tasks, and references to values that actors hold or will compute."""
 
-    def __init__(self, itinerary: EpochScheduler[PackedEpoch], crew: IslandActorPool) -> None:
-        self._itinerary, self._crew = itinerary, crew
+    def __init__(self, scheduler: EpochScheduler[PackedEpoch], pool: IslandActorPool) -> None:
+        self._scheduler, self._pool = scheduler, pool
         self._references: dict[tuple[int, int], References] = {}
-        self._out: dict[ray.ObjectRef[PackedEpoch], EpochTask] = {}
+        self._pending: dict[ray.ObjectRef[PackedEpoch], EpochTask] = {}
         self._caches: dict[str, Caches] = {}
 
     @property
     def memory(self) -> Caches:
-        """What the caches of all actors take."""
+        """Memory of the caches of all actors."""
         names = {name for caches in self._caches.values() for name in caches}
         return {
             name: (
@@ -92,67 +92,71 @@ class _Voyage:
             for name in sorted(names)
         }
 
-    def send(self) -> None:
-        """Send off all that may go. Ray hands the emigrants over when they are there."""
-        for leg in self._itinerary.ready_tasks():
-            before, _ = self._at(leg.island, leg.begin)
-            arriving = [self._at(source, leg.begin)[1] for source in self._itinerary.sources[leg.island]]
-            report, leaving = self._crew.actor_for(leg.island).advance.remote(before, *arriving)
-            self._references[leg.island, leg.end] = report, leaving
-            self._out[report] = leg
+    def submit(self) -> None:
+        """Submit all tasks that are ready. Ray passes the emigrants on as soon as they are computed."""
+        for task in self._scheduler.ready_tasks():
+            before, _ = self._get_references(task.island, task.begin)
+            arriving = [
+                self._get_references(source, task.begin)[1] for source in self._scheduler.sources[task.island]
+            ]
+            report, leaving = self._pool.actor_for(task.island).advance.remote(before, *arriving)
+            self._references[task.island, task.end] = report, leaving
+            self._pending[report] = task
 
-    def _at(self, island: int, generation: int) -> References:
+    def _get_references(self, island: int, generation: int) -> References:
         key = island, generation
         if key not in self._references:
-            report = self._itinerary.known[island][generation]
+            report = self._scheduler.known[island][generation]
             self._references[key] = ray.put(report), ray.put(report.emigrants)
         return self._references[key]
 
     def wait(self) -> None:
-        """Wait a moment for somebody to come back, and take in all who are."""
-        if not self._out:
-            sleep(_LOOK)
+        """Wait a moment for a result, and collect all that are ready."""
+        if not self._pending:
+            sleep(_POLL_SECONDS)
             return
-        ray.wait(list(self._out), num_returns=1, timeout=_LOOK)
-        back, _ = ray.wait(list(self._out), num_returns=len(self._out), timeout=0)
-        lost = [leg for reference in back if not self._taken(leg := self._out.pop(reference), reference)]
+        ray.wait(list(self._pending), num_returns=1, timeout=_POLL_SECONDS)
+        ready, _ = ray.wait(list(self._pending), num_returns=len(self._pending), timeout=0)
+        lost = [
+            task for reference in ready if not self._collect(task := self._pending.pop(reference), reference)
+        ]
         if lost:
-            self._lose(lost)
+            self._reschedule(lost)
 
-    def forget(self) -> None:
-        """Let go of what lies behind the last complete epoch: nothing will stand on it."""
-        complete = self._itinerary.completed_generation
+    def drop_old_references(self) -> None:
+        """Drop object references older than the last complete epoch."""
+        complete = self._scheduler.completed_generation
         self._references = {key: kept for key, kept in self._references.items() if key[1] >= complete}
 
-    def _taken(self, leg: EpochTask, reference: "ray.ObjectRef[PackedEpoch]") -> bool:
-        """Take in what a leg brought; return False where it was lost."""
+    def _collect(self, task: EpochTask, reference: "ray.ObjectRef[PackedEpoch]") -> bool:
+        """Store the result of a task; return False if it was lost."""
         try:
             report = ray.get(reference)
-        except LOST:
+        except LOSS_ERRORS:
             return False
         except RayTaskError as error:
             raise error.cause from error
         self._caches[report.actor] = report.caches
-        self._itinerary.complete(leg, report)
+        self._scheduler.complete(task, report)
         return True
 
-    def _lose(self, legs: list[EpochTask]) -> None:
-        """Forget legs that were lost, and what was sent of their islands after them."""
+    def _reschedule(self, tasks: list[EpochTask]) -> None:
+        """Discard lost tasks and the later tasks of their islands."""
         first: dict[int, int] = {}
-        for leg in legs:
-            self._itinerary.reschedule(leg)
-            first[leg.island] = min(leg.end, first.get(leg.island, leg.end))
-        self._out = {
-            reference: leg
-            for reference, leg in self._out.items()
-            if leg.end <= first.get(leg.island, leg.end)
+        for task in tasks:
+            self._scheduler.reschedule(task)
+            first[task.island] = min(task.end, first.get(task.island, task.end))
+        self._pending = {
+            reference: task
+            for reference, task in self._pending.items()
+            if task.end <= first.get(task.island, task.end)
         }
-        # What is known may have been lost with the machine that held it: it is sent from here again.
+        # Objects with known values may have been lost with their machine: put those values again.
         self._references = {
             (island, generation): references
             for (island, generation), references in self._references.items()
-            if generation not in self._itinerary.known[island]
+            if generation not in self._scheduler.known[island]
             and generation < first.get(island, generation + 1)
         }
-        self._caches.clear()  # whose they were may be gone; who is there tells anew
-        self._crew.maintain(at_once=True)
+        self._caches.clear()  # drop the caches of lost actors; the others report theirs with the next epoch
+        self._pool.maintain(at_once=True)

@@ -1,6 +1,6 @@
-"""``python -m islands_service.runtime.ray_head``: the Ray on this machine, as a process of its own.
+"""``python -m islands_service.runtime.ray_head``: run the Ray head of this machine in a separate process.
 
-Coordinators connect to it by its address, as they do to a cluster: there is one path.
+Coordinators connect to it by its address, in the same way as to an external cluster.
 """
 
 import os
@@ -17,28 +17,29 @@ from islands_service.liveness import StopRequest, send_heartbeat, stop_on_signal
 from islands_service.runtime.cluster import cluster
 from islands_service.settings import service_settings
 
-#: Seconds between two looks at whether Ray still answers.
-_LOOK = 0.5
+#: Seconds between two checks of Ray.
+_POLL_SECONDS = 0.5
 
-#: Processes of Ray that nothing goes on without.
+#: Processes of Ray without which it cannot run anything.
 _VITAL = ("gcs_server", "raylet")
 
 
 def main() -> int:
-    """Start Ray, say where it is, and stay until SIGTERM, or until Ray is lost."""
+    """Start Ray, publish its address, and run until SIGTERM or until Ray fails."""
     settings = service_settings()
     stopping = StopRequest()
     stop_on_signals(stopping)
     try:
         with cluster(None):
             stop_on_signals(stopping)
-            with _found_at(settings.ray_address_file):
-                while not (lost := _lost()) and not stopping.wait(_LOOK):
-                    # Here and not from a thread: where Ray hangs we do, too, and are started again.
+            with _publish_address(settings.ray_address_file):
+                while not (failure := _find_failure()) and not stopping.wait(_POLL_SECONDS):
+                    # In this thread: if Ray hangs, the heartbeats end and the supervisor restarts this
+                    # process.
                     send_heartbeat(settings.lifeline)
-            if lost:
-                print(f"Ray: {lost}", file=sys.stderr, flush=True)
-                # Ray's own end would wait for who is lost; the supervisor ends whom we leave behind.
+            if failure:
+                print(f"Ray: {failure}", file=sys.stderr, flush=True)
+                # A regular shutdown would wait for the lost process. The supervisor kills the remaining ones.
                 os._exit(1)
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
     except IslandsError as error:
@@ -47,9 +48,9 @@ def main() -> int:
     return 0
 
 
-def _lost() -> str:
-    """Say what Ray has lost; "" where it goes on."""
-    # Without its raylet Ray would answer as before, and carry out nothing.
+def _find_failure() -> str:
+    """Return a message about a lost process of Ray; empty if all run."""
+    # Without its raylet Ray would still answer, but run nothing.
     node = ray._private.worker._global_node
     if lost := [name for name, _ in node.dead_processes() if name in _VITAL]:
         return f"it has lost its {', '.join(lost)}"
@@ -57,8 +58,8 @@ def _lost() -> str:
 
 
 @contextmanager
-def _found_at(path: Path) -> Iterator[None]:
-    """Say in a file where Ray is, as long as the block lasts."""
+def _publish_address(path: Path) -> Iterator[None]:
+    """Write the address of Ray to a file, and remove it after the block."""
     address = ray.get_runtime_context().gcs_address
     part = path.with_suffix(".part")
     part.write_text(address)
@@ -66,7 +67,7 @@ def _found_at(path: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # The next service on the same folder may have another Ray by now, and say where that is.
+        # The next service on the same folder may have overwritten the file with the address of another Ray.
         if path.exists() and path.read_text() == address:
             path.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""The store: owns the truth about jobs, data sets and keys, in SQLite or PostgreSQL through one code path."""
+"""SQL store of jobs, data sets and keys, in SQLite or PostgreSQL, and blobs. Read `store` first."""
 
 from islands_service.store.store import Store
 

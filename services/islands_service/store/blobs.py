@@ -1,4 +1,4 @@
-"""Blobs: uploaded records, checkpoints and figures as files named by what is in them."""
+"""Content-addressed files: uploaded records, checkpoints, reports and figures."""
 
 import hashlib
 import os
@@ -12,21 +12,21 @@ from typing import IO
 from islands.errors import IslandsError
 from islands_service.store.database import StorageFullError
 
-#: Of a file that is being written.
+#: Suffix of a file that is being written.
 _PART = ".part"
 
 
 class BlobNotFoundError(IslandsError):
-    """A blob is not there, though something names it: the data folder has lost a file."""
+    """A referenced blob is missing: the data folder has lost a file."""
 
 
 class Blobs:
-    """A folder of blobs. A blob never changes: its name is the SHA-256 of its bytes.
+    """Folder of blobs. A blob is immutable: its name is the SHA-256 of its bytes.
 
     Parameters
     ----------
     folder : Path
-        Made if it is not there. In a cluster all roles see the same one.
+        Created if it does not exist. All roles of a cluster must share it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -34,7 +34,7 @@ class Blobs:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
     def path(self, blob: str) -> Path:
-        """Return where a blob's bytes are.
+        """Return the path of a blob.
 
         Raises
         ------
@@ -48,7 +48,7 @@ class Blobs:
         return path
 
     def read(self, blob: str) -> bytes:
-        """Return a blob's bytes.
+        """Return the bytes of a blob.
 
         Raises
         ------
@@ -57,7 +57,7 @@ class Blobs:
         return self.path(blob).read_bytes()
 
     def write(self, data: bytes) -> str:
-        """Keep bytes, and return their blob once it is on the disk.
+        """Store bytes; return their blob once it is on the disk.
 
         Raises
         ------
@@ -69,7 +69,7 @@ class Blobs:
 
     @contextmanager
     def receiving(self) -> Iterator[IO[bytes]]:
-        """Open a file to receive bytes; it is gone after the block, unless it was kept.
+        """Open a temporary file for incoming bytes. It is deleted after the block unless it was kept.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Blobs:
                     Path(stream.name).unlink()
 
     def keep(self, stream: IO[bytes]) -> str:
-        """Make a blob of a file that has received all its bytes.
+        """Store a file that has received all its bytes as a blob.
 
         Raises
         ------
@@ -105,16 +105,16 @@ class Blobs:
         return blob
 
     def all(self) -> Iterator[tuple[str, Path]]:
-        """Yield every blob, and files that were left half-written (without a name)."""
+        """Yield every blob with its path; files that are only partly written have an empty name."""
         for path in self._folder.glob(f"*{_PART}"):
             yield "", path
         for path in self._folder.glob("??/*"):
             yield path.name, path
 
     def sweep(self, named: Iterable[str], before: float) -> int:
-        """Remove what nobody names and was written before a time, in seconds since 1970; return how many.
+        """Remove unreferenced blobs written before a time in seconds since 1970; return their number.
 
-        What is younger may be about to be named.
+        Younger blobs are kept, since a reference to them may be about to be written.
         """
         needed, removed = set(named), 0
         for blob, path in self.all():
@@ -130,7 +130,7 @@ class Blobs:
 
 @contextmanager
 def translate_disk_full() -> Iterator[None]:
-    """Turn a full disk into our own error.
+    """Translate the error of a full disk to `StorageFullError`.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def translate_disk_full() -> Iterator[None]:
 
 
 def _sync(folder: Path) -> None:
-    """Have a folder's entries on the disk, too."""
+    """Flush the entries of a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

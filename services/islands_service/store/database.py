@@ -1,8 +1,8 @@
-"""A database behind one door: reads side by side, writes in groups, errors that say what to do.
+"""Database access with concurrent reads, group commit and translated errors.
 
-Every write waits until it is durable. Those that come while another group is being written to the disk make
-the next group, each in a savepoint of its own: sixteen clients get three times as many jobs accepted as with
-a transaction each, and the slowest waits a twentieth of the time (decision 0009).
+Every write waits until it is durable. Writes that arrive while a group is being committed form the next
+group, each in its own savepoint. With sixteen clients this accepts three times as many jobs as one
+transaction per job, and the longest wait is a twentieth (decision 0009).
 """
 
 import sqlite3
@@ -22,24 +22,31 @@ from islands_service.store.connections import make_engine
 
 T = TypeVar("T")
 
-#: An operation, and who waits for it; and what an operation came to: what it returned, or what it raised.
+#: An operation, and the future that its caller waits for.
 _Waiting = tuple[Callable[[Connection], Any], Future[Any]]
-_Answer = tuple[Any, Exception | None]
 
-#: The most operations of one transaction, and how often one is tried that had to give way to another one.
-GROUP, TRIES = 64, 5
+#: Returned value and raised error of an operation.
+_OperationResult = tuple[Any, Exception | None]
 
-#: PostgreSQL's states for a full disk, and beginnings of those for a database that is going, gone, or not to
-#: be written any more, since another one has taken its place.
+#: Largest number of operations of one transaction.
+GROUP = 64
+
+#: Attempts at an operation whose transaction is rolled back because of a conflict.
+_MAX_TRIES = 5
+
+#: SQLSTATEs of PostgreSQL for a full disk.
 _FULL_STATES = ("53100",)
-_GONE_STATES = ("08", "57P", "25006")
 
-#: PostgreSQL's states for a transaction that gave way to another one.
+#: Prefixes of the SQLSTATEs of PostgreSQL for a server that is shutting down, unreachable, or read-only since
+#: a standby has taken over.
+_UNAVAILABLE_STATES = ("08", "57P", "25006")
+
+#: SQLSTATEs of PostgreSQL for a serialisation failure and a deadlock.
 _COLLISION_STATES = ("40001", "40P01")
 
 
 class StoreError(IslandsError):
-    """The store cannot do what is asked."""
+    """The store cannot perform an operation."""
 
 
 class StoreUnavailableError(StoreError):
@@ -47,15 +54,15 @@ class StoreUnavailableError(StoreError):
 
 
 class StoreCollisionError(StoreUnavailableError):
-    """Two transactions waited for each other, and this one gave way. Nothing was written; try again."""
+    """The transaction was rolled back because of a deadlock or a conflict. Nothing was written; try again."""
 
 
 class CommitUnknownError(StoreUnavailableError):
-    """The database went away while it committed: nobody knows whether it was written."""
+    """The connection was lost during a commit: it is unknown whether the transaction was written."""
 
 
 class StorageFullError(StoreError):
-    """The disk is full. Nothing was written, and nothing that was accepted is lost; make room."""
+    """The disk is full. Nothing was written, and accepted data are safe; free some space."""
 
 
 class Database:
@@ -73,11 +80,12 @@ class Database:
         self._waiting: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._writer: Thread | None = None
         self._closed = False
-        # One of those who come first starts the writer, and nobody comes behind the end.
+        # Ensures that concurrent first writers start one thread, and that no operation is queued after the
+        # end.
         self._lock = Lock()
 
     def close(self) -> None:
-        """Write what is waiting, and let go of the database."""
+        """Write the queued operations and close all connections."""
         with self._lock:
             self._closed, writer = True, self._writer
             self._waiting.put(None)
@@ -87,38 +95,39 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Connection]:
-        """Open a connection that reads: each statement sees what was durable when it began.
+        """Open a connection for reading: each statement sees the state that was durable when it began.
 
         Raises
         ------
         StoreUnavailableError, StorageFullError
         StoreError
-            It is closed.
+            The database is closed.
         """
-        self._refuse_closed()
+        self._check_open()
         with translate_db_errors(), self.engine.begin() as connection:
             yield connection
 
     def write(self, operation: Callable[[Connection], T]) -> T:
-        """Carry out an operation in a transaction, and return what it returns once that is durable.
+        """Run an operation in a transaction; return its value once the transaction is durable.
 
-        What it raises is raised here, and undoes nothing but its own work.
+        An error of the operation is raised here, and rolls back only the work of this operation.
 
         Raises
         ------
         StoreUnavailableError, StorageFullError
             Nothing was written.
         CommitUnknownError
-            Nobody knows whether it was written.
+            It is unknown whether the operation was written.
         StoreError
-            It is closed.
+            The database is closed.
         """
         done: Future[T] = Future()
         with self._lock:
-            self._refuse_closed()
+            self._check_open()
             if self._writer is None:
                 writer = Thread(target=self._write_groups, name="store writer", daemon=True)
-                # One that cannot start is no writer: whoever comes next would wait for it for ever.
+                # Store the thread only after it has started: later operations would wait for a dead one for
+                # ever.
                 writer.start()
                 self._writer = writer
             self._waiting.put((operation, done))
@@ -126,11 +135,11 @@ class Database:
 
     @contextmanager
     def exclusive(self) -> Iterator[Connection]:
-        """Open a transaction that writes, outside of any group: for migrations."""
+        """Open a writing transaction outside the groups, for migrations."""
         with translate_db_errors(), self._writing.begin() as connection:
             yield connection
 
-    def _refuse_closed(self) -> None:
+    def _check_open(self) -> None:
         if self._closed:
             raise StoreError("the store is closed: open it again")
 
@@ -150,30 +159,30 @@ class Database:
             if last:
                 return
 
-    def _write_group(self, group: list[_Waiting], tries: int = TRIES) -> None:
+    def _write_group(self, group: list[_Waiting], tries: int = _MAX_TRIES) -> None:
         try:
-            answers = self._transaction([operation for operation, _ in group])
+            results = self._run_transaction([operation for operation, _ in group])
         except StoreCollisionError as error:
             if tries > 1:
-                # One by one they hold less at a time that others wait for.
+                # Retry one by one: shorter transactions hold fewer locks.
                 for each in group:
                     self._write_group([each], tries - 1)
                 return
-            answers = [(None, error)] * len(group)
+            results = [(None, error)] * len(group)
         except Exception as error:
-            answers = [(None, error)] * len(group)
-        for (_, done), (value, failure) in zip(group, answers, strict=True):
+            results = [(None, error)] * len(group)
+        for (_, done), (value, failure) in zip(group, results, strict=True):
             if failure is None:
                 done.set_result(value)
             else:
                 done.set_exception(failure)
 
-    def _transaction(self, operations: list[Callable[[Connection], Any]]) -> list[_Answer]:
-        """Carry out a group; return what each came to, once all is durable."""
+    def _run_transaction(self, operations: list[Callable[[Connection], Any]]) -> list[_OperationResult]:
+        """Run a group of operations in one transaction; return their results once it is durable."""
         committing = False
         try:
             with translate_db_errors(), self._writing.begin() as connection:
-                answers = [_carried_out(operation, connection) for operation in operations]
+                results = [_run_operation(operation, connection) for operation in operations]
                 committing = True
         except StoreCollisionError:
             raise
@@ -181,20 +190,20 @@ class Database:
             if not committing:
                 raise
             raise CommitUnknownError(
-                "the database went away while it committed, and nobody knows whether it was written: look, "
-                "or ask again under the same idempotency key"
+                "the connection to the database was lost during the commit, and it is unknown whether the "
+                "transaction was written: check, or repeat the request with the same idempotency key"
             ) from error
-        return answers
+        return results
 
 
-def _carried_out(operation: Callable[[Connection], Any], connection: Connection) -> _Answer:
-    """Carry out an operation in a savepoint of its own: what it raises undoes nothing else."""
+def _run_operation(operation: Callable[[Connection], Any], connection: Connection) -> _OperationResult:
+    """Run an operation in its own savepoint, so that its error rolls back nothing else."""
     savepoint = connection.begin_nested()
     try:
         value = operation(connection)
         savepoint.commit()
     except Exception as error:
-        if isinstance(error, DBAPIError) and _trouble(error) is not None:
+        if isinstance(error, DBAPIError) and _translate(error) is not None:
             raise
         savepoint.rollback()
         return None, error
@@ -203,20 +212,20 @@ def _carried_out(operation: Callable[[Connection], Any], connection: Connection)
 
 @contextmanager
 def translate_db_errors() -> Iterator[None]:
-    """Turn what a database raises when it is full or gone into our own errors."""
+    """Translate driver errors of a full or unavailable database to `StoreError`."""
     try:
         yield
     except PoolTimeout as error:
-        raise StoreUnavailableError("all connections to the database are taken: try again") from error
+        raise StoreUnavailableError("all connections to the database are in use: try again") from error
     except DBAPIError as error:
-        trouble = _trouble(error)
-        if trouble is None:
+        translated = _translate(error)
+        if translated is None:
             raise
-        raise trouble from error
+        raise translated from error
 
 
-def _trouble(error: DBAPIError) -> StoreError | None:
-    """Return what an error of the driver says of the database itself; None if it does not."""
+def _translate(error: DBAPIError) -> StoreError | None:
+    """Return the `StoreError` for a driver error; None if the error is that of a single statement."""
     cause = error.orig
     state = str(getattr(cause, "sqlstate", None) or "")
     text = str(cause)
@@ -224,9 +233,9 @@ def _trouble(error: DBAPIError) -> StoreError | None:
         return StorageFullError(f"the disk of the database is full ({text}): nothing was written; make room")
     if state in _COLLISION_STATES:
         return StoreCollisionError(f"the database is used by others ({text}): nothing was written; try again")
-    if error.connection_invalidated or state.startswith(_GONE_STATES):
+    if error.connection_invalidated or state.startswith(_UNAVAILABLE_STATES):
         return StoreUnavailableError(f"the database does not answer ({text}): nothing was written; try again")
-    # SQLite calls a statement that is wrong in itself operational, too: that one alone fails.
+    # SQLite also reports an invalid statement as an operational error: only that statement fails.
     if isinstance(error, OperationalError) and getattr(cause, "sqlite_errorname", "") != "SQLITE_ERROR":
         return StoreUnavailableError(
             f"the database cannot be used now ({text}): nothing was written; try again"
@@ -236,7 +245,7 @@ def _trouble(error: DBAPIError) -> StoreError | None:
 
 def _is_full(error: sqlite3.Error) -> bool:
     name = getattr(error, "sqlite_errorname", "")
-    # On a full disk the memory shared by SQLite's readers cannot grow: it says that it cannot write there.
+    # On a full disk the shared memory of SQLite's readers cannot grow, which is reported as a write error.
     return name == "SQLITE_FULL" or name in (
         "SQLITE_IOERR_WRITE",
         "SQLITE_IOERR_SHMSIZE",

@@ -1,4 +1,4 @@
-"""Data sets: what was uploaded, by owner. The bytes are blobs; here stands what they hold."""
+"""Uploaded data sets by owner. The bytes are blobs; the rows describe their content."""
 
 import json
 from collections.abc import Mapping
@@ -16,11 +16,11 @@ from islands_service.store.tables import datasets, jobs
 
 
 class DatasetNotFoundError(IslandsError):
-    """There is no such data set for this owner."""
+    """The owner has no such data set."""
 
 
 class DatasetInUseError(IslandsError):
-    """A job that is not finished needs the data set."""
+    """An unfinished job needs the data set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +30,13 @@ class StoredDataset:
     Attributes
     ----------
     id : str
-        By content and format: the same bytes are the same data set.
+        Derived from content and format: the same bytes in the same format are the same data set.
     name, suffix : str
-        Of the file; the suffix chooses its reader.
+        File name, and its suffix, which selects the reader.
     blob : str
-        SHA-256 of its bytes.
+        SHA-256 of the bytes.
+    bytes : int
+        Size of the file.
     preview : mapping
         Columns with units and statistics, sampling, warnings: see `islands.io.records.preview`.
     """
@@ -50,7 +52,7 @@ class StoredDataset:
 
 
 class Datasets:
-    """The part of the store that knows data sets.
+    """Data set operations of the store.
 
     Parameters
     ----------
@@ -70,22 +72,22 @@ class Datasets:
         preview: Mapping[str, Any],
         most_bytes: int | None = None,
     ) -> tuple[StoredDataset, bool]:
-        """Keep a data set; return it, and whether it is new.
+        """Add a data set; return it, and whether it is new.
 
         Raises
         ------
         QuotaError
-            The owner would have more than ``most_bytes``.
+            The data sets of the owner would exceed ``most_bytes``.
         """
         identity = dataset_id(blob, suffix)
 
         def operation(connection: Connection) -> tuple[StoredDataset, bool]:
             dialect.lock_owner(connection, owner)
-            before = connection.execute(_one(owner, identity)).one_or_none()
-            if before is not None:
-                return _dataset_of(before), False
+            existing = connection.execute(_select(owner, identity)).one_or_none()
+            if existing is not None:
+                return _make_dataset(existing), False
             if most_bytes is not None:
-                _refuse_above(connection, owner, size, most_bytes)
+                _check_quota(connection, owner, size, most_bytes)
             values = {
                 "owner": owner,
                 "id": identity,
@@ -97,20 +99,20 @@ class Datasets:
                 "created": now(),
             }
             row = connection.execute(insert(datasets).values(values).returning(datasets)).one()
-            return _dataset_of(row), True
+            return _make_dataset(row), True
 
         return self._database.write(operation)
 
     def check_room(self, owner: str, suffix: str, blob: str, size: int, most_bytes: int) -> None:
-        """Refuse what `add` would refuse, before its bytes are kept.
+        """Raise the error that `add` would raise, before the bytes are stored.
 
         Raises
         ------
         QuotaError
         """
         with self._database.read() as connection:
-            if connection.execute(_one(owner, dataset_id(blob, suffix))).one_or_none() is None:
-                _refuse_above(connection, owner, size, most_bytes)
+            if connection.execute(_select(owner, dataset_id(blob, suffix))).one_or_none() is None:
+                _check_quota(connection, owner, size, most_bytes)
 
     def get(self, owner: str, dataset: str) -> StoredDataset:
         """Return a data set.
@@ -120,23 +122,23 @@ class Datasets:
         DatasetNotFoundError
         """
         with self._database.read() as connection:
-            row = connection.execute(_one(owner, dataset)).one_or_none()
+            row = connection.execute(_select(owner, dataset)).one_or_none()
         if row is None:
             raise DatasetNotFoundError(
-                f"there is no data set {dataset!r}: upload it first, or list those there are"
+                f"there is no data set {dataset!r}: upload it first, or list the existing ones"
             )
-        return _dataset_of(row)
+        return _make_dataset(row)
 
     def page(
         self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
     ) -> tuple[tuple[StoredDataset, ...], tuple[float, str] | None]:
-        """Return the data sets of an owner, newest first, and where the next page begins."""
+        """Return a page of the data sets of an owner, newest first, and the position of the next page."""
         query = select(datasets).where(datasets.c.owner == owner)
         if after is not None:
             query = query.where(tuple_(datasets.c.created, datasets.c.id) < tuple_(*after))
         query = query.order_by(datasets.c.created.desc(), datasets.c.id.desc()).limit(limit + 1)
         with self._database.read() as connection:
-            found = [_dataset_of(row) for row in connection.execute(query)]
+            found = [_make_dataset(row) for row in connection.execute(query)]
         more, found = len(found) > limit, found[:limit]
         return tuple(found), (found[-1].created, found[-1].id) if more else None
 
@@ -149,7 +151,7 @@ class Datasets:
         """
 
         def operation(connection: Connection) -> None:
-            if connection.execute(_one(owner, dataset)).one_or_none() is None:
+            if connection.execute(_select(owner, dataset)).one_or_none() is None:
                 raise DatasetNotFoundError(f"there is no data set {dataset!r}")
             user = connection.execute(
                 select(jobs.c.id)
@@ -164,15 +166,15 @@ class Datasets:
 
 
 def dataset_id(blob: str, suffix: str) -> str:
-    """Return a data set's name: the same bytes in the same format are the same data set."""
+    """Return the id of a data set: the same bytes in the same format have the same id."""
     return f"{blob[:32]}-{suffix.removeprefix('.')}"
 
 
-def _refuse_above(connection: Connection, owner: str, size: int, most: int) -> None:
+def _check_quota(connection: Connection, owner: str, size: int, most: int) -> None:
     used = connection.execute(
         select(func.coalesce(func.sum(datasets.c.bytes), 0)).where(datasets.c.owner == owner)
     ).scalar_one()
-    used = int(used)  # PostgreSQL adds integers up to a decimal number
+    used = int(used)  # PostgreSQL returns a decimal number for a sum of integers
     if used + size > most:
         raise QuotaError(
             f"the data sets take {used / 1e6:.1f} MB, this one has {size / 1e6:.1f} MB, and "
@@ -180,11 +182,11 @@ def _refuse_above(connection: Connection, owner: str, size: int, most: int) -> N
         )
 
 
-def _one(owner: str, dataset: str) -> Any:
+def _select(owner: str, dataset: str) -> Any:
     return select(datasets).where(datasets.c.owner == owner, datasets.c.id == dataset)
 
 
-def _dataset_of(row: Row[Any]) -> StoredDataset:
+def _make_dataset(row: Row[Any]) -> StoredDataset:
     return StoredDataset(
         row.owner, row.id, row.name, row.suffix, row.blob, row.bytes, json.loads(row.preview), row.created
     )

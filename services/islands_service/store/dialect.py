@@ -7,8 +7,8 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.functions import FunctionElement
 
 
-class now(FunctionElement[float]):  # noqa: N801 - a function of SQL
-    """Seconds since 1970, as the database reads them while it carries out the statement."""
+class now(FunctionElement[float]):  # noqa: N801 - an SQL function
+    """Seconds since 1970 by the clock of the database, at the execution of the statement."""
 
     type = Float()
     inherit_cache = True
@@ -21,27 +21,27 @@ def _sqlite(_element: now, _compiler: Any, **_: Any) -> str:
 
 @compiles(now, "postgresql")
 def _postgresql(_element: now, _compiler: Any, **_: Any) -> str:
-    # Not SQL's own now(), which stands still in a transaction: a group of commits may take a while.
+    # SQL's own now() is constant within a transaction, and a group commit may take a while.
     return "EXTRACT(EPOCH FROM clock_timestamp())::float8"
 
 
-#: First halves of the names of PostgreSQL's advisory locks: ours among those of other programs.
-_MIGRATING = 7_241_563
-_COUNTING = 7_241_564
+#: First keys of the advisory locks of PostgreSQL, which separate these from the locks of other programs.
+_MIGRATION_LOCK = 7_241_563
+_OWNER_LOCK = 7_241_564
 
 
 def lock_migration(connection: Connection) -> None:
-    """Hold the lock of migrations until the transaction ends."""
-    _lock(connection, _MIGRATING, "")
+    """Hold the migration lock until the transaction ends."""
+    _lock(connection, _MIGRATION_LOCK, "")
 
 
 def lock_owner(connection: Connection, owner: str) -> None:
     """Hold the lock of an owner until the transaction ends.
 
-    Without it two transactions that count before they insert would not see each other: quotas would be
-    exceeded, and an idempotency key would be used twice.
+    Without it two transactions that count before they insert would not see each other's rows: both could pass
+    the quota check, or use the same idempotency key.
     """
-    _lock(connection, _COUNTING, owner)
+    _lock(connection, _OWNER_LOCK, owner)
 
 
 def _lock(connection: Connection, purpose: int, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Changes of a job: each raises its version, and is an event of that number. And a job as its row has it."""
+"""Updates of jobs and their events. Each update raises the job's version, which numbers its event."""
 
 import json
 from typing import Any
@@ -11,7 +11,7 @@ from islands_service.store.tables import events, jobs
 
 
 def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
-    """Change a job in a way that watchers see, and return it as it is then."""
+    """Update a job, raise its version, and return the new row."""
     return connection.execute(
         update(jobs)
         .where(jobs.c.id == job)
@@ -21,13 +21,13 @@ def update_job(connection: Connection, job: str, **values: Any) -> Row[Any]:
 
 
 def append_event(connection: Connection, row: Row[Any], kind: str, data: str = "{}") -> None:
-    """Write down what happened to a job as its version's event."""
+    """Append the event of the current version of a job."""
     values = {"job_id": row.id, "number": row.version, "kind": kind, "data": data, "at": row.updated}
     connection.execute(insert(events), values)
 
 
 def job_from_row(row: Row[Any]) -> Job:
-    """Make a job of its row."""
+    """Return the `Job` of a row."""
     return Job(
         row.id,
         row.owner,
@@ -51,5 +51,5 @@ def job_from_row(row: Row[Any]) -> Job:
 
 
 def read_document(text: str | None) -> dict[str, Any] | None:
-    """Read what stands in a column as JSON."""
+    """Parse a column that contains JSON."""
     return None if text is None else dict(json.loads(text))

@@ -1,4 +1,4 @@
-"""What owners do with jobs: submit, look, list, cancel, resume, delete. Each owner sees its own alone."""
+"""Operations of owners on their jobs: submit, get, list, cancel, resume, delete."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -25,16 +25,16 @@ from islands_service.store.job_events import append_event, job_from_row, read_do
 from islands_service.store.submission_checks import check_quota, find_accepted_job, request_digest
 from islands_service.store.tables import events, jobs
 
-#: The most jobs of a page.
+#: Largest number of jobs of a page.
 PAGE = 200
 
-#: Built once: to build a statement takes as long as to carry it out.
-_QUEUE = insert(jobs).values(state=JobState.QUEUED, created=now(), updated=now()).returning(jobs)
+#: Built once, since building the statement takes as long as executing it.
+_INSERT_JOB = insert(jobs).values(state=JobState.QUEUED, created=now(), updated=now()).returning(jobs)
 
 
 @dataclass(frozen=True, slots=True)
 class JobRows:
-    """Jobs, newest first, and where the next page begins; None where there is none."""
+    """A page of jobs, newest first, and the position of the next page; None if this is the last one."""
 
     jobs: tuple[Job, ...]
     after: tuple[float, str] | None
@@ -42,16 +42,16 @@ class JobRows:
 
 @dataclass(frozen=True, slots=True)
 class QueueStatistics:
-    """How all jobs stand.
+    """Statistics of the jobs of all owners.
 
     Attributes
     ----------
     counts : mapping
-        Jobs by state.
+        Number of jobs by state.
     oldest : float
-        Seconds that the one that waits longest has waited, since it was queued last.
+        Seconds that the oldest queued job has waited since it was last queued.
     running : mapping
-        The progress of those under a lease that has not expired, by job.
+        Progress of the jobs with a valid lease, by job.
     """
 
     counts: Mapping[JobState, int]
@@ -60,12 +60,12 @@ class QueueStatistics:
 
     @property
     def leases(self) -> int:
-        """How many jobs somebody works on."""
+        """Number of jobs with a valid lease."""
         return len(self.running)
 
 
 class Jobs:
-    """The part of the store that owners use.
+    """Job operations of the store, used by the REST API on behalf of owners.
 
     Parameters
     ----------
@@ -76,23 +76,23 @@ class Jobs:
         self._database = database
 
     def submit(self, submission: Submission, most_active: int | None = None) -> tuple[Job, bool]:
-        """Accept a job: once this returns, it is not lost. Return it, and whether it is new.
+        """Accept a job durably; return it, and whether it is new.
 
         Raises
         ------
         IdempotencyError
-            The key was used with another request.
+            The key belongs to a different request.
         QuotaError
-            The owner has ``most_active`` jobs that are not finished.
+            The owner has ``most_active`` unfinished jobs.
         StoreUnavailableError, StorageFullError
-            Nothing was accepted.
+            The job was not accepted.
         """
         spec = json.dumps(submission.spec)
 
         def operation(connection: Connection) -> tuple[Job, bool]:
             dialect.lock_owner(connection, submission.owner)
-            if (before := find_accepted_job(connection, submission)) is not None:
-                return before, False
+            if (existing := find_accepted_job(connection, submission)) is not None:
+                return existing, False
             if most_active is not None:
                 check_quota(connection, submission.owner, most_active)
             values = {
@@ -105,19 +105,19 @@ class Jobs:
                 "idempotency_key": submission.idempotency_key,
                 "priority": submission.priority,
             }
-            row = connection.execute(_QUEUE, values).one()
+            row = connection.execute(_INSERT_JOB, values).one()
             append_event(connection, row, "queued")
             return job_from_row(row), True
 
         return self._database.write(operation)
 
     def find_replay(self, submission: Submission) -> Job | None:
-        """Return the job that a submission's idempotency key names already, None where it names none.
+        """Return the job that has the idempotency key of a submission; None if there is no such job.
 
         Raises
         ------
         IdempotencyError
-            The key was used with another request.
+            The key belongs to a different request.
         """
         with self._database.read() as connection:
             return find_accepted_job(connection, submission)
@@ -130,7 +130,7 @@ class Jobs:
         JobNotFoundError
         """
         with self._database.read() as connection:
-            return job_from_row(_own(connection, owner, job))
+            return job_from_row(_select_owned(connection, owner, job))
 
     def page(
         self,
@@ -139,7 +139,7 @@ class Jobs:
         after: tuple[float, str] | None = None,
         limit: int = 50,
     ) -> JobRows:
-        """Return the jobs of an owner, newest first, from behind a place on."""
+        """Return the jobs of an owner, newest first, that follow a position."""
         query = select(jobs).where(jobs.c.owner == owner)
         if state is not None:
             query = query.where(jobs.c.state == state)
@@ -153,27 +153,27 @@ class Jobs:
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
     def cancel(self, owner: str, job: str) -> Job:
-        """Cancel a job that is waiting, or ask whoever runs it to let go of it.
+        """Cancel a queued job, or request cancellation of a running one.
 
         Raises
         ------
         JobNotFoundError
         JobStateError
-            It is finished.
+            The job is finished.
         """
 
         def operation(connection: Connection) -> Job:
-            before = _own(connection, owner, job, locked=True)
-            if before.state in TERMINAL:
-                raise JobStateError(f"job {job} is {before.state}: there is nothing to cancel")
-            if before.cancel_requested:
-                return job_from_row(before)
-            waiting = before.state == JobState.QUEUED
+            current = _select_owned(connection, owner, job, locked=True)
+            if current.state in TERMINAL:
+                raise JobStateError(f"job {job} is {current.state}: there is nothing to cancel")
+            if current.cancel_requested:
+                return job_from_row(current)
+            waiting = current.state == JobState.QUEUED
             row = update_job(
                 connection,
                 job,
                 cancel_requested=True,
-                state=JobState.CANCELLED if waiting else before.state,
+                state=JobState.CANCELLED if waiting else current.state,
                 finished=now() if waiting else None,
             )
             append_event(connection, row, "cancelled" if waiting else "cancelling")
@@ -182,23 +182,23 @@ class Jobs:
         return self._database.write(operation)
 
     def resume(self, owner: str, job: str, most_active: int | None = None) -> Job:
-        """Queue a job again that failed or was cancelled: it goes on from its last checkpoint.
+        """Queue a failed or cancelled job again, to continue from its last checkpoint.
 
         Raises
         ------
         JobNotFoundError
         JobStateError
-            It is waiting, running, or has succeeded.
+            The job is queued or running, or has succeeded.
         QuotaError
-            The owner has ``most_active`` jobs that are not finished.
+            The owner has ``most_active`` unfinished jobs.
         """
 
         def operation(connection: Connection) -> Job:
             dialect.lock_owner(connection, owner)
-            before = _own(connection, owner, job, locked=True)
-            if before.state not in RESUMABLE:
+            current = _select_owned(connection, owner, job, locked=True)
+            if current.state not in RESUMABLE:
                 raise JobStateError(
-                    f"job {job} is {before.state}: only one that failed or was cancelled resumes"
+                    f"job {job} is {current.state}: only a failed or cancelled job can be resumed"
                 )
             if most_active is not None:
                 check_quota(connection, owner, most_active)
@@ -217,31 +217,31 @@ class Jobs:
         return self._database.write(operation)
 
     def delete(self, owner: str, job: str) -> None:
-        """Delete a finished job and all that belongs to it.
+        """Delete a finished job with its events, history, result and artefacts.
 
         Raises
         ------
         JobNotFoundError
         JobStateError
-            It is not finished.
+            The job is not finished.
         """
 
         def operation(connection: Connection) -> None:
-            before = _own(connection, owner, job, locked=True)
-            if before.state not in TERMINAL:
-                raise JobStateError(f"job {job} is {before.state}: cancel it first")
+            current = _select_owned(connection, owner, job, locked=True)
+            if current.state not in TERMINAL:
+                raise JobStateError(f"job {job} is {current.state}: cancel it first")
             connection.execute(delete(jobs).where(jobs.c.id == job))
 
         self._database.write(operation)
 
     def versions(self, of: Sequence[str]) -> dict[str, int]:
-        """Return the versions of jobs: what has changed is seen by one query for all who watch."""
+        """Return the versions of jobs. One query finds the changes for all watching clients."""
         with self._database.read() as connection:
             query = select(jobs.c.id, jobs.c.version).where(jobs.c.id.in_(of))
             return {row.id: row.version for row in connection.execute(query)}
 
     def events(self, job: str, after: int = 0) -> tuple[Event, ...]:
-        """Return what happened to a job after an event's number, in order."""
+        """Return the events of a job after a number, in order."""
         with self._database.read() as connection:
             rows = connection.execute(
                 select(events)
@@ -253,9 +253,9 @@ class Jobs:
             )
 
     def queue_statistics(self) -> QueueStatistics:
-        """Return how all owners' jobs stand."""
+        """Return statistics of the jobs of all owners."""
         counted = select(jobs.c.state, func.count()).group_by(jobs.c.state)
-        waits = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
+        oldest = select(func.coalesce(now() - func.min(jobs.c.updated), 0.0)).where(
             jobs.c.state == JobState.QUEUED
         )
         running = select(jobs.c.id, jobs.c.progress).where(
@@ -265,12 +265,12 @@ class Jobs:
             counts = {row[0]: row[1] for row in connection.execute(counted)}
             return QueueStatistics(
                 {state: counts.get(state, 0) for state in JobState},
-                connection.execute(waits).scalar_one(),
+                connection.execute(oldest).scalar_one(),
                 {row.id: read_document(row.progress) or {} for row in connection.execute(running)},
             )
 
 
-def _own(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
+def _select_owned(connection: Connection, owner: str, job: str, locked: bool = False) -> Row[Any]:
     query: Select[Any] = select(jobs).where(jobs.c.id == job, jobs.c.owner == owner)
     row = connection.execute(query.with_for_update() if locked else query).one_or_none()
     if row is None:

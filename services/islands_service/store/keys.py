@@ -1,4 +1,4 @@
-"""API keys: shown once when they are made, kept as hashes, revocable, with an end."""
+"""API keys: shown once, stored as hashes, revocable, with an optional expiry."""
 
 import hashlib
 import json
@@ -13,31 +13,31 @@ from islands_service.store.database import Database
 from islands_service.store.dialect import now
 from islands_service.store.tables import keys
 
-#: What a key may allow.
+#: Scopes of a key, and what each allows.
 SCOPES = {
-    "read": "look at one's own data sets, jobs and results",
+    "read": "read your own data sets, jobs and results",
     "write": "upload data sets, submit, cancel, resume and delete jobs",
     "metrics": "read the service's metrics",
 }
 
-#: What every key begins with, so that a scanner for leaked secrets can know it.
+#: Prefix of every key, by which scanners for leaked secrets can detect it.
 PREFIX = "islands_"
 
 
 class KeyNotFoundError(IslandsError):
-    """There is no such key."""
+    """There is no key with this id."""
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key, without its secret.
+    """An API key without its secret.
 
     Attributes
     ----------
     owner : str
-        Whose data sets and jobs it opens; several keys may have one owner.
+        Owner of the data sets and jobs that the key gives access to; several keys may have the same owner.
     expired : bool
-        By the database's clock, as it was read.
+        Whether the key had expired by the clock of the database when it was read.
     """
 
     id: str
@@ -51,12 +51,12 @@ class Key:
 
     @property
     def valid(self) -> bool:
-        """Whether it opens anything."""
+        """Whether the key is neither revoked nor expired."""
         return self.revoked is None and not self.expired
 
 
 class Keys:
-    """The part of the store that knows keys.
+    """Key operations of the store.
 
     Parameters
     ----------
@@ -69,20 +69,20 @@ class Keys:
     def create(
         self, name: str, scopes: frozenset[str], owner: str | None = None, seconds: float | None = None
     ) -> tuple[Key, str]:
-        """Make a key, for an owner of its own unless one is given; return it and its secret.
+        """Create a key, with a new owner unless one is given; return the key and its secret.
 
         Raises
         ------
         SettingsError
-            A scope is unknown, or there is none; the name or the owner is too long.
+            A scope is unknown, no scope is given, or the name or the owner is too long.
         """
         if not scopes or not scopes <= set(SCOPES):
             raise SettingsError(
                 f"unknown scopes {', '.join(sorted(scopes - set(SCOPES))) or '(none)'}: take some of "
                 f"{', '.join(SCOPES)}"
             )
-        _refuse_long("name", name, keys.c.name)
-        _refuse_long("owner", owner or "", keys.c.owner)
+        _check_length("name", name, keys.c.name)
+        _check_length("owner", owner or "", keys.c.owner)
         identity = secrets.token_hex(8)
         secret = PREFIX + secrets.token_urlsafe(32)
 
@@ -97,27 +97,27 @@ class Keys:
                 "expires": None if seconds is None else now() + seconds,
             }
             connection.execute(insert(keys).values(values))
-            return _key_of(connection.execute(_query().where(keys.c.id == identity)).one())
+            return _make_key(connection.execute(_query().where(keys.c.id == identity)).one())
 
         return self._database.write(operation), secret
 
     def find(self, secret: str) -> Key | None:
-        """Return the key of a secret, also an expired or a revoked one.
+        """Return the key of a secret, even if it is expired or revoked; None if the secret is wrong.
 
-        A secret has 256 random bits: a plain hash of it tells nothing, and finding it by the hash takes the
-        same time for every wrong one.
+        A secret has 256 random bits, so that a plain hash reveals nothing about it, and a lookup by the hash
+        takes the same time for every wrong secret.
         """
         with self._database.read() as connection:
             row = connection.execute(_query().where(keys.c.secret_sha256 == _hash(secret))).one_or_none()
-        return None if row is None else _key_of(row)
+        return None if row is None else _make_key(row)
 
     def all(self) -> tuple[Key, ...]:
         """Return all keys, oldest first."""
         with self._database.read() as connection:
-            return tuple(map(_key_of, connection.execute(_query().order_by(keys.c.created, keys.c.id))))
+            return tuple(map(_make_key, connection.execute(_query().order_by(keys.c.created, keys.c.id))))
 
     def revoke(self, key: str) -> Key:
-        """End a key at once.
+        """Revoke a key with immediate effect.
 
         Raises
         ------
@@ -131,19 +131,19 @@ class Keys:
             row = connection.execute(_query().where(keys.c.id == key)).one_or_none()
             if row is None:
                 raise KeyNotFoundError(f"there is no key {key!r}: list them with 'islands keys list'")
-            return _key_of(row)
+            return _make_key(row)
 
         return self._database.write(operation)
 
     def any_valid(self) -> bool:
-        """Tell whether there is a key that opens anything."""
+        """Return whether at least one key is valid."""
         valid = keys.c.revoked.is_(None) & or_(keys.c.expires.is_(None), keys.c.expires > now())
         with self._database.read() as connection:
             return connection.execute(select(keys.c.id).where(valid).limit(1)).scalar() is not None
 
 
-def _refuse_long(what: str, text: str, column: Column[str]) -> None:
-    # SQLite would take it, and PostgreSQL not say which it was.
+def _check_length(what: str, text: str, column: Column[str]) -> None:
+    # SQLite would store it, and the error of PostgreSQL would not name the column.
     most = column.type.length  # type: ignore[attr-defined]
     if len(text) > most:
         raise SettingsError(
@@ -159,7 +159,7 @@ def _query() -> Any:
     return select(keys, (keys.c.expires <= now()).label("expired"))
 
 
-def _key_of(row: Row[Any]) -> Key:
+def _make_key(row: Row[Any]) -> Key:
     return Key(
         row.id,
         row.owner,

@@ -1,8 +1,8 @@
-"""What coordinators do with jobs: claim one, keep it, tell of it, finish it.
+"""Operations of coordinators on jobs: claim, renew, report, release, finish.
 
-A coordinator owns a job as long as its lease's epoch is the job's. Every write names its epoch, and a write
-under an older epoch changes nothing (`LeaseLostError`): a coordinator that was taken for dead and goes on
-does no harm.
+The epoch of a lease is a fencing token. A coordinator owns a job while the epoch of its lease is that of the
+job. Every write names its epoch, and a write with an older epoch changes nothing and raises `LeaseLostError`.
+A coordinator that resumes after its lease was taken over therefore does no harm.
 """
 
 import json
@@ -16,23 +16,23 @@ from islands_service.store.dialect import now
 from islands_service.store.job_events import append_event, job_from_row, update_job
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
-#: Attempts that may fail to bring a job on, one after the other, before it is given up.
+#: Consecutive attempts without a checkpoint after which a job fails.
 ATTEMPTS = 5
 
-#: Events of progress that are kept of a job: who was away longer reads the job itself.
+#: Progress events that are kept per job. A client that was away longer reads the job itself.
 KEPT = 500
 
-#: Why a job was given up that nobody could bring on.
-GIVEN_UP = {
+#: Problem of a job that failed after `ATTEMPTS` attempts.
+GAVE_UP = {
     "type": "no-progress",
     "title": "The job was given up",
-    "detail": f"{ATTEMPTS} attempts ended without bringing the job on, most likely for lack of memory: "
-    "take fewer islands, smaller populations or a shorter record, and resume or submit it again",
+    "detail": f"{ATTEMPTS} attempts ended without progress, most likely for lack of memory: "
+    "use fewer islands, smaller populations or a shorter record, and resume or submit it again",
 }
 
 
 class Leases:
-    """The part of the store that coordinators use.
+    """Lease operations of the store, used by coordinators.
 
     Parameters
     ----------
@@ -43,22 +43,22 @@ class Leases:
         self._database = database
 
     def claim(self, owner: str, seconds: float) -> Lease | None:
-        """Take the job that has waited longest among those of the highest priority.
+        """Claim the oldest job of the highest priority; None if no job can be claimed.
 
-        A running job may be taken if its lease has expired, or if it has our own name on it: one process at
-        a time has a name, so that one must be gone.
+        A running job can be claimed if its lease has expired, or if its owner has the same name: only one
+        process at a time has a name, so the previous one must have ended.
 
         Parameters
         ----------
         owner : str
-            The coordinator's name.
+            Name of the coordinator.
         seconds : float
-            For how long; `beat` prolongs it.
+            Duration of the lease; `renew` extends it.
         """
         return self._database.write(lambda connection: _claim(connection, owner, seconds))
 
     def renew(self, lease: Lease, seconds: float) -> bool:
-        """Prolong a lease; tell whether the job is to be cancelled.
+        """Extend a lease; return whether cancellation of the job is requested.
 
         Raises
         ------
@@ -69,13 +69,13 @@ class Leases:
             held = update(jobs).where(*_held(lease)).values(lease_until=now() + seconds)
             found = connection.execute(held.returning(jobs.c.cancel_requested)).one_or_none()
             if found is None:
-                raise _lost(lease)
+                raise _make_lease_lost_error(lease)
             return bool(found.cancel_requested)
 
         return self._database.write(operation)
 
     def report(self, lease: Lease, report: ProgressReport) -> Job:
-        """Tell how far a job is; with a checkpoint, all of it counts or nothing.
+        """Store progress, history points and checkpoint of a job in one transaction.
 
         Raises
         ------
@@ -84,14 +84,12 @@ class Leases:
         return self._database.write(lambda connection: _report(connection, lease, report))
 
     def release(self, lease: Lease, attempted: bool = False) -> None:
-        """Give a job back to the queue: it goes on from its checkpoint, and this was no attempt.
-
-        One that is to be cancelled is cancelled instead: nobody has it any more.
+        """Return a job to the queue, or cancel it if that was requested.
 
         Parameters
         ----------
         attempted : bool
-            It was one: something failed that may fail again.
+            Whether this counts as an attempt, because the cause of the release may occur again.
 
         Raises
         ------
@@ -99,7 +97,7 @@ class Leases:
         """
 
         def operation(connection: Connection) -> None:
-            row = _fenced(
+            row = _update_fenced(
                 connection,
                 lease,
                 state=case((jobs.c.cancel_requested, JobState.CANCELLED), else_=JobState.QUEUED),
@@ -113,7 +111,7 @@ class Leases:
         self._database.write(operation)
 
     def finish(self, lease: Lease, outcome: JobOutcome) -> None:
-        """Write down how a job ended, with all that belongs to its result.
+        """Store the outcome of a job together with its result.
 
         Raises
         ------
@@ -121,19 +119,19 @@ class Leases:
         """
 
         def operation(connection: Connection) -> None:
-            row = _fenced(
+            row = _update_fenced(
                 connection,
                 lease,
                 state=outcome.state,
                 finished=now(),
                 lease_owner=None,
-                # What has succeeded never goes on: its checkpoint may be swept away.
+                # A job that has succeeded never continues: allow a sweep of its checkpoint.
                 checkpoint=None if outcome.state == JobState.SUCCEEDED else jobs.c.checkpoint,
                 summary=_text(outcome.summary),
                 problem=_text(outcome.problem),
             )
             if outcome.document is not None:
-                # Figures, too, are of the result before.
+                # Also delete the artefacts, which belong to the previous result.
                 for table in (results, models, artefacts):
                     connection.execute(delete(table).where(table.c.job_id == row.id))
                 connection.execute(insert(results).values(job_id=row.id, document=_text(outcome.document)))
@@ -180,14 +178,14 @@ def _claim(connection: Connection, owner: str, seconds: float) -> Lease | None:
 
 
 def _give_up(connection: Connection, job: str, cancelled: bool) -> None:
-    """End a job that nobody could bring on; one that was to be cancelled is cancelled."""
+    """End a job that makes no progress: as cancelled if that was requested, else as failed."""
     row = update_job(
         connection,
         job,
         state=JobState.CANCELLED if cancelled else JobState.FAILED,
         lease_owner=None,
         finished=now(),
-        problem=None if cancelled else _text(GIVEN_UP),
+        problem=None if cancelled else _text(GAVE_UP),
     )
     append_event(connection, row, row.state, row.problem or "{}")
 
@@ -196,9 +194,9 @@ def _report(connection: Connection, lease: Lease, report: ProgressReport) -> Job
     values: dict[str, Any] = {"progress": _text(report.progress)}
     if report.checkpoint is not None:
         values |= {"checkpoint": report.checkpoint, "stalled": 0}
-    row = _fenced(connection, lease, **values)
+    row = _update_fenced(connection, lease, **values)
     if report.points:
-        # After a crash the same generations come once more, and are the same.
+        # After a crash the same generations are reported again with equal values.
         behind = points.c.generation > report.after
         connection.execute(delete(points).where(points.c.job_id == row.id, behind))
         connection.execute(
@@ -231,8 +229,8 @@ def _held(lease: Lease) -> tuple[Any, ...]:
     )
 
 
-def _fenced(connection: Connection, lease: Lease, **values: Any) -> Row[Any]:
-    """Change a job that is still ours."""
+def _update_fenced(connection: Connection, lease: Lease, **values: Any) -> Row[Any]:
+    """Update a job if the lease is still valid."""
     row = connection.execute(
         update(jobs)
         .where(*_held(lease))
@@ -240,12 +238,12 @@ def _fenced(connection: Connection, lease: Lease, **values: Any) -> Row[Any]:
         .returning(jobs)
     ).one_or_none()
     if row is None:
-        raise _lost(lease)
+        raise _make_lease_lost_error(lease)
     return row
 
 
-def _lost(lease: Lease) -> LeaseLostError:
-    return LeaseLostError(f"job {lease.job.id} is not ours any more (lease {lease.epoch})")
+def _make_lease_lost_error(lease: Lease) -> LeaseLostError:
+    return LeaseLostError(f"the lease of job {lease.job.id} is lost (epoch {lease.epoch})")
 
 
 def _text(document: Any) -> str | None:

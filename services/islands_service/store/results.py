@@ -1,4 +1,4 @@
-"""What jobs brought: history, result, models, and what was made of them."""
+"""Results of jobs: history, result document, models and artefacts."""
 
 import json
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from islands_service.store.tables import artefacts, jobs, models, points, result
 
 @dataclass(frozen=True, slots=True)
 class StoredModel:
-    """A model of a result: its entry of the result, and its model file as text."""
+    """A model of a result: its entry in the result document, and its model file as text."""
 
     rank: int
     document: Mapping[str, Any]
@@ -22,7 +22,7 @@ class StoredModel:
 
 
 class Results:
-    """The part of the store that holds what jobs brought.
+    """Result operations of the store.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Results:
         self._database = database
 
     def history(self, job: str, after: int = -1, limit: int | None = None) -> list[list[Any]]:
-        """Return the points of a search after a generation: generation, evaluations, best, islands."""
+        """Return points after a generation, each a list: generation, evaluations, best, islands."""
         query = (
             select(points)
             .where(points.c.job_id == job, points.c.generation > after)
@@ -47,13 +47,13 @@ class Results:
             ]
 
     def document(self, job: str) -> dict[str, Any] | None:
-        """Return a result without its models; None where there is none yet."""
+        """Return the result document without its models; None if there is no result yet."""
         with self._database.read() as connection:
             text = connection.execute(select(results.c.document).where(results.c.job_id == job)).scalar()
         return None if text is None else dict(json.loads(text))
 
     def models(self, job: str, rank: int | None = None) -> list[StoredModel]:
-        """Return the models of a job, best first, or the one of a rank."""
+        """Return the models of a job, best first, or only the one of a rank."""
         query = select(models).where(models.c.job_id == job).order_by(models.c.rank)
         if rank is not None:
             query = query.where(models.c.rank == rank)
@@ -63,24 +63,25 @@ class Results:
             ]
 
     def artefact(self, job: str, name: str) -> str | None:
-        """Return the blob of what was made of a result, None where it was not made yet."""
+        """Return the blob of an artefact; None if it has not been made yet."""
         query = select(artefacts.c.blob).where(artefacts.c.job_id == job, artefacts.c.name == name)
         with self._database.read() as connection:
             return connection.execute(query).scalar()
 
     def keep(self, job: str, blobs: Mapping[str, str]) -> None:
-        """Keep what was made of a result, by name: blobs.
+        """Store artefacts of a result, given as blobs by name.
 
         Raises
         ------
         JobNotFoundError
-            It was deleted meanwhile.
+            The job was deleted meanwhile.
         """
 
         def operation(connection: Connection) -> None:
-            # Locked: others may have drawn the same, and one has to see what the other has kept.
-            there = connection.execute(select(jobs.c.id).where(jobs.c.id == job).with_for_update())
-            if there.one_or_none() is None:
+            # Lock the job: concurrent processes may have made the same artefacts, and must see each other's
+            # rows.
+            locked = connection.execute(select(jobs.c.id).where(jobs.c.id == job).with_for_update())
+            if locked.one_or_none() is None:
                 raise JobNotFoundError(f"there is no job {job!r} any more")
             connection.execute(
                 delete(artefacts).where(artefacts.c.job_id == job, artefacts.c.name.in_(blobs))

@@ -1,4 +1,4 @@
-"""What may go: finished jobs after their time, and blobs that nobody names."""
+"""Deletion of expired jobs, and the blobs that are still referenced."""
 
 from sqlalchemy import Connection, delete, select, union
 
@@ -9,7 +9,7 @@ from islands_service.store.tables import artefacts, datasets, jobs
 
 
 class Retention:
-    """The part of the store that forgets.
+    """Retention operations of the store.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ class Retention:
         self._database = database
 
     def delete_expired(self, seconds: float) -> int:
-        """Delete the jobs that were finished so long ago; return how many."""
+        """Delete the jobs that finished more than the given seconds ago; return their number."""
 
         def operation(connection: Connection) -> int:
             old = jobs.c.state.in_(TERMINAL) & (jobs.c.finished < now() - seconds)
@@ -29,7 +29,7 @@ class Retention:
         return self._database.write(operation)
 
     def named_blobs(self) -> frozenset[str]:
-        """Return all blobs that something needs."""
+        """Return all blobs that a row references."""
         query = union(
             select(datasets.c.blob),
             select(artefacts.c.blob),

@@ -1,4 +1,4 @@
-"""The schema of a database: made when it is new, migrated when it is older than the code."""
+"""Schema of the database: created if it is new, migrated if it is older than the code."""
 
 from typing import TYPE_CHECKING
 
@@ -10,20 +10,20 @@ from islands_service.store.database import Database, StoreError
 if TYPE_CHECKING:
     from alembic.config import Config
 
-#: The revision that the code is written for. Alembic takes a quarter of a second to import, and a database
-#: that has this revision needs none of it. A test holds it against the migrations.
+#: Revision that the code is written for. Importing Alembic takes a quarter of a second, and a database of
+#: this revision does not need it. A test compares this constant with the migrations.
 HEAD = "0001"
 
 
 def prepare(database: Database) -> None:
-    """Bring a database to the revision that the code is written for.
+    """Bring a database to the revision of the code.
 
-    Several processes may do this at once: one migrates, the others wait.
+    Several processes may call this concurrently: one migrates, the others wait.
 
     Raises
     ------
     StoreError
-        The database was made by a newer version of islands.
+        The database was written by a newer version of islands.
     """
     with database.read() as connection:
         if revision(connection) == HEAD:
@@ -34,7 +34,7 @@ def prepare(database: Database) -> None:
 
 
 def revision(connection: Connection) -> str | None:
-    """Return a database's revision, None if it is new."""
+    """Return the revision of a database; None if it is new."""
     if not inspect(connection).has_table("alembic_version"):
         return None
     found: str | None = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
@@ -42,30 +42,30 @@ def revision(connection: Connection) -> str | None:
 
 
 def upgrade(connection: Connection, to: str = "head") -> None:
-    """Migrate in the connection's transaction.
+    """Migrate the schema within the transaction of the connection.
 
     Raises
     ------
     StoreError
-        The database was made by a newer version of islands.
+        The database was written by a newer version of islands.
     """
     from alembic import command  # noqa: PLC0415
     from alembic.script import ScriptDirectory  # noqa: PLC0415
 
     config = configuration()
     config.attributes["connection"] = connection
-    there = revision(connection)
+    current = revision(connection)
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    if there is not None and there not in known:
+    if current is not None and current not in known:
         raise StoreError(
-            f"the database has revision {there}, which this version of islands does not know: it was made by "
-            "a newer one; run that, or give another database"
+            f"the database has revision {current}, which this version of islands does not know: it was made "
+            "by a newer one; run that, or give another database"
         )
     command.upgrade(config, to)
 
 
 def configuration() -> "Config":
-    """Return where Alembic finds the migrations."""
+    """Return the Alembic configuration of the migrations."""
     from alembic.config import Config  # noqa: PLC0415
 
     config = Config()

@@ -1,4 +1,4 @@
-"""The store as a whole: one database, and the parts of it that owners, coordinators and doors use."""
+"""The store: one database, and the groups of operations of owners, coordinators and the API."""
 
 from types import TracebackType
 
@@ -13,13 +13,13 @@ from islands_service.store.schema_upgrade import prepare
 
 
 class Store:
-    """All that the service remembers, but for blobs.
+    """Persistent state of the service except blobs.
 
-    Laws, for every database (`tests/contracts/test_store.py`): what a write has returned from is durable; a
-    job belongs to one lease at a time, and a write under an older one changes nothing and raises
-    `LeaseLostError`; a checkpoint, its progress and its event appear together or not at all; an idempotency
-    key names one job; events of a job are numbered without gaps in the order in which they became visible; an
-    owner never meets what belongs to another.
+    Guarantees on every database, tested by `tests/contracts/test_store.py`: a write that has returned is
+    durable. A job belongs to one lease at a time, and a write under an older one changes nothing and raises
+    `LeaseLostError`. A checkpoint, its progress and its event appear together or not at all. An idempotency
+    key names one job. Events of a job are numbered without gaps, in the order in which they became visible.
+    An owner cannot access data of another owner.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Store:
     StoreUnavailableError
         The database does not answer.
     StoreError
-        It was made by a newer version of islands.
+        The database was written by a newer version of islands.
     """
 
     def __init__(self, url: str) -> None:
@@ -49,7 +49,7 @@ class Store:
         self.retention = Retention(self.database)
 
     def close(self) -> None:
-        """Write what is waiting, and let go of the database."""
+        """Write the queued operations and close all connections."""
         self.database.close()
 
     def __enter__(self) -> "Store":

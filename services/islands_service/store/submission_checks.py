@@ -10,35 +10,35 @@ from islands_service.store.tables import jobs
 
 
 def request_digest(submission: Submission) -> str:
-    """Return what tells one request from another."""
+    """Return the SHA-256 of a request, which identifies it."""
     return hashlib.sha256(submission.request.encode()).hexdigest()
 
 
 def find_accepted_job(connection: Connection, submission: Submission) -> Job | None:
-    """Return the job that a submission's idempotency key names already, None where it names none.
+    """Return the job that has the idempotency key of a submission; None if there is no such job.
 
     Raises
     ------
     IdempotencyError
-        The key was used with another request.
+        The key belongs to a different request.
     """
     key = submission.idempotency_key
     if key is None:
         return None
     query = select(jobs).where(jobs.c.owner == submission.owner, jobs.c.idempotency_key == key)
-    before = connection.execute(query).one_or_none()
-    if before is None:
+    job = connection.execute(query).one_or_none()
+    if job is None:
         return None
-    if before.request_sha256 != request_digest(submission):
+    if job.request_sha256 != request_digest(submission):
         raise IdempotencyError(
-            f"the idempotency key {key!r} belongs to job {before.id}, which was asked for with another "
+            f"the idempotency key {key!r} belongs to job {job.id}, which was submitted with a different "
             "request: take a new key"
         )
-    return job_from_row(before)
+    return job_from_row(job)
 
 
 def check_quota(connection: Connection, owner: str, most: int) -> None:
-    """Refuse one more job of an owner who has so many.
+    """Raise an error if an owner already has ``most`` active jobs.
 
     Raises
     ------

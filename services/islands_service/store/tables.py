@@ -1,4 +1,4 @@
-"""The tables. A change here needs a migration beside it: a test holds the two against each other."""
+"""Tables of the store. A change needs a migration; a test compares the tables with the migrations."""
 
 from sqlalchemy import (
     BigInteger,
@@ -15,7 +15,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-#: Constraints have names, or a migration could not change them.
+#: Constraints are named, because a migration cannot change an unnamed one.
 metadata = MetaData(
     naming_convention={
         "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -27,7 +27,7 @@ metadata = MetaData(
 
 
 def _job() -> Column[str]:
-    """Return a column that goes with its job."""
+    """Return a foreign key to a job. The row is deleted with its job."""
     return Column("job_id", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
 
 
@@ -45,7 +45,7 @@ jobs = Table(
     Column("state", String(16), nullable=False),
     Column("version", BigInteger, nullable=False, default=1),
     Column("attempt", Integer, nullable=False, default=0),
-    # Attempts since the last one that brought the job on.
+    # Attempts since the last checkpoint.
     Column("stalled", Integer, nullable=False, default=0),
     Column("lease_owner", String(128)),
     Column("lease_epoch", BigInteger, nullable=False, default=0),
@@ -65,7 +65,7 @@ jobs = Table(
     Index(None, "owner", "state", "created", "id"),
 )
 
-#: Numbered by the job's version: without gaps, and in the order in which they were committed.
+#: Events of jobs. The number is the version of the job: without gaps, in the order of the commits.
 events = Table(
     "events",
     metadata,
@@ -76,7 +76,7 @@ events = Table(
     Column("at", Float, nullable=False),
 )
 
-#: The history of a search. It stands apart: a list of jobs never reads it.
+#: History of a search, in a separate table so that a list of jobs does not read it.
 points = Table(
     "points",
     metadata,
@@ -98,7 +98,7 @@ models = Table(
     Column("file", Text, nullable=False),
 )
 
-#: What was made of a result, such as figures, by name; the bytes are a blob.
+#: Blobs derived from a result, such as figures, by name.
 artefacts = Table(
     "artefacts",
     metadata,

@@ -1,1 +1,1 @@
-"""Migrations of the store, one file a revision."""
+"""Alembic migrations of the store, one file per revision."""

@@ -1,4 +1,4 @@
-"""The first tables. Written out rather than taken from `tables`: a migration never changes any more."""
+"""Initial schema. Written out instead of imported from `tables`, because a migration must never change."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -16,7 +16,7 @@ def _with_job(table: str) -> sa.ForeignKeyConstraint:
 
 
 def upgrade() -> None:
-    """Make them."""
+    """Create the tables."""
     op.create_table(
         "jobs",
         sa.Column("id", sa.String(32), nullable=False),
