@@ -1,6 +1,6 @@
-"""What every store owes to those who submit: nothing accepted is lost, a key is one job, a quota is kept.
+"""Contract of the store with clients that submit: durability, idempotency keys and quotas.
 
-Every law of the files `test_store*.py` holds on SQLite and on PostgreSQL.
+Every test of the files `test_store*.py` runs on SQLite and on PostgreSQL.
 """
 
 import json
@@ -47,7 +47,7 @@ def everything(submission):
     return {name: getattr(submission, name) for name in ("owner", "spec", "kind", "name", "priority")}
 
 
-def test_a_job_begins_in_the_queue_as_it_was_asked_for(store):
+def test_submitted_job_is_queued_as_requested(store):
     before = time.time()
     submission = asked(
         kind="discrepancy", name="Bühne 3", priority=-7, spec={"a": [1, 2.5, None, True, "ü"], "b": {}}
@@ -63,14 +63,14 @@ def test_a_job_begins_in_the_queue_as_it_was_asked_for(store):
     assert kinds(store, job.id) == ["queued"]
 
 
-def test_what_was_accepted_is_there_when_the_store_is_opened_again(database):
+def test_accepted_job_is_found_after_reopening_the_store(database):
     with Store(database) as store:
         job = submitted(store)
     with Store(database) as store:
         assert store.jobs.get(ALICE, job.id) == job
 
 
-def test_what_was_accepted_is_seen_at_once_by_whoever_else_has_the_store_open(database):
+def test_accepted_job_is_visible_at_once_to_other_stores(database):
     with several(database, 2) as (one, other):
         for _ in range(20):
             job = submitted(one)
@@ -78,24 +78,24 @@ def test_what_was_accepted_is_seen_at_once_by_whoever_else_has_the_store_open(da
             assert [event.number for event in other.jobs.events(job.id)] == [1]
 
 
-def test_what_was_accepted_is_seen_by_another_process(store, database):
+def test_accepted_job_is_visible_to_another_process(store, database):
     job = submitted(store)
     with child(LOOK, database, ALICE, job.id) as other:
         said, _ = other.communicate(timeout=60)
     assert json.loads(said) == [job.id, "queued", job.spec, job.created]
 
 
-def test_floats_come_back_bit_for_bit(store):
+def test_floats_are_stored_bit_for_bit(store):
     spec = {"values": [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -0.0]}
     job = submitted(store, spec=spec)
     assert repr(store.jobs.get(ALICE, job.id).spec) == repr(spec)
 
 
-def test_two_requests_without_a_key_are_two_jobs(store):
+def test_requests_without_a_key_are_separate_jobs(store):
     assert submitted(store).id != submitted(store).id
 
 
-def test_the_same_key_with_the_same_request_is_the_same_job(store):
+def test_same_key_with_the_same_request_is_the_same_job(store):
     job, new = store.jobs.submit(asked(spec={"a": 1, "b": 2}, idempotency_key="k"))
     before = contents(store)
     again, new_again = store.jobs.submit(asked(spec={"b": 2, "a": 1}, idempotency_key="k"))
@@ -107,7 +107,7 @@ def test_the_same_key_with_the_same_request_is_the_same_job(store):
 @pytest.mark.parametrize(
     "change", [{"spec": {"seed": 8}}, {"kind": "other"}, {"name": "other"}, {"priority": 1}]
 )
-def test_the_same_key_with_another_request_is_refused_and_leaves_the_job(store, change):
+def test_same_key_with_another_request_is_refused(store, change):
     job = submitted(store, idempotency_key="k")
     before = contents(store)
     with pytest.raises(IdempotencyError, match=job.id):
@@ -116,16 +116,16 @@ def test_the_same_key_with_another_request_is_refused_and_leaves_the_job(store, 
 
 
 @pytest.mark.parametrize("state", JobState)
-def test_a_key_names_its_job_in_every_state(store, state):
+def test_key_identifies_its_job_in_every_state(store, state):
     job = job_in(store, state, idempotency_key="k")
     assert store.jobs.submit(asked(idempotency_key="k")) == (job, False)
 
 
-def test_every_owner_has_keys_of_its_own(store):
+def test_owners_have_separate_idempotency_keys(store):
     assert submitted(store, ALICE, idempotency_key="k").id != submitted(store, BOB, idempotency_key="k").id
 
 
-def test_a_deleted_jobs_key_is_free_again(store):
+def test_key_of_a_deleted_job_can_be_reused(store):
     job = submitted(store, idempotency_key="k")
     store.jobs.cancel(ALICE, job.id)
     store.jobs.delete(ALICE, job.id)
@@ -134,7 +134,7 @@ def test_a_deleted_jobs_key_is_free_again(store):
     assert again.id != job.id
 
 
-def test_many_submitters_with_the_same_key_get_one_job(database):
+def test_concurrent_requests_with_the_same_key_get_one_job(database):
     with several(database) as stores:
         for turn in range(5):
             submit = asked(idempotency_key=f"k{turn}")
@@ -144,7 +144,7 @@ def test_many_submitters_with_the_same_key_get_one_job(database):
             assert len(stores[0].jobs.page(ALICE).jobs) == turn + 1
 
 
-def test_many_submitters_with_the_same_key_and_two_requests_get_one_job_and_conflicts(database):
+def test_different_concurrent_requests_with_one_key_get_conflicts(database):
     with several(database) as stores:
         answers = at_once(
             [
@@ -160,7 +160,7 @@ def test_many_submitters_with_the_same_key_and_two_requests_get_one_job_and_conf
         assert len({job.id for job, _ in taken}) == 1
 
 
-def test_jobs_that_wait_or_run_take_up_the_quota(store):
+def test_queued_and_running_jobs_count_towards_the_quota(store):
     job_in(store, JobState.RUNNING)
     submitted(store)
     before = contents(store)
@@ -171,13 +171,13 @@ def test_jobs_that_wait_or_run_take_up_the_quota(store):
 
 
 @pytest.mark.parametrize("state", TERMINAL)
-def test_finished_jobs_take_up_no_quota(store, state):
+def test_finished_jobs_do_not_count_towards_the_quota(store, state):
     assert state not in ACTIVE
     job_in(store, state)
     assert store.jobs.submit(asked(), 1)[1]
 
 
-def test_a_job_that_was_cancelled_or_failed_makes_room_at_once(store):
+def test_cancelled_or_failed_job_frees_the_quota_at_once(store):
     waiting = submitted(store)
     with pytest.raises(QuotaError):
         store.jobs.submit(asked(), 1)
@@ -187,17 +187,17 @@ def test_a_job_that_was_cancelled_or_failed_makes_room_at_once(store):
     assert store.jobs.submit(asked(), 1)[1]
 
 
-def test_the_jobs_of_others_take_up_no_quota(store):
+def test_jobs_of_other_owners_do_not_count_towards_the_quota(store):
     submitted(store, BOB)
     assert store.jobs.submit(asked(ALICE), 1)[1]
 
 
-def test_a_quota_of_nothing_lets_nothing_in(store):
+def test_quota_of_zero_refuses_every_job(store):
     with pytest.raises(QuotaError):
         store.jobs.submit(asked(), 0)
 
 
-def test_what_is_resumed_takes_up_the_quota_too(store):
+def test_resumed_job_counts_towards_the_quota(store):
     job = submitted(store)
     store.jobs.cancel(ALICE, job.id)
     other = submitted(store)
@@ -208,13 +208,13 @@ def test_what_is_resumed_takes_up_the_quota_too(store):
     assert store.jobs.resume(ALICE, job.id, 1).state == JobState.QUEUED
 
 
-def test_a_replay_is_answered_at_a_full_quota(store):
+def test_replayed_request_is_answered_at_a_full_quota(store):
     job, _ = store.jobs.submit(asked(idempotency_key="k"), 1)
     assert store.jobs.submit(asked(idempotency_key="k"), 1) == (job, False)
 
 
 @pytest.mark.parametrize("quota", [1, 7])
-def test_many_submitters_at_once_get_exactly_their_quota(database, quota):
+def test_concurrent_requests_get_exactly_the_quota(database, quota):
     with several(database) as stores:
         answers = at_once(
             [lambda store=stores[i % 4]: store.jobs.submit(asked(), quota) for i in range(MANY)]

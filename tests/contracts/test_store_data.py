@@ -1,4 +1,4 @@
-"""What every store owes to data sets and keys, and what it forgets in time."""
+"""Contract of the store for data sets, keys and retention."""
 
 import time
 from functools import partial
@@ -42,7 +42,7 @@ def added(store, owner=ALICE, number=0, size=1000, **limits):
     return store.datasets.add(owner, f"{number}.csv", ".csv", blob(number), size, PREVIEW, **limits)
 
 
-def test_a_data_set_is_kept_as_it_was_given(store):
+def test_data_set_is_stored_as_given(store):
     dataset, new = store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, PREVIEW)
     assert new
     assert (dataset.owner, dataset.name, dataset.suffix, dataset.blob, dataset.bytes, dataset.preview) == (
@@ -53,7 +53,7 @@ def test_a_data_set_is_kept_as_it_was_given(store):
     assert store.datasets.get(ALICE, dataset.id) == dataset
 
 
-def test_the_same_bytes_in_the_same_format_are_the_same_data_set(store):
+def test_same_bytes_in_the_same_format_are_the_same_data_set(store):
     dataset, _ = store.datasets.add(ALICE, "a.csv", ".csv", BLOB, 12, PREVIEW)
     before = contents(store)
     assert store.datasets.add(ALICE, "other.csv", ".csv", BLOB, 12, {"other": 1}) == (dataset, False)
@@ -66,7 +66,7 @@ def test_the_same_bytes_in_the_same_format_are_the_same_data_set(store):
     assert changed.id != dataset.id
 
 
-def test_two_owners_of_the_same_bytes_have_a_data_set_each(store):
+def test_owners_of_the_same_bytes_have_separate_data_sets(store):
     (mine, _), (theirs, new) = added(store, ALICE), added(store, BOB)
     assert new
     assert mine.id == theirs.id
@@ -74,7 +74,7 @@ def test_two_owners_of_the_same_bytes_have_a_data_set_each(store):
     assert store.datasets.get(BOB, theirs.id) == theirs
 
 
-def test_data_sets_may_have_so_many_bytes_and_no_more(store):
+def test_data_sets_of_an_owner_are_limited_in_size(store):
     added(store, ALICE, 1, 600, most_bytes=1000)
     added(store, BOB, 1, 600, most_bytes=1000)
     before = contents(store)
@@ -82,11 +82,11 @@ def test_data_sets_may_have_so_many_bytes_and_no_more(store):
         added(store, ALICE, 2, 401, most_bytes=1000)
     assert contents(store) == before
     assert added(store, ALICE, 3, 400, most_bytes=1000)[1]
-    # What is there already takes no more room.
+    # An existing data set needs no further space.
     assert not added(store, ALICE, 3, 400, most_bytes=1000)[1]
 
 
-def test_bytes_are_counted_exactly_however_many(store):
+def test_bytes_are_counted_exactly_for_huge_sizes(store):
     huge = 2**52
     added(store, ALICE, 1, huge)
     added(store, ALICE, 2, huge)
@@ -95,14 +95,14 @@ def test_bytes_are_counted_exactly_however_many(store):
         added(store, ALICE, 4, 1, most_bytes=2 * huge + 1)
 
 
-def test_many_uploads_of_the_same_bytes_make_one_data_set(database):
+def test_concurrent_uploads_of_the_same_bytes_make_one_data_set(database):
     with several(database) as stores:
         answers = at_once([partial(added, stores[i % 4]) for i in range(MANY)])
         assert sum(new for _, new in answers) == 1
         assert len({dataset.id for dataset, _ in answers}) == 1
 
 
-def test_many_uploads_at_once_get_exactly_the_bytes_that_there_are(database):
+def test_concurrent_uploads_get_exactly_the_allowed_bytes(database):
     with several(database) as stores:
         answers = at_once([partial(added, stores[i % 4], ALICE, i, 100, most_bytes=550) for i in range(MANY)])
         assert sum(isinstance(answer, QuotaError) for answer in answers) == MANY - 5
@@ -129,7 +129,7 @@ def test_pages_of_data_sets_are_newest_first_and_hold_each_once(store):
 
 
 @pytest.mark.parametrize("state", JobState)
-def test_a_data_set_can_be_deleted_unless_a_job_needs_it(store, state):
+def test_data_set_can_be_deleted_unless_a_job_needs_it(store, state):
     dataset, _ = added(store)
     other, _ = added(store, number=1)
     job_in(store, state, spec={"records": [{"dataset": dataset.id, "use": "estimation"}]})
@@ -146,19 +146,19 @@ def test_a_data_set_can_be_deleted_unless_a_job_needs_it(store, state):
     assert store.datasets.page(ALICE)[0] == (() if state in TERMINAL else (dataset,))
 
 
-def test_the_job_of_another_does_not_hold_ones_data_set(store):
+def test_job_of_another_owner_does_not_block_a_deletion(store):
     dataset, _ = added(store, ALICE)
     added(store, BOB)
     submitted(store, BOB, spec={"dataset": dataset.id})
     store.datasets.delete(ALICE, dataset.id)
 
 
-def test_a_data_set_that_is_not_there_cannot_be_deleted(store):
+def test_missing_data_set_cannot_be_deleted(store):
     with pytest.raises(DatasetNotFoundError):
         store.datasets.delete(ALICE, dataset_id(BLOB, ".csv"))
 
 
-def test_a_key_opens_with_its_secret_alone(store):
+def test_key_is_found_only_by_its_secret(store):
     key, secret = store.keys.create("laptop", frozenset(SCOPES), ALICE)
     assert store.keys.find(secret) == key
     assert (key.owner, key.name, key.scopes) == (ALICE, "laptop", frozenset(SCOPES))
@@ -167,7 +167,7 @@ def test_a_key_opens_with_its_secret_alone(store):
         assert store.keys.find(wrong) is None
 
 
-def test_a_secret_is_written_nowhere(store):
+def test_secret_is_not_stored(store):
     _, secret = store.keys.create("laptop", READ)
     assert secret.startswith(PREFIX)
     kept = repr(contents(store))
@@ -175,23 +175,23 @@ def test_a_secret_is_written_nowhere(store):
     assert secret.removeprefix(PREFIX) not in kept
 
 
-def test_no_two_keys_are_alike(store):
+def test_keys_have_unique_ids_secrets_and_owners(store):
     made = [store.keys.create("same", READ) for _ in range(20)]
     assert len({secret for _, secret in made}) == 20
     assert len({key.id for key, _ in made}) == 20
-    # Unless an owner is given, each opens what is its own.
+    # Without a given owner, each key has a separate one.
     assert len({key.owner for key, _ in made}) == 20
     assert store.keys.all() == tuple(sorted((key for key, _ in made), key=lambda key: (key.created, key.id)))
 
 
 @pytest.mark.parametrize("scopes", [frozenset(), frozenset({"read", "rule"})])
-def test_a_key_of_an_unknown_scope_is_not_made(store, scopes):
+def test_key_with_an_unknown_scope_is_refused(store, scopes):
     with pytest.raises(SettingsError, match="take some of read, write, metrics"):
         store.keys.create("laptop", scopes)
     assert store.keys.all() == ()
 
 
-def test_a_key_expires(store):
+def test_key_expires(store):
     lasting, secret = store.keys.create("a", READ, seconds=LONG)
     over, old = store.keys.create("b", READ, seconds=-1.0)
     assert (lasting.expired, over.expired) == (False, True)
@@ -199,7 +199,7 @@ def test_a_key_expires(store):
     assert (store.keys.find(secret).expired, store.keys.find(old).expired) == (False, True)
 
 
-def test_a_revoked_key_stays_revoked_since_the_first_time(store):
+def test_second_revocation_of_a_key_changes_nothing(store):
     key, secret = store.keys.create("a", READ)
     revoked = store.keys.revoke(key.id)
     assert revoked.revoked >= key.created
@@ -209,7 +209,7 @@ def test_a_revoked_key_stays_revoked_since_the_first_time(store):
         store.keys.revoke("0000")
 
 
-def test_a_key_that_opens_nothing_is_not_valid(store):
+def test_expired_and_revoked_keys_are_not_valid(store):
     assert not store.keys.any_valid()
     store.keys.create("expired", READ, seconds=-1.0)
     key, _ = store.keys.create("revoked", READ)
@@ -220,7 +220,7 @@ def test_a_key_that_opens_nothing_is_not_valid(store):
     assert store.keys.any_valid()
 
 
-def test_what_was_finished_long_ago_is_forgotten_and_nothing_else(store):
+def test_only_jobs_finished_long_ago_are_deleted(store):
     old = {state: job_in(store, state).id for state in TERMINAL}
     fresh = {state: job_in(store, state).id for state in (*TERMINAL, JobState.RUNNING)}
     waiting = submitted(store)
@@ -244,13 +244,13 @@ def test_what_was_finished_long_ago_is_forgotten_and_nothing_else(store):
     assert store.datasets.get(ALICE, dataset.id) == dataset
 
 
-def test_a_job_that_was_resumed_is_not_forgotten(store):
+def test_resumed_job_is_not_deleted(store):
     job = job_in(store, JobState.FAILED)
     store.jobs.resume(ALICE, job.id)
     assert store.retention.delete_expired(-LONG) == 0
 
 
-def test_blobs_are_named_as_long_as_something_needs_them(store):
+def test_blobs_are_referenced_as_long_as_a_row_needs_them(store):
     assert store.retention.named_blobs() == frozenset()
     added(store, number=1)
     added(store, BOB, number=1)

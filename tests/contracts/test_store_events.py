@@ -1,4 +1,4 @@
-"""What every store owes to watchers: events are numbered without gaps, in the order they are seen in."""
+"""Contract of the store with watching clients: events without gaps, in the order of visibility."""
 
 import threading
 
@@ -25,7 +25,7 @@ from support.stores import (
 )
 
 
-def test_everything_that_happens_to_a_job_is_an_event_and_its_number_is_the_jobs_version(store):
+def test_every_change_of_a_job_is_an_event_with_its_version(store):
     job = submitted(store)
     lease = claimed(store, EXPIRED)
     store.leases.report(lease, brought_on(1))
@@ -53,7 +53,7 @@ def test_everything_that_happens_to_a_job_is_an_event_and_its_number_is_the_jobs
     assert times[-1] == store.jobs.get(ALICE, job.id).updated
 
 
-def test_events_are_read_from_a_number_on(store):
+def test_events_are_read_after_a_number(store):
     job = job_in(store, JobState.SUCCEEDED)
     other = submitted(store)
     assert [event.number for event in store.jobs.events(job.id)] == [1, 2, 3]
@@ -63,15 +63,15 @@ def test_events_are_read_from_a_number_on(store):
     assert store.jobs.events("0" * 32) == ()
 
 
-def test_versions_of_many_jobs_are_told_at_once(store):
+def test_versions_of_many_jobs_are_returned_together(store):
     jobs = [job_in(store, state).id for state in (JobState.SUCCEEDED, JobState.RUNNING, JobState.QUEUED)]
     assert store.jobs.versions([*jobs, "0" * 32]) == dict(zip(jobs, (3, 2, 1), strict=True))
     assert store.jobs.versions(jobs[:1]) == {jobs[0]: 3}
     assert store.jobs.versions([]) == {}
 
 
-def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
-    """While the job's coordinator reports, its owner changes its mind, and both groups are committed."""
+def test_reader_that_continues_from_the_last_number_misses_nothing(database):
+    """The coordinator reports while the owner cancels and resumes, and both write at the same time."""
     with several(database, 3) as (coordinator, owner, reader):
         job = submitted(coordinator)
         over = threading.Event()
@@ -85,7 +85,7 @@ def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
                     coordinator.leases.report(lease, brought_on(generation))
                 coordinator.leases.release(lease)
 
-        def change_ones_mind():
+        def cancel_and_resume():
             for turn in range(60):
                 ask = (owner.jobs.cancel, owner.jobs.resume)[turn % 2]
                 try:
@@ -101,7 +101,7 @@ def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
             return seen
 
         def write():
-            failures = [each for each in at_once([bring_on, change_ones_mind]) if each is not None]
+            failures = [each for each in at_once([bring_on, cancel_and_resume]) if each is not None]
             over.set()
             return failures
 
@@ -113,7 +113,7 @@ def test_a_reader_that_goes_on_from_the_last_number_misses_nothing(database):
             assert seen == list(range(1, last + 1))
 
 
-def test_a_reader_that_sees_a_version_finds_its_event(database):
+def test_reader_that_sees_a_version_finds_its_event(database):
     with several(database, 2) as (writer, reader):
         job = submitted(writer)
         lease = claimed(writer)
@@ -140,7 +140,7 @@ def test_a_reader_that_sees_a_version_finds_its_event(database):
 
 
 @pytest.mark.parametrize("waiting", [0, 3])
-def test_the_standing_of_all_jobs_is_told_without_names(store, waiting):
+def test_queue_statistics_count_the_jobs_of_all_owners(store, waiting):
     before = store.jobs.queue_statistics()
     assert before.counts == dict.fromkeys(JobState, 0)
     assert (before.oldest, before.running, before.leases) == (0.0, {}, 0)
@@ -151,18 +151,18 @@ def test_the_standing_of_all_jobs_is_told_without_names(store, waiting):
     store.leases.renew(claimed_again, EXPIRED)
     for _ in range(waiting):
         submitted(store, "bob")
-    standing = store.jobs.queue_statistics()
-    assert standing.counts == {
+    statistics = store.jobs.queue_statistics()
+    assert statistics.counts == {
         JobState.QUEUED: waiting,
         JobState.RUNNING: 2,
         JobState.SUCCEEDED: 1,
         JobState.FAILED: 2,
         JobState.CANCELLED: 0,
     }
-    # An expired lease is nobody's work.
-    assert standing.running == {running.id: {}}
-    assert standing.leases == 1
-    assert (standing.oldest > 0) == bool(waiting)
+    # An expired lease does not count.
+    assert statistics.running == {running.id: {}}
+    assert statistics.leases == 1
+    assert (statistics.oldest > 0) == bool(waiting)
 
 
 def claimed_as(store, submission):
@@ -170,8 +170,8 @@ def claimed_as(store, submission):
     return claimed(store)
 
 
-def test_a_job_that_was_given_back_waits_since_then(store):
-    """It may have run for days before."""
+def test_waiting_time_of_a_released_job_begins_at_its_release(store):
+    """The job may have run for days before."""
     submitted(store)
     lease = claimed(store)
     aged = update(jobs).values(created=jobs.c.created - LONG, updated=jobs.c.updated - LONG)

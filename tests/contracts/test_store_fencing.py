@@ -1,4 +1,4 @@
-"""What every store owes to a coordinator that has lost its job: it writes nothing more, whatever it tries."""
+"""Contract of the store with a coordinator that has lost its lease: all of its writes are refused."""
 
 from functools import partial
 
@@ -21,7 +21,7 @@ from support.stores import (
     submitted,
 )
 
-#: All that a coordinator may do under a lease.
+#: All operations under a lease.
 WRITES = {
     "beat": lambda leases, lease: leases.renew(lease, LONG),
     "report": lambda leases, lease: leases.report(lease, brought_on(9)),
@@ -30,7 +30,7 @@ WRITES = {
     "release of an attempt": lambda leases, lease: leases.release(lease, attempted=True),
     "finish": lambda leases, lease: leases.finish(lease, FOUND),
     "fail": lambda leases, lease: leases.finish(lease, FAILED),
-    "let go": lambda leases, lease: leases.finish(lease, CANCELLED),
+    "cancel": lambda leases, lease: leases.finish(lease, CANCELLED),
 }
 
 
@@ -73,7 +73,7 @@ def cancelled_and_deleted(store, lease):
     store.jobs.delete(ALICE, lease.job.id)
 
 
-#: Ways to lose a job whose lease has expired.
+#: Ways to lose a job with an expired lease.
 LOSSES = [
     taken_over,
     taken_over_and_brought_on,
@@ -88,7 +88,7 @@ LOSSES = [
 
 
 @pytest.mark.parametrize("loss", LOSSES, ids=lambda loss: loss.__name__)
-def test_who_has_lost_a_job_changes_nothing(store, loss):
+def test_writes_under_a_lost_lease_change_nothing(store, loss):
     job = submitted(store)
     submitted(store, priority=-1)
     lease = claimed(store, EXPIRED)
@@ -101,8 +101,8 @@ def test_who_has_lost_a_job_changes_nothing(store, loss):
 
 
 @pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
-def test_a_lease_that_has_expired_counts_until_somebody_takes_the_job(store, write):
-    """Nobody else is there: to stop would only lose time."""
+def test_expired_lease_is_valid_until_the_job_is_claimed(store, write):
+    """No other coordinator has the job: stopping would only lose time."""
     submitted(store)
     lease = claimed(store, EXPIRED)
     before = contents(store)
@@ -111,14 +111,14 @@ def test_a_lease_that_has_expired_counts_until_somebody_takes_the_job(store, wri
 
 
 @pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
-def test_a_job_under_a_lease_may_be_written_by_it_when_it_is_to_be_cancelled(store, write):
+def test_lease_of_a_job_with_a_cancel_request_may_write(store, write):
     job = submitted(store)
     lease = claimed(store)
     store.jobs.cancel(ALICE, job.id)
     write(store.leases, lease)
 
 
-def test_a_lease_is_of_one_job(store):
+def test_lease_belongs_to_one_job(store):
     submitted(store), submitted(store)
     leases = claimed(store), claimed(store)
     assert [lease.epoch for lease in leases] == [1, 1]
@@ -126,7 +126,7 @@ def test_a_lease_is_of_one_job(store):
     assert store.leases.renew(leases[1], LONG) is False
 
 
-def test_epochs_rise_as_long_as_a_job_lives(store):
+def test_epochs_of_a_job_rise_with_every_claim(store):
     job = submitted(store)
     epochs = []
     for end in (FAILED, CANCELLED, FAILED):
@@ -140,8 +140,8 @@ def test_epochs_rise_as_long_as_a_job_lives(store):
     assert epochs == list(range(1, 10))
 
 
-def test_of_two_who_finish_a_job_the_owner_of_the_lease_does(database):
-    """The zombie writes just when its successor claims and finishes: one of them does, never half of each."""
+def test_job_finished_twice_keeps_the_outcome_of_its_lease(database):
+    """The old coordinator finishes while its successor claims and finishes: exactly one outcome is stored."""
     with several(database, 2) as (one, other):
         for turn in range(20):
             job = submitted(one, name=f"{turn}")
@@ -153,13 +153,13 @@ def test_of_two_who_finish_a_job_the_owner_of_the_lease_does(database):
                     other.leases.finish(new, FAILED)
                 return new
 
-            zombie, successor = at_once([partial(one.leases.finish, old, FOUND), succeed])
+            late, successor = at_once([partial(one.leases.finish, old, FOUND), succeed])
             found = one.jobs.get(ALICE, job.id)
             models = one.results.models(job.id)
-            if isinstance(zombie, LeaseLostError):
+            if isinstance(late, LeaseLostError):
                 assert (found.state, models) == (JobState.FAILED, [])
                 assert kinds(one, job.id) == ["queued", "running", "running", "failed"]
             else:
-                assert zombie is successor is None
+                assert late is successor is None
                 assert (found.state, len(models)) == (JobState.SUCCEEDED, 2)
                 assert kinds(one, job.id) == ["queued", "running", "succeeded"]

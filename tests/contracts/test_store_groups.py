@@ -1,4 +1,4 @@
-"""What every store owes to those who write at once: they share a commit, and nobody pays for another."""
+"""Contract of the store with concurrent writers: shared commits and separate errors."""
 
 import threading
 from contextlib import suppress
@@ -28,7 +28,7 @@ from support.stores import (
 
 
 class OwnFault(Exception):  # noqa: N818
-    """What an operation may raise."""
+    """An error of an operation."""
 
 
 def raised(error):
@@ -36,7 +36,7 @@ def raised(error):
 
 
 def in_one_group(store, actions, reads=0):
-    """Do things in threads whose writes make one group; return what each returned, or raised."""
+    """Run calls in threads whose writes form one group; return their values or errors."""
     answers = []
     with one_group(store, len(actions) - reads):
         thread = threading.Thread(target=lambda: answers.extend(at_once(actions)))
@@ -49,15 +49,15 @@ def touched(connection, job):
     append_event(connection, update_job(connection, job), "touched")
 
 
-def test_who_comes_while_others_are_written_shares_their_commit(store):
+def test_writes_that_arrive_during_a_commit_share_the_next_one(store):
     with commits(store) as times:
         answers = in_one_group(store, [lambda: store.jobs.submit(asked())] * MANY)
     assert len({job.id for job, _ in answers}) == MANY
-    # That of who kept the writer busy, and that of the group.
+    # The commit that kept the writer busy, and that of the group.
     assert len(times) == 2
 
 
-def test_many_who_submit_at_once_need_fewer_commits_than_jobs(store):
+def test_concurrent_submissions_need_fewer_commits_than_jobs(store):
     def submit():
         return [submitted(store).id for _ in range(10)]
 
@@ -67,7 +67,7 @@ def test_many_who_submit_at_once_need_fewer_commits_than_jobs(store):
     assert len(times) < 10 * MANY / 2
 
 
-def test_a_group_has_a_greatest_size(store, monkeypatch):
+def test_group_has_a_largest_size(store, monkeypatch):
     assert GROUP >= MANY
     monkeypatch.setattr(database_module, "GROUP", 4)
     with commits(store) as times:
@@ -75,7 +75,7 @@ def test_a_group_has_a_greatest_size(store, monkeypatch):
     assert len(times) == 1 + MANY / 4
 
 
-def test_what_fails_in_a_group_fails_alone_and_the_others_are_written(store):
+def test_failed_operation_does_not_affect_its_group(store):
     store.keys.create("a", frozenset({"read"}))
     job = submitted(store)
 
@@ -99,7 +99,7 @@ def test_what_fails_in_a_group_fails_alone_and_the_others_are_written(store):
             [
                 *[lambda: store.jobs.submit(asked())] * 4,
                 *[lambda each=each: store.database.write(each) for each in failures],
-                lambda: store.jobs.get("nobody", job.id),
+                lambda: store.jobs.get("unknown", job.id),
                 *[lambda: store.jobs.submit(asked())] * 4,
             ],
             reads=1,
@@ -115,12 +115,12 @@ def test_what_fails_in_a_group_fails_alone_and_the_others_are_written(store):
     assert kinds(store, job.id) == ["queued"]
 
 
-def test_each_gets_the_answer_to_its_own_question(store):
+def test_every_operation_returns_its_own_value(store):
     answers = in_one_group(store, [lambda i=i: store.database.write(lambda _: i) for i in range(MANY)])
     assert answers == list(range(MANY))
 
 
-def test_what_has_returned_is_seen_though_its_group_had_failures(database):
+def test_write_in_a_group_with_failures_is_visible_after_its_return(database):
     with several(database, 2) as (one, other):
         answers = in_one_group(
             one,
@@ -129,7 +129,7 @@ def test_what_has_returned_is_seen_though_its_group_had_failures(database):
         assert other.jobs.get(ALICE, answers[1].id) == answers[1]
 
 
-def test_nothing_is_seen_before_it_is_committed(database):
+def test_writes_are_invisible_before_their_commit(database):
     with several(database, 2) as (one, other):
         job = submitted(one)
         written, seen = threading.Event(), threading.Event()
@@ -148,10 +148,10 @@ def test_nothing_is_seen_before_it_is_committed(database):
         assert kinds(other, job.id) == ["queued", "touched"]
 
 
-def test_those_who_come_first_at_once_have_one_writer(database, monkeypatch):
+def test_concurrent_first_writes_start_one_writer(database, monkeypatch):
     class Slow(threading.Thread):
         def __init__(self, **options):
-            threading.Event().wait(0.05)  # as long as it takes another thread to come in between
+            threading.Event().wait(0.05)  # enough time for another thread to arrive
             super().__init__(**options)
 
     monkeypatch.setattr(database_module, "Thread", Slow)
@@ -162,7 +162,7 @@ def test_those_who_come_first_at_once_have_one_writer(database, monkeypatch):
     assert threading.active_count() == before
 
 
-def test_a_store_that_is_closed_has_written_what_was_waiting(database):
+def test_closed_store_has_written_its_queue(database):
     store, answers = Store(database), []
 
     def close():
@@ -183,7 +183,7 @@ def test_a_store_that_is_closed_has_written_what_was_waiting(database):
     assert len(answers) == MANY
 
 
-def test_a_closed_store_says_so_and_keeps_no_thread(database):
+def test_closed_store_raises_errors_and_keeps_no_thread(database):
     before = threading.active_count()
     store = Store(database)
     job = submitted(store)
@@ -196,7 +196,7 @@ def test_a_closed_store_says_so_and_keeps_no_thread(database):
     assert threading.active_count() == before
 
 
-def test_two_who_hold_what_the_other_waits_for_both_come_through(database):
+def test_deadlocked_transactions_both_succeed(database):
     with several(database, 2) as stores:
         jobs = [submitted(stores[0]).id for _ in range(2)]
         both = threading.Barrier(2)
@@ -205,7 +205,7 @@ def test_two_who_hold_what_the_other_waits_for_both_come_through(database):
             def operation(connection):
                 touched(connection, first)
                 if wait.pop():
-                    # Where there is one writer at a time, there is nobody to meet.
+                    # With a single writer at a time the barrier is never reached by both.
                     with suppress(threading.BrokenBarrierError):
                         both.wait(0.5)
                 touched(connection, second)

@@ -1,4 +1,4 @@
-"""What every store owes to coordinators: who gets which job, for how long, and how often."""
+"""Contract of the store with coordinators: order of claims, duration of leases, number of attempts."""
 
 import itertools
 import random
@@ -33,7 +33,7 @@ with Store(url) as store:
     print("ready", flush=True)
     sys.stdin.readline()
     claims = 0
-    # A new name for each: what runs under one's own name would be claimed once more.
+    # A new name for each claim: a job leased under the same name would be claimed again.
     while (lease := store.leases.claim(f"{name} {claims}", 3600.0)) is not None:
         claims += 1
         print(lease.job.id, lease.epoch)
@@ -44,7 +44,7 @@ def in_turn(jobs):
     return sorted(jobs, key=lambda job: (-job.priority, job.created, job.id))
 
 
-def test_where_nothing_waits_nothing_is_claimed_and_nothing_changes(store):
+def test_claim_without_a_queued_job_changes_nothing(store):
     for state in (JobState.RUNNING, *TERMINAL):
         job_in(store, state)
     before = contents(store)
@@ -52,7 +52,7 @@ def test_where_nothing_waits_nothing_is_claimed_and_nothing_changes(store):
     assert contents(store) == before
 
 
-def test_a_claimed_job_runs(store):
+def test_claimed_job_is_running(store):
     job = submitted(store)
     lease = store.leases.claim("first", LONG)
     assert lease.job == store.jobs.get(ALICE, job.id)
@@ -63,7 +63,7 @@ def test_a_claimed_job_runs(store):
     assert store.jobs.events(job.id)[-1].data == {"attempt": 1}
 
 
-def test_the_highest_priority_goes_first_and_of_those_the_oldest(store):
+def test_claims_follow_priority_and_age(store):
     priorities = random.Random(4).choices([-100, -1, 0, 0, 3, 100], k=24)
     jobs = [
         submitted(store, owner, priority=each)
@@ -74,7 +74,7 @@ def test_the_highest_priority_goes_first_and_of_those_the_oldest(store):
     assert store.leases.claim("another", LONG) is None
 
 
-def test_one_of_many_claimers_wins_every_job(database):
+def test_every_job_is_claimed_once_by_concurrent_claimers(database):
     with several(database) as stores:
         jobs = [submitted(stores[0], priority=each % 3) for each in range(24)]
 
@@ -95,7 +95,7 @@ def test_one_of_many_claimers_wins_every_job(database):
             assert kinds(stores[0], job.id) == ["queued", "running"]
 
 
-def test_a_single_job_goes_to_one_of_many_claimers(database):
+def test_single_job_goes_to_one_of_many_claimers(database):
     with several(database) as stores:
         for turn in range(10):
             job = submitted(stores[0])
@@ -111,7 +111,7 @@ def test_a_single_job_goes_to_one_of_many_claimers(database):
 @pytest.mark.parametrize(
     "database", ["sqlite", pytest.param("postgresql", marks=pytest.mark.ci)], indirect=True
 )
-def test_no_job_goes_to_two_processes(store, database):
+def test_jobs_are_not_claimed_by_two_processes(store, database):
     jobs = [submitted(store).id for _ in range(60)]
     with ExitStack() as stack:
         processes = [stack.enter_context(child(CLAIM, database, name)) for name in ("one", "two")]
@@ -125,13 +125,13 @@ def test_no_job_goes_to_two_processes(store, database):
     assert {epoch for each in said for epoch in each[1::2]} == {"1"}
 
 
-def test_a_job_is_kept_until_its_lease_has_expired(store):
+def test_job_is_not_claimed_before_its_lease_has_expired(store):
     submitted(store)
     claimed(store, LONG, "first")
     assert store.leases.claim("second", LONG) is None
 
 
-def test_a_job_is_taken_over_when_its_lease_has_expired(store):
+def test_job_is_taken_over_after_its_lease_has_expired(store):
     job = submitted(store)
     first = claimed(store, EXPIRED, "first")
     second = claimed(store, LONG, "second")
@@ -143,8 +143,8 @@ def test_a_job_is_taken_over_when_its_lease_has_expired(store):
     assert store.leases.claim("third", LONG) is None
 
 
-def test_a_job_under_ones_own_name_is_taken_over_at_once(store):
-    """Whoever comes back under a name knows that its predecessor is gone."""
+def test_job_leased_under_the_same_name_is_taken_over_at_once(store):
+    """A coordinator with the same name implies that the previous process has ended."""
     job = submitted(store)
     claimed(store, LONG, "one")
     assert store.leases.claim("two", LONG) is None
@@ -152,8 +152,8 @@ def test_a_job_under_ones_own_name_is_taken_over_at_once(store):
     assert (again.job.id, again.epoch) == (job.id, 2)
 
 
-def test_what_is_taken_over_stands_in_the_same_queue_as_what_waits(store):
-    """An expired job is not put off, nor does it overtake a higher priority."""
+def test_expired_jobs_and_queued_jobs_share_one_order(store):
+    """An expired job is neither delayed nor claimed before a higher priority."""
     for order in itertools.permutations(range(3)):
         jobs = {priority: submitted(store, priority=priority) for priority in order}
         for _ in order:
@@ -166,20 +166,20 @@ def test_what_is_taken_over_stands_in_the_same_queue_as_what_waits(store):
         ]
 
 
-def test_a_beat_keeps_a_job(store):
+def test_renewal_keeps_a_job(store):
     submitted(store)
     lease = claimed(store, EXPIRED, "first")
     assert store.leases.renew(lease, LONG) is False
     assert store.leases.claim("second", LONG) is None
 
 
-def test_a_beat_can_let_a_lease_run_out(store):
+def test_renewal_can_let_a_lease_expire(store):
     submitted(store)
     store.leases.renew(claimed(store, LONG, "first"), EXPIRED)
     assert claimed(store, LONG, "second").epoch == 2
 
 
-def test_a_beat_is_nothing_that_a_watcher_sees(store):
+def test_renewal_is_not_an_event(store):
     job = submitted(store)
     lease = claimed(store)
     before = store.jobs.get(ALICE, job.id), store.jobs.events(job.id)
@@ -187,7 +187,7 @@ def test_a_beat_is_nothing_that_a_watcher_sees(store):
     assert (store.jobs.get(ALICE, job.id), store.jobs.events(job.id)) == before
 
 
-def test_a_beat_tells_that_a_job_is_to_be_cancelled(store):
+def test_renewal_returns_a_cancel_request(store):
     job = submitted(store)
     lease = claimed(store)
     assert store.leases.renew(lease, LONG) is False
@@ -196,14 +196,14 @@ def test_a_beat_tells_that_a_job_is_to_be_cancelled(store):
     assert store.leases.renew(lease, LONG) is True
 
 
-def test_whoever_takes_a_job_over_learns_that_it_is_to_be_cancelled(store):
+def test_claim_after_a_takeover_contains_the_cancel_request(store):
     job = submitted(store)
     claimed(store, EXPIRED, "first")
     store.jobs.cancel(ALICE, job.id)
     assert claimed(store, LONG, "second").job.cancel_requested
 
 
-def test_a_job_that_nobody_brings_on_is_given_up(store):
+def test_job_without_progress_fails_after_all_attempts(store):
     job = submitted(store)
     for attempt in range(1, ATTEMPTS + 1):
         assert claimed(store, EXPIRED, f"{attempt}").job.attempt == attempt
@@ -216,7 +216,7 @@ def test_a_job_that_nobody_brings_on_is_given_up(store):
     assert store.jobs.events(job.id)[-1].data == job.problem
 
 
-def test_a_job_that_is_given_up_holds_up_no_other(store):
+def test_failed_job_blocks_no_other(store):
     hopeless = [submitted(store, priority=5), submitted(store, priority=5)]
     for _ in range(2 * ATTEMPTS):
         claimed(store, EXPIRED, "unlucky")
@@ -225,7 +225,7 @@ def test_a_job_that_is_given_up_holds_up_no_other(store):
     assert {store.jobs.get(ALICE, job.id).state for job in hopeless} == {JobState.FAILED}
 
 
-def test_a_job_that_is_given_up_while_it_is_to_be_cancelled_is_cancelled(store):
+def test_job_without_attempts_left_is_cancelled_if_requested(store):
     job = submitted(store)
     for _ in range(ATTEMPTS):
         claimed(store, EXPIRED)
@@ -236,7 +236,7 @@ def test_a_job_that_is_given_up_while_it_is_to_be_cancelled_is_cancelled(store):
     assert kinds(store, job.id)[-2:] == ["cancelling", "cancelled"]
 
 
-def test_a_checkpoint_is_progress_and_attempts_are_counted_anew(store):
+def test_checkpoint_resets_the_count_of_attempts(store):
     job = submitted(store)
     for generation in range(3 * ATTEMPTS):
         store.leases.report(claimed(store, EXPIRED), brought_on(generation))
@@ -246,14 +246,14 @@ def test_a_checkpoint_is_progress_and_attempts_are_counted_anew(store):
     assert store.jobs.get(ALICE, job.id).attempt == 4 * ATTEMPTS
 
 
-def test_a_report_without_a_checkpoint_is_no_progress(store):
+def test_report_without_a_checkpoint_is_not_progress(store):
     submitted(store)
     for _ in range(ATTEMPTS):
         store.leases.report(claimed(store, EXPIRED), ProgressReport({"phase": "starting"}))
     assert store.leases.claim("another", LONG) is None
 
 
-def test_a_resumed_job_has_all_attempts_again(store):
+def test_resumed_job_has_all_attempts_again(store):
     job = submitted(store)
     for _ in range(ATTEMPTS):
         claimed(store, EXPIRED)
@@ -264,7 +264,7 @@ def test_a_resumed_job_has_all_attempts_again(store):
     assert store.leases.claim("another", LONG) is None
 
 
-def test_a_release_is_no_attempt(store):
+def test_release_does_not_count_as_an_attempt(store):
     job = submitted(store)
     for _ in range(3 * ATTEMPTS):
         lease = claimed(store)
@@ -275,7 +275,7 @@ def test_a_release_is_no_attempt(store):
         assert claimed(store, EXPIRED).job.attempt == attempt
 
 
-def test_a_release_after_a_checkpoint_leaves_all_attempts(store):
+def test_release_after_a_checkpoint_leaves_all_attempts(store):
     submitted(store)
     lease = claimed(store)
     store.leases.report(lease, brought_on(1))
@@ -285,7 +285,7 @@ def test_a_release_after_a_checkpoint_leaves_all_attempts(store):
     assert store.leases.claim("another", LONG) is None
 
 
-def test_a_release_of_what_may_fail_again_is_an_attempt(store):
+def test_release_after_a_failure_counts_as_an_attempt(store):
     job = submitted(store)
     for _ in range(ATTEMPTS):
         store.leases.release(claimed(store), attempted=True)
@@ -294,7 +294,7 @@ def test_a_release_of_what_may_fail_again_is_an_attempt(store):
     assert (job.state, job.attempt) == (JobState.FAILED, ATTEMPTS)
 
 
-def test_a_released_job_waits_for_whoever_comes(store):
+def test_released_job_can_be_claimed_by_another(store):
     job = submitted(store)
     lease = claimed(store, LONG, "first")
     store.leases.report(lease, brought_on(3))
@@ -306,7 +306,7 @@ def test_a_released_job_waits_for_whoever_comes(store):
     assert kinds(store, job.id) == ["queued", "running", "progress", "queued", "running"]
 
 
-def test_a_job_that_is_to_be_cancelled_is_cancelled_when_it_is_released(store):
+def test_released_job_with_a_cancel_request_is_cancelled(store):
     job = submitted(store)
     lease = claimed(store)
     store.jobs.cancel(ALICE, job.id)

@@ -1,4 +1,4 @@
-"""What every store owes to owners: a state allows what it allows, lists are whole, nobody sees another's."""
+"""Contract of the store with owners: allowed operations by state, complete lists, separation of owners."""
 
 import time
 
@@ -24,18 +24,18 @@ from support.stores import (
 
 QUEUED, RUNNING, SUCCEEDED, FAILED_, CANCELLED = JobState
 
-#: What an owner may ask in which state, and the state that follows; in all others it is refused.
+#: Operations of an owner by state, and the following state; in all other states they are refused.
 ALLOWED = {
     "cancel": {QUEUED: CANCELLED, RUNNING: RUNNING},
     "resume": {FAILED_: QUEUED, CANCELLED: QUEUED},
     "delete": {SUCCEEDED: None, FAILED_: None, CANCELLED: None},
 }
 
-NOBODYS = "0" * 32
+UNKNOWN = "0" * 32
 
 
 def pages(store, owner, limit, state=None, between=lambda: None):
-    """Read a list to its end, and do something between two pages."""
+    """Read a list to its end, and call a function between two pages."""
     after, found = None, []
     while True:
         assert len(found) < 100, "the list has no end"
@@ -49,7 +49,7 @@ def pages(store, owner, limit, state=None, between=lambda: None):
 
 @pytest.mark.parametrize("state", JobState)
 @pytest.mark.parametrize("ask", ALLOWED)
-def test_a_state_allows_what_it_allows(store, ask, state):
+def test_operation_is_allowed_only_in_its_states(store, ask, state):
     job = job_in(store, state)
     before = contents(store)
     if state not in ALLOWED[ask]:
@@ -67,7 +67,7 @@ def test_a_state_allows_what_it_allows(store, ask, state):
         kinds(store, job.id)
 
 
-def test_a_waiting_job_is_cancelled_at_once(store):
+def test_queued_job_is_cancelled_at_once(store):
     job = submitted(store)
     cancelled = store.jobs.cancel(ALICE, job.id)
     assert (cancelled.state, cancelled.cancel_requested) == (CANCELLED, True)
@@ -76,7 +76,7 @@ def test_a_waiting_job_is_cancelled_at_once(store):
     assert kinds(store, job.id) == ["queued", "cancelled"]
 
 
-def test_a_running_job_is_cancelled_when_its_coordinator_lets_go_of_it(store):
+def test_running_job_is_cancelled_when_it_is_released(store):
     job = submitted(store)
     lease = claimed(store)
     asked_for = store.jobs.cancel(ALICE, job.id)
@@ -88,7 +88,7 @@ def test_a_running_job_is_cancelled_when_its_coordinator_lets_go_of_it(store):
     assert store.jobs.get(ALICE, job.id).state == CANCELLED
 
 
-def test_a_wish_to_cancel_that_comes_too_late_takes_no_result_away(store):
+def test_late_cancel_request_does_not_discard_a_result(store):
     job = submitted(store)
     lease = claimed(store)
     store.jobs.cancel(ALICE, job.id)
@@ -97,7 +97,7 @@ def test_a_wish_to_cancel_that_comes_too_late_takes_no_result_away(store):
     assert kinds(store, job.id) == ["queued", "running", "cancelling", "succeeded"]
 
 
-def test_a_resumed_job_goes_on_from_its_checkpoint_as_if_nothing_had_happened(store):
+def test_resumed_job_continues_from_its_checkpoint(store):
     job = submitted(store)
     lease = claimed(store)
     store.leases.report(lease, brought_on(6))
@@ -113,7 +113,7 @@ def test_a_resumed_job_goes_on_from_its_checkpoint_as_if_nothing_had_happened(st
 
 
 @pytest.mark.parametrize("running", [False, True])
-def test_a_job_that_was_cancelled_and_resumed_is_not_cancelled_any_more(store, running):
+def test_resume_clears_the_cancel_request(store, running):
     job = submitted(store)
     lease = claimed(store) if running else None
     store.jobs.cancel(ALICE, job.id)
@@ -127,7 +127,7 @@ def test_a_job_that_was_cancelled_and_resumed_is_not_cancelled_any_more(store, r
     assert store.jobs.get(ALICE, job.id).state == QUEUED
 
 
-def test_a_job_says_when_it_was_changed_last(store):
+def test_job_has_the_time_of_its_last_change(store):
     job = submitted(store)
     for ask in (store.jobs.cancel, store.jobs.resume):
         time.sleep(0.01)
@@ -137,7 +137,7 @@ def test_a_job_says_when_it_was_changed_last(store):
         job = changed
 
 
-def test_a_deleted_job_leaves_nothing_and_no_other_job_loses_anything(store):
+def test_deleted_job_leaves_no_rows_and_other_jobs_are_unchanged(store):
     for _ in range(2):
         submitted(store)
         lease = claimed(store)
@@ -156,20 +156,20 @@ def test_a_deleted_job_leaves_nothing_and_no_other_job_loses_anything(store):
 
 @pytest.mark.parametrize("ask", ["get", *ALLOWED])
 @pytest.mark.parametrize("state", JobState)
-def test_anothers_job_is_no_job_and_stays_as_it_is(store, ask, state):
+def test_job_of_another_owner_is_not_found_and_unchanged(store, ask, state):
     job = job_in(store, state, BOB)
     before = contents(store)
     messages = []
-    for name in (job.id, NOBODYS):
+    for name in (job.id, UNKNOWN):
         with pytest.raises(JobNotFoundError) as raised:
             getattr(store.jobs, ask)(ALICE, name)
         messages.append(str(raised.value).replace(name, "?"))
-    # It does not even say that there is one.
+    # The message does not reveal that the job exists.
     assert messages[0] == messages[1]
     assert contents(store) == before
 
 
-def test_nobody_sees_anything_of_another(store):
+def test_owner_cannot_see_data_of_another_owner(store):
     theirs = submitted(store, BOB)
     dataset, _ = store.datasets.add(BOB, "a.csv", ".csv", "1" * 64, 10, {})
     assert store.jobs.page(ALICE).jobs == ()
@@ -193,26 +193,26 @@ def test_pages_are_newest_first_and_hold_every_job_once(store):
     assert store.jobs.page(ALICE, limit=3).jobs == tuple(expected[:3])
 
 
-def test_an_owner_without_jobs_has_one_empty_page(store):
+def test_owner_without_jobs_has_one_empty_page(store):
     assert pages(store, ALICE, 5) == [[]]
 
 
-def test_jobs_of_the_same_moment_are_all_listed_once(store):
+def test_jobs_created_at_the_same_time_are_all_listed_once(store):
     jobs = {submitted(store).id for _ in range(9)}
     store.database.write(lambda connection: connection.execute(update(jobs_table).values(created=1.5)))
     found = [each for page in pages(store, ALICE, 2) for each in page]
     assert found == sorted(jobs, reverse=True)
 
 
-def test_a_list_that_is_read_while_jobs_come_change_and_go_holds_every_other_job_once(store):
+def test_list_read_during_changes_contains_every_other_job_once(store):
     jobs = [submitted(store, priority=-each) for each in range(12)]
-    goes = store.jobs.cancel(ALICE, submitted(store).id)
+    deleted = store.jobs.cancel(ALICE, submitted(store).id)
     events = [
         lambda: submitted(store, priority=-50),
         lambda: claimed(store),
         lambda: store.leases.finish(claimed(store), FAILED),
         lambda: store.jobs.cancel(ALICE, jobs[5].id),
-        lambda: (store.jobs.delete(ALICE, goes.id), submitted(store, priority=-50)),
+        lambda: (store.jobs.delete(ALICE, deleted.id), submitted(store, priority=-50)),
     ]
     found = pages(store, ALICE, 2, between=lambda: events.pop(0)() if events else None)
     assert not events
@@ -221,13 +221,13 @@ def test_a_list_that_is_read_while_jobs_come_change_and_go_holds_every_other_job
     assert {job.id for job in jobs} <= set(listed)
 
 
-def test_a_list_may_hold_one_state_alone(store):
+def test_list_can_be_limited_to_one_state(store):
     expected = {state: job_in(store, state).id for state in list(JobState)[::-1]}
     for state in JobState:
         assert pages(store, ALICE, 1, state) == [[expected[state]]]
 
 
-def test_a_page_has_a_greatest_size(store):
+def test_page_has_a_largest_size(store):
     for _ in range(PAGE + 1):
         submitted(store)
     page = store.jobs.page(ALICE, limit=10 * PAGE)

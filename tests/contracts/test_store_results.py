@@ -1,4 +1,4 @@
-"""What every store owes to what jobs bring: reports, results and figures come whole, or not at all."""
+"""Contract of the store for reports, results and figures: they are stored completely or not at all."""
 
 import threading
 
@@ -24,7 +24,7 @@ from support.stores import (
 
 
 class Unwritable:
-    """What no document can hold."""
+    """A value that JSON cannot represent."""
 
 
 @pytest.fixture
@@ -44,22 +44,22 @@ def generations(store, lease, **limits):
     return [each[0] for each in store.results.history(lease.job.id, **limits)]
 
 
-def test_all_parts_of_a_report_appear_together(store, lease):
-    told = store.leases.report(lease, brought_on(7))
-    assert told == store.jobs.get(ALICE, lease.job.id)
-    assert told.version == lease.job.version + 1
-    assert (told.state, told.progress, told.checkpoint) == (
+def test_parts_of_a_report_appear_together(store, lease):
+    reported = store.leases.report(lease, brought_on(7))
+    assert reported == store.jobs.get(ALICE, lease.job.id)
+    assert reported.version == lease.job.version + 1
+    assert (reported.state, reported.progress, reported.checkpoint) == (
         JobState.RUNNING,
         {"generation": 7},
         f"{7:064x}",
     )
     assert store.results.history(lease.job.id) == [[7, 70, {"3": 1 / 8}, [0.5, None]]]
     event = store.jobs.events(lease.job.id)[-1]
-    assert (event.kind, event.number, event.data) == ("progress", told.version, told.progress)
-    assert event.at == told.updated
+    assert (event.kind, event.number, event.data) == ("progress", reported.version, reported.progress)
+    assert event.at == reported.updated
 
 
-def test_a_reader_never_sees_a_part_of_a_report(database):
+def test_reader_never_sees_a_part_of_a_report(database):
     with several(database, 2) as (writer, reader):
         job = submitted(writer)
         lease = claimed(writer)
@@ -100,24 +100,24 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("report", BROKEN.values(), ids=BROKEN)
-def test_a_report_that_fails_midway_leaves_nothing(store, lease, report):
+def test_failed_report_is_rolled_back(store, lease, report):
     store.leases.report(lease, brought_on(1))
     before = contents(store)
-    with pytest.raises(Exception):  # noqa: B017, PT011 - a caller's mistake, whatever it is called
+    with pytest.raises(Exception):  # noqa: B017, PT011 - any error of the caller
         store.leases.report(lease, report)
     assert contents(store) == before
     assert store.leases.report(lease, brought_on(2)).progress == {"generation": 2}
 
 
-def test_a_report_without_a_checkpoint_leaves_the_one_that_is_there(store, lease):
+def test_report_without_a_checkpoint_keeps_the_previous_one(store, lease):
     store.leases.report(lease, brought_on(4))
-    told = store.leases.report(lease, ProgressReport({"generation": 5}, (point(5),), after=4))
-    assert (told.checkpoint, told.progress) == (brought_on(4).checkpoint, {"generation": 5})
+    reported = store.leases.report(lease, ProgressReport({"generation": 5}, (point(5),), after=4))
+    assert (reported.checkpoint, reported.progress) == (brought_on(4).checkpoint, {"generation": 5})
     assert generations(store, lease) == [4, 5]
 
 
-def test_points_take_the_place_of_those_behind_the_generation_that_is_said(store, lease):
-    """After a crash the same generations come once more, from the checkpoint on."""
+def test_points_replace_those_after_the_given_generation(store, lease):
+    """After a crash the same generations are reported again, from the checkpoint on."""
     store.leases.report(lease, ProgressReport({}, tuple(map(point, range(8)))))
     store.leases.report(lease, ProgressReport({}, ((5, 99, {2: 0.25}, (0.25,)), point(6)), after=4))
     assert generations(store, lease) == [0, 1, 2, 3, 4, 5, 6]
@@ -128,13 +128,13 @@ def test_points_take_the_place_of_those_behind_the_generation_that_is_said(store
     assert generations(store, lease) == [3]
 
 
-def test_a_report_without_points_leaves_the_history(store, lease):
+def test_report_without_points_keeps_the_history(store, lease):
     store.leases.report(lease, ProgressReport({}, tuple(map(point, range(4)))))
     store.leases.report(lease, ProgressReport({"phase": "refining"}))
     assert generations(store, lease) == [0, 1, 2, 3]
 
 
-def test_history_is_read_from_a_generation_on_and_not_more_than_is_asked_for(store, lease):
+def test_history_is_read_after_a_generation_up_to_a_limit(store, lease):
     store.leases.report(lease, ProgressReport({}, tuple(map(point, range(0, 20, 2)))))
     assert generations(store, lease) == list(range(0, 20, 2))
     assert generations(store, lease, after=4) == [6, 8, 10, 12, 14, 16, 18]
@@ -143,12 +143,12 @@ def test_history_is_read_from_a_generation_on_and_not_more_than_is_asked_for(sto
     assert store.results.history("0" * 32) == []
 
 
-def test_what_is_infinite_in_a_history_stays_infinite(store, lease):
+def test_infinite_values_of_a_history_stay_infinite(store, lease):
     store.leases.report(lease, ProgressReport({}, ((0, 1, {1: float("inf")}, (float("-inf"),)),)))
     assert store.results.history(lease.job.id) == [[0, 1, {"1": float("inf")}, [float("-inf")]]]
 
 
-def test_old_progress_is_forgotten_and_everything_else_is_kept(store, lease, monkeypatch):
+def test_only_old_progress_events_are_deleted(store, lease, monkeypatch):
     monkeypatch.setattr(leases_module, "KEPT", 5)
     for generation in range(20):
         store.leases.report(lease, brought_on(generation))
@@ -158,7 +158,7 @@ def test_old_progress_is_forgotten_and_everything_else_is_kept(store, lease, mon
     assert store.jobs.versions([lease.job.id]) == {lease.job.id: 22}
 
 
-def test_a_success_has_its_result_its_models_and_its_summary(store, lease):
+def test_successful_job_has_a_result_models_and_a_summary(store, lease):
     store.leases.report(lease, brought_on(3))
     store.leases.finish(lease, FOUND)
     job = store.jobs.get(ALICE, lease.job.id)
@@ -176,7 +176,7 @@ def test_a_success_has_its_result_its_models_and_its_summary(store, lease):
     assert (event.kind, event.data) == ("succeeded", FOUND.summary)
 
 
-def test_a_success_needs_no_checkpoint_and_anything_else_keeps_it(store):
+def test_checkpoint_is_kept_unless_the_job_succeeds(store):
     kept = {}
     for outcome in (FOUND, FAILED, CANCELLED):
         submitted(store)
@@ -188,7 +188,7 @@ def test_a_success_needs_no_checkpoint_and_anything_else_keeps_it(store):
     assert kept == {"succeeded": None, "failed": checkpoint, "cancelled": checkpoint}
 
 
-def test_a_failure_says_why(store, lease):
+def test_failed_job_has_a_problem(store, lease):
     store.leases.finish(lease, FAILED)
     job = store.jobs.get(ALICE, lease.job.id)
     assert (job.state, job.problem) == (JobState.FAILED, FAILED.problem)
@@ -196,7 +196,7 @@ def test_a_failure_says_why(store, lease):
     assert (store.results.document(job.id), store.results.models(job.id)) == (None, [])
 
 
-def test_a_cancelled_job_may_have_a_result(store, lease):
+def test_cancelled_job_may_have_a_result(store, lease):
     store.leases.finish(lease, JobOutcome(JobState.CANCELLED, FOUND.document, FOUND.models))
     assert store.jobs.get(ALICE, lease.job.id).state == JobState.CANCELLED
     assert len(store.results.models(lease.job.id)) == 2
@@ -212,16 +212,16 @@ HALVES = {
 
 
 @pytest.mark.parametrize("outcome", HALVES.values(), ids=HALVES)
-def test_an_end_that_fails_midway_leaves_the_job_running(store, lease, outcome):
+def test_failed_finish_leaves_the_job_running(store, lease, outcome):
     store.leases.report(lease, brought_on(1))
     before = contents(store)
-    with pytest.raises(Exception):  # noqa: B017, PT011 - a caller's mistake, whatever it is called
+    with pytest.raises(Exception):  # noqa: B017, PT011 - any error of the caller
         store.leases.finish(lease, outcome)
     assert contents(store) == before
     store.leases.finish(lease, FOUND)
 
 
-def test_what_belongs_to_a_result_comes_with_it_and_is_not_swept_away(store, lease):
+def test_artefacts_of_a_result_are_stored_and_referenced(store, lease):
     job = lease.job.id
     whole = JobOutcome(JobState.SUCCEEDED, {"found": 1}, artefacts={"a": BLOB, "b": "c" * 64})
     store.leases.finish(lease, whole)
@@ -229,18 +229,18 @@ def test_what_belongs_to_a_result_comes_with_it_and_is_not_swept_away(store, lea
     assert {BLOB, "c" * 64} <= store.retention.named_blobs()
 
 
-def test_what_belongs_to_a_result_takes_the_place_of_what_was_there(store, lease):
+def test_artefacts_of_a_new_result_replace_the_old_ones(store, lease):
     job = lease.job.id
     lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, artefacts={"a": BLOB, "b": BLOB}))
     store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"new": 1}, artefacts={"a": "c" * 64}))
     assert [store.results.artefact(job, name) for name in "ab"] == ["c" * 64, None]
 
 
-def test_a_new_result_replaces_all_of_the_old_one(store, lease):
+def test_new_result_replaces_the_whole_old_one(store, lease):
     job = lease.job.id
     lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
     store.results.keep(job, {"pareto.svg": BLOB})
-    # What was found before is there to be looked at until something else has been found.
+    # The previous result is available until there is a new one.
     assert store.results.document(job) == {"old": 1}
     store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {"new": 1}, (({"fitness": 0.1}, "only"),)))
     assert store.results.document(job) == {"new": 1}
@@ -248,7 +248,7 @@ def test_a_new_result_replaces_all_of_the_old_one(store, lease):
     assert store.results.artefact(job, "pareto.svg") is None
 
 
-def test_an_end_without_a_result_leaves_the_one_that_is_there(store, lease):
+def test_finish_without_a_result_keeps_the_old_one(store, lease):
     job = lease.job.id
     lease = again(store, lease, JobOutcome(JobState.CANCELLED, {"old": 1}, FOUND.models))
     store.results.keep(job, {"pareto.svg": BLOB})
@@ -258,7 +258,7 @@ def test_an_end_without_a_result_leaves_the_one_that_is_there(store, lease):
     assert store.results.artefact(job, "pareto.svg") == BLOB
 
 
-def test_what_is_made_of_a_result_is_kept_by_name_and_may_be_made_again(store, lease):
+def test_artefacts_are_stored_by_name_and_can_be_replaced(store, lease):
     job = lease.job.id
     assert store.results.artefact(job, "a") is None
     store.results.keep(job, {"a": "1" * 64, "b": "2" * 64})
@@ -267,10 +267,10 @@ def test_what_is_made_of_a_result_is_kept_by_name_and_may_be_made_again(store, l
     assert store.results.artefact("0" * 32, "a") is None
 
 
-def test_nothing_is_kept_of_a_job_that_is_gone(store, lease):
+def test_artefacts_of_a_deleted_job_are_refused(store, lease):
     store.leases.finish(lease, FOUND)
     store.jobs.delete(ALICE, lease.job.id)
-    # Whoever draws a figure may find that the job was deleted meanwhile.
+    # The job may be deleted while its figures are rendered.
     with pytest.raises(JobNotFoundError, match=lease.job.id):
         store.results.keep(lease.job.id, {"a": BLOB})
     with pytest.raises(LeaseLostError):
@@ -278,7 +278,7 @@ def test_nothing_is_kept_of_a_job_that_is_gone(store, lease):
     assert not any(contents(store).values())
 
 
-def test_what_jobs_bring_does_not_get_mixed_up(store):
+def test_results_of_different_jobs_are_separate(store):
     for priority in (2, 1):
         submitted(store, priority=priority)
     first, second = claimed(store), claimed(store)
@@ -295,7 +295,7 @@ def test_what_jobs_bring_does_not_get_mixed_up(store):
     assert store.results.artefact(first.job.id, "a") == "1" * 64
 
 
-def test_two_who_have_drawn_the_same_at_once_both_keep_it(database):
+def test_concurrent_artefacts_of_the_same_name_are_both_accepted(database):
     with several(database, 2) as (first, second):
         job = submitted(first).id
         writing, late = (
@@ -310,7 +310,7 @@ def test_two_who_have_drawn_the_same_at_once_both_keep_it(database):
             if not writing.is_set():
                 writing.set()
                 late.start()
-                late.join(0.3)  # it has to wait for what is written here
+                late.join(0.3)  # must wait for the lock of this transaction
 
         event.listen(first.database.engine, "commit", slowly)
         first.results.keep(job, {"a": "1" * 64, "b": "1" * 64})

@@ -1,4 +1,4 @@
-"""Runs whose process is killed or told to end: what was found is kept, and resumed it ends the same."""
+"""Runs whose process is killed or stopped: results are kept, and a resumed run ends in the same way."""
 
 import os
 import signal
@@ -20,14 +20,14 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def started(record: Path, out: Path, generations: int, *options: str) -> subprocess.Popen[str]:
     command = [ISLANDS, "identify", record, *JOB, "--generations", str(generations), "--out", out, *options]
-    # A group of their own, as in a terminal: Ctrl-C reaches all of it, Ray's processes too.
+    # A separate process group, as in a terminal: Ctrl-C reaches all of it, including Ray's processes.
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
 
 
 def shortened(out: Path, generations: int) -> None:
-    """Let a run of a million generations have a few: the budget is not part of its random numbers."""
+    """Reduce the budget of a run, which does not affect its random numbers."""
     path = out / "checkpoint.json"
     path.write_text(path.read_text().replace('"generations": 1000000', f'"generations": {generations}'))
 
@@ -41,10 +41,10 @@ def undisturbed(record: Path, generations: int) -> dict[str, bytes]:
 
 @pytest.mark.parametrize(
     "engine",
-    # Some of Ray's processes take a minute to see that they are not wanted any more.
+    # Some of Ray's processes notice only after a minute that their parent has ended.
     [pytest.param("serial", marks=pytest.mark.ci), pytest.param("ray", marks=pytest.mark.nightly)],
 )
-def test_a_killed_run_leaves_no_process_and_resumed_ends_the_same(record: Path, engine: str) -> None:
+def test_killed_run_leaves_no_process_and_resumes_to_the_same_result(record: Path, engine: str) -> None:
     out = record.parent / f"killed-{engine}"
     running = started(record, out, 1_000_000, "--engine", engine)
     eventually((out / "checkpoint.json").exists)
@@ -53,7 +53,7 @@ def test_a_killed_run_leaves_no_process_and_resumed_ends_the_same(record: Path, 
     kill(running.pid)
     running.communicate()
     assert not (out / "result.json").exists()
-    # Two of Ray's own look only now and then whether they are still wanted.
+    # Two of Ray's own processes check only now and then whether their parent lives.
     eventually(lambda: not alive(children), seconds=120.0)
     shortened(out, 20)
     succeed("identify", "--resume", out, "--engine", engine)
@@ -63,7 +63,7 @@ def test_a_killed_run_leaves_no_process_and_resumed_ends_the_same(record: Path, 
 @pytest.mark.nightly
 @pytest.mark.parametrize("engine", ["serial", "ray"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_told_to_end_a_run_keeps_the_best_and_resumed_ends_the_same(
+def test_stopped_run_stores_the_best_and_resumes_to_the_same_result(
     record: Path, engine: str, number: signal.Signals
 ) -> None:
     out = record.parent / f"{engine}-{number.name}"
@@ -90,7 +90,7 @@ def test_told_to_end_a_run_keeps_the_best_and_resumed_ends_the_same(
 
 
 @pytest.mark.nightly
-def test_an_end_by_the_clock_says_that_it_is_not_reproducible(record: Path) -> None:
+def test_run_ended_by_wall_time_is_reported_as_not_reproducible(record: Path) -> None:
     out = record.parent / "clock"
     running = started(record, out, 1_000_000, "--engine", "serial", "--wall-time", "2")
     _, complained = running.communicate(timeout=60)

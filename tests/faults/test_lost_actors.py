@@ -1,4 +1,4 @@
-"""Islands whose processes are killed: the result is that of a run that nobody disturbed, bit for bit."""
+"""Killed actors: the result equals that of an undisturbed run, bit for bit."""
 
 import os
 from contextlib import suppress
@@ -12,7 +12,7 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.problem import Problem
 from islands_service.engines import ENGINES
 from islands_service.runtime import actor_pool
-from islands_service.runtime.cluster import LOST, ClusterError
+from islands_service.runtime.cluster import LOSS_ERRORS, ClusterError
 from support.processes import actors, alive, eventually, kill
 from support.searches import SMALL, exactly, record
 
@@ -39,20 +39,20 @@ def undisturbed(posed):
 
 
 @pytest.fixture
-def told():
+def messages():
     return []
 
 
 @pytest.fixture
-def engine(ray_address, told):
-    with ENGINES["ray"](ray_address, told.append) as started:
+def engine(ray_address, messages):
+    with ENGINES["ray"](ray_address, messages.append) as started:
         yield started
-    # The next test counts its own actors alone.
+    # The next test counts only its own actors.
     eventually(lambda: not actors())
 
 
 @pytest.mark.ci
-def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine, told):
+def test_three_killed_actors_do_not_change_the_result(posed, undisturbed, engine, messages):
     found = []
     for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
         found.append(exactly(epoch.archipelago))
@@ -60,13 +60,13 @@ def test_an_island_killed_three_times_changes_nothing(posed, undisturbed, engine
             victim = min(actors())
             kill(victim)
             eventually(lambda pid=victim: not alive([pid]))
-            # Nothing has been asked of the engine since: the loss is before what comes next.
+            # The engine is suspended: the loss occurs before the next step.
     assert found == undisturbed
-    assert told.count("an actor was lost: its islands go on from their last epoch") == 3
+    assert messages.count("an actor was lost: its islands continue from their last epoch") == 3
 
 
 @pytest.mark.nightly
-def test_losing_all_actors_at_once_changes_nothing(posed, undisturbed, engine, told):
+def test_loss_of_all_actors_does_not_change_the_result(posed, undisturbed, engine, messages):
     found = []
     for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
         found.append(exactly(epoch.archipelago))
@@ -74,60 +74,58 @@ def test_losing_all_actors_at_once_changes_nothing(posed, undisturbed, engine, t
             for pid in actors():
                 kill(pid)
     assert found == undisturbed
-    assert len(told) == min(3, len(os.sched_getaffinity(0)))
+    assert len(messages) == min(3, len(os.sched_getaffinity(0)))
 
 
 @pytest.mark.nightly
-def test_in_a_long_search_somebody_stands_in_for_who_is_lost_until_that_is_replaced(
-    posed, engine, told, monkeypatch
-):
+def test_standby_actor_replaces_a_lost_one_until_its_restart(posed, engine, messages, monkeypatch):
     import ray
 
-    monkeypatch.setattr(actor_pool, "STAND_IN_AFTER", 0.0)
-    found = actor_pool.IslandActorPool(posed, 3, told.append)
+    monkeypatch.setattr(actor_pool, "STANDBY_AFTER", 0.0)
+    found = actor_pool.IslandActorPool(posed, 3, messages.append)
     try:
-        everybody = min(3, len(os.sched_getaffinity(0))) + 1
-        eventually(lambda: found.maintain(at_once=True) and len(found.places) == everybody)
+        full_size = min(3, len(os.sched_getaffinity(0))) + 1
+        eventually(lambda: found.maintain(at_once=True) and len(found.slots) == full_size)
         regular = [found.actor_for(island) for island in range(3)]
         kill(min(actors()))
-        eventually(lambda: found.maintain(at_once=True) and told)
-        assert found.places[0] == actor_pool.STAND_IN
-        assert len(found.places) == everybody - 1
+        eventually(lambda: found.maintain(at_once=True) and messages)
+        assert found.slots[0] == actor_pool.STANDBY
+        assert len(found.slots) == full_size - 1
         replaced = [
             now for now, before in zip(map(found.actor_for, range(3)), regular, strict=True) if now != before
         ]
         assert replaced
         assert all(now not in regular for now in replaced)
         ray.get([actor.prepare.remote() for actor in replaced])
-        eventually(lambda: found.maintain(at_once=True) and len(found.places) == everybody)
+        eventually(lambda: found.maintain(at_once=True) and len(found.slots) == full_size)
         assert not set(replaced) & {found.actor_for(island) for island in range(3)}
     finally:
         found.shutdown()
 
 
 @pytest.mark.nightly
-def test_actors_that_die_again_and_again_end_the_search_with_advice(posed, engine):
-    """Too little memory, for example: nobody wants that to go on for days."""
+def test_repeated_losses_end_the_search_with_advice(posed, engine):
+    """For example for lack of memory: the search must not continue for days."""
     over = Event()
 
-    def murder():
+    def kill_all():
         while not over.wait(0.01):
             for pid in actors():
                 with suppress(ProcessLookupError):
                     kill(pid)
 
-    murderer = Thread(target=murder)
-    murderer.start()
+    killer = Thread(target=kill_all)
+    killer.start()
     try:
-        with pytest.raises(ClusterError, match="actors were lost and no epoch got done"):
+        with pytest.raises(ClusterError, match="actors were lost and no epoch was completed"):
             list(engine.run(posed, empty_archipelago(3, SEED), never))
     finally:
         over.set()
-        murderer.join()
+        killer.join()
 
 
 @pytest.mark.ci
-def test_a_search_that_ends_leaves_no_actor_behind(posed, engine):
+def test_finished_search_leaves_no_actor(posed, engine):
     epochs = engine.run(posed, empty_archipelago(3, SEED), never)
     next(epochs)
     assert actors()
@@ -136,17 +134,17 @@ def test_a_search_that_ends_leaves_no_actor_behind(posed, engine):
 
 
 @pytest.mark.parametrize("kind", ["OutOfMemoryError", "NodeDiedError", "ObjectLostError"])
-def test_a_loss_is_a_loss_whatever_ray_calls_it(kind):
-    """The watchdog of a machine's memory has an error of its own, which is no error of an actor."""
+def test_errors_of_lost_processes_count_as_losses(kind):
+    """The out-of-memory monitor of Ray has its own error, which is no actor error."""
     from ray import exceptions
 
-    assert issubclass(getattr(exceptions, kind), LOST)
+    assert issubclass(getattr(exceptions, kind), LOSS_ERRORS)
 
 
 @pytest.mark.ci
-def test_a_ray_that_is_there_is_left_alone(engine):
+def test_existing_ray_connection_is_left_alone(engine):
     import ray
 
-    with pytest.raises(ClusterError, match="on a Ray already"), ENGINES["ray"](None, print):
+    with pytest.raises(ClusterError, match="already connected to Ray"), ENGINES["ray"](None, print):
         pass
     assert ray.is_initialized()

@@ -1,4 +1,4 @@
-"""Discrepancy jobs of a service that runs: what was hidden is found, whatever happens meanwhile."""
+"""Discrepancy jobs of a running service: the injected effect is found, also after kills and cancellations."""
 
 import json
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from support.service_processes import Service, serving
 
 pytestmark = pytest.mark.nightly
 
-#: Seconds of a record that takes a while to analyse.
+#: Seconds of a record whose analysis takes a while.
 LONG = 150.0
 
 COLUMNS = ("--input", "u_V", "--output", "y_um", "--channel", "T_K", "--simulation", "bouc-wen-piezo")
@@ -37,7 +37,7 @@ def submitted(service: Service, folder: Path, seconds: float) -> str:
 
 
 def found(service: Service, job: str) -> tuple[dict[str, Any], bytes, bytes]:
-    """Wait for a job, and return all that it brought but the time that it took."""
+    """Wait for a job, and return its result without the wall time, its report and its extended simulation."""
     ended = service.ended(job)
     assert ended["state"] == "succeeded", ended
     document, report, extended = (
@@ -48,7 +48,7 @@ def found(service: Service, job: str) -> tuple[dict[str, Any], bytes, bytes]:
     return result, report.content, extended.content
 
 
-def test_what_was_hidden_is_found_as_by_the_command_line(service: Service, tmp_path: Path) -> None:
+def test_injected_effect_is_found_as_by_the_command_line(service: Service, tmp_path: Path) -> None:
     hidden(tmp_path)
     where = ("--url", service.url)
     said = succeed("jobs", "diagnose", tmp_path / "hidden.csv", *COLUMNS, *TOLERANCES, "--watch", *where)
@@ -65,7 +65,7 @@ def test_what_was_hidden_is_found_as_by_the_command_line(service: Service, tmp_p
         assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 
 
-def test_a_killed_coordinator_costs_time_and_nothing_else(service: Service, tmp_path: Path) -> None:
+def test_killed_coordinator_does_not_change_the_diagnosis(service: Service, tmp_path: Path) -> None:
     undisturbed = found(service, submitted(service, tmp_path, LONG))
     job = submitted(service, tmp_path, LONG)
     eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
@@ -74,9 +74,7 @@ def test_a_killed_coordinator_costs_time_and_nothing_else(service: Service, tmp_
     assert service.job(job)["attempt"] == 2
 
 
-def test_a_running_diagnosis_is_cancelled_within_seconds_and_begins_anew(
-    service: Service, tmp_path: Path
-) -> None:
+def test_running_diagnosis_is_cancelled_within_seconds_and_restarts(service: Service, tmp_path: Path) -> None:
     job = submitted(service, tmp_path, LONG)
     eventually(lambda: "effects" in str((service.job(job)["progress"] or {}).get("phase")))
     assert service.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 202

@@ -1,4 +1,4 @@
-"""A service that is told to end, jobs that are cancelled and resumed, and jobs that nobody can bring on."""
+"""Stopped services, cancelled and resumed jobs, and jobs without progress."""
 
 import signal
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ def undisturbed(service: Service) -> bytes:
     return service.found(service.submit(LONG))
 
 
-def test_a_cancelled_job_lets_go_of_its_islands_and_resumed_ends_the_same(
+def test_cancelled_job_ends_its_actors_and_resumes_to_the_same_result(
     service: Service, undisturbed: bytes
 ) -> None:
     job = service.submit(LONG)
@@ -40,7 +40,7 @@ def test_a_cancelled_job_lets_go_of_its_islands_and_resumed_ends_the_same(
     assert service.found(job) == undisturbed
 
 
-def test_a_waiting_job_is_cancelled_at_once_and_resumed_begins(service: Service, undisturbed: bytes) -> None:
+def test_queued_job_is_cancelled_at_once_and_runs_when_resumed(service: Service, undisturbed: bytes) -> None:
     first, second = service.submit(LONG), service.submit(LONG)
     answer = service.ask("POST", f"/v1/jobs/{second}/cancel")
     assert (answer.status_code, answer.json()["state"]) == (202, "cancelled")
@@ -50,9 +50,7 @@ def test_a_waiting_job_is_cancelled_at_once_and_resumed_begins(service: Service,
     assert service.found(second) == undisturbed
 
 
-def test_a_job_that_ends_its_coordinator_again_and_again_is_given_up(
-    service: Service, undisturbed: bytes
-) -> None:
+def test_job_that_repeatedly_ends_its_coordinator_fails(service: Service, undisturbed: bytes) -> None:
     job = service.submit(LONG)
 
     def attempt_is(number: int) -> bool:
@@ -66,43 +64,41 @@ def test_a_job_that_ends_its_coordinator_again_and_again_is_given_up(
     failed = service.ended(job)
     assert (failed["state"], failed["attempt"]) == ("failed", 5)
     assert failed["problem"]["type"] == "no-progress"
-    assert failed["problem"]["detail"].startswith("5 attempts ended without bringing the job on")
-    # Others are not held up by it, and it is not lost.
+    assert failed["problem"]["detail"].startswith("5 attempts ended without progress")
+    # Other jobs are not blocked, and this one is not lost.
     assert service.found(service.submit(5)) != undisturbed
     assert service.ask("POST", f"/v1/jobs/{job}/resume").status_code == 202
     assert service.found(job) == undisturbed
 
 
-def test_told_to_end_a_service_keeps_what_runs_and_goes_on_at_the_next_start(
-    tmp_path: Path, undisturbed: bytes
-) -> None:
+def test_stopped_service_continues_its_jobs_after_the_next_start(tmp_path: Path, undisturbed: bytes) -> None:
     folder = tmp_path / "data"
     with serving(folder) as first:
         job, waiting = first.submit(LONG), first.submit(5)
         at = first.under_way(job, 50)
         children = descendants(first.process.pid)
         assert first.stop(seconds=20.0) == 0
-        # All of them: the islands and Ray's own as well.
+        # All children, including actors and Ray's own processes.
         eventually(lambda: not alive(children), seconds=5.0)
     log = first.log.read_text()
     assert "job released" in log
     assert "Traceback" not in log
-    with serving(folder, environment={"ISLANDS_COORDINATORS": "0"}) as doors:
-        kept = doors.job(job)
+    with serving(folder, environment={"ISLANDS_COORDINATORS": "0"}) as api:
+        kept = api.job(job)
         assert (kept["state"], kept["attempt"]) == ("queued", 0)
         assert kept["progress"]["generation"] >= at
-        assert doors.job(waiting)["state"] == "queued"
+        assert api.job(waiting)["state"] == "queued"
     with serving(folder) as second:
         eventually(lambda: second.job(job)["state"] == "running")
-        # From the checkpoint on: its first report is past what was reached before.
+        # Its first report is past the progress before the stop: it continues from the checkpoint.
         events = second.ask("GET", f"/v1/jobs/{job}/events", params={}).text
         assert second.found(job) == undisturbed
         assert second.found(waiting) != undisturbed
         assert events.count("event: running") == 2
 
 
-def test_ctrl_c_in_the_terminal_reaches_the_supervisor_alone(tmp_path: Path) -> None:
-    """Its children are told by it, each in its turn."""
+def test_ctrl_c_in_the_terminal_reaches_only_the_supervisor(tmp_path: Path) -> None:
+    """The supervisor ends its children one after the other."""
     with serving(tmp_path / "data") as service:
         job = service.submit(LONG)
         service.under_way(job)

@@ -1,4 +1,4 @@
-"""Processes of a service that hang: others take over, and who wakes up again does no harm."""
+"""Hanging processes of a service: others take over, and a resumed process does no harm."""
 
 import os
 import signal
@@ -18,10 +18,10 @@ pytestmark = pytest.mark.nightly
 
 LONG = 600
 
-#: Seconds of a lease; the supervisor ends a coordinator that has said nothing for five.
+#: Seconds of a lease; the supervisor kills a coordinator without heartbeats for five seconds.
 LEASE = {"ISLANDS_LEASE": "2"}
 
-#: What Ray asks everybody for who talks to it.
+#: Token that Ray requires of every client.
 TOKEN = "0123456789abcdef0123456789abcdef"
 
 #: A search that takes one CPU, so that two coordinators find one each.
@@ -30,7 +30,7 @@ ALONE = {"islands": 1}
 
 @pytest.fixture
 def stopped() -> Iterator[list[int]]:
-    """Processes that were stopped: they are woken up, or they would never end."""
+    """Suspended processes, which are resumed after the test so that they can end."""
     pids: list[int] = []
     yield pids
     for pid in alive(pids):
@@ -55,7 +55,7 @@ def undisturbed(service: Service) -> bytes:
 
 
 @pytest.mark.parametrize("role", ["coordinator", "gcs"])
-def test_who_hangs_is_ended_and_the_job_goes_on(
+def test_hanging_process_is_killed_and_the_job_continues(
     service: Service, undisturbed: bytes, stopped: list[int], role: str
 ) -> None:
     job = service.submit(LONG, settings=ALONE)
@@ -67,7 +67,7 @@ def test_who_hangs_is_ended_and_the_job_goes_on(
     assert service.job(job)["attempt"] == 2
 
 
-def test_doors_that_hang_are_started_again(service: Service, undisturbed: bytes, stopped: list[int]) -> None:
+def test_hanging_api_is_restarted(service: Service, undisturbed: bytes, stopped: list[int]) -> None:
     job = service.submit(LONG, settings=ALONE)
     victim = service.one("api")
     stop(victim, stopped)
@@ -77,7 +77,7 @@ def test_doors_that_hang_are_started_again(service: Service, undisturbed: bytes,
 
 @contextmanager
 def colleague(service: Service, name: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a coordinator that no supervisor looks after, as on another machine."""
+    """Run a coordinator without a supervisor, as on another machine."""
     environment = {
         **os.environ,
         **QUICK,
@@ -96,16 +96,14 @@ def colleague(service: Service, name: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def owned(service: Service, name: str) -> list[str]:
-    """The jobs that a coordinator has a lease of."""
+    """Return the jobs that a coordinator has leased."""
     with sqlite3.connect(f"file:{service.folder / 'islands.db'}?mode=ro", uri=True) as database:
         found = [row[0] for row in database.execute("SELECT id FROM jobs WHERE lease_owner = ?", (name,))]
     database.close()
     return found
 
 
-def test_a_coordinator_that_wakes_up_after_another_has_taken_over_writes_nothing(
-    service: Service, undisturbed: bytes
-) -> None:
+def test_coordinator_resumed_after_a_takeover_writes_nothing(service: Service, undisturbed: bytes) -> None:
     with colleague(service, "sleepy") as sleepy:
         jobs = [service.submit(LONG, settings=ALONE) for _ in range(2)]
         (job,) = eventually(lambda: owned(service, "sleepy"))  # type: ignore[misc]
@@ -113,12 +111,12 @@ def test_a_coordinator_that_wakes_up_after_another_has_taken_over_writes_nothing
         os.kill(sleepy.pid, signal.SIGSTOP)
         began = time.monotonic()
         eventually(lambda: service.job(job)["attempt"] == 2)
-        assert time.monotonic() - began > 1.0  # the lease was honoured
+        assert time.monotonic() - began > 1.0  # the lease was respected
         os.kill(sleepy.pid, signal.SIGCONT)
         assert {service.found(each) for each in jobs} == {undisturbed}
         ended = service.job(job)
         eventually(lambda: "lease lost" in service.log.read_text())
-        # It is about other jobs by now.
+        # The coordinator runs other jobs now.
         assert service.found(service.submit(5, settings=ALONE)) != undisturbed
         assert sleepy.poll() is None
         assert service.job(job) == ended

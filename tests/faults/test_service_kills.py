@@ -1,4 +1,4 @@
-"""Each process of a service, killed in the middle of a job: nothing is lost, and the models are the same."""
+"""Each process of a service is killed during a job: no job is lost, and the models are the same."""
 
 import json
 from collections.abc import Iterator
@@ -13,14 +13,17 @@ from islands.io.result_folder import result_document
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, SPEC, Service, serving
 
-#: Generations of the job that is disturbed, and of one that waits behind it.
-LONG, SHORT = 300, 5
+#: Generations of the job that is disturbed.
+LONG = 300
 
-#: One kill of each kind is enough for every change: doors, coordinator, Ray, and an island on it.
+#: Generations of a job that is queued behind it.
+SHORT = 5
+
+#: Roles that are killed on every change: API, coordinator, Ray, and an island on it.
 ESSENTIAL = ("api", "coordinator", "head", "island")
 
-#: Attempts that it may take: who talks to a Ray that is lost starts anew with it, unless the job is done
-#: before that shows. The loss of the doors or of an island is no matter of the coordinator's.
+#: Allowed numbers of attempts. A coordinator that loses Ray exits, unless the job ends before it notices. The
+#: loss of the API or of an island does not affect the coordinator.
 ATTEMPTS = {
     "api": {1},
     "coordinator": {2},
@@ -39,7 +42,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 @pytest.fixture(scope="module")
 def undisturbed(service: Service) -> tuple[bytes, bytes]:
-    """The models of the long and of the short job when nobody disturbs them."""
+    """Models of the long and of the short job without disturbances."""
     jobs = [service.submit(generations) for generations in (LONG, SHORT)]
     long, short = map(service.found, jobs)
     assert long != short
@@ -47,7 +50,7 @@ def undisturbed(service: Service) -> tuple[bytes, bytes]:
 
 
 def kinds(service: Service, job: str) -> list[str]:
-    """What happened to a job that has ended, after making sure that its events are in order, each once."""
+    """Return the kinds of the events of a finished job, which must be numbered consecutively."""
     text = service.ask("GET", f"/v1/jobs/{job}/events").text
     events = [
         dict(line.split(": ", 1) for line in event.splitlines()) for event in text.split("\n\n") if event
@@ -58,9 +61,7 @@ def kinds(service: Service, job: str) -> list[str]:
 
 
 @pytest.mark.ci
-def test_a_service_finds_what_one_process_finds_by_itself(
-    service: Service, undisturbed: tuple[bytes, bytes]
-) -> None:
+def test_service_finds_the_models_of_one_process(service: Service, undisturbed: tuple[bytes, bytes]) -> None:
     record = read_record(service.folder.with_suffix(".csv"), SPEC["inputs"], SPEC["output"])
     settings = {**SPEC["settings"], "generations": SHORT}
     alone = identify(record, preset="hysteresis", seed=SPEC["seed"], engine=SerialEngine(), **settings)
@@ -75,9 +76,7 @@ def test_a_service_finds_what_one_process_finds_by_itself(
         for role in ROLES
     ],
 )
-def test_a_process_is_killed_and_nothing_is_lost(
-    service: Service, undisturbed: tuple[bytes, bytes], role: str
-) -> None:
+def test_killed_process_loses_no_job(service: Service, undisturbed: tuple[bytes, bytes], role: str) -> None:
     job = service.submit(LONG, key=f"long {role}")
     waiting = service.submit(SHORT, key=f"short {role}")
     assert service.under_way(job) < LONG
@@ -95,7 +94,7 @@ def test_a_process_is_killed_and_nothing_is_lost(
 
 
 @pytest.mark.nightly
-def test_a_service_that_is_killed_leaves_no_process_and_goes_on_at_the_next_start(
+def test_killed_service_leaves_no_process_and_continues_after_a_start(
     tmp_path: Path, undisturbed: tuple[bytes, bytes]
 ) -> None:
     folder = tmp_path / "data"
@@ -106,7 +105,7 @@ def test_a_service_that_is_killed_leaves_no_process_and_goes_on_at_the_next_star
         children = descendants(first.process.pid)
         kill(first.process.pid)
         first.process.wait()
-        # At once, as somebody would who does it by hand: what the first one started is still ending.
+        # Start at once, as a user would: processes of the first service are still ending.
         with serving(folder, port=first.client.base_url.port) as second:
             assert second.job(job)["state"] in ("queued", "running")
             assert second.found(job) == undisturbed[0]

@@ -1,4 +1,4 @@
-"""A short soak: the long one is run by hand."""
+"""A short soak test; the long one is run by hand."""
 
 import json
 import subprocess
@@ -17,7 +17,7 @@ KILLS = 15
 
 
 @pytest.mark.timeout(900)
-def test_nothing_is_lost_or_done_twice_or_different_while_processes_are_killed(tmp_path: Path) -> None:
+def test_soak_with_kills_loses_duplicates_or_changes_no_job(tmp_path: Path) -> None:
     report = tmp_path / "found.json"
     done = subprocess.run(
         [sys.executable, SOAK, "--kills", str(KILLS), "--json", report, "--folder", tmp_path],

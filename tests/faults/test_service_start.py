@@ -1,4 +1,4 @@
-"""What a service refuses to start with, and TLS: each refusal says what to do, and ends with status 2."""
+"""Start of a service: each refusal says what to do and exits with status 2. And TLS."""
 
 import resource
 import socket
@@ -16,12 +16,12 @@ from support.service_processes import free_port, serving, started
 
 pytestmark = pytest.mark.nightly
 
-#: None of these is about Ray.
-DOORS = {"ISLANDS_COORDINATORS": "0"}
+#: Settings without coordinators, since these tests need no Ray.
+API_ONLY = {"ISLANDS_COORDINATORS": "0"}
 
 
 def refused(*options: object, **environment: str) -> str:
-    process = started(*options, **{**DOORS, **environment})
+    process = started(*options, **{**API_ONLY, **environment})
     try:
         _, said = process.communicate(timeout=30)
     finally:
@@ -32,24 +32,24 @@ def refused(*options: object, **environment: str) -> str:
     return " ".join(said.split())
 
 
-def test_a_second_service_on_the_same_folder_is_refused(tmp_path: Path) -> None:
+def test_second_service_on_the_same_folder_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "data"
-    with serving(folder, environment=DOORS) as service:
+    with serving(folder, environment=API_ONLY) as service:
         said = refused("--data-dir", folder, "--port", free_port())
         assert f"{folder} belongs to another 'islands serve' (process {service.process.pid})" in said
         assert "give another --data-dir" in said
         service.ready()
 
 
-def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
+def test_port_in_use_is_refused(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         said = refused("--data-dir", tmp_path / "data", "--port", port)
     assert f"cannot listen at 127.0.0.1, port {port} (another program has it): give another --port" in said
 
 
-def test_a_port_that_becomes_free_in_a_moment_is_waited_for() -> None:
-    """Who was there before us may be ending."""
+def test_port_that_becomes_free_soon_is_used() -> None:
+    """The process that has the port may be ending."""
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         Timer(0.3, other.close).start()
@@ -57,23 +57,23 @@ def test_a_port_that_becomes_free_in_a_moment_is_waited_for() -> None:
             assert mine.getsockname() == ("127.0.0.1", port)
 
 
-def test_an_address_that_others_reach_needs_a_key(tmp_path: Path) -> None:
+def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     said = refused("--data-dir", folder, "--host", "0.0.0.0", "--port", free_port())
     assert "0.0.0.0 can be reached by others, and there is no key" in said
     assert "make one with 'islands keys create --scope read --scope write'" in said
     secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()[0]
-    with serving(folder, "--host", "0.0.0.0", environment=DOORS) as service:
+    with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
         assert service.client.get("/v1/jobs").status_code == 401
         answer = service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {secret}"})
         assert answer.status_code == 200
 
 
-def test_doors_that_have_lost_their_last_key_stay_shut_until_there_is_one(tmp_path: Path) -> None:
-    """And nothing else ends for it: jobs run meanwhile."""
+def test_api_without_a_valid_key_starts_when_a_key_is_created(tmp_path: Path) -> None:
+    """No other role ends, so that jobs continue to run."""
     folder = tmp_path / "data"
     _, _, key, *_ = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()
-    with serving(folder, "--host", "0.0.0.0", environment=DOORS) as service:
+    with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
         succeed("keys", "revoke", key, "--data-dir", folder)
         kill(service.one("api"))
         eventually(lambda: "api ended (2): it is started again" in service.log.read_text())
@@ -82,12 +82,12 @@ def test_doors_that_have_lost_their_last_key_stay_shut_until_there_is_one(tmp_pa
         service.ready()
 
 
-def test_the_doors_have_as_many_files_as_the_machine_allows(tmp_path: Path) -> None:
-    """Every connection is one: a thousand of them that say nothing would shut the doors."""
+def test_api_may_open_as_many_files_as_the_machine_allows(tmp_path: Path) -> None:
+    """Every connection is a file: a thousand idle ones would otherwise block the API."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(soft, 256), hard))
     try:
-        with serving(tmp_path / "data", environment=DOORS) as service:
+        with serving(tmp_path / "data", environment=API_ONLY) as service:
             theirs = resource.prlimit(service.one("api"), resource.RLIMIT_NOFILE)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
@@ -96,7 +96,7 @@ def test_the_doors_have_as_many_files_as_the_machine_allows(tmp_path: Path) -> N
 
 @pytest.fixture
 def certificate(tmp_path: Path) -> tuple[Path, Path, ssl.SSLContext]:
-    """A certificate, its key, and what a client needs to trust it."""
+    """A certificate, its key, and a client context that trusts it."""
     authority, trusting = trustme.CA(), ssl.create_default_context()
     authority.configure_trust(trusting)
     issued = authority.issue_cert("127.0.0.1")
@@ -106,11 +106,11 @@ def certificate(tmp_path: Path) -> tuple[Path, Path, ssl.SSLContext]:
     return certificate, key, trusting
 
 
-def test_with_a_certificate_everything_goes_over_tls(
+def test_service_with_a_certificate_uses_tls_only(
     tmp_path: Path, certificate: tuple[Path, Path, ssl.SSLContext]
 ) -> None:
     files = ("--tls-certificate", certificate[0], "--tls-key", certificate[1])
-    with serving(tmp_path / "data", *files, tls=certificate[2], environment=DOORS) as service:
+    with serving(tmp_path / "data", *files, tls=certificate[2], environment=API_ONLY) as service:
         answer = service.client.get("/healthz")
         assert answer.json() == {"status": "alive"}
         assert answer.headers["strict-transport-security"] == "max-age=31536000"
@@ -123,7 +123,7 @@ def test_with_a_certificate_everything_goes_over_tls(
     assert "https://127.0.0.1" in service.log.read_text()
 
 
-def test_a_certificate_without_its_key_is_refused(
+def test_certificate_without_its_key_is_refused(
     tmp_path: Path, certificate: tuple[Path, Path, ssl.SSLContext]
 ) -> None:
     options = ("--data-dir", tmp_path / "data", "--port", free_port())
@@ -136,13 +136,13 @@ def test_a_certificate_without_its_key_is_refused(
     assert "give two PEM files that belong together" in said
 
 
-def test_a_stream_ends_in_good_order_when_the_service_is_told_to_end(tmp_path: Path) -> None:
+def test_event_stream_ends_cleanly_when_the_service_stops(tmp_path: Path) -> None:
     with serving(tmp_path / "data", environment={"ISLANDS_COORDINATORS": "0"}) as service:
         job = service.submit(5)
         with service.client.stream("GET", f"/v1/jobs/{job}/events") as answer:
             lines = answer.iter_lines()
             assert next(lines) == "id: 1"
             service.process.terminate()
-            # An answer that is cut off would raise an error here.
+            # A truncated response would raise an error here.
             assert not [line for line in lines if line.startswith("id: ")]
         assert service.process.wait(30) == 0

@@ -1,4 +1,4 @@
-"""Stores whose process is killed, whose disk is full, whose server goes away: what was accepted stays."""
+"""Killed processes, full disks and lost servers: accepted jobs are kept."""
 
 import shutil
 import sqlite3
@@ -58,7 +58,7 @@ while True:
     generation += 1
 """
 
-#: May write no file larger than so many bytes: what a quota of a file system does, for whoever is not root.
+#: May not write files above a size: the effect of a file system quota, also for unprivileged users.
 NARROW = """
 import resource, sys
 from islands_service.domain.job import Submission
@@ -76,12 +76,15 @@ with Store(sys.argv[1]) as store:
     print(store.jobs.submit(Submission("alice", {}))[0].id)
 """
 
-#: Of a small disk, and of what is left over on it for the tables themselves.
-DISK, TABLES = 2_000_000, 400_000
+#: Bytes of a small disk.
+DISK = 2_000_000
+
+#: Bytes that remain on it for the tables.
+TABLES = 400_000
 
 
 def intact(database):
-    """Make sure that a database has no damage of its own."""
+    """Check that a database is not corrupt."""
     if database.startswith("sqlite"):
         with closing(sqlite3.connect(database.removeprefix("sqlite:///"))) as connection:
             assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
@@ -89,7 +92,7 @@ def intact(database):
 
 
 def killed_after(process, lines):
-    """Let a process say so many lines, kill it, and return all whole lines it has said."""
+    """Kill a process after some lines of output, and return all of its complete lines."""
     said = [process.stdout.readline() for _ in range(lines)]
     kill(process.pid)
     said += process.stdout.readlines()
@@ -97,7 +100,7 @@ def killed_after(process, lines):
 
 
 @pytest.mark.parametrize("lines", [1, 40])
-def test_what_a_killed_process_has_acknowledged_is_there(database, lines):
+def test_acknowledged_jobs_of_a_killed_process_are_stored(database, lines):
     with child(SUBMIT, database) as process:
         acknowledged = killed_after(process, lines)
     intact(database)
@@ -106,7 +109,7 @@ def test_what_a_killed_process_has_acknowledged_is_there(database, lines):
             found = store.jobs.get(ALICE, job)
             assert found.spec == {"key": " ".join(key)}
             assert kinds(store, job) == ["queued"]
-        # What was not acknowledged any more may be there or not: asked again, it is the same job.
+        # Unacknowledged jobs may exist or not: a repeated request gets the same job.
         for job, *key in acknowledged:
             name = " ".join(key)
             again, new = store.jobs.submit(asked(spec={"key": name}, idempotency_key=name))
@@ -114,7 +117,7 @@ def test_what_a_killed_process_has_acknowledged_is_there(database, lines):
 
 
 @pytest.mark.nightly
-def test_a_process_that_is_killed_again_and_again_loses_nothing(database):
+def test_repeated_kills_lose_no_acknowledged_job(database):
     acknowledged = []
     for turn in range(15):
         with child(SUBMIT, database) as process:
@@ -127,27 +130,28 @@ def test_a_process_that_is_killed_again_and_again_loses_nothing(database):
 
 
 @pytest.mark.parametrize("reports", [1, 2, 9, 30])
-def test_a_killed_coordinator_leaves_whole_reports(database, reports):
+def test_killed_coordinator_leaves_complete_reports(database, reports):
     with Store(database) as store:
         job = submitted(store)
         with child(REPORT, database) as process:
-            told = killed_after(process, reports)
-        # PostgreSQL may still be at what the dead one has asked for last: until then the job is passed over.
+            reported = killed_after(process, reports)
+        # PostgreSQL may still execute the last statement of the killed process: its job is skipped until
+        # then.
         again = eventually(lambda: store.leases.claim("first", LONG))
         generation = again.job.progress["generation"]
-        assert generation in (len(told) - 1, len(told))
+        assert generation in (len(reported) - 1, len(reported))
         assert (again.epoch, again.job.checkpoint) == (2, f"{generation:064x}")
         assert [each[0] for each in store.results.history(job.id)] == list(range(generation + 1))
         assert kinds(store, job.id) == ["queued", "running", *["progress"] * (generation + 1), "running"]
     intact(database)
 
 
-def test_a_process_that_is_killed_in_the_middle_of_a_write_holds_nobody_up(database):
+def test_process_killed_during_a_write_blocks_no_other(database):
     with Store(database) as store:
         job = submitted(store)
         with standing(database, seconds=60) as process:
             kill(process.pid)
-        # PostgreSQL has to notice first that nobody is there any more.
+        # PostgreSQL must first notice that the client has ended.
         lease = eventually(lambda: store.leases.claim("second", LONG))
         assert (lease.job.id, lease.epoch, lease.job.progress) == (job.id, 2, None)
         store.leases.report(lease, brought_on(1))
@@ -160,7 +164,7 @@ def disk(small_disk):
 
 
 def until_full(store, jobs):
-    """Submit large jobs until there is no room; return what was raised."""
+    """Submit large jobs until the disk is full; return the error."""
     while True:
         try:
             jobs.append(submitted(store, spec={"text": "x" * 20_000}))
@@ -168,7 +172,7 @@ def until_full(store, jobs):
             return error
 
 
-def test_on_a_full_disk_what_was_accepted_is_there_and_the_store_goes_on_when_there_is_room(disk):
+def test_full_disk_loses_no_job_and_the_store_recovers(disk):
     with Store(f"sqlite:///{disk / 'islands.db'}") as store:
         job = submitted(store, priority=1)
         lease = claimed(store)
@@ -176,7 +180,7 @@ def test_on_a_full_disk_what_was_accepted_is_there_and_the_store_goes_on_when_th
         before = {each.id: each for each in jobs}
         filler = filled(disk, leave=TABLES)
         assert "make room" in str(until_full(store, jobs))
-        # All are told, also those who come at once, and nothing half is seen.
+        # All callers get the error, also concurrent ones, and no partial write is visible.
         answered = at_once([lambda: submitted(store, spec={"text": "x" * 20_000})] * 8)
         assert all(isinstance(each, StorageFullError) for each in answered)
         with pytest.raises(StorageFullError):
@@ -199,7 +203,7 @@ def test_on_a_full_disk_what_was_accepted_is_there_and_the_store_goes_on_when_th
         }
 
 
-def test_on_a_disk_without_a_single_byte_left_what_was_accepted_can_be_read(disk):
+def test_accepted_jobs_can_be_read_from_a_completely_full_disk(disk):
     url = f"sqlite:///{disk / 'islands.db'}"
     with Store(url) as store:
         job = submitted(store)
@@ -211,12 +215,12 @@ def test_on_a_disk_without_a_single_byte_left_what_was_accepted_can_be_read(disk
         submitted(store)
 
 
-def test_on_a_full_disk_a_store_opens_again_when_there_is_room(disk):
+def test_store_opens_again_when_a_full_disk_has_space(disk):
     url = f"sqlite:///{disk / 'islands.db'}"
     with Store(url) as store:
         job = submitted(store)
     filler = filled(disk)
-    # Its log and the memory that its readers share are files, too.
+    # The log and the shared memory of the readers are files, too.
     with pytest.raises(StorageFullError, match="make room"):
         Store(url)
     filler.unlink()
@@ -225,7 +229,7 @@ def test_on_a_full_disk_a_store_opens_again_when_there_is_room(disk):
         submitted(store)
 
 
-def test_where_files_may_not_grow_any_more_the_disk_is_called_full(prepared_sqlite, tmp_path):
+def test_file_size_limit_counts_as_a_full_disk(prepared_sqlite, tmp_path):
     path = shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
     with child(NARROW, f"sqlite:///{path}", "500000") as process:
         *accepted, fault, after = process.communicate(timeout=60)[0].split()
@@ -236,7 +240,7 @@ def test_where_files_may_not_grow_any_more_the_disk_is_called_full(prepared_sqli
         assert {job.id for job in store.jobs.page(ALICE, limit=200).jobs} == {*accepted, after}
 
 
-def test_on_a_full_disk_blobs_are_refused_and_those_that_are_there_stay(disk):
+def test_full_disk_refuses_new_blobs_and_keeps_existing_ones(disk):
     blobs = Blobs(disk / "blobs")
     kept = blobs.write(b"kept" * 1000)
     filler = filled(disk, leave=100_000)

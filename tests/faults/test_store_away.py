@@ -1,4 +1,4 @@
-"""A PostgreSQL that goes away and comes back, and those who stand still while they hold something of it."""
+"""PostgreSQL servers that stop and restart, and processes that are suspended while they hold locks."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ from support.repository import ROOT
 from support.stores import ALICE, EXPIRED, LONG, brought_on, claimed, kinds, standing, submitted
 
 
-def test_on_postgresql_a_job_in_the_middle_of_a_write_is_passed_over(prepared_postgres):
+def test_postgresql_claim_skips_a_job_that_is_being_written(prepared_postgres):
     database = emptied(prepared_postgres)
     with Store(database) as store:
         submitted(store)
@@ -30,20 +30,20 @@ def test_on_postgresql_a_job_in_the_middle_of_a_write_is_passed_over(prepared_po
             assert claimed(store).job.id == other.id
 
 
-def test_on_postgresql_a_process_that_stands_still_in_the_middle_of_a_write_lets_go(prepared_postgres):
+def test_postgresql_ends_the_transaction_of_a_stopped_process(prepared_postgres):
     database = emptied(prepared_postgres)
     with Store(database) as store:
         job = submitted(store)
         with standing(database, seconds=1) as process:
-            # The server ends the transaction of the process that stands still.
+            # The server ends the transaction of the suspended process.
             assert eventually(lambda: store.leases.claim("second", LONG)).job.id == job.id
             os.kill(process.pid, signal.SIGCONT)
-            # The connection is found dead before the commit, or in it.
+            # The connection fails before or during the commit.
             assert process.stdout.readline().startswith("StoreUnavailableError")
             assert store.jobs.get(ALICE, job.id).progress is None
 
 
-#: Runs in a network of its own, and cuts it.
+#: Runs in a separate network namespace, and cuts its network.
 CUT = """
 import subprocess, sys, time
 sys.path.insert(0, sys.argv[1])
@@ -53,7 +53,7 @@ from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
 def network(state):
     subprocess.run(["ip", "link", "set", "lo", state], check=True)
-def told(ask):
+def measure(ask):
     began = time.monotonic()
     try:
         ask()
@@ -64,8 +64,8 @@ with server(listen_addresses="127.0.0.1") as far:
     with Store("postgresql+psycopg://islands@127.0.0.1/postgres") as store:
         job = submitted(store)
         network("down")
-        told(lambda: store.jobs.get(ALICE, job.id))
-        told(lambda: submitted(store))
+        measure(lambda: store.jobs.get(ALICE, job.id))
+        measure(lambda: submitted(store))
         network("up")
         assert store.jobs.get(ALICE, job.id) == job
         submitted(store)
@@ -74,34 +74,34 @@ with server(listen_addresses="127.0.0.1") as far:
 
 
 @pytest.fixture(scope="module")
-def mortals():
-    """A PostgreSQL of these tests alone."""
+def servers():
+    """A PostgreSQL server for these tests only."""
     with server() as own:
         Store(own.url).close()
         yield own
 
 
 @pytest.fixture
-def mortal(mortals):
-    """A PostgreSQL to be stopped and started."""
-    if not answers(mortals.url):
-        mortals.start()
-    emptied(mortals.url)
-    return mortals
+def restartable(servers):
+    """A running PostgreSQL server that may be stopped and started."""
+    if not answers(servers.url):
+        servers.start()
+    emptied(servers.url)
+    return servers
 
 
 @pytest.mark.parametrize(
     "how",
     [
-        pytest.param(signal.SIGINT, marks=pytest.mark.nightly, id="in good order"),
-        pytest.param(signal.SIGQUIT, marks=pytest.mark.ci, id="as in a crash"),
+        pytest.param(signal.SIGINT, marks=pytest.mark.nightly, id="shutdown"),
+        pytest.param(signal.SIGQUIT, marks=pytest.mark.ci, id="crash"),
     ],
 )
-def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mortal, how):
-    with Store(mortal.url) as store:
+def test_stopped_postgresql_raises_errors_and_is_used_after_a_restart(restartable, how):
+    with Store(restartable.url) as store:
         job = submitted(store)
         lease = claimed(store)
-        mortal.stop(how)
+        restartable.stop(how)
         for ask in (
             lambda: store.jobs.get(ALICE, job.id),
             lambda: submitted(store),
@@ -114,18 +114,18 @@ def test_a_postgresql_that_goes_away_is_told_and_used_again_when_it_is_back(mort
                     ask()
                 assert time.monotonic() - began < 20
         with pytest.raises(StoreUnavailableError):
-            Store(mortal.url)
-        assert not answers(mortal.url)
-        mortal.start()
+            Store(restartable.url)
+        assert not answers(restartable.url)
+        restartable.start()
         assert store.jobs.get(ALICE, job.id) == lease.job
         store.leases.report(lease, brought_on(1))
         assert kinds(store, submitted(store).id) == ["queued"]
 
 
 @pytest.mark.ci
-def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
+def test_acknowledged_jobs_survive_a_crash_of_postgresql(restartable):
     over, acknowledged, failed = threading.Event(), [], []
-    with Store(mortal.url) as store:
+    with Store(restartable.url) as store:
 
         def submit():
             while not over.is_set():
@@ -141,10 +141,10 @@ def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
         for _ in range(3):
             seen = len(acknowledged)
             eventually(lambda seen=seen: len(acknowledged) >= seen + 30)
-            mortal.stop(signal.SIGQUIT)
-            told = len(failed)
-            eventually(lambda told=told: len(failed) > told)
-            mortal.start()
+            restartable.stop(signal.SIGQUIT)
+            seen_failures = len(failed)
+            eventually(lambda seen=seen_failures: len(failed) > seen)
+            restartable.start()
         over.set()
         for thread in threads:
             thread.join()
@@ -153,8 +153,8 @@ def test_what_a_postgresql_that_crashes_has_acknowledged_is_there(mortal):
             assert kinds(store, job) == ["queued"]
 
 
-def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(prepared_postgres):
-    """After its place was taken by another one it is a copy."""
+def test_read_only_postgresql_counts_as_unavailable(prepared_postgres):
+    """After a failover the former primary server may be a standby."""
     with Store(emptied(prepared_postgres)) as store:
         job = submitted(store)
 
@@ -168,12 +168,12 @@ def test_a_postgresql_that_may_only_be_read_is_told_as_one_that_is_away(prepared
 
 
 @pytest.mark.ci
-def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebody(mortal):
-    with Store(mortal.url) as store, Store(mortal.url) as other:
+def test_lease_expired_during_an_outage_is_valid_until_the_next_claim(restartable):
+    with Store(restartable.url) as store, Store(restartable.url) as other:
         submitted(store)
         lease = claimed(store, EXPIRED)
-        mortal.stop(signal.SIGQUIT)
-        mortal.start()
+        restartable.stop(signal.SIGQUIT)
+        restartable.start()
         assert store.leases.renew(lease, EXPIRED) is False
         taken = claimed(other)
         assert taken.job.id == lease.job.id
@@ -186,8 +186,8 @@ def test_a_lease_that_ran_out_while_the_database_was_away_is_lost_only_to_somebo
     os.getuid() != 0 or shutil.which("unshare") is None or shutil.which("ip") is None,
     reason="a network to cut needs root, unshare and ip",
 )
-def test_a_postgresql_behind_a_cut_network_is_told_in_seconds_and_used_again_afterwards(mortals):
-    """Nothing comes back from there, not even a refusal: TCP by itself would wait for many minutes."""
+def test_cut_network_to_postgresql_raises_errors_within_seconds(servers):
+    """No packet comes back, not even a refusal: TCP alone would wait for many minutes."""
     tests = ROOT / "tests"
     command = ["unshare", "--net", sys.executable, "-c", CUT, tests]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)

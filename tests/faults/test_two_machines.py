@@ -1,4 +1,4 @@
-"""A cluster of two nodes, each with its own object store: the same result, also when a node is lost."""
+"""A cluster of two nodes with separate object stores: the result is the same, also if a node is lost."""
 
 import os
 from dataclasses import replace
@@ -36,7 +36,7 @@ def undisturbed(posed):
 def head():
     from ray.cluster_utils import Cluster
 
-    # A process reads its token once, and another test of it may have set one.
+    # A process reads its token once, and another test in this process may have set one.
     os.environ.setdefault("RAY_AUTH_TOKEN", "0123456789abcdef0123456789abcdef")
     started = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 10**8})
     try:
@@ -50,34 +50,34 @@ def add(head):
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_two_nodes_find_what_one_process_finds_even_if_one_is_lost(head, posed, undisturbed, lost):
+def test_two_nodes_find_the_models_of_one_process_despite_a_loss(head, posed, undisturbed, lost):
     import ray
 
     nodes = [add(head), add(head)]
-    told, seen = [], []
+    messages, seen = [], []
     with cluster(head.address):
         eventually(lambda: ray.cluster_resources().get("CPU") == 2)
-        for epoch in RayEngine(told.append).run(posed, empty_archipelago(4, 5), never):
+        for epoch in RayEngine(messages.append).run(posed, empty_archipelago(4, 5), never):
             seen.append(exactly(epoch.archipelago))
             if lost and len(seen) == 3:
-                # The machine goes, and all of its processes with it.
+                # The machine is lost with all of its processes.
                 raylet = nodes[1].all_processes["raylet"][0].process.pid
                 for pid in (raylet, *descendants(raylet)):
                     kill(pid)
     assert seen == undisturbed
-    assert any("an actor was lost" in line for line in told) == lost
+    assert any("an actor was lost" in line for line in messages) == lost
 
 
-def test_without_a_cpu_it_says_so_and_begins_when_a_machine_joins(head, posed, undisturbed):
-    told = []
+def test_search_without_a_cpu_begins_when_a_machine_joins(head, posed, undisturbed):
+    messages = []
 
     def tell(line):
-        told.append(line)
+        messages.append(line)
         add(head)
 
     with cluster(head.address):
         seen = [
             exactly(epoch.archipelago) for epoch in RayEngine(tell).run(posed, empty_archipelago(4, 5), never)
         ]
-    assert told[0].startswith("waiting for capacity: 0 of 1 island actors are ready")
+    assert messages[0].startswith("waiting for capacity: 0 of 1 island actors are ready")
     assert seen == undisturbed

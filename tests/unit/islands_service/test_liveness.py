@@ -1,4 +1,4 @@
-"""The wish to stop: a signal may come at any moment, also in the midst of looking for it."""
+"""`StopRequest`: a signal may arrive at any moment, also during a wait."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import pytest
 
 from islands_service.liveness import StopRequest
 
-#: Waits a short time again and again while signals come at every moment of it.
+#: Waits for short times while signals arrive continuously.
 WAITING = """
 import signal
 from islands_service.liveness import StopRequest, stop_on_signals
@@ -26,14 +26,14 @@ print(made)
 
 
 @pytest.mark.ci
-def test_a_signal_in_the_midst_of_a_look_is_not_waited_for_for_ever() -> None:
+def test_signal_during_a_wait_does_not_deadlock_the_stop_request() -> None:
     command = [sys.executable, "-c", WAITING]
     said = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert said.stderr == ""
     assert int(said.stdout) > 1000
 
 
-def test_a_wish_ends_the_wait_at_once_and_stays() -> None:
+def test_stop_request_ends_the_wait_at_once_and_persists() -> None:
     stopping = StopRequest()
     assert not stopping.wait(0.0)
     assert not stopping.requested

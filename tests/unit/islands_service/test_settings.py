@@ -1,4 +1,4 @@
-"""Settings: read from the environment in one place, held to their ranges, handed on to children unchanged."""
+"""Settings: environment variables, ranges, and the environment of child processes."""
 
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ def clean(monkeypatch):
             monkeypatch.delenv(name)
 
 
-def test_what_is_given_goes_before_the_environment_and_that_before_the_default(monkeypatch, tmp_path):
+def test_arguments_precede_the_environment_and_that_precedes_defaults(monkeypatch, tmp_path):
     assert service_settings(data_dir=tmp_path).port == 8000
     monkeypatch.setenv("ISLANDS_PORT", "9000")
     assert service_settings(data_dir=tmp_path).port == 9000
@@ -45,13 +45,13 @@ def test_what_is_given_goes_before_the_environment_and_that_before_the_default(m
         ("require_keys", "perhaps"),
     ],
 )
-def test_a_value_out_of_its_range_is_refused_by_name(monkeypatch, name, value):
+def test_value_out_of_range_is_refused_with_the_name_of_its_setting(monkeypatch, name, value):
     monkeypatch.setenv(f"ISLANDS_{name.upper()}", value)
     with pytest.raises(SettingsError, match=rf"setting {name} \(ISLANDS_{name.upper()}\): .+"):
         service_settings()
 
 
-def test_a_child_has_the_same_settings(monkeypatch, tmp_path):
+def test_child_process_has_the_same_settings(monkeypatch, tmp_path):
     given = ServiceSettings(
         data_dir=tmp_path,
         database="postgresql+psycopg://me@host/islands",
@@ -70,28 +70,28 @@ def test_a_child_has_the_same_settings(monkeypatch, tmp_path):
     assert service_settings() == given.model_copy(update={"lifeline": None})
 
 
-def test_a_child_inherits_the_rest_of_the_environment(monkeypatch, tmp_path):
+def test_child_process_inherits_the_rest_of_the_environment(monkeypatch, tmp_path):
     monkeypatch.setenv("SOMETHING_ELSE", "kept")
     assert ServiceSettings(data_dir=tmp_path).environment()["SOMETHING_ELSE"] == "kept"
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost"])
-def test_on_a_loopback_address_no_key_is_needed_unless_it_is_wished(host):
+def test_loopback_address_needs_no_key_unless_keys_are_required(host):
     assert not ServiceSettings(host=host).keys_needed
     assert ServiceSettings(host=host, require_keys=True).keys_needed
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.0.7", "islands.example.org", ""])
-def test_on_any_other_address_keys_are_needed(host):
+def test_other_addresses_need_keys(host):
     assert ServiceSettings(host=host).keys_needed
 
 
-def test_the_database_stands_in_the_data_folder_unless_another_one_is_given(tmp_path, monkeypatch):
+def test_database_is_in_the_data_folder_unless_another_is_given(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert ServiceSettings(data_dir=Path("data")).url == f"sqlite:///{tmp_path}/data/islands.db"
     assert ServiceSettings(database="postgresql://x").url == "postgresql://x"
 
 
-def test_settings_do_not_change():
+def test_settings_are_immutable():
     with pytest.raises(ValueError, match="frozen"):
         ServiceSettings().port = 1

@@ -1,4 +1,4 @@
-"""The supervisor, with tiny children that write down in a journal what happens to them."""
+"""`supervise` with small child processes that record events in a journal."""
 
 import json
 import os
@@ -14,7 +14,7 @@ import pytest
 from islands_service.supervisor import DataDirLockedError, folder_lock
 from support.processes import alive, eventually
 
-#: Runs roles until it is told to end, with some of the supervisor's constants changed.
+#: Runs roles until it ends, with some constants of the supervisor changed.
 DRIVER = """
 import json, os, signal, sys
 from pathlib import Path
@@ -29,38 +29,38 @@ for role in roles:
 sys.exit(supervisor.supervise([supervisor.Role(**role) for role in roles], os.environ))
 """
 
-#: What every child can do: write in the journal, give a sign of life, and stay until SIGTERM.
+#: Functions of every child: write to the journal, send a heartbeat, and run until SIGTERM.
 CHILD = """
 import os, signal, sys, time
 def note(what, name=sys.argv[1]):
     with open(os.environ["JOURNAL"], "a") as journal:
         journal.write(f"{time.monotonic():.4f} {name} {what} {os.getpid()}\\n")
-def sign():
+def heartbeat():
     os.write(int(os.environ["ISLANDS_LIFELINE"]), b".")
 def wait(what):
     while what not in open(os.environ["JOURNAL"]).read():
         time.sleep(0.005)
 def stay(end=lambda: None):
     def ended(*_):
-        note("told")
+        note("signalled")
         end()
         note("end")
         os._exit(0)
     signal.signal(signal.SIGTERM, ended)
     note("start")
-    sign()
+    heartbeat()
     while True:
         time.sleep(0.05)
         LIVE()
-LIVE = sign
+LIVE = heartbeat
 """
 
-#: Constants that make a test take tenths of a second.
-FAST = {"_LOOK": 0.01, "_BACKOFF": 0.05, "_PROVEN": 5.0, "_API_FIRST": 5.0}
+#: Constants that reduce a test to tenths of a second.
+FAST = {"_POLL_SECONDS": 0.01, "_FIRST_BACKOFF": 0.05, "_STABLE_AFTER": 5.0, "_API_HEAD_START": 5.0}
 
 
 class Supervised:
-    """A supervisor in a process of its own, and the journal of its children."""
+    """A supervisor in a separate process, and the journal of its children."""
 
     def __init__(self, folder: Path, roles: list[dict[str, Any]], constants: dict[str, float]) -> None:
         self.journal = folder / "journal"
@@ -74,21 +74,21 @@ class Supervised:
         )
 
     def entries(self, what: str = "", name: str = "") -> list[tuple[float, str, str, int]]:
-        """What children have written down: when, who, what, and the process."""
+        """Entries of the journal: time, role, event and process id."""
         lines = [line.split() for line in self.journal.read_text().splitlines()]
-        found = [(float(at), who, kind, int(pid)) for at, who, kind, pid in lines]
+        found = [(float(at), role, kind, int(pid)) for at, role, kind, pid in lines]
         return [entry for entry in found if what in ("", entry[2]) and name in ("", entry[1])]
 
     def started(self, count: int = 1, name: str = "") -> list[tuple[float, str, str, int]]:
-        """Wait until children have started so often."""
+        """Wait until children have started ``count`` times."""
         found = eventually(lambda: len(got := self.entries("start", name)) >= count and got, seconds=20.0)
         return list(found)  # type: ignore[call-overload]
 
     def order(self, *kinds: str) -> list[str]:
-        return [f"{who} {kind}" for _, who, kind, _ in self.entries() if kind in kinds]
+        return [f"{role} {kind}" for _, role, kind, _ in self.entries() if kind in kinds]
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> str:
-        """End it, and return what it has said."""
+        """Send a signal, and return the output of the supervisor."""
         self.process.send_signal(number)
         return self.said()
 
@@ -102,7 +102,7 @@ Start = Callable[..., Supervised]
 
 @pytest.fixture
 def supervised(tmp_path: Path) -> Iterator[Start]:
-    """Start a supervisor; none of its children is left at the end."""
+    """Start a supervisor; all of its children have ended after the test."""
     running: list[Supervised] = []
 
     def start(*roles: dict[str, Any], **constants: float) -> Supervised:
@@ -121,119 +121,119 @@ def role(name: str, script: str = "stay()", patience: float = 60.0, **more: Any)
     return {"name": name, "command": command, "patience": patience, **more}
 
 
-def test_who_ends_is_started_again(supervised: Start) -> None:
-    running = supervised(role("doors", "note('start'); sys.exit(7)"))
+def test_role_that_exits_is_restarted(supervised: Start) -> None:
+    running = supervised(role("api", "note('start'); sys.exit(7)"))
     pids = {pid for *_, pid in running.started(3)}
     assert len(pids) >= 3
-    assert "islands serve: doors ended (7): it is started again" in running.end()
+    assert "islands serve: api ended (7): it is started again" in running.end()
     assert running.process.returncode == 0
 
 
-def test_who_says_nothing_any_more_is_taken_for_hanging(supervised: Start) -> None:
-    running = supervised(role("doors", "LIVE = lambda: None\nstay()", patience=0.3))
+def test_role_without_heartbeats_is_killed_and_restarted(supervised: Start) -> None:
+    running = supervised(role("api", "LIVE = lambda: None\nstay()", patience=0.3))
     (first, _, _, pid), (second, *_) = running.started(2)[:2]
     assert second - first > 0.3
     assert not alive([pid])
-    assert "doors has said nothing for 0." in running.end()
+    assert "api has sent no heartbeat for 0." in running.end()
 
 
-def test_the_others_wait_for_the_first_sign_of_the_first_one(supervised: Start) -> None:
-    slow = role("doors", "note('start'); time.sleep(0.5); note('ready'); stay()")
+def test_other_roles_wait_for_the_first_heartbeat_of_the_api(supervised: Start) -> None:
+    slow = role("api", "note('start'); time.sleep(0.5); note('ready'); stay()")
     running = supervised(slow, role("work"))
     running.started(1, "work")
-    assert running.order("start", "ready")[:2] == ["doors start", "doors ready"]
+    assert running.order("start", "ready")[:2] == ["api start", "api ready"]
 
 
-def test_the_others_do_not_wait_for_ever(supervised: Start) -> None:
-    running = supervised(role("doors", "note('start'); time.sleep(60)"), role("work"), _API_FIRST=0.3)
+def test_other_roles_start_after_a_limit_without_the_api(supervised: Start) -> None:
+    running = supervised(role("api", "note('start'); time.sleep(60)"), role("work"), _API_HEAD_START=0.3)
     running.started(1, "work")
 
 
-def test_who_cannot_go_on_without_another_is_started_again_with_it(supervised: Start) -> None:
-    roles = (role("doors"), role("work", needs=["ray"]), role("ray"))
+def test_role_is_restarted_with_a_role_that_it_needs(supervised: Start) -> None:
+    roles = (role("api"), role("work", needs=["ray"]), role("ray"))
     running = supervised(*roles)
     running.started(3)
-    before = {who: pid for _, who, _, pid in running.entries("start")}
+    before = {name: pid for _, name, _, pid in running.entries("start")}
     os.kill(before["ray"], signal.SIGKILL)
     running.started(2, "ray")
     running.started(2, "work")
     assert not alive([before["work"], before["ray"]])
-    assert len(running.entries("start", "doors")) == 1
-    # The other way round nobody else is concerned.
+    assert len(running.entries("start", "api")) == 1
+    # In the other direction no other role is affected.
     os.kill(running.entries("start", "work")[-1][3], signal.SIGKILL)
     running.started(3, "work")
     assert len(running.entries("start", "ray")) == 2
 
 
-def test_where_one_says_that_it_cannot_run_so_all_end_and_so_does_the_supervisor(supervised: Start) -> None:
-    refusing = role("doors", "note('start'); sign(); wait('work start'); sys.exit(2)")
+def test_misconfigured_role_ends_all_roles_and_the_supervisor(supervised: Start) -> None:
+    refusing = role("api", "note('start'); heartbeat(); wait('work start'); sys.exit(2)")
     running = supervised(refusing, role("work"))
     assert "started again" not in running.said()
     assert running.process.returncode == 2
-    assert running.order("told", "end") == ["work told", "work end"]
+    assert running.order("signalled", "end") == ["work signalled", "work end"]
 
 
-def test_one_that_has_run_so_before_and_now_cannot_is_started_again_until_it_can(supervised: Start) -> None:
-    """The doors, whose last key has expired: it is no reason to end the jobs."""
+def test_role_that_has_run_before_is_restarted_when_misconfigured(supervised: Start) -> None:
+    """For example the API whose last key has expired: jobs continue."""
     script = (
-        "count = open(os.environ['JOURNAL']).read().count('doors start')\n"
+        "count = open(os.environ['JOURNAL']).read().count('api start')\n"
         "if count in (1, 2): note('start'); sys.exit(2)\n"
         "stay()"
     )
-    running = supervised(role("doors", script), role("work"), _BACKOFF=0.05)
+    running = supervised(role("api", script), role("work"), _FIRST_BACKOFF=0.05)
     running.started(1, "work")
-    os.kill(running.started(1, "doors")[0][3], signal.SIGKILL)
-    running.started(4, "doors")
+    os.kill(running.started(1, "api")[0][3], signal.SIGKILL)
+    running.started(4, "api")
     assert len(running.entries("start", "work")) == 1
-    assert running.end().count("doors ended (2): it is started again") == 2
+    assert running.end().count("api ended (2): it is started again") == 2
     assert running.process.returncode == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_told_to_end_it_ends_all_in_their_order_each_after_the_one_before(
+def test_signal_ends_the_roles_one_after_the_other_in_order(
     supervised: Start, number: signal.Signals
 ) -> None:
     drains = "stay(lambda: time.sleep(0.2))"
-    running = supervised(role("doors", drains), role("work", drains), role("ray", drains))
+    running = supervised(role("api", drains), role("work", drains), role("ray", drains))
     running.started(3)
     assert running.end(number) == ""
     assert running.process.returncode == 0
-    told = [f"{name} {what}" for name in ("doors", "work", "ray") for what in ("told", "end")]
-    assert running.order("told", "end") == told
+    signalled = [f"{name} {what}" for name in ("api", "work", "ray") for what in ("signalled", "end")]
+    assert running.order("signalled", "end") == signalled
 
 
-def test_who_does_not_end_is_ended(supervised: Start) -> None:
-    stubborn = role("doors", "stay(lambda: time.sleep(60))")
-    running = supervised(stubborn, role("work"), _GRACE=0.3)
+def test_role_that_does_not_end_is_killed(supervised: Start) -> None:
+    stubborn = role("api", "stay(lambda: time.sleep(60))")
+    running = supervised(stubborn, role("work"), _SHUTDOWN_GRACE=0.3)
     running.started(2)
-    assert "doors does not end: it is ended" in running.end()
+    assert "api does not end: it is killed" in running.end()
     assert running.process.returncode == 0
-    assert running.order("told", "end") == ["doors told", "work told", "work end"]
+    assert running.order("signalled", "end") == ["api signalled", "work signalled", "work end"]
 
 
 def test_ctrl_c_in_the_terminal_does_not_reach_the_children(supervised: Start) -> None:
-    running = supervised(
-        role("doors", "signal.signal(signal.SIGINT, lambda *_: note('interrupted'))\nstay()")
-    )
+    running = supervised(role("api", "signal.signal(signal.SIGINT, lambda *_: note('interrupted'))\nstay()"))
     running.started()
     os.killpg(running.process.pid, signal.SIGINT)
     running.said()
-    assert running.order("told", "interrupted", "end") == ["doors told", "doors end"]
+    assert running.order("signalled", "interrupted", "end") == ["api signalled", "api end"]
 
 
-def test_where_the_supervisor_is_killed_the_children_are_told_as_they_asked_for(supervised: Start) -> None:
-    running = supervised(role("doors", orphaned=int(signal.SIGKILL)), role("work"))
+def test_killed_supervisor_sends_each_role_its_parent_death_signal(supervised: Start) -> None:
+    running = supervised(role("api", orphaned=int(signal.SIGKILL)), role("work"))
     running.started(2)
     running.process.kill()
     running.said()
     eventually(lambda: not alive({pid for *_, pid in running.entries()}))
-    assert running.order("told", "end") == ["work told", "work end"]
+    assert running.order("signalled", "end") == ["work signalled", "work end"]
 
 
-def test_whom_a_child_leaves_behind_is_ended_with_it(supervised: Start) -> None:
-    """Ray's processes, and files that are being read: nobody is there any more who would end them."""
+def test_descendants_of_a_role_are_killed_with_it(supervised: Start) -> None:
+    """Ray's processes, and inspections of files: no other process would end them."""
     leaves = (
-        "note('start'); sign()\nif os.fork() == 0: note('left', 'grandchild')\nwhile True: time.sleep(0.05)"
+        "note('start'); heartbeat()\n"
+        "if os.fork() == 0: note('left', 'grandchild')\n"
+        "while True: time.sleep(0.05)"
     )
     running = supervised(role("ray", leaves))
     for number in (signal.SIGKILL, signal.SIGTERM):
@@ -245,26 +245,24 @@ def test_whom_a_child_leaves_behind_is_ended_with_it(supervised: Start) -> None:
     assert not alive({pid for *_, pid in running.entries()})
 
 
-def test_a_file_that_says_how_a_child_is_reached_goes_with_the_child(
-    supervised: Start, tmp_path: Path
-) -> None:
+def test_address_file_of_a_role_is_deleted_with_it(supervised: Start, tmp_path: Path) -> None:
     address = tmp_path / "address"
-    script = "note('start'); sign()\nwhile True: time.sleep(0.05)"
+    script = "note('start'); heartbeat()\nwhile True: time.sleep(0.05)"
     running = supervised(role("ray", script, address=str(address)))
     pid = running.started()[0][3]
-    address.write_text("where it was")
+    address.write_text("the address")
     os.kill(pid, signal.SIGKILL)
     eventually(lambda: not address.exists())
 
 
-def test_children_have_one_secret_for_ray_and_every_service_another(
+def test_roles_share_one_ray_token_that_differs_between_services(
     supervised: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("RAY_AUTH_TOKEN", raising=False)  # one that is given counts
+    monkeypatch.delenv("RAY_AUTH_TOKEN", raising=False)  # a given token takes precedence
     script = "note('token-' + os.environ['RAY_AUTH_TOKEN']); stay()"
     tokens = []
     for _ in range(2):
-        running = supervised(role("doors", script), role("work", script))
+        running = supervised(role("api", script), role("work", script))
         running.started(2)
         tokens.append({kind for _, _, kind, _ in running.entries() if kind.startswith("token")})
         running.end()
@@ -275,17 +273,17 @@ def test_children_have_one_secret_for_ray_and_every_service_another(
     assert len(tokens[0].pop()) == len("token-") + 32
 
 
-def test_starting_again_and_again_takes_no_more_and_more_files(supervised: Start) -> None:
-    running = supervised(role("doors", "note('start')"), _BACKOFF=0.01, _MOST_BACKOFF=0.01)
+def test_restarts_do_not_leak_file_descriptors(supervised: Start) -> None:
+    running = supervised(role("api", "note('start')"), _FIRST_BACKOFF=0.01, _MAX_BACKOFF=0.01)
     files = Path(f"/proc/{running.process.pid}/fd")
     running.started(3)
     before = len(list(files.iterdir()))
     running.started(10)
-    # A child may be just starting.
+    # A child may be starting at this moment.
     eventually(lambda: len(list(files.iterdir())) <= before + 1)
 
 
-def test_a_pipe_that_nobody_reads_holds_no_child_up(supervised: Start) -> None:
+def test_full_heartbeat_pipe_does_not_block_a_role(supervised: Start) -> None:
     flood = (
         "note('start'); time.sleep(0.3)\n"
         "for _ in range(20_000):\n"
@@ -293,7 +291,7 @@ def test_a_pipe_that_nobody_reads_holds_no_child_up(supervised: Start) -> None:
         "    except BlockingIOError: pass\n"
         "note('done'); stay()"
     )
-    running = supervised(role("doors", flood), role("work"))
+    running = supervised(role("api", flood), role("work"))
     running.started()
     os.kill(running.process.pid, signal.SIGSTOP)
     try:
@@ -303,7 +301,7 @@ def test_a_pipe_that_nobody_reads_holds_no_child_up(supervised: Start) -> None:
     running.started(1, "work")
 
 
-def test_a_folder_belongs_to_one_service(tmp_path: Path) -> None:
+def test_data_folder_is_locked_by_one_service(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     with folder_lock(folder):
         assert folder.stat().st_mode & 0o077 == 0
@@ -316,7 +314,7 @@ def test_a_folder_belongs_to_one_service(tmp_path: Path) -> None:
         pass
 
 
-def test_the_lock_of_a_killed_service_is_free(tmp_path: Path) -> None:
+def test_lock_of_a_killed_service_is_released(tmp_path: Path) -> None:
     script = (
         "import sys, time; from pathlib import Path; from islands_service.supervisor import folder_lock\n"
         "with folder_lock(Path(sys.argv[1])): print('mine', flush=True); time.sleep(60)"

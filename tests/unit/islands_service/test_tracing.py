@@ -1,4 +1,4 @@
-"""Traces arrive at a collector: a span a request, with the service's name, and none where none are wanted."""
+"""Traces: spans arrive at a collector with the name of the service."""
 
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from threading import Thread
@@ -12,7 +12,7 @@ from support.service import served
 
 @pytest.fixture
 def collector():
-    """A collector of OTLP over HTTP: its address, and what it was sent."""
+    """A collector of OTLP over HTTP: its address, and the received bodies."""
     received = []
 
     class Handler(BaseHTTPRequestHandler):
@@ -34,7 +34,7 @@ def collector():
 
 
 def spans(received):
-    """Yield the sender and the name of every span."""
+    """Yield the service name and the name of every span."""
     for body in received:
         for resource in ExportTraceServiceRequest.FromString(body).resource_spans:
             sender = {each.key: each.value.string_value for each in resource.resource.attributes}
@@ -43,7 +43,7 @@ def spans(received):
                     yield sender["service.name"], span.name
 
 
-def test_a_request_is_a_span_and_a_look_at_our_health_is_none(collector, tmp_path):
+def test_requests_are_spans_except_health_checks(collector, tmp_path):
     address, received = collector
     with served(tmp_path / "data", telemetry=address) as service:
         assert service.client.get("/v1/jobs").status_code == 200
@@ -62,7 +62,7 @@ def test_an_attempt_at_a_job_is_a_span_of_the_coordinator(collector):
     assert list(spans(received)) == [("islands-coordinator", "identification")]
 
 
-def test_without_an_endpoint_nothing_of_opentelemetry_is_made():
+def test_traces_without_an_endpoint_create_no_provider():
     traces = Traces("", "coordinator")
     with traces.span("identification"):
         traces.close()

@@ -1,4 +1,4 @@
-"""A job in a store, without Ray: what an identification is carried out with, and what it brings alone."""
+"""A job in a store without Ray, and the result of the same search in one process."""
 
 import json
 from collections.abc import Iterator
@@ -42,7 +42,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def undisturbed(record: Path) -> tuple[list[Any], list[Any]]:
-    """The models, and the history, of the job in one process that nobody disturbs."""
+    """Models and history of the job in one uninterrupted process."""
     states = []
     found = identify(
         read_record(record, ["u_V"], "y_um"),

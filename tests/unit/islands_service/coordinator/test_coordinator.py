@@ -1,4 +1,4 @@
-"""The coordinator's loop: every job ends, or is given back, whatever happens to it."""
+"""`Coordinator`: every job ends or is released, whatever error occurs."""
 
 import errno
 import json
@@ -38,23 +38,23 @@ from support.stores import ALICE, child
 Found = tuple[list[Any], list[Any]]
 
 
-class Alone(Coordinator):
-    """A coordinator that needs no Ray: its engine is this process."""
+class SerialCoordinator(Coordinator):
+    """A coordinator without Ray: its engine is serial."""
 
     def _wait_for_ray(self, *_: object) -> None:
         pass
 
-    def _engine(self, _: Lease) -> SerialEngine:  # type: ignore[override]
+    def _make_engine(self, _: Lease) -> SerialEngine:  # type: ignore[override]
         return SerialEngine()
 
 
 @pytest.fixture
 def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
-    """Run a coordinator in a thread; it is told to stop at the end."""
+    """Run a coordinator in a thread, and stop it after the test."""
     stopping = StopRequest()
     threads = []
 
-    def run(kind: type[Coordinator] = Alone, name: str = "me") -> Thread:
+    def run(kind: type[Coordinator] = SerialCoordinator, name: str = "me") -> Thread:
         thread = Thread(target=kind(settings, name, stopping).run)
         thread.stop = stopping.request  # type: ignore[attr-defined]
         thread.start()
@@ -68,38 +68,38 @@ def coordinator(settings: ServiceSettings) -> Iterator[Callable[..., Thread]]:
         assert not thread.is_alive()
 
 
-def ends(store: Store, job: Job) -> Job:
+def wait_until_finished(store: Store, job: Job) -> Job:
     eventually(lambda: store.jobs.get(ALICE, job.id).finished is not None, seconds=30.0)
     return store.jobs.get(ALICE, job.id)
 
 
-def working(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcome]) -> None:
-    """Let jobs be carried out in another way: an entry of the table, as any kind of job is."""
-    monkeypatch.setattr(coordinator_module, "WORK", MappingProxyType({"identification": how}))
-    monkeypatch.setattr(coordinator_module, "RETRY", 0.02)
+def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcome]) -> None:
+    """Replace the runner of identification jobs."""
+    monkeypatch.setattr(coordinator_module, "JOB_RUNNERS", MappingProxyType({"identification": how}))
+    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.02)
 
 
 DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
 
 
-def test_a_coordinator_carries_out_one_job_after_the_other(
+def test_coordinator_runs_one_job_after_the_other(
     store: Store, job: Job, coordinator: Callable[..., Thread], undisturbed: Found
 ) -> None:
     second = store.jobs.submit(Submission(ALICE, job.spec))[0]
     coordinator()
     for each in (job, second):
-        assert ends(store, each).state == JobState.SUCCEEDED
+        assert wait_until_finished(store, each).state == JobState.SUCCEEDED
         assert [model.document for model in store.results.models(each.id)] == undisturbed[0]
 
 
-def test_a_coordinator_carries_out_jobs_of_every_kind(
+def test_coordinator_runs_jobs_of_every_kind(
     store: Store, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
-    assert set(coordinator_module.WORK) == {IDENTIFICATION, DISCREPANCY}
+    assert set(coordinator_module.JOB_RUNNERS) == {IDENTIFICATION, DISCREPANCY}
     short = store.jobs.submit(Submission(ALICE, held(job.spec["dataset"], rows="0:99"), DISCREPANCY))[0]
     coordinator()
-    assert ends(store, job).state == JobState.SUCCEEDED
-    failed = ends(store, short)
+    assert wait_until_finished(store, job).state == JobState.SUCCEEDED
+    failed = wait_until_finished(store, short)
     assert failed.state == JobState.FAILED
     assert failed.problem is not None
     assert failed.problem["type"] == "invalid-record"
@@ -115,7 +115,7 @@ def test_a_coordinator_carries_out_jobs_of_every_kind(
         (ZeroDivisionError("by zero"), "defect", "ZeroDivisionError: by zero. Please report it"),
     ],
 )
-def test_what_goes_wrong_in_a_job_is_told_with_a_type_and_holds_up_nobody(
+def test_failed_job_has_a_typed_problem_and_does_not_block_others(
     store: Store,
     job: Job,
     coordinator: Callable[..., Thread],
@@ -129,19 +129,19 @@ def test_what_goes_wrong_in_a_job_is_told_with_a_type_and_holds_up_nobody(
             raise error
         return DONE
 
-    working(monkeypatch, fail_first)
+    replace_runner(monkeypatch, fail_first)
     second = store.jobs.submit(Submission(ALICE, job.spec))[0]
     coordinator()
-    failed = ends(store, job)
+    failed = wait_until_finished(store, job)
     assert failed.state == JobState.FAILED
     assert failed.problem is not None
     assert failed.problem["type"] == kind
     assert failed.problem["detail"].startswith(detail)
     assert "Traceback" not in json.dumps(failed.problem)
-    assert ends(store, second).state == JobState.SUCCEEDED
+    assert wait_until_finished(store, second).state == JobState.SUCCEEDED
 
 
-def wait_for_end(
+def run_until_check_raises(
     _lease: Lease, _store: Store, _blobs: Blobs, _engine: object, check: Any, _s: float
 ) -> JobOutcome:
     while True:
@@ -149,10 +149,10 @@ def wait_for_end(
         time.sleep(0.01)
 
 
-def test_told_to_stop_it_gives_its_job_back_and_that_was_no_attempt(
+def test_stopping_coordinator_releases_its_job_without_an_attempt(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    working(monkeypatch, wait_for_end)
+    replace_runner(monkeypatch, run_until_check_raises)
     thread = coordinator()
     eventually(lambda: store.jobs.get(ALICE, job.id).state == JobState.RUNNING)
     thread.stop()  # type: ignore[attr-defined]
@@ -161,28 +161,28 @@ def test_told_to_stop_it_gives_its_job_back_and_that_was_no_attempt(
     assert (back.state, back.attempt) == (JobState.QUEUED, 0)
 
 
-def test_a_cancelled_job_is_let_go(
+def test_running_job_is_cancelled_on_request(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    working(monkeypatch, wait_for_end)
+    replace_runner(monkeypatch, run_until_check_raises)
     coordinator()
     eventually(lambda: store.jobs.get(ALICE, job.id).state == JobState.RUNNING)
     store.jobs.cancel(ALICE, job.id)
-    assert ends(store, job).state == JobState.CANCELLED
+    assert wait_until_finished(store, job).state == JobState.CANCELLED
 
 
-def test_a_job_that_is_taken_away_is_left_to_who_has_it(
+def test_job_with_a_lost_lease_is_left_to_its_new_owner(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gone = []
 
     def lose(lease: Lease, *arguments: Any) -> JobOutcome:
         if not gone:
-            gone.append(store.leases.claim("me", 60.0))  # who has the name may take it
-            wait_for_end(lease, *arguments)
+            gone.append(store.leases.claim("me", 60.0))  # the same name may claim the job
+            run_until_check_raises(lease, *arguments)
         return DONE
 
-    working(monkeypatch, lose)
+    replace_runner(monkeypatch, lose)
     coordinator()
     second = store.jobs.submit(Submission(ALICE, job.spec))[0]
     eventually(lambda: store.jobs.get(ALICE, second.id).state == JobState.SUCCEEDED)
@@ -190,8 +190,8 @@ def test_a_job_that_is_taken_away_is_left_to_who_has_it(
     assert gone[0].epoch == 2
 
 
-class Full(Alone):
-    """A coordinator whose store is full when a job's end is to be written down, for some tries."""
+class Full(SerialCoordinator):
+    """A coordinator whose store is full for some attempts to store an outcome."""
 
     def run(self) -> None:
         finish = self._store.leases.finish
@@ -209,21 +209,21 @@ class Full(Alone):
         super().run()
 
 
-def test_the_end_of_a_job_is_written_down_as_soon_as_there_is_room(
+def test_outcome_is_stored_as_soon_as_the_disk_has_space(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing is done again: it is one attempt, and whoever cancels it now is too late."""
-    working(monkeypatch, lambda *_: DONE)
-    monkeypatch.setattr(coordinator_module, "RETRY", 0.1)
+    """The job is not run again: it is one attempt, and a cancel request in the meantime is too late."""
+    replace_runner(monkeypatch, lambda *_: DONE)
+    monkeypatch.setattr(coordinator_module, "RETRY_SECONDS", 0.1)
     coordinator(Full)
-    ended = ends(store, job)
+    ended = wait_until_finished(store, job)
     assert (ended.state, ended.attempt, ended.summary) == (JobState.SUCCEEDED, 1, {"done": True})
 
 
-def test_a_store_that_is_away_in_the_middle_of_a_job_costs_no_attempt(
+def test_unavailable_store_during_a_job_is_not_an_attempt(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    away = [7]  # more often than a job may be tried in vain
+    away = [7]  # more often than a job may fail
 
     def work(*_: object) -> JobOutcome:
         if away[0]:
@@ -231,21 +231,21 @@ def test_a_store_that_is_away_in_the_middle_of_a_job_costs_no_attempt(
             raise StoreUnavailableError("the database does not answer")
         return DONE
 
-    monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY", 0.01)
-    working(monkeypatch, work)
+    monkeypatch.setattr("islands_service.coordinator.coordinator.RETRY_SECONDS", 0.01)
+    replace_runner(monkeypatch, work)
     coordinator()
-    ended = ends(store, job)
+    ended = wait_until_finished(store, job)
     assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, 1)
 
 
-def test_a_lost_cluster_ends_the_coordinator_and_gives_the_job_back_as_an_attempt(
+def test_lost_cluster_ends_the_coordinator_and_is_an_attempt(
     store: Store, job: Job, settings: ServiceSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def lost(*_: object) -> JobOutcome:
         raise ClusterError("no more")
 
-    working(monkeypatch, lost)
-    doomed = Alone(settings, "me", StopRequest())
+    replace_runner(monkeypatch, lost)
+    doomed = SerialCoordinator(settings, "me", StopRequest())
     doomed._connected = True
     with pytest.raises(ClusterError, match="no more"):
         doomed.run()
@@ -253,17 +253,17 @@ def test_a_lost_cluster_ends_the_coordinator_and_gives_the_job_back_as_an_attemp
     assert (back.state, back.attempt) == (JobState.QUEUED, 1)
 
 
-def test_who_has_the_name_of_one_that_died_takes_its_job_over_at_once(
+def test_coordinator_with_the_same_name_takes_a_job_over_at_once(
     store: Store, job: Job, coordinator: Callable[..., Thread], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     died = store.leases.claim("me", 3600.0)
     assert died is not None
-    working(monkeypatch, lambda *_: DONE)
+    replace_runner(monkeypatch, lambda *_: DONE)
     coordinator(name="me")
-    assert ends(store, job).attempt == 2  # long before the lease of an hour has run out
+    assert wait_until_finished(store, job).attempt == 2  # long before the lease of an hour has expired
 
 
-def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
+def test_unreferenced_blobs_are_swept_after_an_hour(
     store: Store, blobs: Blobs, job: Job, coordinator: Callable[..., Thread]
 ) -> None:
     young, old = blobs.write(b"young"), blobs.write(b"old")
@@ -271,7 +271,7 @@ def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
     for blob in (old, named):
         os.utime(blobs.path(blob), (1e9, 1e9))
     coordinator()
-    ends(store, job)
+    wait_until_finished(store, job)
 
     def swept() -> bool:
         return old not in {blob for blob, _ in blobs.all()}
@@ -280,7 +280,7 @@ def test_blobs_that_nobody_names_are_swept_away_after_an_hour(
     assert {young, named} <= {blob for blob, _ in blobs.all()}
 
 
-def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
+def test_replaced_checkpoints_are_swept_while_the_job_runs(
     store: Store,
     blobs: Blobs,
     job: Job,
@@ -299,10 +299,10 @@ def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
             left.append(old(data))
             store.leases.report(lease, ProgressReport({}, checkpoint=left[-1]))
         left.append(blobs.write(b"about to be named"))
-        return wait_for_end(lease, *arguments)
+        return run_until_check_raises(lease, *arguments)
 
-    working(monkeypatch, keeps_checkpoints)
-    monkeypatch.setattr(coordinator_module, "SWEEP_EVERY", 0.05)
+    replace_runner(monkeypatch, keeps_checkpoints)
+    monkeypatch.setattr(coordinator_module, "SWEEP_INTERVAL", 0.05)
     coordinator()
     eventually(lambda: len(left) == 3 and left[0] not in dict(blobs.all()), seconds=30.0)
     now = store.jobs.get(ALICE, job.id)
@@ -314,7 +314,7 @@ def test_what_a_long_job_leaves_is_swept_away_while_it_runs(
     "error",
     [StoreUnavailableError("the database does not answer"), OSError(errno.ESTALE, "Stale file handle")],
 )
-def test_a_sweep_that_fails_costs_a_job_nothing(
+def test_failed_sweep_does_not_affect_the_job(
     store: Store,
     job: Job,
     coordinator: Callable[..., Thread],
@@ -323,7 +323,7 @@ def test_a_sweep_that_fails_costs_a_job_nothing(
 ) -> None:
     tries = []
 
-    class Unswept(Alone):
+    class Unswept(SerialCoordinator):
         def _sweep(self) -> None:
             if self._store.jobs.queue_statistics().leases:
                 tries.append(1)
@@ -334,29 +334,29 @@ def test_a_sweep_that_fails_costs_a_job_nothing(
             arguments[4]()
         return DONE
 
-    working(monkeypatch, works)
-    monkeypatch.setattr(coordinator_module, "SWEEP_EVERY", 0.0)
+    replace_runner(monkeypatch, works)
+    monkeypatch.setattr(coordinator_module, "SWEEP_INTERVAL", 0.0)
     coordinator(Unswept)
-    assert ends(store, job).state == JobState.SUCCEEDED
+    assert wait_until_finished(store, job).state == JobState.SUCCEEDED
     assert [event.kind for event in store.jobs.events(job.id)] == ["queued", "running", "succeeded"]
 
 
-def test_nothing_is_swept_that_was_named_while_a_sweep_looked(
+def test_blob_referenced_during_a_sweep_is_kept(
     store: Store, blobs: Blobs, settings: ServiceSettings, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A coordinator may stand still between two steps of a sweep, for longer than a blob may be unnamed."""
-    monkeypatch.setattr(coordinator_module, "ORPHAN", 0.1)
-    sweeping = Alone(settings, "me", StopRequest())
+    """A coordinator may be suspended between two steps of a sweep for longer than the age limit."""
+    monkeypatch.setattr(coordinator_module, "ORPHAN_AGE", 0.1)
+    sweeping = SerialCoordinator(settings, "me", StopRequest())
     named_blobs = sweeping._store.retention.named_blobs
     written: list[str] = []
 
-    def standing_still() -> frozenset[str]:
+    def slow_named_blobs() -> frozenset[str]:
         named = named_blobs()
         written.append(blobs.write(b"named meanwhile"))
         time.sleep(0.3)
         return named
 
-    sweeping._store.retention.named_blobs = standing_still  # type: ignore[method-assign]
+    sweeping._store.retention.named_blobs = slow_named_blobs  # type: ignore[method-assign]
     with sweeping._store:
         sweeping._sweep()
     assert blobs.read(written[0]) == b"named meanwhile"
@@ -369,26 +369,26 @@ from islands_service.liveness import StopRequest
 from islands_service.coordinator import heartbeat
 from islands_service.coordinator.coordinator import Coordinator
 from islands_service.settings import ServiceSettings
-heartbeat.HANGS = 0.3
+heartbeat.HANG_TIMEOUT = 0.3
 class Engine:
     def run(self, problem, start, stop):
         stop()
         time.sleep(60)
         yield
-class Alone(Coordinator):
+class SerialCoordinator(Coordinator):
     def _wait_for_ray(self, *_): pass
-    def _engine(self, _): return Engine()
-Alone(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", StopRequest()).run()
+    def _make_engine(self, _): return Engine()
+SerialCoordinator(ServiceSettings(data_dir=Path(sys.argv[1]), lease=1.0), "hanging", StopRequest()).run()
 """
 
 
 @pytest.mark.ci
-def test_a_coordinator_whose_search_hangs_ends_and_its_job_goes_on(
+def test_coordinator_with_a_hanging_search_exits_and_the_job_continues(
     store: Store, job: Job, settings: ServiceSettings, coordinator: Callable[..., Thread]
 ) -> None:
     with child(HANGING, str(settings.data_dir)) as hanging:
         said, _ = hanging.communicate(timeout=60)
     assert ("search hangs" in said, hanging.returncode) == (True, 1)
     coordinator(name="hanging")
-    ended = ends(store, job)
+    ended = wait_until_finished(store, job)
     assert (ended.state, ended.attempt) == (JobState.SUCCEEDED, 2)

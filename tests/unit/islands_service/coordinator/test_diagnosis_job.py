@@ -1,4 +1,4 @@
-"""A discrepancy job: what it tells, what it brings, and that it brings the same however often it begins."""
+"""Discrepancy job: progress, result, and reproducibility after interruptions."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
@@ -12,7 +12,7 @@ from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
-from islands_service.coordinator.coordinator import problem_of
+from islands_service.coordinator.coordinator import make_problem
 from islands_service.coordinator.diagnosis_job import discrepancy
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.domain.job import (
@@ -40,7 +40,7 @@ COLUMN, PIEZO = {"kind": "column", "column": "theirs_um"}, {"kind": "bouc-wen-pi
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record with a temperature, and a simulation in a column that lacks an offset."""
+    """A record with a temperature, and a column with a simulation that lacks an offset."""
     path = write_offset(tmp_path_factory.mktemp("offset") / "record.csv")
     header, *lines = path.read_text().splitlines()
     warmth = np.cumsum(np.random.default_rng(1).standard_normal(len(lines)))
@@ -51,7 +51,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """No figure is drawn, and few random waves look for what a residual still holds."""
+    """Render no figures, and use few random features in the search for residual structure."""
     monkeypatch.setattr(noise_floor, "RANDOM_FEATURES", 20)
     with undrawn_figures():
         yield
@@ -59,7 +59,7 @@ def _cheap_analysis(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def submit(store: Store, blobs: Blobs, measured: Path) -> Submit:
-    """What submits a job on the record that differs from its simulation by an offset."""
+    """Submit jobs on the record that differs from its simulation by an offset."""
     data, described = measured.read_bytes(), asdict(preview(measured))
     dataset, _ = store.datasets.add(ALICE, "record.csv", ".csv", blobs.write(data), len(data), described)
 
@@ -76,9 +76,7 @@ def claim(store: Store) -> Lease:
     return lease
 
 
-def carried_out(
-    lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None
-) -> JobOutcome:
+def run_job(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> JobOutcome:
     return discrepancy(lease, store, blobs, SerialEngine(), check, 1.0, map)
 
 
@@ -105,25 +103,23 @@ class Interruption:
 
 
 @pytest.mark.ci
-def test_the_same_job_brings_the_same_bytes_however_often_it_is_interrupted(
-    store: Store, blobs: Blobs, submit: Submit
-) -> None:
+def test_interrupted_diagnosis_gives_the_same_bytes(store: Store, blobs: Blobs, submit: Submit) -> None:
     job = submit()
-    first = without_time(carried_out(claim(store), store, blobs))
-    told = phases(store, job)
+    first = without_time(run_job(claim(store), store, blobs))
+    stored_phases = phases(store, job)
     assert (first.document or {})["effects"][0]["name"] == "offset"
     assert set(first.artefacts) == {REPORT, EXTENDED}
-    for at in (1, len(told)):
+    for at in (1, len(stored_phases)):
         with pytest.raises(JobCancelled):
-            carried_out(claim(store), store, blobs, Interruption(at))
-    # Blobs are named by what is in them: the report and the extended simulation are the same, too.
-    assert without_time(carried_out(claim(store), store, blobs)) == first
-    assert phases(store, job)[-len(told) :] == told
+            run_job(claim(store), store, blobs, Interruption(at))
+    # Blobs are named by content: report and extended simulation are equal, too.
+    assert without_time(run_job(claim(store), store, blobs)) == first
+    assert phases(store, job)[-len(stored_phases) :] == stored_phases
 
 
-def test_a_column_is_a_simulation_too(store: Store, blobs: Blobs, submit: Submit) -> None:
+def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs, submit: Submit) -> None:
     job = submit()
-    document = carried_out(claim(store), store, blobs).document or {}
+    document = run_job(claim(store), store, blobs).document or {}
     assert document["simulation"] == "column theirs_um"
     assert document["record"]["names"]["inputs"] == ["u_V", "T_K"]
     assert document["verdict"] == "named"
@@ -142,18 +138,18 @@ def test_a_column_is_a_simulation_too(store: Store, blobs: Blobs, submit: Submit
         ),
     ],
 )
-def test_what_the_record_or_the_simulation_does_not_allow_is_the_jobs_problem(
+def test_unusable_record_or_simulation_becomes_a_problem_of_the_job(
     store: Store, blobs: Blobs, submit: Submit, changes: dict[str, Any], kind: type, words: str
 ) -> None:
     submit(**changes)
     with pytest.raises(kind, match=words) as caught:
-        carried_out(claim(store), store, blobs)
+        run_job(claim(store), store, blobs)
     expected = {RecordError: "invalid-record", SettingsError: "invalid-settings"}[kind]
-    assert problem_of(caught.value)["type"] == expected
+    assert make_problem(caught.value)["type"] == expected
 
 
 class Away:
-    """Leases of a store that cannot be reached when something is to be told."""
+    """Leases of a store that is unavailable for reports."""
 
     def __init__(self, store: Store) -> None:
         self._store, self.leases = store, self
@@ -165,8 +161,8 @@ class Away:
         return getattr(self._store, name)
 
 
-def test_reports_that_fail_cost_nothing(store: Store, blobs: Blobs, submit: Submit) -> None:
+def test_failed_reports_do_not_affect_the_result(store: Store, blobs: Blobs, submit: Submit) -> None:
     job = submit()
-    outcome = carried_out(claim(store), Away(store), blobs)
+    outcome = run_job(claim(store), Away(store), blobs)
     assert outcome.state == JobState.SUCCEEDED
     assert phases(store, job) == []

@@ -1,4 +1,4 @@
-"""An identification as a job: what it tells, what it keeps, and how it goes on where it was interrupted."""
+"""Identification job: progress, checkpoints, result, and continuation after interruptions."""
 
 import gzip
 import json
@@ -27,16 +27,16 @@ def claim(store: Store, name: str = "me") -> Lease:
     return lease
 
 
-def carried_out(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> JobOutcome:
+def run_job(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> JobOutcome:
     return identification(lease, store, blobs, SerialEngine(), check, 1e-9)
 
 
-def models_of(outcome: JobOutcome) -> list[Any]:
+def get_models(outcome: JobOutcome) -> list[Any]:
     return [json.loads(json.dumps(document)) for document, _ in outcome.models]
 
 
 class Interruption:
-    """A check that raises as soon as a job's progress has reached a generation."""
+    """A check that raises when the progress of a job has reached a generation."""
 
     def __init__(self, store: Store, job: Job, at: int) -> None:
         self._store, self._job, self._at = store, job.id, at
@@ -47,13 +47,13 @@ class Interruption:
             raise JobCancelled("enough")
 
 
-def test_a_job_brings_what_one_process_finds_by_itself(
+def test_job_finds_the_models_of_a_single_process(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found
 ) -> None:
     lease = claim(store)
-    outcome = carried_out(lease, store, blobs)
+    outcome = run_job(lease, store, blobs)
     assert outcome.state == JobState.SUCCEEDED
-    assert models_of(outcome) == undisturbed[0]
+    assert get_models(outcome) == undisturbed[0]
     store.leases.finish(lease, outcome)
     assert [model.document for model in store.results.models(job.id)] == undisturbed[0]
     ended = store.jobs.get(ALICE, job.id)
@@ -63,7 +63,7 @@ def test_a_job_brings_what_one_process_finds_by_itself(
     assert ended.progress["generation"] == ended.progress["generations"]
 
 
-def test_however_often_it_is_interrupted_it_ends_with_the_same_models_and_history(
+def test_interrupted_job_ends_with_the_same_models_and_history(
     store: Store,
     blobs: Blobs,
     job: Job,
@@ -74,24 +74,24 @@ def test_however_often_it_is_interrupted_it_ends_with_the_same_models_and_histor
     for at in (0, 1, 2, 9, 25):
         lease = claim(store)
         with pytest.raises(JobCancelled):
-            carried_out(lease, store, blobs, Interruption(store, job, at))
+            run_job(lease, store, blobs, Interruption(store, job, at))
         store.leases.release(lease)
     lease = claim(store)
     assert lease.job.progress is not None
     assert lease.job.progress["generation"] >= 25
-    outcome = carried_out(lease, store, blobs)
-    assert models_of(outcome) == undisturbed[0]
+    outcome = run_job(lease, store, blobs)
+    assert get_models(outcome) == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]
 
 
-def test_rare_reports_tell_the_same_history_as_frequent_ones(
+def test_rare_reports_store_the_same_history_as_frequent_ones(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found
 ) -> None:
-    carried_out(claim(store), store, blobs)
+    run_job(claim(store), store, blobs)
     assert store.results.history(job.id) == undisturbed[1]
 
 
-def test_the_time_of_all_attempts_counts(
+def test_wall_time_includes_all_attempts(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
@@ -102,15 +102,15 @@ def test_the_time_of_all_attempts_counts(
         interruption()
 
     with pytest.raises(JobCancelled):
-        carried_out(lease := claim(store), store, blobs, slowly)
+        run_job(lease := claim(store), store, blobs, slowly)
     store.leases.release(lease)
     kept = store.jobs.get(ALICE, job.id).checkpoint
     assert kept is not None
     before = json.loads(gzip.decompress(blobs.read(kept)))["about"]["wall_s"]
-    time.sleep(0.5)  # nobody works on it
+    time.sleep(0.5)  # no coordinator has the job
     checks: list[float] = []
     began = time.monotonic()
-    outcome = carried_out(claim(store), store, blobs, lambda: checks.append(time.monotonic()))
+    outcome = run_job(claim(store), store, blobs, lambda: checks.append(time.monotonic()))
     last = time.monotonic() - began
     assert outcome.document is not None
     assert before > 0.2
@@ -118,15 +118,15 @@ def test_the_time_of_all_attempts_counts(
     assert before + checks[-1] - checks[0] <= spent <= before + last + 0.01
 
 
-def test_the_first_populations_are_kept_at_once(store: Store, blobs: Blobs, job: Job) -> None:
-    """A job that ends its coordinator soon after would otherwise never come on."""
+def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:
+    """Otherwise a job that soon ends its coordinator would never make progress."""
     with pytest.raises(JobCancelled):
         identification(claim(store), store, blobs, SerialEngine(), Interruption(store, job, 0), 3600.0)
     assert store.jobs.get(ALICE, job.id).checkpoint is not None
 
 
 class Flaky:
-    """Leases of a store that cannot be reached at some of the reports."""
+    """Leases of a store that is unavailable for some of the reports."""
 
     def __init__(self, store: Store, fails: Callable[[int], bool]) -> None:
         self._store, self._fails, self.reports = store, fails, 0
@@ -142,7 +142,7 @@ class Flaky:
         return getattr(self._store, name)
 
 
-def test_reports_that_fail_cost_nothing(
+def test_failed_reports_do_not_affect_the_result(
     store: Store,
     blobs: Blobs,
     job: Job,
@@ -150,25 +150,25 @@ def test_reports_that_fail_cost_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
-    # The last ones are among those that fail.
+    # The failing reports include the last ones.
     flaky = Flaky(store, lambda number: number % 3 != 0 or 30 < number < 36)
-    outcome = carried_out(claim(store), flaky, blobs)
+    outcome = run_job(claim(store), flaky, blobs)
     assert flaky.reports > 9
-    assert models_of(outcome) == undisturbed[0]
+    assert get_models(outcome) == undisturbed[0]
     assert store.results.history(job.id) == undisturbed[1]
 
 
-def test_who_has_lost_the_lease_stops_at_its_next_report(store: Store, blobs: Blobs, job: Job) -> None:
+def test_job_with_a_lost_lease_stops_at_its_next_report(store: Store, blobs: Blobs, job: Job) -> None:
     old = store.leases.claim("me", 60.0)
     assert old is not None
-    new = claim(store)  # the same name: the one before must be gone
+    new = claim(store)  # the same name: the previous process must have ended
     with pytest.raises(LeaseLostError):
-        carried_out(old, store, blobs)
+        run_job(old, store, blobs)
     assert store.jobs.get(ALICE, job.id).version == new.job.version
     assert store.jobs.get(ALICE, job.id).checkpoint is None
 
 
-def test_a_store_that_is_away_is_not_offered_a_new_checkpoint_every_time(
+def test_unavailable_store_does_not_cause_repeated_checkpoints(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)

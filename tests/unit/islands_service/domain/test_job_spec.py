@@ -1,4 +1,4 @@
-"""What a job may say: what no service could carry out is refused before anything is made of it."""
+"""Specifications of jobs: unusable ones are refused before anything is built."""
 
 import time
 from dataclasses import asdict, fields
@@ -21,7 +21,7 @@ def order(**changes):
 
 
 def refused(settings, **changes):
-    """What is said of settings that can be read and not be carried out, and the seconds that it takes."""
+    """Return the error message for settings that can be parsed but not run, within a time limit."""
     began = time.perf_counter()
     with pytest.raises(SettingsError) as error:
         resolve_job_settings(order(settings=settings, **changes), 256, 10**10)
@@ -30,28 +30,28 @@ def refused(settings, **changes):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_every_preset_is_accepted_as_it_is(preset):
+def test_every_preset_is_accepted_unchanged(preset):
     assert resolve_job_settings(order(preset=preset), 256, 10**10) == PRESETS[preset]
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_every_setting_of_a_preset_can_be_said(preset):
-    said = asdict(PRESETS[preset])
-    assert resolve_job_settings(order(preset=preset, settings=said), 256, 10**10) == PRESETS[preset]
+def test_every_setting_of_a_preset_can_be_given(preset):
+    given = asdict(PRESETS[preset])
+    assert resolve_job_settings(order(preset=preset, settings=given), 256, 10**10) == PRESETS[preset]
 
 
-def test_every_setting_says_what_it_means():
+def test_every_setting_has_a_description():
     described = SettingsChanges.model_json_schema()["properties"]
     assert list(described) == [each.name for each in fields(Settings)]
     assert all(entry["description"] for entry in described.values())
 
 
-def test_every_limit_is_of_a_setting():
+def test_every_limit_belongs_to_a_setting():
     assert LIMITS.keys() <= {each.name for each in fields(Settings)}
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_one_more_than_a_limit_is_refused(name):
+def test_value_above_a_limit_is_refused(name):
     most = LIMITS[name]
     assert refused({name: most + 1}) == f"{name} is at most {most} on this service, got {most + 1}"
 
@@ -95,15 +95,15 @@ def test_one_more_than_a_limit_is_refused(name):
         ),
     ],
 )
-def test_what_would_take_all_memory_or_time_is_refused_at_once(settings, words):
+def test_settings_that_exhaust_memory_or_time_are_refused_at_once(settings, words):
     assert words in refused(settings)
 
 
-def test_many_inputs_make_a_library_too_large():
+def test_library_of_many_inputs_is_too_large():
     assert "candidates are more" in refused({"library_degree": 5}, inputs=[f"u{i}" for i in range(16)])
 
 
-def test_the_budget_counts_the_first_population_too():
+def test_budget_includes_the_first_population():
     settings = {"population": 10, "generations": 9, "islands": 1, "max_terms": 3}
     assert resolve_job_settings(order(settings=settings), 256, 100).population == 10
     with pytest.raises(SettingsError, match="100 individuals, and this service evaluates at most 99"):
@@ -152,13 +152,13 @@ def test_the_budget_counts_the_first_population_too():
         ({"settings": []}, "valid dictionary"),
     ],
 )
-def test_what_has_no_meaning_is_refused(changes, words):
+def test_invalid_field_is_refused(changes, words):
     with pytest.raises(ValidationError, match=words.replace("(", r"\(").replace("?", r"\?")):
         order(**changes)
 
 
 @pytest.mark.parametrize("rows", [":", "0:", ":-1", "-100:", "10:20", "999999999999:"])
-def test_rows_are_read(rows):
+def test_valid_rows_are_accepted(rows):
     assert order(rows=rows).rows == rows
 
 
@@ -168,16 +168,16 @@ def test_every_seed_of_63_bits_is_kept_exactly(seed):
 
 
 @pytest.mark.parametrize("name", ["a\0b", "a\nb", "a\x1b[31mb", "x" * 201, "\x7f"])
-def test_a_job_has_a_name_of_one_line(name):
+def test_job_name_must_be_one_short_line(name):
     with pytest.raises(ValidationError, match="name"):
         JobRequest.model_validate(spec(DATASET, name=name))
 
 
 @pytest.mark.parametrize("name", ["", "Größe 😀 <b>'\"&", "x" * 200])
-def test_a_job_may_be_called_as_people_do(name):
+def test_job_name_may_contain_any_printable_text(name):
     assert JobRequest.model_validate(spec(DATASET, name=name)).name == name
 
 
-def test_what_determines_the_result_is_what_was_said_and_no_more():
+def test_specification_contains_only_the_given_fields():
     request = JobRequest.model_validate(spec(DATASET, name="n", priority=3, settings={"islands": 2}))
     assert request.spec == spec(DATASET, settings={"islands": 2})

@@ -1,4 +1,4 @@
-"""Inspection: whatever a file does to the process that reads it, that process alone has the harm."""
+"""`inspect_file`: a harmful file affects only the process that reads it."""
 
 import asyncio
 import os
@@ -19,7 +19,7 @@ from support.service import csv
 
 MEMORY, SECONDS = 6_000_000_000, 30.0
 
-#: What the process writes after it has limited itself.
+#: Writes files after the limits are set.
 WRITES = """
 import sys
 from islands_service.intake.file_inspection import _limit
@@ -33,12 +33,12 @@ for path in sys.argv[1:]:
 """
 
 
-def looked_into(path, asked=None, memory=MEMORY, seconds=SECONDS):
+def inspect(path, asked=None, memory=MEMORY, seconds=SECONDS):
     return asyncio.run(inspect_file(path, asked or InspectionRequest(), memory, seconds))
 
 
 def inspections():
-    """The processes that read files for this one."""
+    """Return the inspection processes of this process."""
     return [
         pid
         for pid, line in descendants(os.getpid()).items()
@@ -55,14 +55,14 @@ def record(tmp_path):
 
 @pytest.fixture
 def endless(tmp_path):
-    """A file that is never read to its end."""
+    """A named pipe, so that reading never ends."""
     path = tmp_path / "a.csv"
     os.mkfifo(path)
     return path
 
 
-def test_a_record_is_described(record):
-    found = looked_into(record, InspectionRequest(("u_V",), "y_um", 0.01, "0:100"))
+def test_record_is_described(record):
+    found = inspect(record, InspectionRequest(("u_V",), "y_um", 0.01, "0:100"))
     assert [column["name"] for column in found["columns"]] == ["t_s", "u_V", "y_um"]
     assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
 
@@ -85,35 +85,35 @@ def test_a_record_is_described(record):
         (InspectionRequest(("u_V+1",), "y_um", rows="-20:"), "are too few"),
     ],
 )
-def test_what_is_asked_of_a_record_is_checked(record, asked, words):
+def test_requested_columns_and_rows_are_checked(record, asked, words):
     with pytest.raises(RecordError) as refused:
-        looked_into(record, asked)
+        inspect(record, asked)
     assert words in str(refused.value)
 
 
 def test_a_file_that_takes_too_much_memory_ends_the_process(record):
     with pytest.raises(RecordError, match=r"a\.csv cannot be read within 0\.1 GB of memory and 30 s \(.+\)"):
-        looked_into(record, memory=100_000_000)
+        inspect(record, memory=100_000_000)
 
 
 def test_a_file_that_takes_too_long_ends_the_process(endless):
     began = time.monotonic()
     with pytest.raises(RecordError, match=r"a\.csv takes longer than 1 s to read: give a shorter record"):
-        looked_into(endless, seconds=1.0)
+        inspect(endless, seconds=1.0)
     assert time.monotonic() - began < 20.0
     assert not alive(inspections())
 
 
 @pytest.mark.ci
-def test_a_process_that_turns_in_circles_has_so_much_time_of_the_processor():
+def test_looping_process_is_ended_by_its_cpu_limit():
     imports = "from islands_service.intake.file_inspection import _limit"
     script = f"{imports}\n_limit(6_000_000_000, 0.0)\nwhile True: pass"
     done = subprocess.run([sys.executable, "-c", script], check=False, timeout=60)
     assert done.returncode < 0
 
 
-def test_who_gives_up_takes_the_process_along(endless):
-    async def scene():
+def test_cancelled_inspection_ends_its_process(endless):
+    async def run():
         task = asyncio.create_task(inspect_file(endless, InspectionRequest(), MEMORY, SECONDS))
         while not inspections():
             await asyncio.sleep(0.01)
@@ -122,14 +122,14 @@ def test_who_gives_up_takes_the_process_along(endless):
             await task
         return alive(inspections())
 
-    assert asyncio.run(scene()) == []
+    assert asyncio.run(run()) == []
 
 
-def test_the_process_knows_no_secret_and_holds_no_file_of_ours(endless, tmp_path, monkeypatch):
+def test_process_has_no_secrets_and_no_files_of_the_service(endless, tmp_path, monkeypatch):
     monkeypatch.setenv("ISLANDS_DATABASE", "postgresql+psycopg://me:secret@host/islands")
     (tmp_path / "islands.db").touch()
 
-    async def scene():
+    async def run():
         task = asyncio.create_task(inspect_file(endless, InspectionRequest(), MEMORY, SECONDS))
         while not (found := inspections()) or _limits(found[0])["Max file size"] != ["0", "0"]:
             await asyncio.sleep(0.01)
@@ -145,7 +145,7 @@ def test_the_process_knows_no_secret_and_holds_no_file_of_ours(endless, tmp_path
         return environment, opened, limits
 
     with (tmp_path / "islands.db").open("rb"):
-        environment, opened, limits = asyncio.run(scene())
+        environment, opened, limits = asyncio.run(run())
     assert environment.keys() <= {b"PATH", b"OPENBLAS_NUM_THREADS", b"PYTHONDONTWRITEBYTECODE"}
     assert not [path for path in opened if path.endswith(".db") or path.startswith("socket")]
     assert limits["Max address space"] == [str(MEMORY)] * 2
@@ -155,7 +155,7 @@ def test_the_process_knows_no_secret_and_holds_no_file_of_ours(endless, tmp_path
 
 
 def _opened(pid):
-    """What a process has open: it goes on opening and closing while it is looked at."""
+    """Return the open files of a process, which may change meanwhile."""
     opened = []
     for path in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(OSError):
@@ -168,7 +168,7 @@ def _limits(pid):
     return {line[:26].strip(): line[26:].split()[:2] for line in lines}
 
 
-def test_the_process_writes_no_files(tmp_path):
+def test_process_cannot_write_files(tmp_path):
     new = tmp_path / "new"
     done = subprocess.run(
         [sys.executable, "-c", WRITES, new], capture_output=True, text=True, check=False, timeout=60
@@ -178,11 +178,11 @@ def test_the_process_writes_no_files(tmp_path):
 
 
 @pytest.mark.ci
-def test_the_service_answers_while_two_files_at_a_time_are_read(serve):
+def test_service_answers_while_two_files_at_a_time_are_inspected(serve):
     stopped = set()
 
     def stop_readers():
-        """Have those who read wait in the middle of it."""
+        """Suspend the inspections while they read."""
         for pid in inspections():
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGSTOP)

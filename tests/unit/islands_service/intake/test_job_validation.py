@@ -1,4 +1,4 @@
-"""Admission: what a preview settles is settled by it, and what it leaves open is read once more."""
+"""`validate_job`: decisions from previews, and the inspections that remain."""
 
 import json
 from types import SimpleNamespace
@@ -17,16 +17,16 @@ ONE, OTHER = "0" * 32 + "-csv", "1" * 32 + "-csv"
 
 
 def dataset(identity=ONE, time="t_s", dt=0.01, warnings=(), **columns):
-    """A data set with columns; of each its samples, or its problem."""
+    """A data set with columns, each given by its number of samples or by its problem."""
     columns = {"t_s": 100, "u_V": 100, "y_um": 100, **columns}
     preview = {
         "columns": [
             {
                 "name": name,
-                "samples": told if isinstance(told, int) else None,
-                "problem": told if isinstance(told, str) else "",
+                "samples": found if isinstance(found, int) else None,
+                "problem": found if isinstance(found, str) else "",
             }
-            for name, told in columns.items()
+            for name, found in columns.items()
         ],
         "time": time,
         "dt": dt,
@@ -35,8 +35,8 @@ def dataset(identity=ONE, time="t_s", dt=0.01, warnings=(), **columns):
     return StoredDataset("me", identity, "a.csv", ".csv", "b" * 64, 7, json.loads(json.dumps(preview)), 0.0)
 
 
-def doubts(*datasets, **changes):
-    """What stays open of a job on data sets."""
+def pending_inspections(*datasets, **changes):
+    """Return the pending inspections of a job on data sets."""
     known = {each.id: each for each in datasets}
 
     def get(owner, identity):
@@ -49,11 +49,11 @@ def doubts(*datasets, **changes):
     return validate_job(order, "me", store, ServiceSettings())
 
 
-def test_a_clean_record_leaves_nothing_open():
-    assert doubts(dataset()) == ()
-    assert doubts(dataset(), inputs=["u_V+1"]) == ()
-    assert doubts(dataset(v_V="broken"), settings={"islands": 3}, seed=4) == ()
-    assert doubts(dataset(), dataset(OTHER), validation={"dataset": OTHER}) == ()
+def test_clean_record_needs_no_inspection():
+    assert pending_inspections(dataset()) == ()
+    assert pending_inspections(dataset(), inputs=["u_V+1"]) == ()
+    assert pending_inspections(dataset(v_V="broken"), settings={"islands": 3}, seed=4) == ()
+    assert pending_inspections(dataset(), dataset(OTHER), validation={"dataset": OTHER}) == ()
 
 
 @pytest.mark.parametrize(
@@ -70,21 +70,21 @@ def test_a_clean_record_leaves_nothing_open():
         (dataset(**{"run.u": 100, "run.y": 100}), {"inputs": ["run.u"], "output": "run.y"}),
     ],
 )
-def test_what_a_preview_cannot_settle_is_read_as_the_job_would(record, changes):
-    (doubt,) = doubts(record, **changes)
+def test_record_with_an_insufficient_preview_is_inspected(record, changes):
+    (pending,) = pending_inspections(record, **changes)
     inputs = tuple(changes.get("inputs", ["u_V"]))
     asked = InspectionRequest(inputs, changes.get("output", "y_um"), changes.get("dt"), changes.get("rows"))
-    assert (doubt.dataset, doubt.request) == (record, asked)
+    assert (pending.dataset, pending.request) == (record, asked)
 
 
-def test_a_validation_record_is_looked_at_like_the_first():
+def test_validation_record_is_checked_like_the_estimation_record():
     other = dataset(OTHER, y_um="NaN in line 7")
-    (doubt,) = doubts(dataset(), other, validation={"dataset": OTHER})
-    assert doubt.dataset == other
-    (doubt,) = doubts(dataset(), dataset(OTHER), validation={"dataset": OTHER, "rows": "5:"})
-    assert (doubt.dataset.id, doubt.request.rows) == (OTHER, "5:")
+    (pending,) = pending_inspections(dataset(), other, validation={"dataset": OTHER})
+    assert pending.dataset == other
+    (pending,) = pending_inspections(dataset(), dataset(OTHER), validation={"dataset": OTHER, "rows": "5:"})
+    assert (pending.dataset.id, pending.request.rows) == (OTHER, "5:")
     with pytest.raises(DatasetNotFoundError):
-        doubts(dataset(), validation={"dataset": OTHER})
+        pending_inspections(dataset(), validation={"dataset": OTHER})
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_a_validation_record_is_looked_at_like_the_first():
         ({"inputs": ["u\n'\"V"]}, "has no column"),
     ],
 )
-def test_a_choice_that_the_columns_cannot_serve_is_refused(changes, words):
+def test_invalid_choice_of_columns_is_refused(changes, words):
     with pytest.raises(RecordError) as refused:
-        doubts(dataset(), **changes)
+        pending_inspections(dataset(), **changes)
     assert words in str(refused.value)

@@ -1,7 +1,7 @@
-"""Itinerary: an island waits for those it receives from and for nobody else, whatever gets lost on the way.
+"""`EpochScheduler`: an island waits only for its sources, also after losses.
 
-The actors' side is played here, in any order. An epoch of these islands is a number that is made of the
-numbers it began with: a search that mixed anything up would end with another one.
+The tests play the actors, in any order. An epoch is a number computed from the numbers that it depends on, so
+that any confusion would change the last number.
 """
 
 import random
@@ -15,16 +15,16 @@ from hypothesis import strategies as st
 from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands_service.runtime.epoch_scheduler import EpochTask
 
-#: Where numbers stand for islands nobody looks at the record.
-from support.itineraries import (
+#: The record is not used, since numbers replace islands.
+from support.epoch_runs import (
     SEED,
-    Voyage,
-    epoch_of,
-    in_lock_step,
-    itinerary,
+    PlayedRun,
+    make_epoch,
+    make_scheduler,
     orders,
+    play,
     posed,
-    sailed,
+    run_in_lockstep,
     searches,
 )
 
@@ -32,51 +32,51 @@ from support.itineraries import (
 @given(searches(), orders)
 def test_every_epoch_comes_once_in_order_and_with_the_right_values(search, choose):
     problem_, ends, ahead = search
-    done = sailed(Voyage(problem_, ends, ahead), choose)
-    assert done == list(in_lock_step(problem_, ends))
+    done = play(PlayedRun(problem_, ends, ahead), choose)
+    assert done == list(run_in_lockstep(problem_, ends))
 
 
 @given(searches(), orders, st.integers(1, 25))
-def test_whatever_is_lost_the_search_ends_with_the_same_values(search, choose, losses):
+def test_losses_do_not_change_the_values_of_a_search(search, choose, losses):
     problem_, ends, ahead = search
-    done = sailed(Voyage(problem_, ends, ahead), choose, losses)
-    assert done == list(in_lock_step(problem_, ends))
+    done = play(PlayedRun(problem_, ends, ahead), choose, losses)
+    assert done == list(run_in_lockstep(problem_, ends))
 
 
 @given(searches(), orders, st.integers(0, 25))
 @example((posed("ring", 1, ((0, 1),), 2), [-1, 0, 1, 2], 2), random.Random(57), 5)
-def test_it_does_not_matter_in_which_order_it_is_told(search, choose, losses):
+def test_order_of_completion_does_not_change_the_values(search, choose, losses):
     problem_, ends, ahead = search
-    done = sailed(Voyage(problem_, ends, ahead), choose, losses, at_once=False)
-    assert done == list(in_lock_step(problem_, ends))
+    done = play(PlayedRun(problem_, ends, ahead), choose, losses, at_once=False)
+    assert done == list(run_in_lockstep(problem_, ends))
 
 
 @given(searches(), orders, st.integers(0, 25))
-def test_every_leg_is_sent_behind_those_that_it_stands_on(search, choose, losses):
-    """What it takes may not have come back yet, but there is a reference to it that can be passed on."""
+def test_every_task_is_submitted_after_its_dependencies(search, choose, losses):
+    """A dependency may be incomplete, but there is a reference to it that can be passed on."""
     problem_, ends, ahead = search
-    voyage = Voyage(problem_, ends, ahead)
-    sailed(voyage, choose, losses)
+    run = PlayedRun(problem_, ends, ahead)
+    play(run, choose, losses)
     sent = set()
-    for leg in voyage.sent:
-        for needed in (leg.island, *voyage.sources[leg.island]):
-            assert leg.begin == ends[0] or (needed, leg.begin) in sent
-        sent.add((leg.island, leg.end))
+    for task in run.sent:
+        for needed in (task.island, *run.sources[task.island]):
+            assert task.begin == ends[0] or (needed, task.begin) in sent
+        sent.add((task.island, task.end))
     assert len(sent) == problem_.settings.islands * (len(ends) - 1)
 
 
 @given(searches())
-def test_all_that_is_not_too_far_ahead_is_sent_at_once(search):
-    """Nobody has to come back first: not the island itself, and not those that it receives from."""
+def test_all_tasks_within_the_limit_are_ready_at_once(search):
+    """No result is needed first: neither of the island itself nor of its sources."""
     problem_, ends, ahead = search
     islands, stages = range(problem_.settings.islands), list(pairwise(ends))[:ahead]
-    assert Voyage(problem_, ends, ahead).send() == [
+    assert PlayedRun(problem_, ends, ahead).send() == [
         EpochTask(each, *stage) for stage in stages for each in islands
     ]
 
 
 @given(searches(), orders, st.data())
-def test_it_goes_on_from_any_epoch_as_if_it_had_begun_there(search, choose, data):
+def test_scheduler_continues_from_any_epoch(search, choose, data):
     problem_, ends, ahead = search
     first = data.draw(st.sampled_from(ends))
     start = Archipelago(
@@ -86,22 +86,22 @@ def test_it_goes_on_from_any_epoch_as_if_it_had_begun_there(search, choose, data
         )
     )
     left = ends[ends.index(first) :]
-    done = sailed(Voyage(problem_, left, ahead, start), choose, losses=3)
-    assert done == list(in_lock_step(problem_, left, first))
+    done = play(PlayedRun(problem_, left, ahead, start), choose, losses=3)
+    assert done == list(run_in_lockstep(problem_, left, first))
     assert len(done) == len(left) - 1
 
 
 @given(searches(), orders)
-def test_it_remembers_nothing_older_than_the_last_complete_archipelago(search, choose):
+def test_epochs_before_the_last_complete_archipelago_are_dropped(search, choose):
     problem_, ends, ahead = search
-    voyage = Voyage(problem_, ends, ahead)
-    while not voyage.plan.finished:
-        voyage.send()
-        leg = choose.choice(voyage.ready())
-        voyage.carry(leg)
-        voyage.report(leg)
-        known = [sorted(each) for each in voyage.plan.known]
-        assert {each[0] for each in known} == {voyage.plan.completed_generation}
+    run = PlayedRun(problem_, ends, ahead)
+    while not run.scheduler.finished:
+        run.send()
+        task = choose.choice(run.ready())
+        run.carry(task)
+        run.report(task)
+        known = [sorted(each) for each in run.scheduler.known]
+        assert {each[0] for each in known} == {run.scheduler.completed_generation}
         assert all(len(each) <= ahead + 1 for each in known)
 
 
@@ -109,7 +109,7 @@ def test_it_remembers_nothing_older_than_the_last_complete_archipelago(search, c
 
 
 def distances(sources, island):
-    """How many epochs it takes until others feel the want of an island."""
+    """Return the number of epochs after which the lack of an island delays each other one."""
     found, new = {island: 0}, deque([island])
     while new:
         near = new.popleft()
@@ -121,72 +121,72 @@ def distances(sources, island):
 
 
 @given(searches(), orders, st.data())
-def test_who_does_not_depend_on_the_slowest_is_not_held_back_by_it(search, choose, data):
-    """Whoever is n islands away from it is n epochs ahead, all others as far as anybody may be."""
+def test_islands_independent_of_the_slowest_are_not_delayed(search, choose, data):
+    """An island at distance n from the slowest is n epochs ahead; independent ones are at the limit."""
     problem_, ends, ahead = search
-    voyage = Voyage(problem_, ends, ahead)
+    run = PlayedRun(problem_, ends, ahead)
     slowest = data.draw(st.integers(0, problem_.settings.islands - 1))
     for _ in range(data.draw(st.integers(0, 12))):
-        if not voyage.plan.finished:
-            voyage.send()
-            leg = choose.choice(voyage.ready())
-            voyage.carry(leg)
-            voyage.report(leg)
-    from_there = ends.index(max(voyage.plan.known[slowest]))
-    while not voyage.plan.finished:
-        voyage.send()
-        ready = [leg for leg in voyage.ready() if leg.island != slowest]
+        if not run.scheduler.finished:
+            run.send()
+            task = choose.choice(run.ready())
+            run.carry(task)
+            run.report(task)
+    from_there = ends.index(max(run.scheduler.known[slowest]))
+    while not run.scheduler.finished:
+        run.send()
+        ready = [task for task in run.ready() if task.island != slowest]
         if not ready:
             break
-        leg = choose.choice(ready)
-        voyage.carry(leg)
-        voyage.report(leg)
-    complete, away = ends.index(voyage.plan.completed_generation), distances(voyage.sources, slowest)
-    for island, known in enumerate(voyage.plan.known):
+        task = choose.choice(ready)
+        run.carry(task)
+        run.report(task)
+    complete, away = ends.index(run.scheduler.completed_generation), distances(run.sources, slowest)
+    for island, known in enumerate(run.scheduler.known):
         reachable = from_there + away.get(island, len(ends))
         assert ends.index(max(known)) == min(reachable, complete + ahead, len(ends) - 1)
 
 
-def test_by_default_an_island_is_on_one_epoch_and_has_two_in_the_queue():
-    plan = itinerary(islands=2)
-    assert list(plan.ready_tasks()) == [
+def test_default_limit_is_one_running_and_two_queued_epochs():
+    scheduler = make_scheduler(islands=2)
+    assert list(scheduler.ready_tasks()) == [
         EpochTask(island, *stage) for stage in ((-1, 0), (0, 4), (4, 8)) for island in (0, 1)
     ]
-    assert list(plan.ready_tasks()) == []
-    assert (plan.completed_generation, plan.finished) == (-1, False)
+    assert list(scheduler.ready_tasks()) == []
+    assert (scheduler.completed_generation, scheduler.finished) == (-1, False)
 
 
 @given(searches(), orders)
-def test_of_what_is_due_earlier_epochs_come_first(search, choose):
+def test_ready_tasks_of_earlier_epochs_come_first(search, choose):
     problem_, ends, ahead = search
-    voyage = Voyage(problem_, ends, ahead)
-    while not voyage.plan.finished:
-        begins = [leg.begin for leg in voyage.send()]
+    run = PlayedRun(problem_, ends, ahead)
+    while not run.scheduler.finished:
+        begins = [task.begin for task in run.send()]
         assert begins == sorted(begins)
-        leg = choose.choice(voyage.ready())
-        voyage.carry(leg)
-        voyage.report(leg)
+        task = choose.choice(run.ready())
+        run.carry(task)
+        run.report(task)
 
 
-def test_who_takes_one_of_those_that_are_due_finds_the_others_later():
-    all_of_them, plan = list(itinerary().ready_tasks()), itinerary()
+def test_remaining_ready_tasks_are_yielded_by_a_later_call():
+    all_of_them, scheduler = list(make_scheduler().ready_tasks()), make_scheduler()
     one_by_one = []
     while len(one_by_one) < len(all_of_them):
-        one_by_one.append(next(plan.ready_tasks()))
+        one_by_one.append(next(scheduler.ready_tasks()))
     assert one_by_one == all_of_them
-    assert list(plan.ready_tasks()) == []
+    assert list(scheduler.ready_tasks()) == []
 
 
-def test_what_was_told_out_of_order_comes_in_order_as_soon_as_it_is_complete():
-    plan = itinerary(islands=2, ahead=2)
-    one, other, later, other_later = plan.ready_tasks()
-    for leg in (later, other_later, other):
-        plan.complete(leg, epoch_of(leg))
-        assert list(plan.completed_epochs()) == []
-    plan.complete(one, epoch_of(one))
-    assert list(plan.completed_epochs()) == [
-        (epoch_of(one), epoch_of(other)),
-        (epoch_of(later), epoch_of(other_later)),
+def test_epochs_completed_out_of_order_are_yielded_in_order():
+    scheduler = make_scheduler(islands=2, ahead=2)
+    one, other, later, other_later = scheduler.ready_tasks()
+    for task in (later, other_later, other):
+        scheduler.complete(task, make_epoch(task))
+        assert list(scheduler.completed_epochs()) == []
+    scheduler.complete(one, make_epoch(one))
+    assert list(scheduler.completed_epochs()) == [
+        (make_epoch(one), make_epoch(other)),
+        (make_epoch(later), make_epoch(other_later)),
     ]
-    assert plan.completed_generation == 4
-    assert list(plan.completed_epochs()) == []
+    assert scheduler.completed_generation == 4
+    assert list(scheduler.completed_epochs()) == []

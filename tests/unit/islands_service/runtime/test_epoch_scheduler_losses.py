@@ -1,4 +1,4 @@
-"""The itinerary where legs are lost, and where islands evolve on it."""
+"""`EpochScheduler` with lost tasks, and with islands that evolve."""
 
 import random
 from dataclasses import replace
@@ -13,76 +13,76 @@ from islands.evolution.gp.individual import Individual
 from islands.evolution.problem import problem
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 
-#: Where numbers stand for islands nobody looks at the record.
-from support.itineraries import (
+#: The record is not used, since numbers replace islands.
+from support.epoch_runs import (
     SEED,
-    as_it_is,
-    epoch_of,
-    itinerary,
+    keep_epoch,
+    make_epoch,
+    make_scheduler,
 )
 from support.searches import SMALL, exactly, record
 
-# What is lost.
+# Lost tasks.
 
 
-def test_a_lost_leg_and_what_was_sent_after_it_are_due_again_and_nobody_else_s():
-    plan = itinerary(ahead=3)
-    assert len(list(plan.ready_tasks())) == 9
-    plan.reschedule(EpochTask(1, 0, 4))
-    assert list(plan.ready_tasks()) == [EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
-    plan.reschedule(EpochTask(2, 4, 8))
-    plan.reschedule(EpochTask(0, -1, 0))
-    assert list(plan.ready_tasks()) == [
+def test_lost_task_and_later_ones_of_its_island_are_ready_again():
+    scheduler = make_scheduler(ahead=3)
+    assert len(list(scheduler.ready_tasks())) == 9
+    scheduler.reschedule(EpochTask(1, 0, 4))
+    assert list(scheduler.ready_tasks()) == [EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
+    scheduler.reschedule(EpochTask(2, 4, 8))
+    scheduler.reschedule(EpochTask(0, -1, 0))
+    assert list(scheduler.ready_tasks()) == [
         EpochTask(0, -1, 0),
         EpochTask(0, 0, 4),
         EpochTask(0, 4, 8),
         EpochTask(2, 4, 8),
     ]
-    # Told of the later one besides, as late as may be.
-    plan.reschedule(EpochTask(1, -1, 0))
-    plan.reschedule(EpochTask(1, 4, 8))
-    assert list(plan.ready_tasks()) == [EpochTask(1, -1, 0), EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
+    # A later task of the same island is reported as lost after the earlier one.
+    scheduler.reschedule(EpochTask(1, -1, 0))
+    scheduler.reschedule(EpochTask(1, 4, 8))
+    assert list(scheduler.ready_tasks()) == [EpochTask(1, -1, 0), EpochTask(1, 0, 4), EpochTask(1, 4, 8)]
 
 
-def test_a_loss_of_what_is_known_already_holds_nobody_up():
-    """The second leg came back, the first one was lost; then what was sent again after it is lost too."""
-    plan = itinerary(text="isolated", islands=1, ahead=2)
-    first, second = plan.ready_tasks()
-    plan.complete(second, epoch_of(second))
-    plan.reschedule(first)
-    again = list(plan.ready_tasks())
-    plan.complete(first, epoch_of(first))
-    assert list(plan.completed_epochs()) == [(epoch_of(first),), (epoch_of(second),)]
-    for leg in again[1:]:
-        plan.reschedule(leg)
-    assert EpochTask(0, 4, 8) in list(plan.ready_tasks())
+def test_loss_of_a_task_with_a_known_result_blocks_nothing():
+    """The first task is lost, the second one is completed; then the repeated second one is lost."""
+    scheduler = make_scheduler(text="isolated", islands=1, ahead=2)
+    first, second = scheduler.ready_tasks()
+    scheduler.complete(second, make_epoch(second))
+    scheduler.reschedule(first)
+    again = list(scheduler.ready_tasks())
+    scheduler.complete(first, make_epoch(first))
+    assert list(scheduler.completed_epochs()) == [(make_epoch(first),), (make_epoch(second),)]
+    for task in again[1:]:
+        scheduler.reschedule(task)
+    assert EpochTask(0, 4, 8) in list(scheduler.ready_tasks())
 
 
 def completed_twice():
-    """An island whose second leg is out once more, though it is known and complete; a third is out, too."""
-    plan = itinerary(text="isolated", islands=1)
-    first, second, _ = plan.ready_tasks()
-    plan.complete(second, epoch_of(second))
-    plan.reschedule(first)
-    assert list(plan.ready_tasks()) == [first, second, EpochTask(0, 4, 8)]
-    plan.complete(first, epoch_of(first))
-    assert len(list(plan.completed_epochs())) == 2
-    return plan, second
+    """Return a scheduler whose pending second task is already complete, and that task."""
+    scheduler = make_scheduler(text="isolated", islands=1)
+    first, second, _ = scheduler.ready_tasks()
+    scheduler.complete(second, make_epoch(second))
+    scheduler.reschedule(first)
+    assert list(scheduler.ready_tasks()) == [first, second, EpochTask(0, 4, 8)]
+    scheduler.complete(first, make_epoch(first))
+    assert len(list(scheduler.completed_epochs())) == 2
+    return scheduler, second
 
 
-def test_a_loss_of_what_is_complete_loses_what_was_sent_after_it():
-    plan, second = completed_twice()
-    plan.reschedule(second)
-    assert list(plan.ready_tasks()) == [EpochTask(0, 4, 8), EpochTask(0, 8, 10)]
+def test_loss_of_a_complete_task_reschedules_the_later_ones():
+    scheduler, second = completed_twice()
+    scheduler.reschedule(second)
+    assert list(scheduler.ready_tasks()) == [EpochTask(0, 4, 8), EpochTask(0, 8, 10)]
 
 
-def test_what_comes_back_of_what_is_complete_already_is_forgotten():
-    plan, second = completed_twice()
-    before = [dict(known) for known in plan.known]
-    plan.complete(second, replace(epoch_of(second), emigrants=(Individual(()),)))
-    plan.complete(EpochTask(0, -1, 0), epoch_of(EpochTask(0, -1, 0)))
-    assert plan.known == before
-    assert list(plan.completed_epochs()) == []
+def test_second_result_of_a_complete_task_is_ignored():
+    scheduler, second = completed_twice()
+    before = [dict(known) for known in scheduler.known]
+    scheduler.complete(second, replace(make_epoch(second), emigrants=(Individual(()),)))
+    scheduler.complete(EpochTask(0, -1, 0), make_epoch(EpochTask(0, -1, 0)))
+    assert scheduler.known == before
+    assert list(scheduler.completed_epochs()) == []
 
 
 # With islands that evolve.
@@ -105,10 +105,10 @@ def evolving():
     return problem(record(150), setting)
 
 
-def test_it_begins_with_those_who_leave_the_islands_of_its_start(evolving):
+def test_scheduler_begins_with_the_emigrants_of_its_start(evolving):
     for epoch in SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False):
         start = epoch.archipelago
-        known = EpochScheduler(evolving, start, as_it_is).known
+        known = EpochScheduler(evolving, start, keep_epoch).known
         for island, each in zip(start.islands, known, strict=True):
             leaving = select_migrants(island, evolving.settings_of(island.index))
             assert each == {start.generation: IslandEpoch(island, leaving, ())}
@@ -117,35 +117,40 @@ def test_it_begins_with_those_who_leave_the_islands_of_its_start(evolving):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("first", [None, 1])
-def test_in_any_order_and_with_losses_islands_evolve_as_one_after_the_other(evolving, first, seed):
+def test_islands_evolve_as_in_the_serial_engine_despite_losses(evolving, first, seed):
     whole = list(SerialEngine().run(evolving, empty_archipelago(3, SEED), lambda: False))
     start = empty_archipelago(3, SEED) if first is None else whole[first].archipelago
     whole = whole if first is None else whole[first + 1 :]
-    plan, evaluator, choose = (
-        EpochScheduler(evolving, start, as_it_is),
+    scheduler, evaluator, choose = (
+        EpochScheduler(evolving, start, keep_epoch),
         Evaluator(evolving.record, evolving.settings),
         random.Random(seed),
     )
     out, found, losses = [], [], 0
-    while not plan.finished:
-        out += plan.ready_tasks()
-        leg = choose.choice(
+    while not scheduler.finished:
+        out += scheduler.ready_tasks()
+        task = choose.choice(
             [
-                leg
-                for leg in out
-                if all(leg.begin in plan.known[each] for each in (leg.island, *plan.sources[leg.island]))
+                task
+                for task in out
+                if all(
+                    task.begin in scheduler.known[each]
+                    for each in (task.island, *scheduler.sources[task.island])
+                )
             ]
         )
         if choose.random() < 0.3:
             losses += 1
-            plan.reschedule(leg)
-            out = [each for each in out if each.island != leg.island or each.end < leg.end]
+            scheduler.reschedule(task)
+            out = [each for each in out if each.island != task.island or each.end < task.end]
             continue
-        out.remove(leg)
-        arriving = [plan.known[source][leg.begin].emigrants for source in plan.sources[leg.island]]
-        island = plan.known[leg.island][leg.begin].island
-        plan.complete(leg, run_epoch(island, arriving, evaluator, evolving, lambda: False))
-        found += plan.completed_epochs()
+        out.remove(task)
+        arriving = [
+            scheduler.known[source][task.begin].emigrants for source in scheduler.sources[task.island]
+        ]
+        island = scheduler.known[task.island][task.begin].island
+        scheduler.complete(task, run_epoch(island, arriving, evaluator, evolving, lambda: False))
+        found += scheduler.completed_epochs()
     assert losses > 0
     assert len(found) == len(whole)
     for epochs, expected in zip(found, whole, strict=True):

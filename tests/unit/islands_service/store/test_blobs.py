@@ -1,4 +1,4 @@
-"""Blobs: named by what is in them, whole or not there, swept away when nobody names them."""
+"""`Blobs`: content-addressed, complete or absent, swept if unreferenced."""
 
 import errno
 import os
@@ -35,14 +35,14 @@ def aged(path):
 
 
 @pytest.mark.parametrize("data", [b"", b"a", bytes(range(256)) * 5000])
-def test_a_blob_is_what_was_written_and_its_name_says_what_that_was(blobs, data):
+def test_blob_holds_the_written_bytes_and_is_named_by_their_hash(blobs, data):
     blob = blobs.write(data)
     assert blob == sha256(data).hexdigest()
     assert blobs.read(blob) == data
     assert blobs.path(blob).read_bytes() == data
 
 
-def test_a_blob_is_there_for_whoever_opens_the_folder(blobs, folder):
+def test_blob_is_visible_to_other_instances_on_the_folder(blobs, folder):
     assert Blobs(folder).read(blobs.write(b"a")) == b"a"
 
 
@@ -51,23 +51,23 @@ def test_the_same_bytes_are_one_file(blobs, folder):
     assert len(files(folder)) == 1
 
 
-def test_many_who_write_the_same_bytes_at_once_write_one_blob(blobs, folder):
+def test_concurrent_writes_of_the_same_bytes_make_one_blob(blobs, folder):
     data = b"x" * 100_000
     assert set(at_once([partial(blobs.write, data)] * MANY)) == {sha256(data).hexdigest()}
     assert [path.read_bytes() for path in files(folder)] == [data]
 
 
-def test_a_blob_that_is_not_there_says_what_to_do(blobs, folder):
+def test_missing_blob_raises_an_error_with_advice(blobs, folder):
     with pytest.raises(BlobNotFoundError, match=f"{'0' * 64} is not in .*blobs: restore .* from a backup"):
         blobs.read("0" * 64)
 
 
-def test_nobody_else_may_look_into_the_folder(blobs, folder):
+def test_folder_is_not_accessible_to_other_users(blobs, folder):
     blobs.write(b"a")
     assert {path.stat().st_mode & 0o077 for path in (folder, *folder.rglob("*"))} == {0}
 
 
-def test_what_is_received_in_pieces_is_one_blob(blobs):
+def test_bytes_received_in_pieces_are_one_blob(blobs):
     with blobs.receiving() as stream:
         for _ in range(100):
             stream.write(b"abc")
@@ -75,14 +75,14 @@ def test_what_is_received_in_pieces_is_one_blob(blobs):
     assert blobs.read(blob) == b"abc" * 100
 
 
-def test_what_is_not_kept_leaves_nothing(blobs, folder):
+def test_received_file_that_is_not_kept_is_deleted(blobs, folder):
     with blobs.receiving() as stream:
         stream.write(b"a")
         assert len(files(folder)) == 1
     assert files(folder) == []
 
 
-def test_what_fails_while_it_is_received_leaves_nothing(blobs, folder):
+def test_failed_reception_leaves_no_file(blobs, folder):
     def fails():
         with blobs.receiving() as stream:
             stream.write(b"a" * 100_000)
@@ -93,7 +93,7 @@ def test_what_fails_while_it_is_received_leaves_nothing(blobs, folder):
     assert files(folder) == []
 
 
-def test_what_was_kept_is_kept_whatever_fails_after_it(blobs, folder):
+def test_kept_blob_survives_a_later_error(blobs, folder):
     def fails():
         with blobs.receiving() as stream:
             stream.write(b"a")
@@ -106,7 +106,7 @@ def test_what_was_kept_is_kept_whatever_fails_after_it(blobs, folder):
     assert len(files(folder)) == 1
 
 
-def test_a_blob_and_its_folders_are_on_the_disk_before_its_name_is_told(blobs, folder, monkeypatch):
+def test_blob_and_its_folders_are_synced_before_its_name_is_returned(blobs, folder, monkeypatch):
     synced = []
 
     def fsync(descriptor):
@@ -120,7 +120,7 @@ def test_a_blob_and_its_folders_are_on_the_disk_before_its_name_is_told(blobs, f
     assert [path for path, _ in folders] == [folder / blob[:2], folder]
 
 
-def test_all_that_is_there_is_told_and_what_has_no_name_yet(blobs, folder):
+def test_all_yields_blobs_and_partly_written_files(blobs, folder):
     assert list(blobs.all()) == []
     made = {blobs.write(bytes([each])) for each in range(20)}
     with blobs.receiving() as stream:
@@ -130,7 +130,7 @@ def test_all_that_is_there_is_told_and_what_has_no_name_yet(blobs, folder):
         assert all(blobs.path(blob) == path for blob, path in found if blob)
 
 
-def test_what_nobody_names_is_swept_away_once_it_is_old(blobs):
+def test_old_unreferenced_blobs_are_swept(blobs):
     named, unnamed, young = (blobs.write(each) for each in (b"a", b"b", b"c"))
     for blob in (named, unnamed):
         aged(blobs.path(blob))
@@ -140,7 +140,7 @@ def test_what_nobody_names_is_swept_away_once_it_is_old(blobs):
     assert blobs.sweep((), time.time() + 60) == 2
 
 
-def test_what_was_left_half_written_is_swept_away_once_it_is_old(blobs, folder):
+def test_old_partly_written_files_are_swept(blobs, folder):
     left = folder / "left.part"
     left.write_bytes(b"half")
     assert blobs.sweep((), LONG_AGO) == 0
@@ -149,8 +149,8 @@ def test_what_was_left_half_written_is_swept_away_once_it_is_old(blobs, folder):
     assert files(folder) == []
 
 
-def test_a_blob_that_is_written_again_is_young_again(blobs):
-    """Whoever has written it is about to name it."""
+def test_rewritten_blob_counts_as_new(blobs):
+    """A reference to it is about to be written."""
     blob = blobs.write(b"a")
     aged(blobs.path(blob))
     blobs.write(b"a")
@@ -159,12 +159,12 @@ def test_a_blob_that_is_written_again_is_young_again(blobs):
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
-def test_a_full_disk_is_told(number):
+def test_full_disk_raises_a_storage_full_error(number):
     with pytest.raises(StorageFullError, match="make room"), translate_disk_full():
         raise OSError(number, os.strerror(number))
 
 
-def test_another_fault_of_the_disk_is_not_called_a_full_one():
+def test_other_disk_errors_are_not_translated():
     with pytest.raises(OSError, match="Input/output error") as raised, translate_disk_full():
         raise OSError(errno.EIO, os.strerror(errno.EIO))
     assert not isinstance(raised.value, StorageFullError)

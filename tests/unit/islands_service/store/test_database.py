@@ -1,4 +1,4 @@
-"""Database: what a driver raises is told as what it means, and what it means for whoever asked."""
+"""`Database`: translated errors, timeouts and retries."""
 
 import socket
 import sqlite3
@@ -31,10 +31,10 @@ MEANS = {
     "57P01": StoreUnavailableError,  # admin shutdown
     "57P03": StoreUnavailableError,  # cannot connect now
     "53300": StoreUnavailableError,  # too many connections
-    "25006": StoreUnavailableError,  # read-only transaction: this one is another one's copy now
+    "25006": StoreUnavailableError,  # read-only transaction: the server is a standby now
     "40001": StoreCollisionError,  # serialization failure
     "40P01": StoreCollisionError,  # deadlock
-    "23505": IntegrityError,  # unique violation: somebody's mistake, and nobody's but its own
+    "23505": IntegrityError,  # unique violation: an error of the operation alone
     "42P01": ProgrammingError,  # undefined table
 }
 
@@ -58,7 +58,7 @@ def executing(statement):
 
 
 @pytest.mark.parametrize("state", MEANS)
-def test_what_postgresql_raises_is_told_as_what_it_means(postgresql, state):
+def test_postgresql_errors_are_translated(postgresql, state):
     with pytest.raises((StoreError, DBAPIError)) as raised:
         postgresql.write(executing(RAISE.format(state)))
     assert type(raised.value) is MEANS[state]
@@ -69,12 +69,12 @@ def test_what_postgresql_raises_is_told_as_what_it_means(postgresql, state):
     postgresql.write(executing("SELECT 1"))
 
 
-def test_a_read_is_told_alike(postgresql):
+def test_errors_of_a_read_are_translated(postgresql):
     with pytest.raises(StoreUnavailableError), postgresql.read() as connection:
         connection.execute(text(RAISE.format("57P01")))
 
 
-def test_a_collision_is_tried_again_and_in_the_end_given_up(postgresql):
+def test_collision_is_retried_a_limited_number_of_times(postgresql):
     tries = []
 
     def collides(connection):
@@ -86,7 +86,7 @@ def test_a_collision_is_tried_again_and_in_the_end_given_up(postgresql):
     assert 2 <= len(tries) <= 10
 
 
-def test_a_collision_that_is_over_is_not_seen(postgresql):
+def test_transient_collision_is_hidden_by_a_retry(postgresql):
     tries = []
 
     def collides_once(connection):
@@ -99,33 +99,33 @@ def test_a_collision_that_is_over_is_not_seen(postgresql):
 
 
 def ending(connection):
-    """Have the server end a connection, as an administrator or a crash does."""
+    """Make the server end the connection, as an administrator or a crash does."""
     return connection.exec_driver_sql("SELECT pg_terminate_backend(pg_backend_pid())")
 
 
-def test_who_is_cut_off_before_the_commit_is_told_that_nothing_was_written(postgresql):
+def test_connection_lost_before_the_commit_means_nothing_was_written(postgresql):
     with pytest.raises(StoreUnavailableError, match="nothing was written") as raised:
         postgresql.write(ending)
     assert not isinstance(raised.value, CommitUnknownError)
     postgresql.write(executing("SELECT 1"))
 
 
-def test_who_is_cut_off_during_the_commit_is_not_told_that_nothing_was_written(postgresql):
+def test_connection_lost_during_the_commit_means_unknown_outcome(postgresql):
     event.listen(postgresql.engine, "commit", ending, once=True)
-    with pytest.raises(CommitUnknownError, match="nobody knows whether it was written") as raised:
+    with pytest.raises(CommitUnknownError, match="unknown whether the transaction was written") as raised:
         postgresql.write(executing("SELECT 1"))
     assert "nothing was written" not in str(raised.value)
     postgresql.write(executing("SELECT 1"))
 
 
-def test_a_statement_that_is_wrong_is_not_the_databases_fault(sqlite):
+def test_invalid_statement_is_not_an_unavailable_database(sqlite):
     with pytest.raises(DBAPIError, match="nowhere"):
         sqlite.write(executing("SELECT * FROM nowhere"))
     with pytest.raises(DBAPIError, match="nowhere"), sqlite.read() as connection:
         connection.execute(text("SELECT * FROM nowhere"))
 
 
-def test_a_file_that_is_locked_is_waited_for_and_then_told(sqlite, tmp_path, monkeypatch):
+def test_locked_file_raises_an_error_after_the_timeout(sqlite, tmp_path, monkeypatch):
     sqlite.write(executing("SELECT 1"))
     monkeypatch.setattr(connections, "PRAGMAS", ("busy_timeout=200",))
     hasty = Database(sqlite.url)
@@ -142,9 +142,9 @@ def test_a_file_that_is_locked_is_waited_for_and_then_told(sqlite, tmp_path, mon
     hasty.close()
 
 
-def test_a_new_file_that_is_locked_is_waited_for_and_then_told(tmp_path, monkeypatch):
-    """Whoever turns it to a log that is written ahead is not made to wait by SQLite."""
-    monkeypatch.setattr(connections, "PATIENCE", 0.4)
+def test_locked_new_file_raises_an_error_after_the_timeout(tmp_path, monkeypatch):
+    """SQLite itself does not wait when the file is switched to write-ahead logging."""
+    monkeypatch.setattr(connections, "BUSY_TIMEOUT", 0.4)
     database = Database(f"sqlite:///{tmp_path / 'islands.db'}")
     with closing(sqlite3.connect(tmp_path / "islands.db", isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")
@@ -168,34 +168,34 @@ def test_a_file_that_is_no_database_is_not_written(tmp_path):
     assert path.read_bytes() == b"a record, perhaps" * 100
 
 
-def test_a_folder_that_is_not_there_is_told(tmp_path):
+def test_missing_folder_raises_an_error(tmp_path):
     with pytest.raises(StoreUnavailableError, match="unable to open"):
         Store(f"sqlite:///{tmp_path / 'nowhere' / 'islands.db'}")
 
 
-def test_every_connection_to_sqlite_waits_for_the_disk_and_holds_to_foreign_keys(sqlite):
+def test_sqlite_connections_are_durable_and_enforce_foreign_keys(sqlite):
     def asked(name):
         with sqlite.read() as connection:
             return connection.execute(text(f"PRAGMA {name}")).scalar()
 
     names = ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
     found = at_once([lambda: [asked(name) for name in names]] * 8)
-    assert found == [["wal", 2, 1, 1000 * connections.PATIENCE]] * 8
+    assert found == [["wal", 2, 1, 1000 * connections.BUSY_TIMEOUT]] * 8
 
 
-def test_a_connection_to_postgresql_notices_an_end_and_lets_go_when_it_stands_still(postgresql):
+def test_postgresql_connections_have_keepalives_and_an_idle_timeout(postgresql):
     with postgresql.read() as connection:
         info = connection.connection.dbapi_connection.info
         assert (
             info.get_parameters().items()
-            >= {name: str(value) for name, value in connections.CONNECTING.items()}.items()
+            >= {name: str(value) for name, value in connections.LIBPQ_OPTIONS.items()}.items()
         )
         timeout = connection.execute(text("SHOW idle_in_transaction_session_timeout")).scalar()
         level = connection.execute(text("SHOW transaction_isolation")).scalar()
     assert (timeout, level) == ("10s", "read committed")
 
 
-def test_what_the_url_says_is_heeded(postgresql):
+def test_options_of_the_url_take_precedence(postgresql):
     patient = Database(f"{postgresql.url}&connect_timeout=77")
     with patient.read() as connection:
         assert connection.connection.dbapi_connection.info.get_parameters()["connect_timeout"] == "77"
@@ -203,11 +203,11 @@ def test_what_the_url_says_is_heeded(postgresql):
 
 
 @pytest.mark.ci
-def test_a_server_that_takes_connections_and_never_answers_is_given_up(monkeypatch):
-    """As one that was stopped, or is behind a wall."""
-    monkeypatch.setitem(connections.CONNECTING, "connect_timeout", 2)
+def test_server_that_never_answers_raises_an_error_after_a_timeout(monkeypatch):
+    """For example a stopped server, or one behind a firewall."""
+    monkeypatch.setitem(connections.LIBPQ_OPTIONS, "connect_timeout", 2)
     with socket.create_server(("127.0.0.1", 0)) as silent:
-        database = Database(f"postgresql+psycopg://nobody@127.0.0.1:{silent.getsockname()[1]}/none")
+        database = Database(f"postgresql+psycopg://user@127.0.0.1:{silent.getsockname()[1]}/none")
         began = time.monotonic()
         with pytest.raises(StoreUnavailableError, match="timeout"):
             database.write(executing("SELECT 1"))
@@ -215,8 +215,8 @@ def test_a_server_that_takes_connections_and_never_answers_is_given_up(monkeypat
         database.close()
 
 
-def test_many_who_open_a_new_file_at_once_all_succeed(tmp_path):
-    """The API and the coordinator do, at the first start: of those who turn a file to its log, one may."""
+def test_concurrent_opening_of_a_new_file_succeeds(tmp_path):
+    """The API and the coordinator do so at the first start; only one may enable write-ahead logging."""
     for turn in range(10):
         made = [Database(f"sqlite:///{tmp_path / f'{turn}.db'}") for _ in range(8)]
         answers = at_once([partial(each.write, executing("SELECT 1")) for each in made])
@@ -225,8 +225,8 @@ def test_many_who_open_a_new_file_at_once_all_succeed(tmp_path):
             each.close()
 
 
-def test_a_writer_that_cannot_start_keeps_nobody_waiting(sqlite, monkeypatch):
-    """Where there are too many threads already: whoever comes next tries again."""
+def test_writer_that_cannot_start_blocks_no_later_write(sqlite, monkeypatch):
+    """With too many threads the first write fails, and the next one tries again."""
     start, starts = threading.Thread.start, []
 
     def refused_once(thread):

@@ -1,4 +1,4 @@
-"""Migrations: every revision there ever was becomes today's tables, with what was in it."""
+"""Migrations: a database of any revision is upgraded to the current tables with its rows."""
 
 import sqlite3
 from contextlib import ExitStack, closing
@@ -17,7 +17,7 @@ from islands_service.store.schema_upgrade import HEAD, configuration, prepare, r
 from islands_service.store.tables import metadata
 from support.stores import ALICE, BOB, asked, child, contents, kinds, submitted
 
-#: What `migrations/dump.py` wrote when a revision was the last one.
+#: Written by `migrations/dump.py` when each revision was the last one.
 DUMPS = Path(__file__).with_name("migrations")
 
 REVISIONS = sorted(path.stem for path in DUMPS.glob("*.sql"))
@@ -43,7 +43,7 @@ print(*(name for name in sys.modules if name.partition(".")[0] in ("alembic", "m
 
 
 def restored(number, path):
-    """Make the database that a dump was taken of."""
+    """Create the database of a dump."""
     with closing(sqlite3.connect(path)) as connection:
         connection.executescript((DUMPS / f"{number}.sql").read_text())
 
@@ -55,7 +55,7 @@ def tables_of(connection):
 
 
 def rows(connection, columns=None):
-    """Return what is in all tables, or in some columns of them, by name."""
+    """Return the rows of all tables by name, reduced to some columns if given."""
     found = {}
     for name, table in tables_of(connection).items():
         names = sorted(set(table.c.keys()) & set(columns[name]) if columns else table.c.keys())
@@ -85,12 +85,12 @@ def old(request, empty_database, tmp_path):
 def test_the_code_is_written_for_the_last_revision():
     script = ScriptDirectory.from_config(configuration())
     assert script.get_heads() == [HEAD]
-    # One line, numbered.
+    # The revisions are a single line of consecutive numbers.
     numbers = [each.revision for each in script.walk_revisions()][::-1]
     assert numbers == [f"{number:04d}" for number in range(1, len(numbers) + 1)]
 
 
-def test_there_is_a_dump_of_every_revision():
+def test_every_revision_has_a_dump():
     script = ScriptDirectory.from_config(configuration())
     missing = {each.revision for each in script.walk_revisions()} - set(REVISIONS)
     assert not missing, f"python {DUMPS / 'dump.py'}"
@@ -98,7 +98,7 @@ def test_there_is_a_dump_of_every_revision():
 
 @pytest.mark.parametrize("number", REVISIONS)
 def test_a_revision_never_changes(number, tmp_path):
-    """Databases of it are out in the world, and what they look like is in its dump."""
+    """Databases of the revision exist, and have the schema of its dump."""
 
     def shape(path):
         with closing(sqlite3.connect(path)) as connection:
@@ -113,7 +113,7 @@ def test_a_revision_never_changes(number, tmp_path):
     assert shape(tmp_path / "now.db") == shape(tmp_path / "then.db")
 
 
-def test_the_migrations_make_the_tables_that_the_code_knows(empty_database):
+def test_migrations_create_the_tables_of_the_code(empty_database):
     with Store(empty_database) as store, store.database.read() as connection:
         assert compare_metadata(MigrationContext.configure(connection), metadata) == []
         found = inspect(connection)
@@ -127,7 +127,7 @@ def test_the_migrations_make_the_tables_that_the_code_knows(empty_database):
                 assert foreign["options"] == {"ondelete": "CASCADE"}
 
 
-def test_what_an_old_database_holds_is_kept(old):
+def test_rows_of_an_old_database_are_kept(old):
     url, kept = old
     with Store(url) as store, store.database.read() as connection:
         assert revision(connection) == HEAD
@@ -136,7 +136,7 @@ def test_what_an_old_database_holds_is_kept(old):
         assert all(kept.values()), "a dump has something in every table"
 
 
-def test_an_old_database_is_worked_with_as_a_new_one(old):
+def test_migrated_database_works_like_a_new_one(old):
     url, _ = old
     with Store(url) as store:
         mine = {job.state: job for job in store.jobs.page(ALICE).jobs}
@@ -160,13 +160,13 @@ def test_an_old_database_is_worked_with_as_a_new_one(old):
         assert (again.id, new) == (failed.id, False)
 
 
-def test_a_new_database_holds_nothing(empty_database):
+def test_new_database_is_empty(empty_database):
     with Store(empty_database) as store:
         assert not any(contents(store).values())
         submitted(store)
 
 
-def test_to_prepare_again_changes_nothing(database):
+def test_repeated_preparation_changes_nothing(database):
     with Store(database) as store:
         submitted(store)
         before = contents(store)
@@ -177,7 +177,7 @@ def test_to_prepare_again_changes_nothing(database):
 
 
 @pytest.mark.ci
-def test_processes_that_prepare_the_same_new_databases_at_once_all_succeed(empty_database, tmp_path):
+def test_concurrent_preparation_of_new_databases_succeeds(empty_database, tmp_path):
     urls = [empty_database]
     if empty_database.startswith("sqlite"):
         urls += [f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(4)]
@@ -195,14 +195,14 @@ def test_processes_that_prepare_the_same_new_databases_at_once_all_succeed(empty
             submitted(store)
 
 
-def test_a_database_that_is_up_to_date_needs_no_alembic(database):
-    """It takes a quarter of a second to import."""
+def test_current_database_does_not_import_alembic(database):
+    """Importing Alembic takes a quarter of a second."""
     with child(MODULES, database) as process:
         said, _ = process.communicate(timeout=60)
     assert said == "\n"
 
 
-def test_a_database_of_a_newer_version_is_refused_and_stays_as_it_is(empty_database):
+def test_database_of_a_newer_version_is_refused_unchanged(empty_database):
     with Store(empty_database) as store:
         submitted(store)
         before = contents(store)
@@ -216,7 +216,7 @@ def test_a_database_of_a_newer_version_is_refused_and_stays_as_it_is(empty_datab
             assert revision(connection) == "9999"
 
 
-def test_a_migration_that_is_interrupted_leaves_nothing(empty_database):
+def test_interrupted_migration_is_rolled_back(empty_database):
     made = Database(empty_database)
 
     def interrupted():

@@ -1,4 +1,4 @@
-"""Queries: what is asked often reads an index, however many jobs there are."""
+"""Query plans: frequent queries use an index, whatever the number of jobs."""
 
 import json
 import random
@@ -13,7 +13,7 @@ from support.stores import ALICE, BOB, EXPIRED, LONG, asked
 
 JOBS = 2000
 
-#: What is asked, and the index that SQLite is to take for its slowest part.
+#: Frequent queries, and the index that SQLite must use for the slowest part.
 ASKED = {
     "claim": (lambda store: store.leases.claim("first", LONG), "ix_jobs_state_priority_created"),
     "quota": (lambda store: store.jobs.submit(asked(), 10**6), "ix_jobs_owner_state_created_id"),
@@ -68,13 +68,13 @@ def full(store):
 
 @pytest.fixture
 def sqlite(sqlite_database):
-    """The same in SQLite alone: it chooses its plans without looking at how much there is."""
+    """The same in SQLite only, which chooses its plans without statistics."""
     with Store(sqlite_database) as store:
         yield filled(store)
 
 
 def plans(store, ask):
-    """Return how the database carries out what is asked, a text for every statement."""
+    """Return the query plans of the statements that a call executes."""
     engine, seen = store.database.engine, []
 
     def executed(connection, cursor, statement, parameters, context, many):
@@ -89,7 +89,7 @@ def plans(store, ask):
     found = []
     with store.database.read() as connection:
         if connection.dialect.name == "postgresql":
-            # Of a table that fits into a few pages it would read all: ask for what it does of a large one.
+            # PostgreSQL would scan a table that fits into a few pages: show the plan for a large one.
             connection.execute(text("SET LOCAL enable_seqscan = off"))
         word = "EXPLAIN QUERY PLAN " if connection.dialect.name == "sqlite" else "EXPLAIN "
         for statement, parameters in seen:
@@ -99,16 +99,16 @@ def plans(store, ask):
 
 
 @pytest.mark.parametrize("ask", ASKED)
-def test_what_is_asked_often_reads_an_index(full, ask):
+def test_frequent_query_reads_an_index(full, ask):
     found = plans(full, ASKED[ask][0])
     assert found
     for plan in found:
-        assert "SCAN " not in plan  # SQLite's word for reading a whole table
+        assert "SCAN " not in plan  # SQLite's word for a scan of the whole table
         assert "Seq Scan" not in plan
 
 
 @pytest.mark.parametrize("ask", ASKED)
-def test_it_is_the_index_that_was_made_for_it(sqlite, ask):
+def test_frequent_query_reads_its_intended_index(sqlite, ask):
     action, index = ASKED[ask]
     assert any(index in plan for plan in plans(sqlite, action))
 
@@ -116,13 +116,13 @@ def test_it_is_the_index_that_was_made_for_it(sqlite, ask):
 @pytest.mark.parametrize(
     "ask", ["page", "next page", "page of a state", "next of a state", "events", "history"]
 )
-def test_what_is_read_in_order_is_not_sorted(sqlite, ask):
+def test_ordered_query_needs_no_sort(sqlite, ask):
     assert "TEMP B-TREE" not in "\n".join(plans(sqlite, ASKED[ask][0]))
 
 
-def test_a_quota_is_counted_in_the_index_alone(sqlite):
+def test_quota_is_counted_in_the_index_alone(sqlite):
     assert any("COVERING INDEX ix_jobs_owner_state" in plan for plan in plans(sqlite, ASKED["quota"][0]))
 
 
-def test_a_page_takes_one_statement_whatever_it_holds(sqlite):
+def test_page_needs_one_statement(sqlite):
     assert len(plans(sqlite, lambda store: store.jobs.page(ALICE, limit=200))) == 1

@@ -1,7 +1,7 @@
-"""Writes a revision's dump: a tiny database with something in every table, as today's code fills it.
+"""Write the dump of a revision: a small database with rows in every table, written by the current code.
 
-After adding a revision, run this file once and commit the dump. An existing dump is never rewritten, because
-databases of that revision exist outside.
+Run this file once after adding a revision, and commit the dump. An existing dump must not be rewritten,
+because databases of that revision exist.
 """
 
 import sqlite3
@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parent
 
 
 def fill(store: Store) -> None:
-    """Put something into every table, and every state of a job."""
+    """Add rows to every table, and a job in every state."""
     store.keys.create("revoked", frozenset({"read", "write"}), ALICE, seconds=3600.0)
     store.keys.revoke(store.keys.all()[0].id)
     store.datasets.add(ALICE, "Bühne.csv", ".csv", BLOB, 12, {"columns": [{"name": "u", "unit": "µm"}]})
@@ -39,7 +39,7 @@ def fill(store: Store) -> None:
 def main() -> None:
     target = FOLDER / f"{HEAD}.sql"
     if target.exists():
-        raise SystemExit(f"{target} is there: what it shows is out in the world")
+        raise SystemExit(f"{target} exists already: databases of this revision may exist, too")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "islands.db"
         with Store(f"sqlite:///{path}") as store:

@@ -1,4 +1,4 @@
-"""Islands on their way: packed, and unpacked where somebody looks at them."""
+"""`PackedEpoch` and `PackedIslands`: packing, and unpacking at the first access."""
 
 import pickle
 from dataclasses import replace
@@ -8,7 +8,7 @@ import pytest
 from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.generation.evaluation import Evaluator
-from islands_service.runtime import packed_epoch as reports
+from islands_service.runtime import packed_epoch
 from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_island
 from support.searches import SMALL, exactly, islands_of, record
 
@@ -23,17 +23,17 @@ def packed(islands):
     return PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands])
 
 
-def test_an_island_comes_out_as_it_went_in(islands):
+def test_packed_island_is_unpacked_unchanged(islands):
     for island in islands:
         back = unpack_island(pack_epoch(IslandEpoch(island, island.elite[:2], ())))
         assert exactly(back) == exactly(island)
-        # And goes on to breed the same: hashes are of one process, and made anew.
+        # The order of genes in a dictionary is equal, too: hashes are computed per process.
         assert {gene: 0 for each in back.population for gene in each.genes} == {
             gene: 0 for each in island.population for gene in each.genes
         }
 
 
-def test_a_report_says_what_the_epoch_brought(islands):
+def test_packed_epoch_contains_emigrants_steps_and_caches(islands):
     epoch = IslandEpoch(islands[-1], islands[-1].elite[:2], ())
     found = pack_epoch(epoch, "me", {"pairs": (1, 2)})
     assert (found.emigrants, found.steps) == (epoch.emigrants, epoch.steps)
@@ -41,7 +41,7 @@ def test_a_report_says_what_the_epoch_brought(islands):
     assert pickle.loads(pickle.dumps(found)) == found
 
 
-def test_packed_islands_are_those_islands(islands, packed):
+def test_packed_islands_behave_like_the_tuple_of_islands(islands, packed):
     assert len(packed) == len(islands)
     assert [*packed] == islands
     assert packed[-1] == islands[-1]
@@ -50,7 +50,7 @@ def test_packed_islands_are_those_islands(islands, packed):
     assert exactly(Archipelago(packed)) == exactly(Archipelago(tuple(islands)))
 
 
-def test_packed_islands_equal_whatever_has_the_same_islands(islands, packed):
+def test_packed_islands_equal_sequences_with_the_same_islands(islands, packed):
     assert packed == tuple(islands)
     assert tuple(islands) == packed
     assert Archipelago(packed) == Archipelago(tuple(islands))
@@ -61,16 +61,16 @@ def test_packed_islands_equal_whatever_has_the_same_islands(islands, packed):
     assert packed != 3
 
 
-def test_places_that_are_not_there_are_refused(islands, packed):
+def test_index_out_of_range_raises_an_error(islands, packed):
     for place in (len(islands), -len(islands) - 1):
         with pytest.raises(IndexError):
             packed[place]
 
 
-def test_an_island_is_unpacked_once_and_not_before_somebody_looks(monkeypatch, islands):
+def test_island_is_unpacked_once_at_its_first_access(monkeypatch, islands):
     opened = []
     monkeypatch.setattr(
-        reports, "unpack_island", lambda report: opened.append(report) or unpack_island(report)
+        packed_epoch, "unpack_island", lambda report: opened.append(report) or unpack_island(report)
     )
     found = PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands])
     assert len(found) == len(islands)
