@@ -49,8 +49,7 @@ SWEEP_INTERVAL = 600.0
 #: Seconds after which a blob that no row references is deleted.
 ORPHAN_AGE = 3600.0
 
-#: Runs a job, given the lease, the store, the blobs, an engine, a function that raises if the job must end,
-#: and the least number of seconds between checkpoints.
+#: Runs a job: lease, store, blobs, engine, check that raises if it must end, seconds between checkpoints.
 JobRunner = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float], JobOutcome]
 
 

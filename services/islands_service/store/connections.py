@@ -49,8 +49,8 @@ def _sqlite(url: str) -> Engine:
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
         # Take the write lock at the beginning: an upgrade from a read transaction may fail on stale data.
-        # Readers use no transaction, as with PostgreSQL's READ COMMITTED: beginning and ending one takes as
-        # long as reading a job.
+        # Readers begin no transaction, so that each statement has its own snapshot, as with READ COMMITTED in
+        # PostgreSQL: beginning and ending a transaction takes as long as reading a job.
         if connection.get_execution_options().get("writes", False):
             connection.exec_driver_sql("BEGIN IMMEDIATE")
 

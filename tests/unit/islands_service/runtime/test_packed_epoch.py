@@ -27,7 +27,7 @@ def test_packed_island_is_unpacked_unchanged(islands):
     for island in islands:
         back = unpack_island(pack_epoch(IslandEpoch(island, island.elite[:2], ())))
         assert exactly(back) == exactly(island)
-        # The order of genes in a dictionary is equal, too: hashes are computed per process.
+        # Genes are equal as keys, too, although hashes differ between processes and are computed again.
         assert {gene: 0 for each in back.population for gene in each.genes} == {
             gene: 0 for each in island.population for gene in each.genes
         }
