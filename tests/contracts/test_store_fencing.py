@@ -23,7 +23,7 @@ from support.stores import (
 
 #: All operations under a lease.
 WRITES = {
-    "beat": lambda leases, lease: leases.renew(lease, LONG),
+    "renew": lambda leases, lease: leases.renew(lease, LONG),
     "report": lambda leases, lease: leases.report(lease, brought_on(9)),
     "progress alone": lambda leases, lease: leases.report(lease, ProgressReport({"phase": "search"})),
     "release": lambda leases, lease: leases.release(lease),
@@ -42,11 +42,11 @@ def taken_over_and_brought_on(store, lease):
     store.leases.report(claimed(store), brought_on(5))
 
 
-def given_back(store, lease):
+def released_by_another(store, lease):
     store.leases.release(claimed(store))
 
 
-def given_back_by_itself(store, lease):
+def released_by_itself(store, lease):
     store.leases.release(lease)
 
 
@@ -77,8 +77,8 @@ def cancelled_and_deleted(store, lease):
 LOSSES = [
     taken_over,
     taken_over_and_brought_on,
-    given_back,
-    given_back_by_itself,
+    released_by_another,
+    released_by_itself,
     finished_by_another,
     finished_by_itself,
     failed_and_waiting_again,

@@ -9,7 +9,7 @@ from sqlalchemy import insert, select, text
 from islands_service.domain.job import JobNotFoundError
 from islands_service.store import Store
 from islands_service.store import database as database_module
-from islands_service.store.database import GROUP, StoreError
+from islands_service.store.database import MAX_GROUP_SIZE, StoreError
 from islands_service.store.job_events import append_event, update_job
 from islands_service.store.tables import keys
 from support.stores import (
@@ -68,8 +68,8 @@ def test_concurrent_submissions_need_fewer_commits_than_jobs(store):
 
 
 def test_group_has_a_largest_size(store, monkeypatch):
-    assert GROUP >= MANY
-    monkeypatch.setattr(database_module, "GROUP", 4)
+    assert MAX_GROUP_SIZE >= MANY
+    monkeypatch.setattr(database_module, "MAX_GROUP_SIZE", 4)
     with commits(store) as times:
         in_one_group(store, [lambda: store.jobs.submit(asked())] * MANY)
     assert len(times) == 1 + MANY / 4

@@ -7,7 +7,7 @@ from sqlalchemy import update
 
 from islands_service.domain.job import JobNotFoundError, JobState, JobStateError
 from islands_service.store.datasets import DatasetNotFoundError
-from islands_service.store.jobs import PAGE
+from islands_service.store.jobs import MAX_PAGE_SIZE
 from islands_service.store.tables import jobs as jobs_table
 from support.stores import (
     ALICE,
@@ -228,9 +228,9 @@ def test_list_can_be_limited_to_one_state(store):
 
 
 def test_page_has_a_largest_size(store):
-    for _ in range(PAGE + 1):
+    for _ in range(MAX_PAGE_SIZE + 1):
         submitted(store)
-    page = store.jobs.page(ALICE, limit=10 * PAGE)
-    assert len(page.jobs) == PAGE
+    page = store.jobs.page(ALICE, limit=10 * MAX_PAGE_SIZE)
+    assert len(page.jobs) == MAX_PAGE_SIZE
     assert page.after == (page.jobs[-1].created, page.jobs[-1].id)
-    assert len(store.jobs.page(ALICE, after=page.after, limit=10 * PAGE).jobs) == 1
+    assert len(store.jobs.page(ALICE, after=page.after, limit=10 * MAX_PAGE_SIZE).jobs) == 1

@@ -50,7 +50,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog=command, description=__doc__)
     parser.add_argument("job")
     parser.add_argument("--owner", required=True)
-    parser.add_argument("--rank", type=int, help="a model's; without it, the figures of the search")
+    parser.add_argument("--rank", type=int, help="rank of a model; without it, the figures of the search")
     arguments = parser.parse_args()
     settings = service_settings()
     _limit(settings)

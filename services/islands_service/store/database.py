@@ -29,7 +29,7 @@ _Waiting = tuple[Callable[[Connection], Any], Future[Any]]
 _OperationResult = tuple[Any, Exception | None]
 
 #: Largest number of operations of one transaction.
-GROUP = 64
+MAX_GROUP_SIZE = 64
 
 #: Attempts at an operation whose transaction is rolled back because of a conflict.
 _MAX_TRIES = 5
@@ -146,7 +146,7 @@ class Database:
     def _write_groups(self) -> None:
         while (first := self._waiting.get()) is not None:
             group, last = [first], False
-            while len(group) < GROUP:
+            while len(group) < MAX_GROUP_SIZE:
                 try:
                     following = self._waiting.get_nowait()
                 except Empty:

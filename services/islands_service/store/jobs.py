@@ -26,7 +26,7 @@ from islands_service.store.submission_checks import check_quota, find_accepted_j
 from islands_service.store.tables import events, jobs
 
 #: Largest number of jobs of a page.
-PAGE = 200
+MAX_PAGE_SIZE = 200
 
 #: Built once, since building the statement takes as long as executing it.
 _INSERT_JOB = insert(jobs).values(state=JobState.QUEUED, created=now(), updated=now()).returning(jobs)
@@ -145,11 +145,11 @@ class Jobs:
             query = query.where(jobs.c.state == state)
         if after is not None:
             query = query.where(tuple_(jobs.c.created, jobs.c.id) < tuple_(*after))
-        query = query.order_by(jobs.c.created.desc(), jobs.c.id.desc()).limit(min(limit, PAGE) + 1)
+        query = query.order_by(jobs.c.created.desc(), jobs.c.id.desc()).limit(min(limit, MAX_PAGE_SIZE) + 1)
         with self._database.read() as connection:
             found = [job_from_row(row) for row in connection.execute(query)]
-        more = len(found) > min(limit, PAGE)
-        found = found[: min(limit, PAGE)]
+        more = len(found) > min(limit, MAX_PAGE_SIZE)
+        found = found[: min(limit, MAX_PAGE_SIZE)]
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
     def cancel(self, owner: str, job: str) -> Job:
