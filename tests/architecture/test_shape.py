@@ -18,6 +18,10 @@ SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*
 #: Class names that two modules use: the client and the OpenAPI document name them like the core does.
 SHARED_CLASS_NAMES = {"Event", "HistoryPoint", "Preview"}
 
+#: Module names that two packages use: the application of each interface, errors and settings of each package,
+#: and records of jobs, keys and the second-order system, which a store or a simulator has a module for.
+SHARED_MODULE_NAMES = {"app", "errors", "second_order", "settings"}
+
 
 def test_imports_keep_the_contracts() -> None:
     """Layers point down, siblings do not see each other, the core knows no clock and no environment."""
@@ -57,6 +61,25 @@ def test_a_class_name_is_unique() -> None:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].add(path)
     assert {name for name, found in places.items() if len(found) > 1} == SHARED_CLASS_NAMES
+
+
+def test_module_names_are_unique() -> None:
+    """Folders of commands, routes and faults name a module after what it exposes or injects."""
+    places: dict[str, set[Path]] = defaultdict(set)
+    for path in SOURCES:
+        if path.parent.name not in {"commands", "routes", "injection"} and "__" not in path.stem:
+            places[path.stem].add(path)
+    assert {name for name, found in places.items() if len(found) > 1} == SHARED_MODULE_NAMES
+
+
+def test_a_folder_has_at_most_fifteen_entries() -> None:
+    entries: dict[Path, set[Path]] = defaultdict(set)
+    for path in SOURCES:
+        if path.stem != "__init__":
+            entries[path.parent].add(path)
+        else:
+            entries[path.parent.parent].add(path.parent)
+    assert not {str(folder): len(found) for folder, found in entries.items() if len(found) > 15}
 
 
 def test_no_room_is_an_attic() -> None:

@@ -7,9 +7,9 @@ from islands_service.store.datasets import Datasets
 from islands_service.store.jobs import Jobs
 from islands_service.store.keys import Keys
 from islands_service.store.leases import Leases
+from islands_service.store.migrations.upgrade import prepare
 from islands_service.store.results import Results
 from islands_service.store.retention import Retention
-from islands_service.store.schema_upgrade import prepare
 
 
 class Store:

@@ -1,4 +1,4 @@
-"""Alembic environment: runs the migrations in the transaction opened by `store.schema_upgrade`."""
+"""Alembic environment: runs the migrations in the transaction opened by `migrations.upgrade`."""
 
 from alembic import context
 

@@ -1,1 +1,1 @@
-"""Schema revisions in the order of their numbers; `schema_upgrade.HEAD` names the last one."""
+"""Schema revisions in the order of their numbers; `upgrade.HEAD` names the last one."""

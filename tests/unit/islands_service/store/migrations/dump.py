@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[4]))
 
 from islands_service.store import Store
-from islands_service.store.schema_upgrade import HEAD
+from islands_service.store.migrations.upgrade import HEAD
 from support.stores import ALICE, BLOB, BOB, FAILED, FOUND, brought_on, claimed, submitted
 
 FOLDER = Path(__file__).parent

@@ -13,12 +13,12 @@ from sqlalchemy import MetaData, create_engine, inspect, select, text
 from islands_service.domain.job import JobState
 from islands_service.store import Store
 from islands_service.store.database import Database, StoreError
-from islands_service.store.schema_upgrade import HEAD, configuration, prepare, revision, upgrade
+from islands_service.store.migrations.upgrade import HEAD, configuration, prepare, revision, upgrade
 from islands_service.store.tables import metadata
 from support.stores import ALICE, BOB, asked, child, contents, kinds, submitted
 
-#: Written by `migrations/dump.py` when each revision was the last one.
-DUMPS = Path(__file__).with_name("migrations")
+#: Written by `dump.py` when each revision was the last one.
+DUMPS = Path(__file__).parent
 
 REVISIONS = sorted(path.stem for path in DUMPS.glob("*.sql"))
 
