@@ -1,4 +1,4 @@
-"""The front doors: HTTP, the command line, and the client that speaks REST.
+"""Web service, REST client and command line of islands. Read `web.app`, `client` or `cli` first.
 
 >>> from islands_api import Client
 >>> client = Client("http://127.0.0.1:8000")  # doctest: +SKIP
@@ -18,5 +18,5 @@ __all__ = ["AsyncClient", "Client", "JobFailedError", "ServiceError", "ServiceUn
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # The command line and the service have no use for it.
+    # Lazy: the command line and the service do not need the client.
     return getattr(import_module("islands_api.client"), name)

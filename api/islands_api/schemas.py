@@ -1,4 +1,4 @@
-"""What goes over the wire, for the doors and for the client: requests, answers, and their examples."""
+"""Wire models shared by the web service and the client: requests, responses and their examples."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -8,10 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from islands_service.domain.job import DISCREPANCY, IDENTIFICATION, PRIORITIES, JobState
 from islands_service.domain.job_spec import Discrepancy, Identification
 
-_JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
-_DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"
+_JOB_ID = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
+_DATASET_ID = "9f86d081884c7d659a2feaa0c55ad015-csv"
 _SPEC: dict[str, Any] = {
-    "dataset": _DATASET,
+    "dataset": _DATASET_ID,
     "inputs": ["u_V"],
     "output": "y_um",
     "preset": "hysteresis",
@@ -19,7 +19,7 @@ _SPEC: dict[str, Any] = {
     "settings": {"islands": 2, "generations": 40},
 }
 _DISCREPANCY: dict[str, Any] = {
-    "dataset": _DATASET,
+    "dataset": _DATASET_ID,
     "input": "u_V",
     "output": "y_um",
     "channels": ["T_K"],
@@ -29,39 +29,43 @@ _DISCREPANCY: dict[str, Any] = {
 }
 
 
-class Answer(BaseModel):
-    """What the service sends; what a newer service adds to it is let through."""
+class ResponseModel(BaseModel):
+    """Base class of responses. Accepts unknown fields, which a newer service may send."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
 
-class Column(Answer):
-    """A column of a data set."""
+class Column(ResponseModel):
+    """Column of a data set."""
 
     name: str
     unit: str
-    samples: int | None = Field(description="None where the column cannot be read.")
+    samples: int | None = Field(description="None if the column cannot be read.")
     minimum: float | None = None
     maximum: float | None = None
     mean: float | None = None
-    deviation: float | None = Field(default=None, description="The standard deviation.")
-    problem: str = Field(default="", description="Why it can be neither input nor output; empty if it can.")
+    deviation: float | None = Field(default=None, description="Standard deviation.")
+    problem: str = Field(
+        default="", description="Why the column can be neither input nor output. Empty if it can."
+    )
 
 
-class Preview(Answer):
-    """What a file holds."""
+class Preview(ResponseModel):
+    """Content of a file."""
 
     samples: int | None
     columns: tuple[Column, ...]
-    time: str | None = Field(default=None, description="The column that is time.")
-    dt: float | None = Field(default=None, description="Sampling time in seconds, where the file tells it.")
+    time: str | None = Field(default=None, description="Name of the time column.")
+    dt: float | None = Field(
+        default=None, description="Sampling time in seconds. None if the file does not give it."
+    )
     warnings: tuple[str, ...] = ()
 
 
-class DatasetView(Answer):
-    """An uploaded record."""
+class DatasetView(ResponseModel):
+    """Uploaded record."""
 
-    id: str = Field(examples=[_DATASET])
+    id: str = Field(examples=[_DATASET_ID])
     name: str
     sha256: str
     bytes: int
@@ -69,45 +73,48 @@ class DatasetView(Answer):
     preview: Preview
 
 
-class DatasetPage(Answer):
-    """Data sets, newest first."""
+class DatasetPage(ResponseModel):
+    """Page of data sets, newest first."""
 
     items: tuple[DatasetView, ...]
-    next: str | None = Field(default=None, description="The cursor of the next page, if there is one.")
+    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")
 
 
-class Treated(BaseModel):
-    """How a job is treated, whatever it asks for."""
+class JobMetadata(BaseModel):
+    """Fields of a job that do not influence its result."""
 
     name: Annotated[
-        str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="For people; one line.")
+        str,
+        Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="Human-readable name; one line."),
     ] = ""
     priority: Annotated[
         int,
-        Field(ge=PRIORITIES.start, le=PRIORITIES.stop - 1, description="Higher ones go first."),
+        Field(
+            ge=PRIORITIES.start, le=PRIORITIES.stop - 1, description="Jobs with a higher priority run first."
+        ),
     ] = 0
 
     @property
     def spec(self) -> dict[str, Any]:
-        """What determines the result."""
+        """Fields that determine the result."""
         return self.model_dump(mode="json", exclude_unset=True, exclude={"name", "priority"})
 
 
-class JobRequest(Treated, Identification):
-    """Identify a record by evolution: what determines the result, and how the job is treated."""
+class JobRequest(JobMetadata, Identification):
+    """Request to identify a record by evolution."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{**_SPEC, "name": "piezo, 2 islands"}]})
 
 
-class DiscrepancyRequest(Treated, Discrepancy):
-    """Find out what a simulation gets wrong about a record, and how the job is treated."""
+class DiscrepancyRequest(JobMetadata, Discrepancy):
+    """Request to diagnose what a simulation gets wrong about a record."""
 
     model_config = ConfigDict(
         json_schema_extra={
             "examples": [
                 {**_DISCREPANCY, "name": "piezo against its model"},
                 {
-                    "dataset": _DATASET,
+                    "dataset": _DATASET_ID,
                     "input": "u_V",
                     "output": "y_um",
                     "simulation": {"kind": "column", "column": "y_sim_um"},
@@ -117,8 +124,8 @@ class DiscrepancyRequest(Treated, Discrepancy):
     )
 
 
-class JobView(Answer):
-    """A job as it stands."""
+class JobView(ResponseModel):
+    """Job with its current state."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -126,7 +133,7 @@ class JobView(Answer):
         json_schema_extra={
             "examples": [
                 {
-                    "id": _JOB,
+                    "id": _JOB_ID,
                     "kind": IDENTIFICATION,
                     "name": "piezo, 2 islands",
                     "state": "running",
@@ -177,8 +184,8 @@ class JobView(Answer):
     name: str
     state: JobState
     priority: int
-    version: int = Field(description="Rises with every change; the number of the last event.")
-    attempt: int = Field(description="How often a coordinator has taken it.")
+    version: int = Field(description="Increases with every change; the number of the last event.")
+    attempt: int = Field(description="Number of times a coordinator has started it.")
     cancel_requested: bool
     created: datetime
     updated: datetime
@@ -186,60 +193,62 @@ class JobView(Answer):
     finished: datetime | None = None
     spec: dict[str, Any]
     progress: dict[str, Any] | None = None
-    summary: dict[str, Any] | None = Field(default=None, description="The result at a glance.")
-    problem: dict[str, Any] | None = Field(default=None, description="Why it failed.")
+    summary: dict[str, Any] | None = Field(default=None, description="Summary of the result.")
+    problem: dict[str, Any] | None = Field(default=None, description="Why the job failed.")
 
 
-class JobPage(Answer):
-    """Jobs, newest first."""
+class JobPage(ResponseModel):
+    """Page of jobs, newest first."""
 
     items: tuple[JobView, ...]
-    next: str | None = Field(default=None, description="The cursor of the next page, if there is one.")
+    next: str | None = Field(default=None, description="Cursor of the next page. None on the last page.")
 
 
-class ModelView(Answer):
-    """A model with its metrics, physics checks and residual tests, as in ``result.json``."""
+class ModelView(ResponseModel):
+    """Model with its metrics, physics checks and residual tests, as in ``result.json``."""
 
-    rank: int = Field(description="1 is the best on the validation data.")
+    rank: int = Field(description="1 is the best model on the validation data.")
     size: int = Field(description="Number of terms.")
     equation: str
     latex: str
     terms: list[dict[str, Any]]
-    metrics: dict[str, Any] = Field(description="metrics.validation.free_run.mape, and so on.")
+    metrics: dict[str, Any] = Field(description="For example metrics.validation.free_run.mape.")
     outcomes: dict[str, Any]
     information: dict[str, Any]
     physics: dict[str, Any]
     residual_tests: dict[str, Any]
 
 
-class ModelPage(Answer):
+class ModelPage(ResponseModel):
     """All models of a job, best first."""
 
     items: tuple[ModelView, ...]
 
 
-class HistoryPoint(Answer):
-    """The search at a generation; errors are mean squared, over intervals of multiple shooting."""
+class HistoryPoint(ResponseModel):
+    """State of a search at a generation. Errors are mean squared, over intervals of multiple shooting."""
 
     generation: int
     evaluations: int
-    best: dict[str, float] = Field(description="By number of terms.")
-    islands: tuple[float | None, ...] = Field(description="By island; null where it has no model yet.")
+    best: dict[str, float] = Field(description="Error by number of terms.")
+    islands: tuple[float | None, ...] = Field(
+        description="Error by island; null if an island has no model yet."
+    )
 
 
-class HistoryPage(Answer):
-    """The course of a search, from a generation on."""
+class HistoryPage(ResponseModel):
+    """Page of the history of a search."""
 
     items: tuple[HistoryPoint, ...]
 
 
-class Names(Answer):
-    """What there is to ask for."""
+class Names(ResponseModel):
+    """List of names."""
 
     items: tuple[str, ...]
 
 
-class Health(Answer):
-    """How the service is."""
+class Health(ResponseModel):
+    """State of the service."""
 
     status: str

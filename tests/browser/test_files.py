@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from islands_api.web.middleware import SECURITY
-from islands_api.web.routes.page import FILES, FOLDER
+from islands_api.web.middleware import SECURITY_HEADERS
+from islands_api.web.routes.page import DASHBOARD_DIR, FILES
 
-TEXTS = {path.name: path.read_text(encoding="utf-8") for path in sorted(FOLDER.iterdir())}
+TEXTS = {path.name: path.read_text(encoding="utf-8") for path in sorted(DASHBOARD_DIR.iterdir())}
 SCRIPTS = {name: text for name, text in TEXTS.items() if name.endswith(".js")}
 
 #: Names of formats, which nobody asks for.
@@ -45,8 +45,8 @@ def test_nothing_is_inline() -> None:
     """The policy would block it, and is not to be weakened for it."""
     page = TEXTS["index.html"]
     assert not re.search(r"<style|\sstyle=|\son\w+=|<script(?![^>]*\ssrc=)|javascript:", page)
-    assert "unsafe" not in SECURITY["Content-Security-Policy"]
-    assert "default-src 'self'" in SECURITY["Content-Security-Policy"]
+    assert "unsafe" not in SECURITY_HEADERS["Content-Security-Policy"]
+    assert "default-src 'self'" in SECURITY_HEADERS["Content-Security-Policy"]
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

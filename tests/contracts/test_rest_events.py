@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from islands_api.web import event_hub
-from islands_api.web.auth import LOCAL
+from islands_api.web.auth import LOCAL_OWNER
 from islands_api.web.routes import events as routes
 from islands_service.store import leases
 from support.processes import eventually
@@ -133,7 +133,7 @@ def test_a_job_that_goes_on_is_followed_again(service):
     job = queued(service.store).id
     service.store.leases.finish(claimed(service.store), CANCELLED)
     assert [number for number, _, _ in followed(service, job)] == [1, 2, 3]
-    service.store.jobs.resume(LOCAL, job)
+    service.store.jobs.resume(LOCAL_OWNER, job)
     thread, seen = watched(service, job, last=3)
     service.store.leases.finish(claimed(service.store), FOUND)
     thread.join(PATIENCE)
@@ -149,7 +149,7 @@ def test_who_claims_to_have_seen_the_future_sees_it_come(service):
 
 
 def test_silence_is_filled_with_comments(service, monkeypatch):
-    monkeypatch.setattr(routes, "_ALIVE", 0.05)
+    monkeypatch.setattr(routes, "_KEEP_ALIVE_SECONDS", 0.05)
     job = queued(service.store).id
     with service.client.stream("GET", f"/v1/jobs/{job}/events") as answer:
         text = ""

@@ -215,7 +215,7 @@ def test_a_lost_record_and_a_database_that_is_away_are_told_as_such_where_a_figu
 
 def test_a_drawing_that_takes_too_long_is_not_begun_again_at_once(drawing, monkeypatch):
     path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
-    monkeypatch.setattr(figures, "_PATIENCE", 0.1)
+    monkeypatch.setattr(figures, "_DRAWING_TIMEOUT", 0.1)
     detail = problem_of(drawing.client.get(path), 500, "failed")
     assert "take longer than" in detail
     monkeypatch.undo()
@@ -224,7 +224,7 @@ def test_a_drawing_that_takes_too_long_is_not_begun_again_at_once(drawing, monke
 
 def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
     failures, error = figures.FigureFailures(), figures.FigureError("no")
-    monkeypatch.setattr(figures, "_REMEMBERED", 2)
+    monkeypatch.setattr(figures, "_MAX_FAILURES", 2)
     for job in ("a", "b", "a", "c"):
         failures.remember(job, 1, error)
     for job, rank in (("b", 1), ("a", 2), ("a", None)):
@@ -232,7 +232,7 @@ def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
     for job in ("a", "c"):
         with pytest.raises(figures.FigureError, match="no"):
             failures.refuse(job, 1)
-    monkeypatch.setattr(figures, "_REST", 0.0)
+    monkeypatch.setattr(figures, "_FAILURE_SECONDS", 0.0)
     failures.remember("a", 1, error)
     failures.refuse("a", 1)
 

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from islands_api.web.auth import LOCAL
+from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import JobState, ProgressReport, Submission
 from support.service import kept, problem_of, queued, spec
 from support.stores import FOUND, brought_on, claimed, job_in
@@ -25,7 +25,7 @@ def ids(answer):
 
 def in_state(service, state):
     """Bring a job to a state; no other may be waiting."""
-    return job_in(service.store, state, LOCAL).id
+    return job_in(service.store, state, LOCAL_OWNER).id
 
 
 def test_an_accepted_job_is_where_the_answer_says(service, order):
@@ -267,7 +267,7 @@ def test_the_course_of_a_search_is_read_from_a_generation_on(service):
 
 def test_the_course_of_many_islands_comes_in_pages_that_can_be_sent(service):
     asked = {**spec("0-csv"), "settings": {"islands": 256}}
-    job, _ = service.store.jobs.submit(Submission(LOCAL, asked))
+    job, _ = service.store.jobs.submit(Submission(LOCAL_OWNER, asked))
     points = tuple((at, 60 * at, {"3": 0.5}, (1.0 / 3.0,) * 256) for at in range(400))
     service.store.leases.report(claimed(service.store), ProgressReport({"generation": 399}, points))
     path, sizes, seen = f"/v1/jobs/{job.id}/history", [], [-1]
@@ -281,7 +281,7 @@ def test_the_course_of_many_islands_comes_in_pages_that_can_be_sent(service):
 
 
 def test_a_job_of_another_version_says_so_where_a_figure_is_wanted(service):
-    job, _ = service.store.jobs.submit(Submission(LOCAL, {**spec("0-csv"), "colour": "red"}))
+    job, _ = service.store.jobs.submit(Submission(LOCAL_OWNER, {**spec("0-csv"), "colour": "red"}))
     service.store.leases.finish(claimed(service.store), FOUND)
     answer = service.client.get(f"/v1/jobs/{job.id}/models/1/figures/loop.svg")
     detail = problem_of(answer, 422, "invalid-settings")

@@ -128,7 +128,7 @@ def test_a_secret_is_kept_nowhere(service):
 
 @pytest.mark.parametrize("end", ["revoked", pytest.param("expired", marks=pytest.mark.ci)])
 def test_a_stream_ends_with_its_key(service, monkeypatch, end):
-    monkeypatch.setattr(events, "_ALIVE", 0.05)
+    monkeypatch.setattr(events, "_KEEP_ALIVE_SECONDS", 0.05)
     path = f"/v1/jobs/{queued(service.store, 'me').id}/events"
     mine = service.key(owner="me", seconds=2.0 if end == "expired" else None)
     with service.client.stream("GET", path, headers=mine) as answer:

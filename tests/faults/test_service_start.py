@@ -9,7 +9,7 @@ from threading import Timer
 import pytest
 import trustme
 
-from islands_api.__main__ import listening
+from islands_api.__main__ import open_listener
 from support.command_line import succeed
 from support.processes import eventually, kill
 from support.service_processes import free_port, serving, started
@@ -53,7 +53,7 @@ def test_port_that_becomes_free_soon_is_used() -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         Timer(0.3, other.close).start()
-        with listening("127.0.0.1", port) as mine:
+        with open_listener("127.0.0.1", port) as mine:
             assert mine.getsockname() == ("127.0.0.1", port)
 
 

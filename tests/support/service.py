@@ -23,7 +23,7 @@ from sqlalchemy import Connection
 
 from islands.io.records import write_record
 from islands_api.web.app import create_app
-from islands_api.web.auth import LOCAL
+from islands_api.web.auth import LOCAL_OWNER
 from islands_service.domain.job import Job, Submission
 from islands_service.settings import ServiceSettings
 from islands_service.store import Store
@@ -270,7 +270,7 @@ def emptied(service: Service) -> Service:
     return service
 
 
-def kept(store: Store, owner: str = LOCAL, content: bytes = b"") -> str:
+def kept(store: Store, owner: str = LOCAL_OWNER, content: bytes = b"") -> str:
     """Keep a clean data set without a file behind it; return its id."""
     number = hashlib.sha256(owner.encode() + content).hexdigest()
     column = {"minimum": -1.0, "maximum": 1.0, "mean": 0.0, "deviation": 1.0, "problem": ""}
@@ -286,7 +286,7 @@ def kept(store: Store, owner: str = LOCAL, content: bytes = b"") -> str:
     return store.datasets.add(owner, "record.csv", ".csv", number, 7, preview)[0].id
 
 
-def queued(store: Store, owner: str = LOCAL, **changes: Any) -> Job:
+def queued(store: Store, owner: str = LOCAL_OWNER, **changes: Any) -> Job:
     """Submit a job past the doors."""
     return store.jobs.submit(Submission(owner, spec("0-csv"), **changes))[0]
 

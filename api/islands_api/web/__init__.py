@@ -1,1 +1,1 @@
-"""The web service: a FastAPI application over the store. Read `app` first."""
+"""Web service: a FastAPI application on top of the store. Read `app` first, then `routes`."""

@@ -1,4 +1,4 @@
-"""The application: a value built from its parts. It reaches the database and the blobs, and never Ray."""
+"""Application factory. The application uses the database and the blobs, never Ray."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -12,7 +12,7 @@ from starlette.middleware.gzip import GZipMiddleware
 from islands_api.web import exception_handlers
 from islands_api.web.auth import KeyCache
 from islands_api.web.concurrency import BlockingExecutor
-from islands_api.web.dependencies import DRAWINGS, INSPECTIONS, AppState
+from islands_api.web.dependencies import MAX_CONCURRENT_DRAWINGS, MAX_CONCURRENT_INSPECTIONS, AppState
 from islands_api.web.event_hub import JobEventHub
 from islands_api.web.middleware import BodyLimit, RequestLogging, SameOrigin
 from islands_api.web.problems import ProblemDocument
@@ -25,15 +25,15 @@ from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.tracing import Traces
 
-#: Bytes from which on an answer is packed.
-_PACKED = 4000
+#: Minimum size in bytes of a response that is compressed.
+_GZIP_MIN_BYTES = 4000
 
 _DESCRIPTION = """Finds the equation behind measured data.
 
-Upload a record, submit a job, follow it, and take its models: small difference equations with their metrics.
-Or have a simulation held against the record: what it gets wrong, and why (`/v1/discrepancies`).
-Every answer that is not a success is `application/problem+json`; its `detail` says what to do.
-On this machine's own address no key is needed; elsewhere send `Authorization: Bearer islands_...`."""
+Upload a record, submit a job, follow it, and download its models: small difference equations with metrics.
+Or compare a simulation with the record to find out what it gets wrong, and why (`/v1/discrepancies`).
+Every error response is `application/problem+json`; its `detail` says what to do.
+A loopback address needs no key. Elsewhere send `Authorization: Bearer islands_...`."""
 
 
 def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI:
@@ -43,15 +43,15 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
     ----------
     settings : ServiceSettings
     store : Store, optional
-        One that is open already, and is closed with the application.
+        An open store, which the application closes at shutdown. Opened from the settings by default.
     """
     traces = Traces(settings.telemetry, "api")
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         opened = store or Store(settings.url)
-        threads = BlockingExecutor()
-        hub = JobEventHub(opened, threads)
+        executor = BlockingExecutor()
+        hub = JobEventHub(opened, executor)
         app.state.islands = state = AppState(
             settings,
             opened,
@@ -59,12 +59,12 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
             hub,
             RateLimiter(settings.rate, settings.burst),
             ServiceMetrics(opened),
-            asyncio.Semaphore(INSPECTIONS),
-            asyncio.Semaphore(DRAWINGS),
-            threads,
+            asyncio.Semaphore(MAX_CONCURRENT_INSPECTIONS),
+            asyncio.Semaphore(MAX_CONCURRENT_DRAWINGS),
+            executor,
         )
         app.state.keys = KeyCache(state)
-        tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_live(settings.lifeline))]
+        tasks = [asyncio.create_task(hub.run()), asyncio.create_task(_send_heartbeats(settings.lifeline))]
         try:
             yield
         finally:
@@ -74,7 +74,7 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
                     await task
             await state.run_blocking(opened.close)
             await state.run_blocking(traces.close)
-            threads.close()
+            executor.close()
 
     app = FastAPI(
         title="islands",
@@ -83,23 +83,24 @@ def create_app(settings: ServiceSettings, store: Store | None = None) -> FastAPI
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
-        redirect_slashes=False,  # a path has one name
+        redirect_slashes=False,  # each resource has exactly one path
         openapi_url="/openapi.json",
     )
     for router in ROUTERS:
         app.include_router(router)
     exception_handlers.install_handlers(app)
-    # Figures and the page take a third; a job on its own is too small to gain, and events are not held back.
-    app.add_middleware(GZipMiddleware, minimum_size=_PACKED, compresslevel=5)
+    # Compression reduces figures and the dashboard to a third. A single job is too small to gain from it.
+    # Event streams are not buffered.
+    app.add_middleware(GZipMiddleware, minimum_size=_GZIP_MIN_BYTES, compresslevel=5)
     app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(SameOrigin, settings=settings)
     app.add_middleware(RequestLogging)
-    _trace(app, traces)
-    _describe(app)
+    _install_tracing(app, traces)
+    _install_openapi(app)
     return app
 
 
-def _trace(app: FastAPI, traces: Traces) -> None:
+def _install_tracing(app: FastAPI, traces: Traces) -> None:
     if traces.provider is not None:
         from opentelemetry.instrumentation.fastapi import FastAPIInstrumentor  # noqa: PLC0415
 
@@ -108,15 +109,15 @@ def _trace(app: FastAPI, traces: Traces) -> None:
         )
 
 
-async def _live(descriptor: int | None) -> None:
-    """Give signs of life from the event loop: if that hangs, nobody is answered."""
+async def _send_heartbeats(descriptor: int | None) -> None:
+    """Send heartbeats from the event loop, so that they stop if it hangs."""
     while True:
         send_heartbeat(descriptor)
         await asyncio.sleep(EVERY)
 
 
-def _describe(app: FastAPI) -> None:
-    """Have the description name the document that every problem is."""
+def _install_openapi(app: FastAPI) -> None:
+    """Add the problem document to the OpenAPI schema."""
 
     def openapi() -> dict[str, object]:
         if app.openapi_schema is None:
@@ -127,15 +128,15 @@ def _describe(app: FastAPI) -> None:
             schemas = schema["components"]["schemas"]
             schemas.update(document.pop("$defs"))
             schemas["ProblemDocument"] = document
-            _without_framework_answers(schema)
+            _remove_framework_responses(schema)
             app.openapi_schema = schema
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]
 
 
-def _without_framework_answers(schema: dict[str, object]) -> None:
-    """Take out the answers to invalid requests that the framework would give, and we do not."""
+def _remove_framework_responses(schema: dict[str, object]) -> None:
+    """Remove the framework's responses to invalid requests; this application sends problems instead."""
     paths = schema["paths"]
     assert isinstance(paths, dict)
     for operations in paths.values():

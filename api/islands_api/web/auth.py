@@ -1,4 +1,4 @@
-"""Who asks: the owner behind a key, and what the key allows."""
+"""Authentication: API keys, owners and scopes."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -13,30 +13,30 @@ from islands_api.web.problems import AuthenticationError, InsufficientScopeError
 from islands_service.store.database import StoreError
 from islands_service.store.keys import SCOPES, Key
 
-#: Whose everything is that comes without a key, on a loopback address.
-LOCAL = "local"
+#: Owner of all data of requests without a key, which only a loopback address allows.
+LOCAL_OWNER = "local"
 
-#: Seconds for which a key is not looked up again: so long may a revoked one still open.
-REMEMBERED = 1.0
+#: Seconds for which a key is cached, and therefore the longest time for which a revoked key still works.
+KEY_CACHE_SECONDS = 1.0
 
-#: Tokens of the rate limit that a wrong key costs its address.
-_WRONG = 10.0
+#: Tokens of the rate limit that an invalid key costs the address that sent it.
+_INVALID_KEY_TOKENS = 10.0
 
 _bearer = HTTPBearer(auto_error=False, description="A key of `islands keys create`.", scheme_name="key")
 
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """Who asks.
+    """Authenticated caller.
 
     Attributes
     ----------
     owner : str
-        Whose jobs and data sets these are.
+        Owner of the caller's jobs and data sets.
     scopes : frozenset of str
-        What is allowed.
+        Scopes of the key.
     secret : str or None
-        Of the key that was shown.
+        Secret of the key. None if the request had no key.
     """
 
     owner: str
@@ -45,7 +45,7 @@ class Principal:
 
 
 class KeyCache:
-    """Keys that were looked up a moment ago.
+    """Cache of recently used keys.
 
     Parameters
     ----------
@@ -57,20 +57,22 @@ class KeyCache:
         self._found: dict[str, tuple[float, Key | None]] = {}
 
     async def find(self, secret: str) -> Key | None:
-        """Return a secret's key, None where it is of none."""
+        """Return the key of a secret, or None if there is none."""
         now = monotonic()
-        at, key = self._found.get(secret, (-REMEMBERED, None))
-        if now - at >= REMEMBERED:
+        at, key = self._found.get(secret, (-KEY_CACHE_SECONDS, None))
+        if now - at >= KEY_CACHE_SECONDS:
             key = await self._state.run_blocking(self._state.store.keys.find, secret)
             if key is not None:
                 self._found = {
-                    each: entry for each, entry in self._found.items() if now - entry[0] < REMEMBERED
+                    cached: entry
+                    for cached, entry in self._found.items()
+                    if now - entry[0] < KEY_CACHE_SECONDS
                 }
                 self._found[secret] = now, key
         return key
 
     async def is_still_valid(self, caller: Principal) -> bool:
-        """Tell whether a caller who was let in a while ago would be let in now, as far as can be known."""
+        """Return whether the caller's key is still valid. True if the database cannot say."""
         if caller.secret is None:
             return True
         try:
@@ -81,59 +83,66 @@ class KeyCache:
 
 
 async def authenticate(request: Request) -> Principal:
-    """Return who asks.
+    """Return the caller of a request.
 
     Raises
     ------
     AuthenticationError
+        The key is missing, unknown, revoked or expired.
     RateLimitError
     """
     if not hasattr(request.state, "caller"):
-        # Once for each request: it takes a token of the rate.
-        request.state.caller = await _let_in(request, request.app.state.islands, await _bearer(request))
+        # Only once per request: each check takes a token of the rate limit.
+        request.state.caller = await _check_key(request, request.app.state.islands, await _bearer(request))
     caller: Principal = request.state.caller
     return caller
 
 
-async def _let_in(request: Request, state: AppState, given: HTTPAuthorizationCredentials | None) -> Principal:
+async def _check_key(
+    request: Request, state: AppState, credentials: HTTPAuthorizationCredentials | None
+) -> Principal:
     address = request.client.host if request.client is not None else "?"
-    if given is None:
+    if credentials is None:
         if state.settings.keys_needed:
             state.rate_limiter.acquire(f"address {address}")
             raise AuthenticationError(
-                "this service needs a key: send 'Authorization: Bearer islands_...'; whoever runs it makes "
+                "this service needs a key: send 'Authorization: Bearer islands_...'; its operator creates "
                 "one with 'islands keys create'"
             )
-        return Principal(LOCAL, frozenset(SCOPES))
-    key = await request.app.state.keys.find(given.credentials)
+        return Principal(LOCAL_OWNER, frozenset(SCOPES))
+    key = await request.app.state.keys.find(credentials.credentials)
     if key is None or not key.valid:
-        state.rate_limiter.acquire(f"address {address}", min(_WRONG, state.settings.burst))
-        what = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
-        raise AuthenticationError(f"the key {what}: ask whoever runs this service for another one")
+        state.rate_limiter.acquire(f"address {address}", min(_INVALID_KEY_TOKENS, state.settings.burst))
+        reason = "is unknown" if key is None else "was revoked" if key.revoked is not None else "has expired"
+        raise AuthenticationError(f"the key {reason}: ask the operator of this service for another one")
     state.rate_limiter.acquire(f"key {key.id}")
-    return Principal(key.owner, key.scopes, given.credentials)
+    return Principal(key.owner, key.scopes, credentials.credentials)
 
 
-async def _caller(
+async def _get_principal(
     request: Request,
     _described: Annotated[HTTPAuthorizationCredentials | None, Security(_bearer)] = None,
 ) -> Principal:
     return await authenticate(request)
 
 
-def _allowed(scope: str) -> Callable[[Principal], Awaitable[Principal]]:
-    async def allowed(caller: Annotated[Principal, Depends(_caller)]) -> Principal:
+def _require_scope(scope: str) -> Callable[[Principal], Awaitable[Principal]]:
+    async def check_scope(caller: Annotated[Principal, Depends(_get_principal)]) -> Principal:
         if scope not in caller.scopes:
             raise InsufficientScopeError(
-                f"the key has the scopes {', '.join(sorted(caller.scopes))}, this needs "
+                f"the key has the scopes {', '.join(sorted(caller.scopes))}, but this request needs "
                 f"{scope}: ask for another key"
             )
         return caller
 
-    return allowed
+    return check_scope
 
 
-#: What a route asks for: a caller who may look, who may change, who may see the service's metrics.
-Reader = Annotated[Principal, Depends(_allowed("read"))]
-Writer = Annotated[Principal, Depends(_allowed("write"))]
-Operator = Annotated[Any, Depends(_allowed("metrics"))]
+#: Type of a route parameter that receives a caller with the scope `read`.
+Reader = Annotated[Principal, Depends(_require_scope("read"))]
+
+#: Type of a route parameter that receives a caller with the scope `write`.
+Writer = Annotated[Principal, Depends(_require_scope("write"))]
+
+#: Type of a route parameter that receives a caller with the scope `metrics`.
+Operator = Annotated[Any, Depends(_require_scope("metrics"))]

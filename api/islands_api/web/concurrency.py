@@ -1,4 +1,4 @@
-"""Threads for what waits for the database or the disk, so that no other request is held up meanwhile."""
+"""Thread pool for operations that wait for the database or the disk, to keep the event loop free."""
 
 import asyncio
 from collections.abc import Callable
@@ -12,28 +12,31 @@ from anyio import CancelScope
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Operations that wait at once.
-COUNT = 40
+#: Maximum number of blocking operations at once.
+MAX_THREADS = 40
 
 
 class BlockingExecutor:
-    """Carries out operations in threads. The framework's own way takes a third of a look at a job."""
+    """Thread pool for blocking operations.
+
+    The framework's own thread pool takes a third of the time of a request for a job.
+    """
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(COUNT, "islands-web")
+        self._pool = ThreadPoolExecutor(MAX_THREADS, "islands-web")
 
-    async def run(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
-        """Carry out an operation; what it returns or raises comes back here."""
-        call = partial(copy_context().run, operation, *arguments, **named)
-        done = asyncio.get_running_loop().run_in_executor(self._pool, call)
+    async def run(self, operation: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Run an operation in a thread with a copy of the current context, and return its result."""
+        call = partial(copy_context().run, operation, *args, **kwargs)
+        future = asyncio.get_running_loop().run_in_executor(self._pool, call)
         try:
-            return await asyncio.shield(done)
+            return await asyncio.shield(future)
         except asyncio.CancelledError:
-            # The client is gone, the thread is not: what it works with stays open as long.
+            # The client has disconnected, but the thread still runs: keep its files open until it ends.
             with CancelScope(shield=True):
-                await asyncio.wait([done])
+                await asyncio.wait([future])
             raise
 
     def close(self) -> None:
-        """Wait for what is under way, and end the threads."""
+        """Wait for running operations, then stop the threads."""
         self._pool.shutdown()

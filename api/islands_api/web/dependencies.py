@@ -1,4 +1,4 @@
-"""What the doors of one application share: settings, store, blobs, who watches, who asks how much."""
+"""State shared by the routes of one application, and the dependency that injects it."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,13 +18,16 @@ from islands_service.store.blobs import Blobs
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Files that are inspected at once, and figures that are drawn at once: each takes a core.
-INSPECTIONS, DRAWINGS = 2, 1
+#: Maximum number of uploads that are inspected at once; each takes a core.
+MAX_CONCURRENT_INSPECTIONS = 2
+
+#: Maximum number of figure processes at once; each takes a core.
+MAX_CONCURRENT_DRAWINGS = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppState:
-    """Made when the application starts, and closed when it ends."""
+    """Settings, store and shared services of one application, from its startup to its shutdown."""
 
     settings: ServiceSettings
     store: Store
@@ -36,15 +39,15 @@ class AppState:
     figure_slots: asyncio.Semaphore
     executor: BlockingExecutor
 
-    async def run_blocking(self, operation: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
-        """Carry out what waits for the database or the disk, without holding up other requests."""
-        return await self.executor.run(operation, *arguments, **named)
+    async def run_blocking(self, operation: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Run an operation that waits for the database or the disk in a thread."""
+        return await self.executor.run(operation, *args, **kwargs)
 
 
 async def _get_state(request: Request) -> Any:
-    # Asynchronous though it waits for nothing: the framework gives any other one a thread, for every request.
+    # Asynchronous although it never waits: the framework runs synchronous dependencies in a thread.
     return request.app.state.islands
 
 
-#: What a route asks for to get at them.
+#: Type of a route parameter that receives the application state.
 AppStateDep = Annotated[AppState, Depends(_get_state)]

@@ -1,4 +1,4 @@
-"""The hub: tells everybody who watches a job when it has changed. One query for all, ten times a second."""
+"""Event hub: notifies all subscribers of a job of its changes, with one query for all jobs in each poll."""
 
 import asyncio
 from collections import deque
@@ -15,68 +15,71 @@ from islands_service.store.database import StoreError
 
 log = structlog.get_logger()
 
-#: Seconds between two looks, and between two tries while the database is away.
-LOOK, RETRY = 0.1, 0.5
+#: Seconds between two polls of the database.
+POLL_SECONDS = 0.1
 
-#: Events that are kept of a watched job, for watchers that are a little behind.
-_KEPT = 256
+#: Seconds between two attempts while the database is unavailable.
+RETRY_SECONDS = 0.5
+
+#: Number of events kept in memory for each job, for subscribers that lag behind.
+_MAX_RECENT_EVENTS = 256
 
 
 @dataclass(slots=True, eq=False)
 class JobFeed:
-    """What is known of a watched job."""
+    """Latest version and recent events of a job that has subscribers."""
 
     version: int
     subscribers: int = 0
     gone: bool = False
-    recent: deque[Event] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    recent: deque[Event] = field(default_factory=lambda: deque(maxlen=_MAX_RECENT_EVENTS))
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
     def publish(self) -> None:
-        """Wake all who wait; the next change is another one."""
+        """Wake all waiting subscribers."""
         self.changed.set()
         self.changed = asyncio.Event()
 
 
 class JobEventHub:
-    """Feeds of all jobs that somebody watches.
+    """Feeds of all jobs that have subscribers.
 
     Parameters
     ----------
     store : Store
-    threads : BlockingExecutor
+    executor : BlockingExecutor
     """
 
-    def __init__(self, store: Store, threads: BlockingExecutor) -> None:
-        self._store, self._threads = store, threads
+    def __init__(self, store: Store, executor: BlockingExecutor) -> None:
+        self._store, self._executor = store, executor
         self._feeds: dict[str, JobFeed] = {}
         self._has_subscribers = asyncio.Event()
         self.closed = False
 
     async def run(self) -> None:
-        """Look for changes until cancelled."""
+        """Poll for changes until cancelled."""
         while True:
             await self._has_subscribers.wait()
             try:
                 await self._poll()
-                await asyncio.sleep(LOOK)
+                await asyncio.sleep(POLL_SECONDS)
             except StoreError as error:
-                log.warning("hub cannot look", reason=str(error))
-                await asyncio.sleep(RETRY)
+                log.warning("event hub cannot poll", reason=str(error))
+                await asyncio.sleep(RETRY_SECONDS)
             except Exception as error:
-                # Whoever watches any job would wait for ever.
+                # Continue: without the hub, all subscribers would wait for ever.
                 log.error("defect", exc_info=error)
-                await asyncio.sleep(RETRY)
+                await asyncio.sleep(RETRY_SECONDS)
 
     def close(self) -> None:
-        """End all streams: their clients come back, and go on where they were."""
+        """End all streams. Their clients reconnect and continue after their last event."""
         self.closed = True
         for feed in self._feeds.values():
             feed.publish()
 
     @contextmanager
     def subscribe(self, job: str, version: int) -> Iterator[JobFeed]:
-        """Have a job's feed kept up to date in the block, from a version on that is known."""
+        """Return a context manager that keeps the feed of a job up to date, from a known version on."""
         feed = self._feeds.setdefault(job, JobFeed(version))
         feed.subscribers += 1
         self._has_subscribers.set()
@@ -90,7 +93,7 @@ class JobEventHub:
                     self._has_subscribers.clear()
 
     async def wait(self, feed: JobFeed, version: int, seconds: float) -> bool:
-        """Wait until a job is past a version; return whether it is."""
+        """Wait until a job has a newer version, for at most some seconds; return whether it has."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 while feed.version <= version and not (feed.gone or self.closed):
@@ -98,13 +101,24 @@ class JobEventHub:
         return feed.version > version
 
     async def events(self, job: str, version: int, after: int, alive: float) -> AsyncGenerator[Event | None]:
-        """Yield a job's events after a number, until it has ended; None where nothing happens for a while."""
+        """Yield the events of a job after an event number until it has ended; yield None if idle for a while.
+
+        Parameters
+        ----------
+        job : str
+        version : int
+            Known version of the job.
+        after : int
+            Number of the last event that the client has.
+        alive : float
+            Seconds without an event after which None is yielded.
+        """
         with self.subscribe(job, version) as feed:
             last = after
             while not (feed.gone or self.closed):
-                found = await self._after(job, feed, last)
-                newest = max((feed.version, *(event.number for event in found)))
-                for event in found:
+                unread = await self._read_events_after(job, feed, last)
+                newest = max((feed.version, *(event.number for event in unread)))
+                for event in unread:
                     yield event
                     last = event.number
                     if event.kind in TERMINAL and last >= newest:
@@ -112,28 +126,28 @@ class JobEventHub:
                 if last >= feed.version and not await self.wait(feed, last, alive):
                     yield None
 
-    async def _after(self, job: str, feed: JobFeed, last: int) -> list[Event]:
+    async def _read_events_after(self, job: str, feed: JobFeed, last: int) -> list[Event]:
         if last >= feed.version:
             return []
         if feed.recent and feed.recent[0].number <= last + 1:
             return [event for event in feed.recent if event.number > last]
-        # These may be newer than what the feed knows; they reach it, and its other watchers, by its own look.
+        # These events may be newer than the feed, but are not added to it: the next poll delivers them.
         try:
-            return list(await self._threads.run(self._store.jobs.events, job, last))
+            return list(await self._executor.run(self._store.jobs.events, job, last))
         except StoreError as error:
-            log.warning("hub cannot read", job=job, reason=str(error))
-            await asyncio.sleep(RETRY)
+            log.warning("event hub cannot read", job=job, reason=str(error))
+            await asyncio.sleep(RETRY_SECONDS)
             return []
 
     async def _poll(self) -> None:
-        watched = dict(self._feeds)
-        versions = await self._threads.run(self._store.jobs.versions, list(watched))
-        for job, feed in watched.items():
+        feeds = dict(self._feeds)
+        versions = await self._executor.run(self._store.jobs.versions, list(feeds))
+        for job, feed in feeds.items():
             if job not in versions:
                 feed.gone = True
                 feed.publish()
             elif versions[job] > feed.version:
-                news = await self._threads.run(self._store.jobs.events, job, feed.version)
-                feed.recent.extend(news)
-                feed.version = max((versions[job], *(event.number for event in news)))
+                events = await self._executor.run(self._store.jobs.events, job, feed.version)
+                feed.recent.extend(events)
+                feed.version = max((versions[job], *(event.number for event in events)))
                 feed.publish()

@@ -1,4 +1,4 @@
-"""How a problem is said: our own errors, what the framework raises, and defects, all in the one form."""
+"""Exception handlers: every error becomes an RFC 9457 problem document."""
 
 from collections.abc import Mapping, Sequence
 from errno import EDQUOT, ENOSPC
@@ -24,7 +24,7 @@ from islands_api.web.problems import (
     RateLimitError,
     ResourceNotFoundError,
     UnsupportedMediaTypeError,
-    problem_of,
+    lookup_problem,
 )
 from islands_service.domain.job import QuotaError
 from islands_service.store.blobs import BlobNotFoundError
@@ -32,8 +32,8 @@ from islands_service.store.database import CommitUnknownError, StorageFullError,
 
 log = structlog.get_logger()
 
-#: What the framework itself raises, by status: it has no classes for it.
-_FRAMEWORK = {
+#: Problems of errors that the framework raises, by status: it has no separate classes for them.
+_FRAMEWORK_PROBLEMS = {
     PROBLEMS[kind].status: PROBLEMS[kind]
     for kind in (
         MalformedBodyError,
@@ -44,14 +44,14 @@ _FRAMEWORK = {
     )
 }
 
-#: What may be asked of a path.
+#: HTTP methods, in the order of the header Allow.
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE")
 
-#: Seconds after which to ask again, by status.
+#: Value of the header Retry-After in seconds, by status.
 _RETRY_AFTER = {HTTPStatus.SERVICE_UNAVAILABLE: 1, HTTPStatus.INSUFFICIENT_STORAGE: 30}
 
-#: The most that is said of one request: a body of a megabyte could hold a hundred thousand errors.
-_ERRORS = 20
+#: Maximum number of errors in a response: a body of one megabyte could have a hundred thousand.
+_MAX_ERRORS = 20
 
 
 def problem_response(
@@ -61,7 +61,7 @@ def problem_response(
     errors: Sequence[Mapping[str, str]] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> JSONResponse:
-    """Say what is wrong."""
+    """Return a problem document as a response."""
     document = {
         "type": f"/problems/{problem.type}",
         "title": problem.title,
@@ -78,14 +78,14 @@ def problem_response(
 
 
 def install_handlers(app: FastAPI) -> None:
-    """Have an application answer every error as a problem."""
-    app.add_exception_handler(IslandsError, _deliberate)
-    app.add_exception_handler(RequestValidationError, _invalid)
-    app.add_exception_handler(HTTPException, _http)
+    """Install handlers that turn every error of an application into a problem."""
+    app.add_exception_handler(IslandsError, _handle_islands_error)
+    app.add_exception_handler(RequestValidationError, _handle_invalid_request)
+    app.add_exception_handler(HTTPException, _handle_http_exception)
 
 
-async def _deliberate(request: Request, error: Exception) -> JSONResponse:
-    problem, headers = problem_of(error), {}
+async def _handle_islands_error(request: Request, error: Exception) -> JSONResponse:
+    problem, headers = lookup_problem(error), {}
     if isinstance(error, RateLimitError):
         headers["Retry-After"] = str(ceil(error.seconds))
     if isinstance(error, QuotaError):
@@ -94,63 +94,64 @@ async def _deliberate(request: Request, error: Exception) -> JSONResponse:
         headers["WWW-Authenticate"] = 'Bearer realm="islands"'
     if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         log.error("request failed", type=problem.type, reason=str(error))
-    return problem_response(request, problem, _detail(error), headers=headers)
+    return problem_response(request, problem, _public_detail(error), headers=headers)
 
 
-def _detail(error: Exception) -> str:
-    """Return what a stranger is told: where data lies, what a driver says, is for the log."""
+def _public_detail(error: Exception) -> str:
+    """Return the message for the client: paths and messages of the database driver go to the log only."""
     if isinstance(error, CommitUnknownError):
-        return f"{error.__doc__} Look whether it was, or ask again under the same idempotency key."
+        return f"{error.__doc__} Check the state, or repeat the request with the same idempotency key."
     return str(error.__doc__) if isinstance(error, StoreError | BlobNotFoundError) else str(error)
 
 
-async def _invalid(request: Request, error: Exception) -> JSONResponse:
+async def _handle_invalid_request(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    found = error.errors()
+    invalid = error.errors()
     errors = [
-        {"pointer": _pointer(entry["loc"]), "detail": _words(entry["msg"])} for entry in found[:_ERRORS]
+        {"pointer": _format_pointer(entry["loc"]), "detail": _format_message(entry["msg"])}
+        for entry in invalid[:_MAX_ERRORS]
     ]
     detail = "; ".join(f"{entry['pointer']}: {entry['detail']}" for entry in errors)
-    if len(found) > _ERRORS:
-        detail += f"; and {len(found) - _ERRORS} more"
-    return problem_response(request, problem_of(error), detail, errors)
+    if len(invalid) > _MAX_ERRORS:
+        detail += f"; and {len(invalid) - _MAX_ERRORS} more"
+    return problem_response(request, lookup_problem(error), detail, errors)
 
 
-def _words(message: str) -> str:
-    # The framework's word for a part of a form that has no file's name.
+def _format_message(message: str) -> str:
+    # The framework's message for a form part without a file name.
     if "Expected UploadFile" in message:
-        return "it is no file: send one with its name"
+        return "not a file: send a file with a file name"
     return message.removeprefix("Value error, ")
 
 
-def _pointer(where: Sequence[int | str]) -> str:
-    kind, *rest = where
+def _format_pointer(location: Sequence[int | str]) -> str:
+    kind, *rest = location
     path = "/".join(str(part).replace("~", "~0").replace("/", "~1") for part in rest)
     return f"/{path}" if kind == "body" else path
 
 
-async def _http(request: Request, error: Exception) -> JSONResponse:
-    """Say as a problem what the framework itself raises: no such path, a method that is not allowed."""
+async def _handle_http_exception(request: Request, error: Exception) -> JSONResponse:
+    """Turn an error of the framework into a problem, for example an unknown path or a wrong method."""
     assert isinstance(error, HTTPException)
     status = HTTPStatus(error.status_code)
     detail, headers = str(error.detail), dict(error.headers or {})
     if isinstance(error.__cause__, OSError) and error.__cause__.errno in (ENOSPC, EDQUOT):
-        return await _deliberate(
-            request, StorageFullError("there is no room to receive the request: make room")
+        return await _handle_islands_error(
+            request, StorageFullError("there is no disk space to receive the request: free some")
         )
     if status == HTTPStatus.NOT_FOUND:
-        detail = f"there is nothing at {request.url.path}: /openapi.json says what there is"
+        detail = f"there is nothing at {request.url.path}: see /openapi.json for all paths"
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(_allowed(request))
-        detail = f"{request.url.path} does not take {request.method}: it takes {headers['Allow']}"
-    problem = _FRAMEWORK.get(status) or ProblemKind(
+        headers["Allow"] = ", ".join(_allowed_methods(request))
+        detail = f"{request.url.path} does not accept {request.method}: use {headers['Allow']}"
+    problem = _FRAMEWORK_PROBLEMS.get(status) or ProblemKind(
         status, status.phrase.lower().replace(" ", "-"), status.phrase
     )
     return problem_response(request, problem, detail, headers=headers)
 
 
-def _allowed(request: Request) -> list[str]:
-    """Return the methods of a path: the framework names those of the first route that it finds."""
+def _allowed_methods(request: Request) -> list[str]:
+    """Return the methods of all routes of a path; the framework returns those of the first one only."""
     routes = request.app.router.routes
     return [
         method
@@ -160,7 +161,7 @@ def _allowed(request: Request) -> list[str]:
 
 
 def internal_error(request: Request, error: Exception) -> JSONResponse:
-    """Say that something went wrong that nobody has thought of; what it was stands in the log alone."""
+    """Return a response to an unexpected error, which is described in the log only."""
     log.error("defect", exc_info=error)
-    detail = "This is a defect of the service. Please report it with the request's id."
-    return problem_response(request, problem_of(error), detail)
+    detail = "This is a defect of the service: report it with the id of the request."
+    return problem_response(request, lookup_problem(error), detail)

@@ -1,4 +1,4 @@
-"""Submissions: a job of any kind is checked, accepted once, and answered with where it is."""
+"""Job submission, and lookup of jobs and results, for all kinds of jobs."""
 
 from typing import Annotated, Any
 
@@ -15,18 +15,20 @@ from islands_service.intake.file_inspection import inspect_file
 from islands_service.intake.job_inputs import link_blob
 from islands_service.intake.job_validation import PendingInspection, validate_job
 
-#: Where jobs of every kind are.
-JOBS = "/v1/jobs"
+#: Path of jobs of every kind.
+JOBS_PATH = "/v1/jobs"
 
-#: What every answer that shows a job says beside it.
+#: Documented header of every response that contains a job.
 ETAG = {"description": "The job's version, for `If-None-Match`.", "schema": {"type": "string"}}
-ACCEPTED: dict[int | str, dict[str, Any]] = {
+
+#: Documented responses of the routes that submit a job.
+ACCEPTED_RESPONSES: dict[int | str, dict[str, Any]] = {
     202: {
-        "description": "Accepted. With `Idempotent-Replayed: true` it is the job that the key named before.",
+        "description": "Accepted. With `Idempotent-Replayed: true`, the job of an earlier, equal request.",
         "headers": {
             "ETag": ETAG,
-            "Location": {"description": "Where the job is.", "schema": {"type": "string"}},
-            "Retry-After": {"description": "Seconds after which to look.", "schema": {"type": "string"}},
+            "Location": {"description": "Path of the job.", "schema": {"type": "string"}},
+            "Retry-After": {"description": "Seconds until the next poll.", "schema": {"type": "string"}},
         },
     }
 }
@@ -36,7 +38,7 @@ IdempotencyKey = Annotated[
     Header(
         min_length=1,
         max_length=255,
-        description="Send the same one again to be sure: it is one job.",
+        description="A repeated request with the same key creates no second job.",
     ),
 ]
 
@@ -46,82 +48,87 @@ Request = JobRequest | DiscrepancyRequest
 async def submit_job(
     state: AppState, caller: Principal, request: Request, kind: str, key: str | None
 ) -> JSONDocument:
-    """Accept a job, and say where it is.
+    """Validate a job, store it once and return it.
 
     Raises
     ------
     IslandsError
-        It could only fail, or its owner may not have it now.
+        The job could only fail, or its owner has used up a quota.
     """
     submission = Submission(caller.owner, request.spec, kind, request.name, request.priority, key)
-    job, new = await _submitted(state, request, submission)
+    job, new = await _validate_and_store(state, request, submission)
     if new:
         state.metrics.accepted.inc()
-    headers = {"Location": f"{JOBS}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
+    headers = {"Location": f"{JOBS_PATH}/{job.id}", "ETag": etag(job), "Retry-After": "1"}
     if not new:
         headers["Idempotent-Replayed"] = "true"
     return JSONDocument(job_document(job), 202, headers)
 
 
 def etag(job: Job) -> str:
-    """Return what a job is known by as it is now."""
+    """Return the entity tag of a job: its version."""
     return f'"{job.version}"'
 
 
-async def _submitted(state: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
-    before, doubts = await state.run_blocking(_admitted, state, request, submission)
-    if before is not None:
-        return before, False
-    for doubt in doubts:
-        with link_blob(state.blobs.path(doubt.dataset.blob), doubt.dataset.name) as path:
+async def _validate_and_store(state: AppState, request: Request, submission: Submission) -> tuple[Job, bool]:
+    replayed, inspections = await state.run_blocking(_validate_or_replay, state, request, submission)
+    if replayed is not None:
+        return replayed, False
+    for inspection in inspections:
+        with link_blob(state.blobs.path(inspection.dataset.blob), inspection.dataset.name) as path:
             async with state.inspection_slots:
                 await inspect_file(
-                    path, doubt.request, state.settings.inspection_memory, state.settings.inspection_seconds
+                    path,
+                    inspection.request,
+                    state.settings.inspection_memory,
+                    state.settings.inspection_seconds,
                 )
     return await state.run_blocking(state.store.jobs.submit, submission, state.settings.max_active)
 
 
-def _admitted(
+def _validate_or_replay(
     state: AppState, request: Request, submission: Submission
 ) -> tuple[Job | None, tuple[PendingInspection, ...]]:
-    """Return what is in doubt about a submission, or the job that it is already.
+    """Return the job that an earlier request with the same key created, and the inspections that are needed.
 
-    That is looked for only where it spares an inspection or a refusal: what was accepted once stays so, even
-    if its data set was deleted since. All others are told by `Jobs.submit`, in the transaction that accepts.
+    The earlier job is looked up only if it saves an inspection or a rejection: an accepted job stays
+    accepted, even if its data set has been deleted since. In all other cases `Jobs.submit` finds it, in the
+    transaction that stores the job.
     """
     try:
-        doubts = validate_job(request, submission.owner, state.store, state.settings)
+        inspections = validate_job(request, submission.owner, state.store, state.settings)
     except IslandsError:
-        if (before := state.store.jobs.find_replay(submission)) is not None:
-            return before, ()
+        if (replayed := state.store.jobs.find_replay(submission)) is not None:
+            return replayed, ()
         raise
-    return state.store.jobs.find_replay(submission) if doubts else None, doubts
+    return state.store.jobs.find_replay(submission) if inspections else None, inspections
 
 
 async def get_job_of_kind(state: AppState, caller: Principal, job: str, kind: str) -> Job:
-    """Return a job that is of a kind.
+    """Return a job of a certain kind.
 
     Raises
     ------
     JobNotFoundError
     ResourceNotFoundError
-        It is of another kind, and has nothing of what is asked for.
+        The job is of another kind.
     """
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     if found.kind != kind:
         raise ResourceNotFoundError(
-            f"job {job} is of the kind {found.kind}, and only those of the kind {kind} have this: its "
-            "/result and /report say what it found"
+            f"job {job} is of the kind {found.kind}, but only jobs of the kind {kind} have this resource: "
+            "see its /result and /report"
         )
     return found
 
 
 async def get_result(state: AppState, job: Job) -> dict[str, Any]:
-    """Return a job's result without its models.
+    """Return the result of a job without its models.
 
     Raises
     ------
     ResultNotReadyError
+        The job has not succeeded.
     """
     document = await state.run_blocking(state.store.results.document, job.id)
     if document is None:

@@ -1,4 +1,4 @@
-"""What happens to every request: an id, a line in the log, a time, a limit on its body, safe headers."""
+"""Middleware: request id, logging, latency, security headers, body limit and origin check."""
 
 import secrets
 from time import perf_counter
@@ -11,19 +11,22 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from islands_api.web.exception_handlers import METHODS, internal_error, problem_response
-from islands_api.web.problems import CrossOriginError, PayloadTooLargeError, problem_of
+from islands_api.web.problems import CrossOriginError, PayloadTooLargeError, lookup_problem
 from islands_service.settings import LOOPBACK, ServiceSettings
 
 log = structlog.get_logger()
 
-#: Bytes of a body that is not an upload, and what a form adds to the file in it.
-BODY, FORM = 1_000_000, 100_000
+#: Maximum size in bytes of a body that is not an upload.
+MAX_BODY_BYTES = 1_000_000
 
-#: The path that takes uploads.
-UPLOADS = "/v1/datasets"
+#: Bytes that a form may have in addition to its file.
+FORM_OVERHEAD_BYTES = 100_000
 
-#: Sent with every answer. The page of our own needs nothing from elsewhere, and nobody may frame it.
-SECURITY = {
+#: Path that accepts uploads.
+UPLOAD_PATH = "/v1/datasets"
+
+#: Headers of every response. The dashboard loads nothing from other origins, and no page may frame it.
+SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
     "Referrer-Policy": "no-referrer",
@@ -32,13 +35,15 @@ SECURITY = {
     "frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
 }
 
-_TLS = {"Strict-Transport-Security": "max-age=31536000"}
+#: Header of responses over TLS: browsers use HTTPS for a year.
+_HSTS_HEADERS = {"Strict-Transport-Security": "max-age=31536000"}
 
 
 class RequestLogging:
-    """Gives a request an id, binds it to the log, and takes the time until the answer begins.
+    """Middleware that logs each request with an id, measures its latency and sets security headers.
 
-    An id that the client sends is kept, so that one line of work can be followed through several services.
+    An id that the client sends is kept, so that a request can be traced through several services. The latency
+    is the time until the response starts.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -48,41 +53,44 @@ class RequestLogging:
         """Handle a request."""
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
-        began = perf_counter()
-        sent = Headers(scope=scope).get("x-request-id", "")
-        request_id = sent if sent.isascii() and sent.isalnum() and len(sent) <= 64 else secrets.token_hex(8)
+        start = perf_counter()
+        given = Headers(scope=scope).get("x-request-id", "")
+        # Only short alphanumeric ids: the id is written to the log.
+        request_id = (
+            given if given.isascii() and given.isalnum() and len(given) <= 64 else secrets.token_hex(8)
+        )
         scope.setdefault("state", {})["request_id"] = request_id
-        secure = _TLS if scope["scheme"] == "https" else {}
+        security = {**SECURITY_HEADERS, **(_HSTS_HEADERS if scope["scheme"] == "https" else {})}
         started = False
 
-        async def sending(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             nonlocal started
             if message["type"] == "http.response.start":
                 started = True
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-ID"] = request_id
-                for name, value in {**SECURITY, **secure}.items():
+                for name, value in security.items():
                     headers.setdefault(name, value)
-                self._note(scope, message["status"], perf_counter() - began)
+                self._record(scope, message["status"], perf_counter() - start)
             await send(message)
 
         with structlog.contextvars.bound_contextvars(request_id=request_id):
             try:
-                await self._app(scope, receive, sending)
+                await self._app(scope, receive, send_with_headers)
             except Exception as error:
-                # Here, so that this answer has its headers too, and the connection lives on.
+                # Handled here, so that this response has the headers too, and the connection stays open.
                 response = internal_error(Request(scope), error)
                 if started:
                     raise
-                await response(scope, receive, sending)
+                await response(scope, receive, send_with_headers)
 
-    def _note(self, scope: Scope, status: int, seconds: float) -> None:
+    def _record(self, scope: Scope, status: int, seconds: float) -> None:
         route = getattr(scope.get("route"), "path", "none")
         state: Any = getattr(scope["app"].state, "islands", None)
         if state is not None:
             method = scope["method"] if scope["method"] in METHODS else "other"
             state.metrics.latency.labels(method, route, status).observe(seconds)
-        # Those who look whether we live, and how we are, would fill the log.
+        # Health checks and metrics scrapes would fill the log.
         if route not in ("/healthz", "/readyz", "/metrics"):
             log.info(
                 "request",
@@ -94,63 +102,68 @@ class RequestLogging:
 
 
 class BodyLimit:
-    """Refuses a body that is too large, whatever it says of its length."""
+    """Middleware that rejects bodies that are too large, with or without a Content-Length header."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
-        self._app, self._upload = app, settings.max_upload + FORM
+        self._app, self._max_upload_bytes = app, settings.max_upload + FORM_OVERHEAD_BYTES
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle a request."""
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
-        most = self._upload if scope["path"] == UPLOADS else BODY
-        claimed = Headers(scope=scope).get("content-length", "0")
-        error = PayloadTooLargeError(f"the request has more than {most} bytes, the most that is taken here")
-        if claimed.isdecimal() and int(claimed) > most:
-            return await problem_response(Request(scope), problem_of(error), error.detail)(
+        max_bytes = self._max_upload_bytes if scope["path"] == UPLOAD_PATH else MAX_BODY_BYTES
+        declared = Headers(scope=scope).get("content-length", "0")
+        error = PayloadTooLargeError(f"the request has more than {max_bytes} bytes, the maximum of this path")
+        if declared.isdecimal() and int(declared) > max_bytes:
+            return await problem_response(Request(scope), lookup_problem(error), error.detail)(
                 scope, receive, send
             )
         received = 0
 
-        async def receiving() -> Message:
+        async def receive_limited() -> Message:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
-            if received > most:
+            if received > max_bytes:
                 raise error
             return message
 
-        return await self._app(scope, receiving, send)
+        return await self._app(scope, receive_limited, send)
 
 
 class SameOrigin:
-    """Refuses what another site's page asks for, and names that are not ours.
+    """Middleware that rejects requests from pages of other sites and with foreign host names.
 
-    On a loopback address no key is needed, so that any page in the user's browser could ask: by a request to
-    our address, or by a name of its own that it lets point to it (DNS rebinding).
+    A loopback address needs no key, so that any page in the user's browser could send requests: to the
+    address itself, or to a host name of the attacker that resolves to it (DNS rebinding).
     """
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
-        self._app, self._names = app, None if settings.keys_needed else LOOPBACK
+        self._app, self._allowed_hosts = app, None if settings.keys_needed else LOOPBACK
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handle a request."""
         if scope["type"] == "http" and (refusal := self._refusal(Headers(scope=scope))):
             error = CrossOriginError(refusal)
-            return await problem_response(Request(scope), problem_of(error), str(error))(scope, receive, send)
+            return await problem_response(Request(scope), lookup_problem(error), str(error))(
+                scope, receive, send
+            )
         return await self._app(scope, receive, send)
 
     def _refusal(self, headers: Headers) -> str:
         host, origin = headers.get("host", ""), headers.get("origin")
-        if origin is not None and _part(origin, "netloc") != host:
+        if origin is not None and _get_url_part(origin, "netloc") != host:
             return f"the page at {origin} may not use this service: open the service's own page"
-        if self._names is not None and _part(f"//{host}", "hostname") not in self._names:
-            return f"this service is not called {host}: without keys it answers to this machine's own names"
+        if (
+            self._allowed_hosts is not None
+            and _get_url_part(f"//{host}", "hostname") not in self._allowed_hosts
+        ):
+            return f"{host} is not a name of this service: without keys it accepts only loopback names"
         return ""
 
 
-def _part(url: str, part: str) -> str:
-    """Return a part of a URL that a stranger sent; empty where it is none."""
+def _get_url_part(url: str, part: str) -> str:
+    """Return a part of an untrusted URL. Empty if the URL is invalid."""
     try:
         return getattr(urlsplit(url), part) or ""
     except ValueError:

@@ -1,6 +1,7 @@
-"""Problems: the one table from an error to what HTTP says of it (RFC 9457).
+"""Errors of the web service, and the table that maps each error to an HTTP problem (RFC 9457).
 
-A new error is an entry here; its type is documented in docs/how-to/use-the-rest-api.md and never changes.
+To add an error, add an entry to `PROBLEMS`. Its type is documented in docs/how-to/use-the-rest-api.md and never
+changes.
 """
 
 from collections.abc import Mapping
@@ -23,15 +24,15 @@ MEDIA_TYPE = "application/problem+json"
 
 
 class AuthenticationError(IslandsError):
-    """The request has no key, or one that opens nothing."""
+    """The request has no key, or an invalid one."""
 
 
 class InsufficientScopeError(IslandsError):
-    """The key does not allow this."""
+    """The key does not have the scope that the request needs."""
 
 
 class RateLimitError(IslandsError):
-    """The key has asked too much in too short a time."""
+    """The client has sent too many requests in too short a time."""
 
     def __init__(self, message: str, seconds: float) -> None:
         super().__init__(message)
@@ -39,9 +40,10 @@ class RateLimitError(IslandsError):
 
 
 class PayloadTooLargeError(HTTPException):
-    """The request has more bytes than this service takes.
+    """The request has more bytes than this service accepts.
 
-    One of the framework's own errors: others, raised while it reads a body, become a plain 400 to it.
+    A subclass of the framework's error: the framework turns any other error raised while it reads a body into
+    a plain 400.
     """
 
     def __init__(self, message: str) -> None:
@@ -49,25 +51,25 @@ class PayloadTooLargeError(HTTPException):
 
 
 class MalformedBodyError(HTTPException):
-    """The body of the request cannot be read: it is damaged, or not what it says it is."""
+    """The body of the request is damaged, or does not have the type that it declares."""
 
     def __init__(self, message: str) -> None:
         super().__init__(HTTPStatus.BAD_REQUEST, message)
 
 
 class UnsupportedMediaTypeError(HTTPException):
-    """The body of the request is of another type than this path takes."""
+    """The body of the request has a media type that the path does not accept."""
 
     def __init__(self, message: str) -> None:
         super().__init__(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, message)
 
 
 class MethodNotAllowedError(HTTPException):
-    """The path does not take this method; the header Allow names those that it takes."""
+    """The path does not accept the method; the header Allow lists the methods that it accepts."""
 
 
 class CrossOriginError(IslandsError):
-    """Another site's page wants something of this service."""
+    """The request comes from a page of another site."""
 
 
 class ResourceNotFoundError(IslandsError):
@@ -80,14 +82,14 @@ class ResultNotReadyError(IslandsError):
 
 @dataclass(frozen=True, slots=True)
 class ProblemKind:
-    """What HTTP says of an error: the status, the type's name, and a title for people."""
+    """HTTP status, type name and human-readable title of a kind of problem."""
 
     status: HTTPStatus
     type: str
     title: str
 
 
-#: By class; of a class that is not listed, its nearest listed parent.
+#: Problem by class of error. A class that is not listed has the problem of its nearest listed base class.
 PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
     {
         RecordError: ProblemKind(
@@ -108,13 +110,13 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
             HTTPStatus.FORBIDDEN, "scope-missing", "The key does not allow this"
         ),
         CrossOriginError: ProblemKind(
-            HTTPStatus.FORBIDDEN, "cross-origin", "Requests of other sites are refused"
+            HTTPStatus.FORBIDDEN, "cross-origin", "Requests from other sites are rejected"
         ),
         JobNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "no-such-job", "There is no such job"),
         DatasetNotFoundError: ProblemKind(
             HTTPStatus.NOT_FOUND, "no-such-dataset", "There is no such data set"
         ),
-        ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such thing"),
+        ResourceNotFoundError: ProblemKind(HTTPStatus.NOT_FOUND, "not-found", "There is no such resource"),
         MalformedBodyError: ProblemKind(HTTPStatus.BAD_REQUEST, "bad-request", "The request cannot be read"),
         MethodNotAllowedError: ProblemKind(
             HTTPStatus.METHOD_NOT_ALLOWED, "method-not-allowed", "The method is not allowed here"
@@ -137,26 +139,24 @@ PROBLEMS: Mapping[type[Exception], ProblemKind] = MappingProxyType(
             HTTPStatus.SERVICE_UNAVAILABLE, "store-unavailable", "The database does not answer"
         ),
         CommitUnknownError: ProblemKind(
-            HTTPStatus.GATEWAY_TIMEOUT, "store-in-doubt", "Nobody knows whether it was done"
+            HTTPStatus.GATEWAY_TIMEOUT, "store-in-doubt", "The outcome of the write is unknown"
         ),
-        StorageFullError: ProblemKind(
-            HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "There is no room left"
-        ),
+        StorageFullError: ProblemKind(HTTPStatus.INSUFFICIENT_STORAGE, "storage-full", "The disk is full"),
         IslandsError: ProblemKind(HTTPStatus.INTERNAL_SERVER_ERROR, "failed", "The service failed"),
-        Exception: ProblemKind(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "The service met a defect"),
+        Exception: ProblemKind(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "The service has a defect"),
     }
 )
 
 
 class Detail(BaseModel):
-    """One thing that is wrong with a request."""
+    """One error in a request."""
 
-    pointer: str = Field(description="Where: a JSON pointer into the body, or the name of a parameter.")
-    detail: str = Field(description="What is wrong, and what would be right.")
+    pointer: str = Field(description="JSON pointer into the body, or the name of a parameter.")
+    detail: str = Field(description="What is wrong, and what is accepted.")
 
 
 class ProblemDocument(BaseModel):
-    """What every answer that is not a success holds."""
+    """Body of every error response (RFC 9457)."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -173,15 +173,15 @@ class ProblemDocument(BaseModel):
         }
     )
 
-    type: str = Field(description="The same for the same kind of problem, in every version.")
+    type: str = Field(description="Identifies the kind of problem; the same in every version.")
     title: str
     status: int
-    detail: str = Field(description="What is wrong here, and what to do.")
-    request_id: str | None = Field(default=None, description="Stands in the service's logs, too.")
+    detail: str = Field(description="What is wrong with this request, and what to do.")
+    request_id: str | None = Field(default=None, description="Also in the logs of the service.")
     errors: list[Detail] | None = None
 
 
-#: Joins every route's documented answers.
+#: Documented responses of every route.
 RESPONSES: dict[int | str, dict[str, Any]] = {
     "default": {
         "description": "A problem (RFC 9457): the detail says what to do.",
@@ -190,6 +190,6 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 }
 
 
-def problem_of(error: Exception) -> ProblemKind:
-    """Return what HTTP says of an error."""
+def lookup_problem(error: Exception) -> ProblemKind:
+    """Return the problem of an error, by the nearest listed base class."""
     return next(PROBLEMS[kind] for kind in type(error).__mro__ if kind in PROBLEMS)

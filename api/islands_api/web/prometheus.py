@@ -1,4 +1,4 @@
-"""What Prometheus reads: requests as they come, and jobs as they stand when it looks."""
+"""Prometheus metrics: requests as they arrive, and the state of all jobs at each scrape."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ from islands_service.store import Store
 
 
 class ServiceMetrics:
-    """The metrics of one application.
+    """Metrics of one application.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class ServiceMetrics:
         self.registry = CollectorRegistry()
         self.latency = Histogram(
             "islands_request_seconds",
-            "Time until an answer began, by route.",
+            "Time until the response started, by route.",
             ["method", "route", "status"],
             buckets=(0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 30.0),
             registry=self.registry,
@@ -30,11 +30,11 @@ class ServiceMetrics:
         self.received = Counter(
             "islands_dataset_bytes_received", "Bytes of data sets received.", registry=self.registry
         )
-        self.streams = Gauge("islands_event_streams", "Event streams that are open.", registry=self.registry)
-        self.registry.register(_Jobs(store))
+        self.streams = Gauge("islands_event_streams", "Open event streams.", registry=self.registry)
+        self.registry.register(_JobCollector(store))
 
     def page(self) -> bytes:
-        """Return all in Prometheus' text form.
+        """Return all metrics in the text format of Prometheus.
 
         Raises
         ------
@@ -43,33 +43,33 @@ class ServiceMetrics:
         return generate_latest(self.registry)
 
 
-class _Jobs(Collector):
+class _JobCollector(Collector):
     def __init__(self, store: Store) -> None:
         self._store = store
 
     def describe(self) -> Iterator[Metric]:
-        """Name nothing: jobs are counted when somebody looks, not when this is registered."""
+        """Describe no metrics, so that registration does not query the database."""
         return iter(())
 
     def collect(self) -> Iterator[Metric]:
-        """Read how the jobs stand."""
-        standing = self._store.jobs.queue_statistics()
+        """Query the state of the jobs."""
+        statistics = self._store.jobs.queue_statistics()
         jobs = GaugeMetricFamily("islands_jobs", "Jobs by state.", labels=["state"])
-        for state, count in standing.counts.items():
+        for state, count in statistics.counts.items():
             jobs.add_metric([state], count)
         yield jobs
         yield GaugeMetricFamily(
-            "islands_queue_oldest_seconds", "How long the job that waits longest has.", standing.oldest
+            "islands_queue_oldest_seconds", "Waiting time of the oldest queued job.", statistics.oldest
         )
-        yield GaugeMetricFamily("islands_leases", "Leases that have not expired.", standing.leases)
+        yield GaugeMetricFamily("islands_leases", "Leases that have not expired.", statistics.leases)
         running = (
-            ("islands_evaluations_per_second", "Individuals evaluated a second.", "evaluations_per_second"),
+            ("islands_evaluations_per_second", "Individuals evaluated per second.", "evaluations_per_second"),
             ("islands_best_error", "RMSE of the best individual, in the output's unit.", "best_error"),
-            ("islands_generation", "Generation that is complete.", "generation"),
+            ("islands_generation", "Last complete generation.", "generation"),
         )
         for name, text, field in running:
             family = GaugeMetricFamily(name, f"{text} Of running jobs.", labels=["job"])
-            for job, progress in standing.running.items():
+            for job, progress in statistics.running.items():
                 if progress.get(field) is not None:
                     family.add_metric([job], progress[field])
             yield family

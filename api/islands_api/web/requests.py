@@ -1,6 +1,6 @@
-"""Bodies of requests: what cannot be read is refused in words of our own, before the framework guesses.
+"""Request bodies and cursors: strict parsing with clear errors, before the framework parses leniently.
 
-JSON is read strictly: of a name that stands twice the framework would take the last, and NaN for a number.
+The JSON parser of the framework keeps the last value of a duplicate name and accepts NaN as a number.
 """
 
 import base64
@@ -22,39 +22,40 @@ from islands.errors import SettingsError
 from islands_api.web.auth import authenticate
 from islands_api.web.problems import MalformedBodyError, UnsupportedMediaTypeError
 
-#: The most digits of a whole number: reading one takes the square of their count.
-_DIGITS = 400
+#: Maximum number of digits of an integer: parsing takes time proportional to the square of the digits.
+_MAX_INTEGER_DIGITS = 400
 
-#: Characters of a name that are repeated to whoever sent it.
-_NAME = 40
+#: Maximum number of characters of a name that an error message repeats.
+_MAX_QUOTED_NAME = 40
 
 
 class BodyRoute(APIRoute):
-    """A route that takes bodies of one type alone."""
+    """Route that accepts bodies of one media type."""
 
     media: ClassVar[str]
-    advice: ClassVar[str] = "send it anew"
+    advice: ClassVar[str] = "send it again"
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return what answers a request, behind a look at its body's type."""
+        """Return a handler that checks the caller and the media type before it reads the body."""
         handler = super().get_route_handler()
         if self.body_field is None:
             return handler
 
         async def handle(request: Request) -> Response:
-            # Before the body is received: a stranger would have us keep what nobody will look at.
+            # Authenticate before reading the body, so that anonymous clients cannot make the server
+            # buffer data.
             await authenticate(request)
-            given = request.headers.get("content-type", "")
-            if given.partition(";")[0].strip().lower() != self.media:
+            media = request.headers.get("content-type", "")
+            if media.partition(";")[0].strip().lower() != self.media:
                 raise UnsupportedMediaTypeError(
-                    f"the body is {given or 'of no type'}: send it as {self.media}"
+                    f"the body has {f'the type {media}' if media else 'no type'}: send it as {self.media}"
                 )
             try:
-                return await handler(_Strict(request.scope, request.receive))
+                return await handler(_StrictRequest(request.scope, request.receive))
             except HTTPException as error:
                 if error.status_code != HTTPStatus.BAD_REQUEST or isinstance(error, MalformedBodyError):
                     raise
-                if isinstance(error.__cause__, OSError):  # a full disk, say
+                if isinstance(error.__cause__, OSError):  # for example a full disk
                     raise
                 raise MalformedBodyError(
                     f"the body cannot be read ({error.detail}): {self.advice}"
@@ -64,19 +65,19 @@ class BodyRoute(APIRoute):
 
 
 class JSONRoute(BodyRoute):
-    """A route that takes JSON."""
+    """Route that accepts JSON."""
 
     media = "application/json"
 
 
 class FormRoute(BodyRoute):
-    """A route that takes a form with a file in it."""
+    """Route that accepts a form with a file."""
 
     media = "multipart/form-data"
     advice = "send the record as the part 'file' of a form, under a name of at most 200 characters"
 
 
-class _Strict(Request):
+class _StrictRequest(Request):
     async def json(self) -> Any:
         if not hasattr(self, "_json"):
             self._json = read_json(await self.body())
@@ -84,62 +85,70 @@ class _Strict(Request):
 
 
 def read_json(body: bytes) -> Any:
-    """Read JSON as RFC 8259 has it.
+    """Parse JSON strictly according to RFC 8259.
 
     Raises
     ------
     MalformedBodyError
-        It is none, holds what is no number, names a thing twice, or is nested too deeply.
+        The body is not JSON, contains NaN, infinity or a huge integer, repeats a name, or is nested too
+        deeply.
     """
     try:
-        return json.loads(body, object_pairs_hook=_once, parse_int=_whole, parse_constant=_no_number)
+        return json.loads(
+            body,
+            object_pairs_hook=_reject_duplicates,
+            parse_int=_parse_integer,
+            parse_constant=_reject_constant,
+        )
     except RecursionError:
-        raise MalformedBodyError("the body is nested too deeply: a job needs a few levels") from None
+        raise MalformedBodyError("the body is nested too deeply: a job needs only a few levels") from None
     except json.JSONDecodeError as error:
         raise MalformedBodyError(
-            f"the body is no JSON: {error.msg} in line {error.lineno}, column {error.colno}"
+            f"the body is not valid JSON: {error.msg} in line {error.lineno}, column {error.colno}"
         ) from error
     except ValueError as error:
-        raise MalformedBodyError(f"the body is no JSON: {error}") from error
+        raise MalformedBodyError(f"the body is not valid JSON: {error}") from error
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    read = dict(pairs)
-    if len(read) < len(pairs):
-        twice, _ = max(Counter(name for name, _ in pairs).items(), key=itemgetter(1))
-        raise ValueError(f"{twice[:_NAME]!r} stands in it twice")
-    return read
+def _reject_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document = dict(pairs)
+    if len(document) < len(pairs):
+        duplicate, _ = max(Counter(name for name, _ in pairs).items(), key=itemgetter(1))
+        raise ValueError(f"the name {duplicate[:_MAX_QUOTED_NAME]!r} appears twice")
+    return document
 
 
-def _whole(text: str) -> int:
-    if len(text) > _DIGITS:
-        raise ValueError(f"a number in it has {len(text)} digits")
+def _parse_integer(text: str) -> int:
+    if len(text) > _MAX_INTEGER_DIGITS:
+        raise ValueError(f"a number has {len(text)} digits")
     return int(text)
 
 
-def _no_number(text: str) -> Any:
-    raise ValueError(f"{text} is no number there: leave the entry out")
+def _reject_constant(text: str) -> Any:
+    raise ValueError(f"{text} is not a JSON number: omit the entry")
 
 
-#: What a route that lists asks for.
-Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the page before.")]
-Limit = Annotated[int, Query(ge=1, le=200, description="The most entries of a page.")]
+#: Query parameter of a route that lists: the page to return.
+Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the previous page.")]
+
+#: Query parameter of a route that lists: the size of the page.
+Limit = Annotated[int, Query(ge=1, le=200, description="Maximum number of entries of a page.")]
 
 
-def encode_cursor(place: tuple[float, str] | None) -> str | None:
-    """Write the place behind which the next page begins."""
-    if place is None:
+def encode_cursor(position: tuple[float, str] | None) -> str | None:
+    """Encode the creation time and id of the last entry of a page."""
+    if position is None:
         return None
-    return base64.urlsafe_b64encode(json.dumps(place).encode()).decode().rstrip("=")
+    return base64.urlsafe_b64encode(json.dumps(position).encode()).decode().rstrip("=")
 
 
 def decode_cursor(cursor: str | None) -> tuple[float, str] | None:
-    """Read a cursor.
+    """Decode a cursor to a creation time and an id.
 
     Raises
     ------
     SettingsError
-        It is none of ours.
+        The cursor was not made by `encode_cursor`.
     """
     if cursor is None:
         return None
@@ -149,4 +158,6 @@ def decode_cursor(cursor: str | None) -> tuple[float, str] | None:
             raise ValueError(cursor)
         return float(created), identity
     except (ValueError, TypeError, OverflowError, binascii.Error):
-        raise SettingsError(f"{cursor!r} is no cursor: give `next` of the page before as it is") from None
+        raise SettingsError(
+            f"{cursor!r} is not a cursor: send `next` of the previous page unchanged"
+        ) from None

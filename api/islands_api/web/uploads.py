@@ -1,4 +1,4 @@
-"""Uploads: from the bytes of a stranger to a blob and what it holds."""
+"""Uploads: sanitise the file name, decompress and copy the bytes of an untrusted file."""
 
 import gzip
 import hashlib
@@ -10,66 +10,69 @@ from islands.errors import RecordError
 from islands.io.records import READERS
 from islands_api.web.problems import PayloadTooLargeError
 
-#: Bytes that are handled at once.
-CHUNK = 1 << 20
+#: Number of bytes that are copied at once.
+CHUNK_BYTES = 1 << 20
 
-#: The most bytes of a file's name.
-NAME = 200
+#: Maximum length in bytes of a file name.
+MAX_NAME_BYTES = 200
 
-#: The end of a name that says that the file is compressed.
-GZIP = ".gz"
+#: Suffix of compressed files.
+GZIP_SUFFIX = ".gz"
 
 
-def name_of(given: str | None) -> tuple[str, bool]:
-    """Return a file's own name, without any folder, and whether its bytes are compressed.
+def parse_file_name(given: str | None) -> tuple[str, bool]:
+    """Return the name of a file without folders and the suffix .gz, and whether the file is compressed.
 
     Raises
     ------
     RecordError
-        The file has no name, or one that says nothing of a format that is known.
+        The file has no name, or its suffix is not that of a supported format.
     """
     name = PurePosixPath(PureWindowsPath(given or "").name).name
-    name = "".join(each for each in name if each.isprintable()).lstrip(".")
-    compressed = name.lower().endswith(GZIP)
-    name = name[: -len(GZIP)] if compressed else name
+    name = "".join(character for character in name if character.isprintable()).lstrip(".")
+    compressed = name.lower().endswith(GZIP_SUFFIX)
+    name = name[: -len(GZIP_SUFFIX)] if compressed else name
     suffix = PurePosixPath(name).suffix.lower()
     if suffix not in READERS:
         known = ", ".join(READERS)
         raise RecordError(
-            f"{name or 'the file'}: its name has to end in one of {known}, or in that and {GZIP}: export the "
-            "record to one of these"
+            f"{name or 'the file'}: its name must end in one of {known}, optionally followed by "
+            f"{GZIP_SUFFIX}: export the record to one of these formats"
         )
-    # A file's name has at most 255 bytes on Linux, and the table of data sets no more characters.
-    stem = name[: -len(suffix)].encode()[: NAME - len(suffix)].decode(errors="ignore")
+    # A file name has at most 255 bytes on Linux, and the table of data sets stores at most 255 characters.
+    stem = name[: -len(suffix)].encode()[: MAX_NAME_BYTES - len(suffix)].decode(errors="ignore")
     return stem + suffix, compressed
 
 
-def receive(source: IO[bytes], target: IO[bytes], name: str, compressed: bool, most: int) -> tuple[int, str]:
-    """Copy a file, unpacked, to where it is kept; return its bytes' count and SHA-256.
+def receive(
+    source: IO[bytes], target: IO[bytes], name: str, compressed: bool, max_bytes: int
+) -> tuple[int, str]:
+    """Copy a file, decompressed if necessary; return its size in bytes and its SHA-256.
 
     Raises
     ------
     RecordError
-        It is empty, or no gzip though its name says so.
+        The file is empty, or its name ends in .gz but it is not gzip.
     PayloadTooLargeError
-        It unpacks to more than ``most`` bytes: a small file may unpack to any size.
+        The file has more than ``max_bytes`` bytes after decompression: a small file may decompress to any
+        size.
     """
     size, digest = 0, hashlib.sha256()
     stream = gzip.GzipFile(fileobj=source, mode="rb") if compressed else source
     try:
-        while piece := stream.read(CHUNK):
-            size += len(piece)
-            if size > most:
+        while chunk := stream.read(CHUNK_BYTES):
+            size += len(chunk)
+            if size > max_bytes:
                 raise PayloadTooLargeError(
-                    f"{name} has more than {most / 1e6:.0f} MB unpacked, the most that is taken here"
+                    f"{name} has more than {max_bytes / 1e6:.0f} MB after decompression, the maximum here"
                 )
-            target.write(piece)
-            digest.update(piece)
+            target.write(chunk)
+            digest.update(chunk)
         target.flush()
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise RecordError(
-            f"{name}{GZIP} is no gzip, or damaged ({error}): compress the record anew"
+            f"{name}{GZIP_SUFFIX} is not a gzip file, or is damaged ({error}): compress the record again"
         ) from error
     if size == 0:
-        raise RecordError(f"{name} is empty: export the record once more")
+        raise RecordError(f"{name} is empty: export the record again")
     return size, digest.hexdigest()

@@ -1,10 +1,13 @@
-"""The routes: one file for each thing of the interface. A newcomer's endpoints join `ROUTERS`."""
+"""Routes of the REST interface, one file for each resource. Read `jobs` first.
+
+To add a file, add its router to `ROUTERS`.
+"""
 
 from fastapi import APIRouter
 
 from islands_api.web.routes import datasets, diagnoses, events, figures, jobs, models, page, service
 
-#: All of the interface.
+#: All routers of the application.
 ROUTERS: tuple[APIRouter, ...] = (
     datasets.router,
     jobs.router,

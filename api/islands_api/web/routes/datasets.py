@@ -1,4 +1,4 @@
-"""Data sets: upload a record, look at what it holds, list, delete."""
+"""Data sets: upload, inspect, list, delete."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +13,7 @@ from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import Cursor, FormRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument, dataset_document
-from islands_api.web.uploads import name_of, receive
+from islands_api.web.uploads import parse_file_name, receive
 from islands_service.domain.job_spec import Name
 from islands_service.intake.file_inspection import InspectionRequest, inspect_file
 from islands_service.intake.job_inputs import link_blob
@@ -21,10 +21,14 @@ from islands_service.store.datasets import StoredDataset
 
 router = APIRouter(prefix="/v1/datasets", tags=["data sets"], responses=RESPONSES, route_class=FormRoute)
 
-_AT = {"Location": {"description": "Where the data set is.", "schema": {"type": "string"}}}
-_STORED: dict[int | str, dict[str, Any]] = {
-    200: {"model": DatasetView, "description": "The same bytes were uploaded before.", "headers": _AT},
-    201: {"description": "Stored.", "headers": _AT},
+_LOCATION_HEADER = {"Location": {"description": "Path of the data set.", "schema": {"type": "string"}}}
+_UPLOAD_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {
+        "model": DatasetView,
+        "description": "The same bytes were uploaded before.",
+        "headers": _LOCATION_HEADER,
+    },
+    201: {"description": "Stored.", "headers": _LOCATION_HEADER},
 }
 
 Id = Annotated[
@@ -41,11 +45,11 @@ Id = Annotated[
     "",
     status_code=201,
     response_model=DatasetView,
-    responses=_STORED,
+    responses=_UPLOAD_RESPONSES,
     form_limits={"max_files": 1, "max_fields": 200, "max_part_size": 10_000},
 )
 async def upload(
-    file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet; or one of them as .gz")],
+    file: Annotated[UploadFile, File(description="CSV, NPZ, MAT or Parquet, optionally compressed as .gz")],
     caller: Writer,
     state: AppStateDep,
     inputs: Annotated[list[Name], Form(max_length=16, description="Columns to check as inputs.")] = [],  # noqa: B006
@@ -54,13 +58,13 @@ async def upload(
 ) -> Any:
     """Upload a record.
 
-    It is read at once: the answer says which columns it has, with units and statistics, and what is wrong
-    with those that cannot be used. With `inputs` and `output` the record is checked as a job would, and
-    refused if that could not use it; with one of them, those columns are. The same bytes are the same data
-    set: 200 in the place of 201.
+    The response lists the columns with units and statistics, and the problems of columns that cannot be used.
+    With `inputs` and `output`, the record is validated as for a job and rejected if a job could not use it;
+    with only one of them, only these columns are validated. The same bytes are the same data set: the status
+    is then 200 instead of 201.
     """
-    name, compressed = name_of(file.filename)
-    stored, new = await _stored(
+    name, compressed = parse_file_name(file.filename)
+    stored, new = await _store_upload(
         state, caller.owner, file, name, compressed, InspectionRequest(tuple(inputs), output, dt)
     )
     state.metrics.received.inc(stored.bytes if new else 0)
@@ -68,25 +72,25 @@ async def upload(
     return JSONDocument(dataset_document(stored), 201 if new else 200, headers)
 
 
-async def _stored(
-    state: AppState, owner: str, file: UploadFile, name: str, compressed: bool, asked: InspectionRequest
+async def _store_upload(
+    state: AppState, owner: str, file: UploadFile, name: str, compressed: bool, inspection: InspectionRequest
 ) -> tuple[StoredDataset, bool]:
     settings = state.settings
     with state.blobs.receiving() as stream:
-        # A few at a time: a small file may unpack to a thousand times its size.
+        # Limit the number of uploads in progress: a small file may decompress to a thousand times its size.
         async with state.inspection_slots:
             size, blob = await state.run_blocking(
                 receive, file.file, stream, name, compressed, settings.max_unpacked
             )
             with link_blob(Path(stream.name), name) as path:
                 preview = await inspect_file(
-                    path, asked, settings.inspection_memory, settings.inspection_seconds
+                    path, inspection, settings.inspection_memory, settings.inspection_seconds
                 )
             suffix = Path(name).suffix.lower()
             await state.run_blocking(
                 state.store.datasets.check_room, owner, suffix, blob, size, settings.max_stored
             )
-            # What was refused until here is gone with the block.
+            # An upload that was rejected before this line is deleted at the end of the block.
             await state.run_blocking(state.blobs.keep, stream)
     return await state.run_blocking(
         state.store.datasets.add, owner, name, suffix, blob, size, preview, settings.max_stored
@@ -96,15 +100,17 @@ async def _stored(
 @router.get("", response_model=DatasetPage)
 async def datasets(caller: Reader, state: AppStateDep, cursor: Cursor = None, limit: Limit = 50) -> Any:
     """List the data sets, newest first."""
-    found, after = await state.run_blocking(
+    page, after = await state.run_blocking(
         state.store.datasets.page, caller.owner, decode_cursor(cursor), limit
     )
-    return JSONDocument({"items": [dataset_document(each) for each in found], "next": encode_cursor(after)})
+    return JSONDocument(
+        {"items": [dataset_document(dataset) for dataset in page], "next": encode_cursor(after)}
+    )
 
 
 @router.get("/{dataset}", response_model=DatasetView)
 async def dataset(dataset: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Look at a data set: columns, units, statistics, sampling, warnings."""
+    """Return a data set: columns, units, statistics, sampling, warnings."""
     return JSONDocument(
         dataset_document(await state.run_blocking(state.store.datasets.get, caller.owner, dataset))
     )

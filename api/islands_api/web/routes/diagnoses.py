@@ -1,4 +1,4 @@
-"""Discrepancies: have a simulation held against a record, and take it along with what it lacked."""
+"""Discrepancy diagnoses: compare a simulation with a record, and download the extended simulation."""
 
 from typing import Any
 
@@ -8,8 +8,8 @@ from islands_api.schemas import DiscrepancyRequest, JobView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppStateDep
 from islands_api.web.job_submission import (
-    ACCEPTED,
-    JOBS,
+    ACCEPTED_RESPONSES,
+    JOBS_PATH,
     IdempotencyKey,
     get_job_of_kind,
     get_result,
@@ -23,26 +23,26 @@ from islands_service.domain.job import DISCREPANCY, EXTENDED
 router = APIRouter(tags=["discrepancies"], responses=RESPONSES, route_class=JSONRoute)
 
 
-@router.post("/v1/discrepancies", status_code=202, response_model=JobView, responses=ACCEPTED)
+@router.post("/v1/discrepancies", status_code=202, response_model=JobView, responses=ACCEPTED_RESPONSES)
 async def submit(
     request: DiscrepancyRequest, caller: Writer, state: AppStateDep, idempotency_key: IdempotencyKey = None
 ) -> Any:
-    """Submit a job that finds out what a simulation gets wrong about a record, and why.
+    """Submit a job that diagnoses what a simulation gets wrong about a record.
 
-    It is a job as all others are, under `/v1/jobs`: followed, cancelled and resumed there. Its `result` is
-    what the command line writes as `discrepancy.json`, its `report` says it in words and figures.
+    The job is followed, cancelled and resumed under `/v1/jobs`. Its `result` has the form of the file
+    `discrepancy.json` of the command line; its `report` describes the result in words and figures.
     """
     return await submit_job(state, caller, request, DISCREPANCY, idempotency_key)
 
 
-@router.get(JOBS + "/{job}/extended", response_model=dict[str, Any])
+@router.get(JOBS_PATH + "/{job}/extended", response_model=dict[str, Any])
 async def extended(job: Id, caller: Reader, state: AppStateDep) -> Response:
-    """Take the simulation with the effects that it lacked; there is none where nothing was named."""
+    """Return the simulation extended by the missing effects; 404 if the diagnosis named none."""
     found = await get_job_of_kind(state, caller, job, DISCREPANCY)
     document = await get_result(state, found)
     blob = await state.run_blocking(state.store.results.artefact, job, EXTENDED)
     if blob is None:
         raise ResourceNotFoundError(
-            f"job {job} has nothing to extend the simulation by: it found {document['verdict']}"
+            f"job {job} has no extended simulation: its verdict is {document['verdict']}"
         )
     return Response(await state.run_blocking(state.blobs.read, blob), media_type="application/json")

@@ -1,4 +1,4 @@
-"""Events of a job as they happen: server-sent events that go on where a client was cut off."""
+"""Events of a job as server-sent events. A client that reconnects continues after its last event."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing
@@ -17,16 +17,16 @@ from islands_service.domain.job import TERMINAL, Event, Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 
-#: Seconds of silence after which a comment is sent: a connection that says nothing is cut by some proxies.
-#: A stream outlives its key's revocation for twice as long at the most.
-_ALIVE = 7.0
+#: Idle seconds after which a comment is sent: some proxies close idle connections. After its key was revoked,
+#: a stream ends within twice this time.
+_KEEP_ALIVE_SECONDS = 7.0
 
-#: What may happen to a job.
-_KINDS = ("queued", "running", "progress", "cancelling", "succeeded", "failed", "cancelled")
+#: Kinds of events of a job.
+_EVENT_KINDS = ("queued", "running", "progress", "cancelling", "succeeded", "failed", "cancelled")
 
-_EVENTS: dict[int | str, dict[str, Any]] = {
+_STREAM_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {
-        "description": f"Events: {', '.join(_KINDS)}.",
+        "description": f"Events: {', '.join(_EVENT_KINDS)}.",
         "content": {
             "text/event-stream": {
                 "itemSchema": {
@@ -34,7 +34,7 @@ _EVENTS: dict[int | str, dict[str, Any]] = {
                     "required": ["id", "event", "data"],
                     "properties": {
                         "id": {"type": "string", "pattern": "^[0-9]+$"},
-                        "event": {"type": "string", "enum": list(_KINDS)},
+                        "event": {"type": "string", "enum": list(_EVENT_KINDS)},
                         "data": {"type": "string", "contentMediaType": "application/json"},
                     },
                 },
@@ -42,29 +42,31 @@ _EVENTS: dict[int | str, dict[str, Any]] = {
             }
         },
     },
-    204: {"description": "The job has ended, and its last event was seen: do not come back."},
+    204: {"description": "The job has ended, and the client has its last event: do not reconnect."},
 }
 
 
-@router.get("/{job}/events", response_class=StreamingResponse, responses=_EVENTS)
+@router.get("/{job}/events", response_class=StreamingResponse, responses=_STREAM_RESPONSES)
 async def events(
     request: Request,
     job: Id,
     caller: Reader,
     state: AppStateDep,
     last_event_id: Annotated[
-        int, Header(ge=0, le=2**62, description="The last event that was seen: what came after it is sent.")
+        int, Header(ge=0, le=2**62, description="Number of the last event received; later ones are sent.")
     ] = 0,
 ) -> Response:
-    """Follow a job until it has ended; who is cut off comes back with `Last-Event-ID`."""
+    """Stream the events of a job until it has ended. To continue a broken stream, send `Last-Event-ID`."""
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     if found.state in TERMINAL and last_event_id >= found.version:
-        # A browser's event source comes back after every end but this one.
+        # Any other end of the stream makes an EventSource of a browser reconnect.
         return Response(status_code=204)
-    # The framework's own event response makes a model of every event for every client; five hundred watch.
+    # The event response of the framework builds a model of every event for each client: too slow for 500.
     return StreamingResponse(
-        # Nobody has seen what has not happened yet: who says so would wait for ever.
-        _while_open(request.app.state.keys, caller, _stream(state, found, min(last_event_id, found.version))),
+        # Limit the event number to existing events: a client with a larger one would wait for ever.
+        _while_key_valid(
+            request.app.state.keys, caller, _stream(state, found, min(last_event_id, found.version))
+        ),
         media_type="text/event-stream",
         headers={"Cache-Control": "no-store"},
     )
@@ -72,24 +74,24 @@ async def events(
 
 async def _stream(state: AppState, job: Job, last: int) -> AsyncGenerator[bytes]:
     with state.metrics.streams.track_inprogress():
-        async with aclosing(state.hub.events(job.id, job.version, last, _ALIVE)) as events:
+        async with aclosing(state.hub.events(job.id, job.version, last, _KEEP_ALIVE_SECONDS)) as events:
             async for event in events:
-                yield b": alive\n\n" if event is None else _encoded(event)
+                yield b": alive\n\n" if event is None else _encode(event)
 
 
-async def _while_open(
+async def _while_key_valid(
     keys: KeyCache, caller: Principal, stream: AsyncGenerator[bytes]
 ) -> AsyncIterator[bytes]:
-    let_in = monotonic()
+    checked_at = monotonic()
     async with aclosing(stream):
-        async for piece in stream:
-            if monotonic() - let_in >= _ALIVE:
+        async for chunk in stream:
+            if monotonic() - checked_at >= _KEEP_ALIVE_SECONDS:
                 if not await keys.is_still_valid(caller):
                     return
-                let_in = monotonic()
-            yield piece
+                checked_at = monotonic()
+            yield chunk
 
 
-def _encoded(event: Event) -> bytes:
+def _encode(event: Event) -> bytes:
     data = json_text({**event.data, "at": event.at})
     return f"id: {event.number}\nevent: {event.kind}\ndata: {data}\n\n".encode()

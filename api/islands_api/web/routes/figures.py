@@ -1,4 +1,4 @@
-"""Figures of a finished job: drawn by a process of their own when somebody first wants one, and kept."""
+"""Figures and reports of finished jobs: drawn by a separate process at the first request, then stored."""
 
 import asyncio
 import errno
@@ -17,7 +17,7 @@ from islands_api.web.dependencies import AppState, AppStateDep
 from islands_api.web.job_submission import get_job_of_kind, get_result
 from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.routes.jobs import Id
-from islands_api.web.routes.models import Rank, stored
+from islands_api.web.routes.models import Rank, get_model
 from islands_service.domain.job import IDENTIFICATION, REPORT
 from islands_service.domain.job_spec import identification_of
 from islands_service.store.blobs import BlobNotFoundError
@@ -27,28 +27,37 @@ log = structlog.get_logger()
 
 router = APIRouter(prefix="/v1/jobs", tags=["figures"], responses=RESPONSES)
 
-#: Figures of a model, and of a whole search: the names of the galleries' tables, as a test makes sure. To
-#: import the galleries here would make every start of the service wait for matplotlib.
+#: Names of the figures of a model. A test compares them with `islands.figures`, which is not imported here
+#: because the import of matplotlib would delay every start of the service.
 MODEL_FIGURES = ("free-run", "loop", "hold", "residuals")
+
+#: Names of the figures of a search, likewise.
 SEARCH_FIGURES = ("record", "front", "convergence", "islands")
 
-#: The figure that a search of a single island lacks.
-_OF_SEVERAL = "islands"
+#: The figure that exists only for searches with several islands.
+_MULTI_ISLAND_FIGURE = "islands"
 
-#: Seconds that drawing may take: until then nobody else's figures are drawn.
-_PATIENCE = 120.0
+#: Timeout in seconds of a figure process, which blocks the figures of all other jobs.
+_DRAWING_TIMEOUT = 120.0
 
-#: Seconds for which what could not be drawn is not tried again, and how many such are remembered.
-_REST, _REMEMBERED = 300.0, 1000
+#: Seconds for which a failed figure is not drawn again.
+_FAILURE_SECONDS = 300.0
 
-#: A model's simulation, as numbers.
-SIMULATION = "free-run.json"
+#: Maximum number of failures that are stored.
+_MAX_FAILURES = 1000
 
-_SVG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}}
+#: Artefact with the simulation of a model as numbers.
+SIMULATION_ARTEFACT = "free-run.json"
 
-_HTML: dict[int | str, dict[str, Any]] = {200: {"content": {"text/html": {"schema": {"type": "string"}}}}}
+_SVG_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"image/svg+xml": {"schema": {"type": "string"}}}}
+}
 
-#: A report brings its own style and figures, and needs nothing else.
+_HTML_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"text/html": {"schema": {"type": "string"}}}}
+}
+
+#: Content-Security-Policy of a report, which contains its styles and figures and loads nothing.
 _REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
 
 ModelFigure = Annotated[
@@ -74,98 +83,100 @@ class FigureError(IslandsError):
 
 
 class FigureFailures:
-    """What could not be drawn of late: to try it again would keep others from their figures."""
+    """Recent failures of figure processes: repeated attempts would delay the figures of other jobs."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[str, int | None], tuple[float, IslandsError]] = {}
+        self._check_figure: dict[tuple[str, int | None], tuple[float, IslandsError]] = {}
 
     def remember(self, job: str, rank: int | None, error: IslandsError) -> None:
-        """Keep why figures could not be drawn."""
-        self._known.pop((job, rank), None)
-        if len(self._known) == _REMEMBERED:
-            del self._known[next(iter(self._known))]
-        self._known[job, rank] = monotonic() + _REST, error
+        """Store the error of a failed attempt."""
+        self._check_figure.pop((job, rank), None)
+        if len(self._check_figure) == _MAX_FAILURES:
+            del self._check_figure[next(iter(self._check_figure))]
+        self._check_figure[job, rank] = monotonic() + _FAILURE_SECONDS, error
 
     def refuse(self, job: str, rank: int | None) -> None:
-        """Raise once more what came of an earlier try.
+        """Raise the error of a recent failed attempt, if there is one.
 
         Raises
         ------
         FigureError, BlobNotFoundError
         """
-        until, error = self._known.get((job, rank), (0.0, None))
+        until, error = self._check_figure.get((job, rank), (0.0, None))
         if error is not None and monotonic() < until:
             raise type(error)(*error.args)
 
 
-#: Of this process: a job's id is of no other service.
+#: Failures of this process.
 _FAILURES = FigureFailures()
 
 
 @router.get("/{job}/figures", response_model=Names)
 async def search_figures(job: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Say which figures of the search there may be."""
-    return {"items": await _of_search(state, caller, job)}
+    """List the names of the figures of the search."""
+    return {"items": await _list_search_figures(state, caller, job)}
 
 
-@router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG)
+@router.get("/{job}/figures/{figure}.svg", response_class=Response, responses=_SVG_RESPONSES)
 async def search_figure(job: Id, figure: SearchFigure, caller: Reader, state: AppStateDep) -> Response:
-    """See a figure of the search: the record, error against size, convergence, the islands' course."""
-    _known(figure, await _of_search(state, caller, job))
-    return await _figure(state, caller, job, f"{figure}.svg", None)
+    """Return a figure of the search: record, error against size, convergence, or error of each island."""
+    _check_figure(figure, await _list_search_figures(state, caller, job))
+    return await _figure_response(state, caller, job, f"{figure}.svg", None)
 
 
 @router.get("/{job}/models/{rank}/figures", response_model=Names)
 async def model_figures(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
-    """Say which figures of a model there are."""
-    await stored(state, caller, job, rank)
+    """List the names of the figures of a model."""
+    await get_model(state, caller, job, rank)
     return {"items": MODEL_FIGURES}
 
 
-@router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG)
+@router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG_RESPONSES)
 async def model_figure(
     job: Id, rank: Rank, figure: ModelFigure, caller: Reader, state: AppStateDep
 ) -> Response:
-    """See a figure of a model: free run, hysteresis loop, holds, residual correlations."""
-    await stored(state, caller, job, rank)
-    _known(figure, MODEL_FIGURES)
-    return await _figure(state, caller, job, f"{rank}/{figure}.svg", rank)
+    """Return a figure of a model: free run, hysteresis loop, holds, or residual correlations."""
+    await get_model(state, caller, job, rank)
+    _check_figure(figure, MODEL_FIGURES)
+    return await _figure_response(state, caller, job, f"{rank}/{figure}.svg", rank)
 
 
 @router.get("/{job}/models/{rank}/simulation", response_model=dict[str, Any])
 async def simulation(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Response:
-    """Take a model's free run over the validation data as numbers, thinned for a screen."""
-    await stored(state, caller, job, rank)
-    return await _figure(state, caller, job, f"{rank}/{SIMULATION}", rank, "application/json")
+    """Return the free run of a model over the validation data as numbers, downsampled for a screen."""
+    await get_model(state, caller, job, rank)
+    return await _figure_response(
+        state, caller, job, f"{rank}/{SIMULATION_ARTEFACT}", rank, "application/json"
+    )
 
 
-@router.get("/{job}/report", response_class=Response, responses=_HTML)
+@router.get("/{job}/report", response_class=Response, responses=_HTML_RESPONSES)
 async def report(job: Id, caller: Reader, state: AppStateDep) -> Response:
-    """Take the report of a job: one HTML file with what it found and its figures, to be kept or sent."""
+    """Return the report of a job: a self-contained HTML file with the result and its figures."""
     await get_result(state, await state.run_blocking(state.store.jobs.get, caller.owner, job))
-    answer = await _figure(state, caller, job, REPORT, None, "text/html; charset=utf-8")
-    answer.headers["Content-Security-Policy"] = _REPORT_POLICY
-    return answer
+    response = await _figure_response(state, caller, job, REPORT, None, "text/html; charset=utf-8")
+    response.headers["Content-Security-Policy"] = _REPORT_POLICY
+    return response
 
 
-async def _of_search(state: AppState, caller: Principal, job: str) -> tuple[str, ...]:
+async def _list_search_figures(state: AppState, caller: Principal, job: str) -> tuple[str, ...]:
     document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
     several = document["settings"]["islands"] > 1
-    return tuple(name for name in SEARCH_FIGURES if several or name != _OF_SEVERAL)
+    return tuple(name for name in SEARCH_FIGURES if several or name != _MULTI_ISLAND_FIGURE)
 
 
-def _known(figure: str, figures: tuple[str, ...]) -> None:
+def _check_figure(figure: str, figures: tuple[str, ...]) -> None:
     if figure not in figures:
-        raise ResourceNotFoundError(f"there is no figure {figure!r}: take one of {', '.join(figures)}")
+        raise ResourceNotFoundError(f"there is no figure {figure!r}: use one of {', '.join(figures)}")
 
 
-async def _figure(
+async def _figure_response(
     state: AppState, caller: Principal, job: str, name: str, rank: int | None, media: str = "image/svg+xml"
 ) -> Response:
     blob = await state.run_blocking(state.store.results.artefact, job, name)
     if blob is None:
         async with state.figure_slots:
-            # Somebody else may have had it drawn while we waited for our turn.
+            # Another request may have drawn the figure in the meantime.
             blob = await state.run_blocking(state.store.results.artefact, job, name)
             if blob is None:
                 await _draw(state, caller, job, rank)
@@ -173,7 +184,7 @@ async def _figure(
     if blob is None:
         raise ResourceNotFoundError(f"job {job} has no figure {name}")
     data = await state.run_blocking(state.blobs.read, blob)
-    # A browser may have several keys, one after the other.
+    # A browser may use several keys one after the other.
     headers = {"Cache-Control": "private, max-age=86400, immutable", "Vary": "Authorization"}
     return Response(data, media_type=media, headers=headers)
 
@@ -181,39 +192,48 @@ async def _figure(
 async def _draw(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
     for dataset in identification_of(found.spec).datasets:
-        await state.run_blocking(state.store.datasets.get, caller.owner, dataset)  # it may have been deleted
+        await state.run_blocking(state.store.datasets.get, caller.owner, dataset)  # raises if it was deleted
     _FAILURES.refuse(job, rank)
     try:
-        await _drawn(state, caller, job, rank)
+        await _run_figure_worker(state, caller, job, rank)
     except (FigureError, BlobNotFoundError) as error:
         _FAILURES.remember(job, rank, error)
         raise
 
 
-async def _drawn(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
-    of = () if rank is None else ("--rank", str(rank))
+async def _run_figure_worker(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
+    options = () if rank is None else ("--rank", str(rank))
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "islands_service.reports.figure_worker", job, f"--owner={caller.owner}", *of),
+        *(
+            sys.executable,
+            "-m",
+            "islands_service.reports.figure_worker",
+            job,
+            f"--owner={caller.owner}",
+            *options,
+        ),
         stdout=PIPE,
         stderr=PIPE,
         env=state.settings.environment(),
     )
     try:
-        async with asyncio.timeout(_PATIENCE):
-            said, complaint = await process.communicate()
+        async with asyncio.timeout(_DRAWING_TIMEOUT):
+            stdout, stderr = await process.communicate()
     except TimeoutError:
-        raise FigureError(f"the figures of job {job} take longer than {_PATIENCE:.0f} s to draw") from None
+        raise FigureError(
+            f"the figures of job {job} take longer than {_DRAWING_TIMEOUT:.0f} s to draw"
+        ) from None
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
     if process.returncode == 0:
         return
-    # What is not meant for whoever asked: paths, and what the database's driver says.
-    reason = _text(complaint)
+    # The error output is for the log: it may contain paths and messages of the database driver.
+    reason = _decode(stderr)
     match process.returncode:
         case errno.EINVAL:
-            raise FigureError(f"the figures of job {job} cannot be drawn: {_text(said)}")
+            raise FigureError(f"the figures of job {job} cannot be drawn: {_decode(stdout)}")
         case errno.ENOSPC:
             raise StorageFullError(reason)
         case errno.EAGAIN:
@@ -221,10 +241,8 @@ async def _drawn(state: AppState, caller: Principal, job: str, rank: int | None)
         case errno.ENODATA:
             raise BlobNotFoundError(reason)
     log.error("drawing failed", job=job, status=process.returncode, reason=reason)
-    raise FigureError(
-        f"the figures of job {job} cannot be drawn: why stands in the log, for whoever runs this service"
-    )
+    raise FigureError(f"the figures of job {job} cannot be drawn: the log of the service gives the reason")
 
 
-def _text(said: bytes) -> str:
-    return said.decode(errors="replace").strip()
+def _decode(output: bytes) -> str:
+    return output.decode(errors="replace").strip()

@@ -1,4 +1,4 @@
-"""Jobs: submit, look, wait, list, cancel, resume, delete."""
+"""Jobs: submit, list, get, wait, cancel, resume, delete, history."""
 
 from typing import Annotated, Any
 
@@ -7,7 +7,14 @@ from fastapi import APIRouter, Header, Path, Query, Response
 from islands_api.schemas import HistoryPage, JobPage, JobRequest, JobView
 from islands_api.web.auth import Reader, Writer
 from islands_api.web.dependencies import AppState, AppStateDep
-from islands_api.web.job_submission import ACCEPTED, ETAG, IdempotencyKey, etag, get_job_of_kind, submit_job
+from islands_api.web.job_submission import (
+    ACCEPTED_RESPONSES,
+    ETAG,
+    IdempotencyKey,
+    etag,
+    get_job_of_kind,
+    submit_job,
+)
 from islands_api.web.problems import RESPONSES
 from islands_api.web.requests import Cursor, JSONRoute, Limit, decode_cursor, encode_cursor
 from islands_api.web.responses import JSONDocument, JSONItems, job_document
@@ -15,7 +22,7 @@ from islands_service.domain.job import IDENTIFICATION, TERMINAL, Job, JobState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES, route_class=JSONRoute)
 
-#: A job's id.
+#: Path parameter: the id of a job.
 Id = Annotated[
     str,
     Path(
@@ -25,23 +32,28 @@ Id = Annotated[
     ),
 ]
 
-_SEEN: dict[int | str, dict[str, Any]] = {
+_JOB_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"headers": {"ETag": ETAG}},
-    304: {"description": "As it was.", "headers": {"ETag": ETAG}},
+    304: {"description": "Not changed.", "headers": {"ETag": ETAG}},
 }
 
-#: The most and the fewest points of a page of the history, and the most errors of islands in it: with many
-#: islands it would hold up everybody else for seconds.
-_POINTS, _FEWEST, _ERRORS = 5000, 50, 100_000
+#: Maximum number of points of a page of the history.
+_MAX_POINTS = 5000
+
+#: Minimum number of points of a page of the history, whatever the number of islands.
+_MIN_POINTS = 50
+
+#: Maximum number of island errors of a page: a larger page would block other requests for seconds.
+_MAX_ISLAND_ERRORS = 100_000
 
 
-@router.post("", status_code=202, response_model=JobView, responses=ACCEPTED)
+@router.post("", status_code=202, response_model=JobView, responses=ACCEPTED_RESPONSES)
 async def submit(
     request: JobRequest, caller: Writer, state: AppStateDep, idempotency_key: IdempotencyKey = None
 ) -> Any:
-    """Submit a job that identifies a record. Once this answers 202 it is not lost, whatever happens.
+    """Submit a job that identifies a record. A job accepted with 202 is stored durably.
 
-    It waits until a coordinator is free; follow it by its `events`, or by `GET` with `wait`.
+    The job is queued until a coordinator is free. Follow it by its `events`, or by `GET` with `wait`.
     """
     return await submit_job(state, caller, request, IDENTIFICATION, idempotency_key)
 
@@ -50,11 +62,13 @@ async def submit(
 async def jobs(
     caller: Reader,
     state: AppStateDep,
-    job_state: Annotated[JobState | None, Query(alias="state", description="Of this state alone.")] = None,
+    job_state: Annotated[
+        JobState | None, Query(alias="state", description="Only jobs in this state.")
+    ] = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> Any:
-    """List the jobs of every kind, newest first."""
+    """List jobs of all kinds, newest first."""
     page = await state.run_blocking(
         state.store.jobs.page, caller.owner, job_state, decode_cursor(cursor), limit
     )
@@ -63,7 +77,7 @@ async def jobs(
     )
 
 
-@router.get("/{job}", response_model=JobView, responses=_SEEN)
+@router.get("/{job}", response_model=JobView, responses=_JOB_RESPONSES)
 async def job(
     job: Id,
     caller: Reader,
@@ -72,24 +86,24 @@ async def job(
         float, Query(ge=0.0, le=60.0, description="Seconds to wait for a change since `If-None-Match`.")
     ] = 0.0,
     if_none_match: Annotated[
-        str | None, Header(max_length=1000, description="The `ETag` of what is known already.")
+        str | None, Header(max_length=1000, description="The `ETag` of the last response.")
     ] = None,
 ) -> Any:
-    """Look at a job. With `If-None-Match` the answer is 304 as long as nothing has changed."""
+    """Return a job. With `If-None-Match`, the status is 304 if the job has not changed."""
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
-    if wait and _known(if_none_match, found) and found.state not in TERMINAL:
-        found = await _changed(state, found, wait)
+    if wait and _matches_etag(if_none_match, found) and found.state not in TERMINAL:
+        found = await _wait_for_change(state, found, wait)
     headers = {"ETag": etag(found), "Cache-Control": "private, no-cache"}
     if found.state not in TERMINAL:
         headers["Retry-After"] = "1"
-    if _known(if_none_match, found):
+    if _matches_etag(if_none_match, found):
         return Response(status_code=304, headers=headers)
     return JSONDocument(job_document(found), headers=headers)
 
 
 @router.post("/{job}/cancel", status_code=202, response_model=JobView)
 async def cancel(job: Id, caller: Writer, state: AppStateDep) -> Any:
-    """Cancel a job: at once if it waits; if it runs, within a second or so."""
+    """Cancel a job: a queued one immediately, a running one within about a second."""
     return JSONDocument(
         job_document(await state.run_blocking(state.store.jobs.cancel, caller.owner, job)), 202
     )
@@ -97,7 +111,7 @@ async def cancel(job: Id, caller: Writer, state: AppStateDep) -> Any:
 
 @router.post("/{job}/resume", status_code=202, response_model=JobView)
 async def resume(job: Id, caller: Writer, state: AppStateDep) -> Any:
-    """Have a job that failed or was cancelled go on from its last checkpoint."""
+    """Resume a failed or cancelled job from its last checkpoint."""
     resumed = await state.run_blocking(state.store.jobs.resume, caller.owner, job, state.settings.max_active)
     return JSONDocument(job_document(resumed), 202)
 
@@ -114,32 +128,32 @@ async def history(
     caller: Reader,
     state: AppStateDep,
     after: Annotated[
-        int, Query(ge=-1, le=2**31 - 1, description="From the generation behind this one on.")
+        int, Query(ge=-1, le=2**31 - 1, description="Return only generations after this one.")
     ] = -1,
 ) -> Any:
-    """Look at the course of a search: the error of every size and of every island over generations.
+    """Return the convergence of a search: the error of each model size and of each island by generation.
 
-    It comes in pages: ask for what is behind the last generation of one, until a page is empty.
+    The history has pages: repeat the request with `after` set to the last generation until a page is empty.
     """
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
-    return await state.run_blocking(_course, state, found, after)
+    return await state.run_blocking(_read_history, state, found, after)
 
 
-def _course(state: AppState, job: Job, after: int) -> JSONItems:
+def _read_history(state: AppState, job: Job, after: int) -> JSONItems:
     islands = (job.spec.get("settings") or {}).get("islands") or 1
-    most = min(_POINTS, max(_FEWEST, _ERRORS // islands))
+    limit = min(_MAX_POINTS, max(_MIN_POINTS, _MAX_ISLAND_ERRORS // islands))
     names = ("generation", "evaluations", "best", "islands")
-    points = state.store.results.history(job.id, after, most)
+    points = state.store.results.history(job.id, after, limit)
     return JSONItems([dict(zip(names, point, strict=True)) for point in points])
 
 
-async def _changed(state: AppState, job: Job, seconds: float) -> Job:
+async def _wait_for_change(state: AppState, job: Job, seconds: float) -> Job:
     with state.hub.subscribe(job.id, job.version) as feed:
         await state.hub.wait(feed, job.version, seconds)
     return await state.run_blocking(state.store.jobs.get, job.owner, job.id)
 
 
-def _known(given: str | None, job: Job) -> bool:
-    """Tell whether a client has a job as it is: it may send several tags, and a proxy may weaken them."""
-    tags = [tag.strip().removeprefix("W/") for tag in (given or "").split(",")]
+def _matches_etag(if_none_match: str | None, job: Job) -> bool:
+    """Return whether If-None-Match contains the tag of a job; it may list several tags, and weak ones."""
+    tags = [tag.strip().removeprefix("W/") for tag in (if_none_match or "").split(",")]
     return "*" in tags or etag(job) in tags

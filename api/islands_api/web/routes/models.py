@@ -1,4 +1,4 @@
-"""Models of a job: metrics, physics checks, exports; and the result as a whole."""
+"""Models of a job (metrics, physics checks, exports), and the whole result."""
 
 from typing import Annotated, Any
 
@@ -18,20 +18,22 @@ from islands_service.store.results import StoredModel
 
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)
 
-#: A model's place in its result.
-Rank = Annotated[int, Path(ge=1, le=10_000, description="1 is the best on the validation data.")]
+#: Path parameter: the rank of a model in its result.
+Rank = Annotated[int, Path(ge=1, le=10_000, description="1 is the best model on the validation data.")]
 
-#: Media types of exports, where they are not plain text, and the ends of their files.
-_TYPES = {"json": "application/json", "mathml": "application/mathml+xml"}
-_ENDS = {"python": "py", "c": "c", "matlab": "m", "latex": "tex", "json": "json", "mathml": "xml"}
+#: Media types of the export formats that are not plain text.
+_MEDIA_TYPES = {"json": "application/json", "mathml": "application/mathml+xml"}
 
-_TEXT: dict[str, Any] = {"schema": {"type": "string"}}
-_EXPORTED: dict[int | str, dict[str, Any]] = {
+#: File name suffixes of the export formats; others have .txt.
+_SUFFIXES = {"python": "py", "c": "c", "matlab": "m", "latex": "tex", "json": "json", "mathml": "xml"}
+
+_TEXT_SCHEMA: dict[str, Any] = {"schema": {"type": "string"}}
+_EXPORT_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {
         "content": {
-            "text/plain": _TEXT,
-            _TYPES["mathml"]: _TEXT,
-            _TYPES["json"]: {"schema": {"type": "object"}},
+            "text/plain": _TEXT_SCHEMA,
+            _MEDIA_TYPES["mathml"]: _TEXT_SCHEMA,
+            _MEDIA_TYPES["json"]: {"schema": {"type": "object"}},
         }
     }
 }
@@ -39,7 +41,7 @@ _EXPORTED: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{job}/models", response_model=ModelPage)
 async def models(job: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Look at the models of a job, best first; there are none before it has succeeded."""
+    """Return the models of a job, best first. The list is empty until the job has succeeded."""
     await get_job_of_kind(state, caller, job, IDENTIFICATION)
     return await state.run_blocking(
         lambda: JSONItems([model.document for model in state.store.results.models(job)])
@@ -48,14 +50,14 @@ async def models(job: Id, caller: Reader, state: AppStateDep) -> Any:
 
 @router.get("/{job}/models/{rank}", response_model=ModelView)
 async def model(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
-    """Look at one model."""
-    return JSONDocument((await stored(state, caller, job, rank)).document)
+    """Return one model."""
+    return JSONDocument((await get_model(state, caller, job, rank)).document)
 
 
 @router.get(
     "/{job}/models/{rank}/export",
     response_class=Response,
-    responses=_EXPORTED,
+    responses=_EXPORT_RESPONSES,
 )
 async def exported(
     job: Id,
@@ -63,23 +65,24 @@ async def exported(
     caller: Reader,
     state: AppStateDep,
     form: Annotated[
-        str, Query(alias="format", description="A kind of text.", json_schema_extra={"enum": list(EXPORTS)})
+        str,
+        Query(alias="format", description="Format of the export.", json_schema_extra={"enum": list(EXPORTS)}),
     ] = "python",
 ) -> Response:
-    """Take a model with you: as Python, C, MATLAB, an equation, or a model file."""
-    found = await stored(state, caller, job, rank)
+    """Export a model as Python, C, MATLAB, an equation, or a model file."""
+    found = await get_model(state, caller, job, rank)
     text = await state.run_blocking(export, model_from_json(found.file, f"model {rank}"), form)
-    name = f"model-{rank:02d}.{_ENDS.get(form, 'txt')}"
+    name = f"model-{rank:02d}.{_SUFFIXES.get(form, 'txt')}"
     return Response(
         text,
-        media_type=_TYPES.get(form, "text/plain"),
+        media_type=_MEDIA_TYPES.get(form, "text/plain"),
         headers={"Content-Disposition": f'inline; filename="{name}"'},
     )
 
 
 @router.get("/{job}/result", response_model=dict[str, Any])
 async def result(job: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Take the whole result, in the form of `result.json`, or of `discrepancy.json`."""
+    """Return the whole result, in the form of `result.json` or `discrepancy.json`."""
     found = await state.run_blocking(state.store.jobs.get, caller.owner, job)
     document = await get_result(state, found)
     if found.kind != IDENTIFICATION:
@@ -88,15 +91,18 @@ async def result(job: Id, caller: Reader, state: AppStateDep) -> Any:
     return JSONDocument({**document, "models": [model.document for model in models]})
 
 
-async def stored(state: AppState, caller: Principal, job: str, rank: int) -> StoredModel:
+async def get_model(state: AppState, caller: Principal, job: str, rank: int) -> StoredModel:
     """Return a model of a finished job.
 
     Raises
     ------
-    ResultNotReadyError, ResourceNotFoundError
+    ResultNotReadyError
+        The job has not succeeded.
+    ResourceNotFoundError
+        The job has no model of this rank.
     """
     await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
     found = await state.run_blocking(state.store.results.models, job, rank)
     if not found:
-        raise ResourceNotFoundError(f"job {job} has no model {rank}: look at its /models")
+        raise ResourceNotFoundError(f"job {job} has no model {rank}: see its /models")
     return found[0]

@@ -1,4 +1,4 @@
-"""The status page at ``/``: files of our own, which speak REST as every other client does."""
+"""Dashboard at ``/``: static files; the page uses the REST interface like any other client."""
 
 import hashlib
 from functools import cache
@@ -11,12 +11,12 @@ from islands_api.web.problems import ResourceNotFoundError
 
 router = APIRouter(include_in_schema=False)
 
-FOLDER = Path(__file__).parents[2] / "dashboard"
+DASHBOARD_DIR = Path(__file__).parents[2] / "dashboard"
 
 _SCRIPT = "text/javascript; charset=utf-8"
 _STYLE = "text/css; charset=utf-8"
 
-#: What may be asked for, and what it is. A newcomer's module is an entry here, and a preload in index.html.
+#: Media types of the files of the dashboard. A new module needs an entry here and a preload in index.html.
 FILES = {
     "index.html": "text/html; charset=utf-8",
     "icon.svg": "image/svg+xml",
@@ -46,29 +46,29 @@ FILES = {
 
 
 @cache
-def _file(name: str) -> tuple[bytes, str]:
-    """Return a file's bytes, and their ETag."""
-    data = (FOLDER / name).read_bytes()
+def _read_file(name: str) -> tuple[bytes, str]:
+    """Return the bytes of a file and its ETag."""
+    data = (DASHBOARD_DIR / name).read_bytes()
     return data, f'W/"{hashlib.sha256(data).hexdigest()[:16]}"'
 
 
 @router.get("/")
 async def index(if_none_match: Annotated[str | None, Header()] = None) -> Response:
-    """Show the jobs."""
-    return _given("index.html", if_none_match)
+    """Return the dashboard."""
+    return _file_response("index.html", if_none_match)
 
 
 @router.get("/dashboard/{name}")
 async def file(name: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
-    """Give a file of the page."""
+    """Return a file of the dashboard."""
     if name not in FILES:
-        raise ResourceNotFoundError(f"the page has no file {name!r}")
-    return _given(name, if_none_match)
+        raise ResourceNotFoundError(f"the dashboard has no file {name!r}")
+    return _file_response(name, if_none_match)
 
 
-def _given(name: str, known: str | None) -> Response:
-    data, etag = _file(name)
+def _file_response(name: str, if_none_match: str | None) -> Response:
+    data, etag = _read_file(name)
     headers = {"Cache-Control": "no-cache", "ETag": etag}
-    if known == etag:
+    if if_none_match == etag:
         return Response(status_code=304, headers=headers)
     return Response(data, media_type=FILES[name], headers=headers)

@@ -1,4 +1,4 @@
-"""The service itself: whether it lives and is ready, what it measures, what a problem's type means."""
+"""Service endpoints: liveness, readiness, metrics, and descriptions of problem types."""
 
 from typing import Annotated, Any
 
@@ -15,13 +15,13 @@ router = APIRouter(tags=["service"], responses=RESPONSES)
 
 @router.get("/healthz", response_model=Health)
 async def healthz() -> Any:
-    """Say that this process lives."""
+    """Return 200 if the process is alive."""
     return {"status": "alive"}
 
 
 @router.get("/readyz", response_model=Health)
 async def readyz(state: AppStateDep) -> Any:
-    """Say that jobs are accepted: the database answers. Ray may still be starting."""
+    """Return 200 if the database answers, so that jobs are accepted. Ray may still be starting."""
     await state.run_blocking(state.store.jobs.versions, [])
     return {"status": "ready"}
 
@@ -32,7 +32,7 @@ async def readyz(state: AppStateDep) -> Any:
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
 async def metrics(_operator: Operator, state: AppStateDep) -> Response:
-    """Measure, for Prometheus: queue, leases, evaluations a second, best error, latency."""
+    """Return metrics for Prometheus: queue, leases, evaluations per second, best error, latency."""
     return Response(await state.run_blocking(state.metrics.page), media_type=CONTENT_TYPE_LATEST)
 
 
@@ -42,8 +42,8 @@ async def problem(
         str, Path(description="The last part of a problem's `type`.", examples=["invalid-record"])
     ],
 ) -> Any:
-    """Say what a problem's type means."""
+    """Describe a problem type."""
     for entry in PROBLEMS.values():
         if entry.type == kind:
             return {"type": f"/problems/{kind}", "status": int(entry.status), "title": entry.title}
-    raise ResourceNotFoundError(f"there is no type of problem {kind!r}")
+    raise ResourceNotFoundError(f"there is no problem type {kind!r}")

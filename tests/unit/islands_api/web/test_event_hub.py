@@ -16,8 +16,8 @@ from support.stores import CANCELLED, FOUND, LONG, brought_on, claimed, submitte
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(hubs, "LOOK", 0.02)
-    monkeypatch.setattr(hubs, "RETRY", 0.02)
+    monkeypatch.setattr(hubs, "POLL_SECONDS", 0.02)
+    monkeypatch.setattr(hubs, "RETRY_SECONDS", 0.02)
 
 
 @pytest.fixture

@@ -77,7 +77,7 @@ def test_without_a_rate_nobody_is_refused(clock):
 
 
 def test_strangers_take_up_no_memory_without_end(clock, monkeypatch):
-    monkeypatch.setattr(rate_limit, "_REMEMBERED", 10)
+    monkeypatch.setattr(rate_limit, "_MAX_BUCKETS", 10)
     bucket = RateLimiter(rate=1.0, burst=2)
     bucket.acquire("first")
     for stranger in range(1000):

@@ -9,7 +9,7 @@ import pytest
 
 from islands.errors import RecordError
 from islands_api.web.problems import PayloadTooLargeError
-from islands_api.web.uploads import NAME, name_of, receive
+from islands_api.web.uploads import MAX_NAME_BYTES, parse_file_name, receive
 
 #: What strangers call a file, and what we do.
 NAMES = {
@@ -34,15 +34,15 @@ NAMES = {
 
 @pytest.mark.parametrize("given", NAMES)
 def test_a_name_is_a_file_of_its_own_in_no_folder(given):
-    assert name_of(given) == (NAMES[given], False)
-    assert name_of(f"{given}.GZ") == (NAMES[given], True)
+    assert parse_file_name(given) == (NAMES[given], False)
+    assert parse_file_name(f"{given}.GZ") == (NAMES[given], True)
 
 
 @pytest.mark.parametrize("given", ["x" * 10_240, "ü" * 300, "😀" * 300])
 def test_a_long_name_is_cut_to_what_a_file_may_be_called(given, tmp_path):
-    name, _ = name_of(f"{given}.csv")
+    name, _ = parse_file_name(f"{given}.csv")
     assert given.startswith(name.removesuffix(".csv"))
-    assert NAME - 4 < len(name.encode()) <= NAME
+    assert MAX_NAME_BYTES - 4 < len(name.encode()) <= MAX_NAME_BYTES
     (tmp_path / name).touch()
 
 
@@ -53,7 +53,7 @@ def test_a_name_that_tells_no_format_is_refused(given):
     with pytest.raises(
         RecordError, match=r"its name has to end in one of \.csv, .*\.parquet.* export the record"
     ):
-        name_of(given)
+        parse_file_name(given)
 
 
 def told(data):
