@@ -91,10 +91,10 @@ def bomb(samples, members):
 
 #: Files that nobody could use: content, name, what the message says.
 REFUSED = {
-    "empty": (b"", "a.csv", ("a.csv is empty", "export the record once more")),
+    "empty": (b"", "a.csv", ("a.csv is empty", "export the record again")),
     "header alone": (b"t_s,u_V,y_um\n", "a.csv", ("a header in line 1 and not a single sample",)),
     "text as archive": (csv(), "a.npz", ("a.npz is not a NumPy archive", "numpy.savez")),
-    "program": (csv(), "a.exe", ("a.exe: its name has to end in one of .csv", "export the record")),
+    "program": (csv(), "a.exe", ("a.exe: its name must end in one of .csv", "export the record")),
     "picture": (PNG, "a.csv", ("a.csv, line 1: byte 0x89", "is not UTF-8: save the file as UTF-8")),
     "2 GB header": (claiming(2**28), "a.npz", (f"column u claims {2**28} samples", "the file is damaged")),
     "0.8 GB header": (claiming(10**8), "a.npz", ("claims 800000000 bytes, and the file stores 64", "anew")),
@@ -105,8 +105,8 @@ REFUSED = {
         "a.csv",
         (f"a.csv has a column {'y' * 40}... whose name has 100000 characters", "200 is the most", "shorter"),
     ),
-    "no gzip": (csv(), "a.csv.gz", ("a.csv.gz is no gzip, or damaged", "compress the record anew")),
-    "gzip cut short": (gzip.compress(csv())[:-50], "a.csv.gz", ("is no gzip, or damaged", "compress")),
+    "no gzip": (csv(), "a.csv.gz", ("a.csv.gz is not a gzip file, or is damaged", "compress the record again")),
+    "gzip cut short": (gzip.compress(csv())[:-50], "a.csv.gz", ("is not a gzip file, or is damaged", "compress")),
     "line cut short": (
         csv() + b"2.0,1.0\n",
         "a.csv",
@@ -152,7 +152,7 @@ def test_a_gzip_bomb_is_cut_off_at_the_limit(service):
     one = time.process_time() - began
     began = time.process_time()
     detail = problem_of(service.upload(400 * member, "a.csv.gz"), 413, "too-large")
-    assert detail == "a.csv has more than 50 MB unpacked, the most that is taken here"
+    assert detail == "a.csv has more than 50 MB after decompression, the maximum here"
     # Five members reach the limit; the whole file would take the time of four hundred.
     assert time.process_time() - began < 200 * one
     assert nothing_stored(service)
@@ -358,7 +358,7 @@ def test_anothers_data_set_is_as_if_it_were_not_there(service):
 def test_an_expired_key_opens_nothing(service):
     answer = service.client.get("/v1/jobs", headers=service.key(seconds=0.0))
     assert problem_of(answer, 401, "no-key") == (
-        "the key has expired: ask whoever runs this service for another one"
+        "the key has expired: ask the operator of this service for another one"
     )
     assert answer.headers["www-authenticate"] == 'Bearer realm="islands"'
 

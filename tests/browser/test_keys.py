@@ -136,7 +136,7 @@ def test_what_a_key_does_not_allow_is_said(
     enter(page, made(locked, "read", owner=owner))
     page.get_by_role("button", name="Cancel").click()
     banner = page.locator(".banner")
-    expect(banner).to_contain_text("the key has the scopes read, this needs write")
+    expect(banner).to_contain_text("the key has the scopes read, but this request needs write")
     banner.get_by_role("button", name="Dismiss").click()
     expect(banner).to_have_count(0)
     assert locked.job(job)["state"] == "queued"

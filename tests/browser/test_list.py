@@ -139,7 +139,7 @@ def test_a_refusal_is_told_in_the_services_words(
     desk.submit(500)
     page = screens(desk.url).go("#/jobs?cursor=garbage")
     banner = page.locator(".banner")
-    expect(banner).to_contain_text("'garbage' is no cursor: give `next` of the page before as it is")
+    expect(banner).to_contain_text("'garbage' is not a cursor: send `next` of the previous page unchanged")
     expect(banner.locator("code")).to_have_text(pattern(r"[0-9a-f]{16}"))
     page.get_by_role("link", name="all", exact=True).click()
     expect(page.locator("tbody tr").first).to_be_visible()

@@ -73,7 +73,7 @@ def test_a_browser_that_asks_for_another_site_is_refused(service, asks):
 )
 def test_a_name_that_another_site_lets_point_to_us_is_refused(service, host):
     answer = service.client.get("/v1/jobs", headers={"Host": host})
-    assert "it answers to this machine's own names" in problem_of(answer, 403, "cross-origin")
+    assert "it accepts only loopback names" in problem_of(answer, 403, "cross-origin")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost:{port}", "LOCALHOST", "[::1]:{port}", "[::1]"])

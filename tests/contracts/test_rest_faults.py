@@ -187,7 +187,7 @@ def test_a_defect_of_drawing_stands_in_the_log_alone_and_is_not_met_again_at_onc
     drawing.logs.clear()
     said = [problem_of(drawing.client.get(path), 500, "failed") for _ in range(2)]
     assert said[0] == said[1]
-    assert said[0].endswith("cannot be drawn: why stands in the log, for whoever runs this service")
+    assert said[0].endswith("cannot be drawn: the log of the service gives the reason")
     (entry,) = [each for each in drawing.logs if each["event"] == "drawing failed"]
     assert entry["reason"].endswith("KeyError: 'search'")
 

@@ -189,7 +189,7 @@ def test_pages_of_a_state_show_no_other(service):
 @pytest.mark.parametrize("cursor", ["x", "!!!", "bnVsbA", "WzEsMl0", "WzFlOTk5LCJhIl0"])
 def test_garbage_is_no_cursor(service, path, cursor):
     detail = problem_of(service.client.get(path, params={"cursor": cursor}), 422, "invalid-settings")
-    assert detail == f"{cursor!r} is no cursor: give `next` of the page before as it is"
+    assert detail == f"{cursor!r} is not a cursor: send `next` of the previous page unchanged"
 
 
 #: What may be asked in which state, and what follows; in all others it is a conflict.

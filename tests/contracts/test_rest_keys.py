@@ -85,7 +85,7 @@ def test_a_key_opens_what_its_scopes_allow(service, method, path):
     others = sorted(SCOPES.keys() - {needed})
     answer = asked(service, method, path, service.key(*others))
     assert problem_of(answer, 403, "scope-missing") == (
-        f"the key has the scopes {', '.join(others)}, this needs {needed}: ask for another key"
+        f"the key has the scopes {', '.join(others)}, but this request needs {needed}: ask for another key"
     )
     assert asked(service, method, path, service.key(needed)).status_code in (200, 404, 422)
 
@@ -194,7 +194,7 @@ def test_a_key_asks_so_often_and_another_one_is_not_held_up(strict):
     count, answer = counted(strict, mine)
     assert 20 <= count <= 30
     detail = problem_of(answer, 429, "too-many-requests")
-    assert "more than 2 requests a second: wait" in detail
+    assert "more than 2 requests per second: wait" in detail
     assert "?wait=30" in detail
     assert strict.client.get("/v1/jobs", headers=theirs).status_code == 200
     time.sleep(int(answer.headers["retry-after"]))

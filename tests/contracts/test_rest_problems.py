@@ -68,7 +68,7 @@ def test_a_method_that_is_not_allowed_is_told_those_that_are(service, method, pa
     path = path.format(job=queued(service.store).id)
     answer = service.client.request(method, path)
     assert (
-        problem_of(answer, 405, "method-not-allowed") == f"{path} does not take {method}: it takes {allowed}"
+        problem_of(answer, 405, "method-not-allowed") == f"{path} does not accept {method}: use {allowed}"
     )
     assert answer.headers["allow"] == allowed
 
@@ -151,7 +151,7 @@ def test_a_header_out_of_its_range_is_named(service, header):
 def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
     answer = service.client.request(method, path, headers={"X-Request-ID": "find4me"})
     assert problem_of(answer, 500, "defect") == (
-        "This is a defect of the service. Please report it with the request's id."
+        "This is a defect of the service: report it with the id of the request."
     )
     assert answer.json().keys() == FORM
     assert answer.headers["x-request-id"] == "find4me"

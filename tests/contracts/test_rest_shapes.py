@@ -188,7 +188,7 @@ def test_a_model_is_the_one_of_the_result(service, finished):
     assert job["summary"]["models"] == len(models)
     assert models[0]["metrics"]["validation"]["free_run"]["mape"] < 1.0
     missing = service.client.get(f"/v1/jobs/{finished}/models/{len(models) + 1}")
-    assert "look at its /models" in problem_of(missing, 404, "not-found")
+    assert "see its /models" in problem_of(missing, 404, "not-found")
 
 
 @pytest.mark.parametrize("form", EXPORTS)
@@ -222,7 +222,7 @@ def test_the_figures_that_are_named_are_those_of_the_galleries():
 )
 def test_a_figure_that_there_is_not_is_not_drawn(service, finished, path):
     detail = problem_of(service.client.get(f"/v1/jobs/{finished}/{path}"), 404, "not-found")
-    assert "take one of" in detail
+    assert "use one of" in detail
 
 
 @pytest.mark.nightly

@@ -45,7 +45,7 @@ def test_port_in_use_is_refused(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         said = refused("--data-dir", tmp_path / "data", "--port", port)
-    assert f"cannot listen at 127.0.0.1, port {port} (another program has it): give another --port" in said
+    assert f"cannot listen at 127.0.0.1, port {port} (another program uses it): give another --port" in said
 
 
 def test_port_that_becomes_free_soon_is_used() -> None:
@@ -60,7 +60,7 @@ def test_port_that_becomes_free_soon_is_used() -> None:
 def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     said = refused("--data-dir", folder, "--host", "0.0.0.0", "--port", free_port())
-    assert "0.0.0.0 can be reached by others, and there is no key" in said
+    assert "0.0.0.0 can be reached by other machines, and there is no key" in said
     assert "make one with 'islands keys create --scope read --scope write'" in said
     secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()[0]
     with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
@@ -132,8 +132,8 @@ def test_certificate_without_its_key_is_refused(
     said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", tmp_path / "none.pem")
     assert f"there is no file {tmp_path / 'none.pem'}" in said
     said = refused(*options, "--tls-certificate", certificate[0], "--tls-key", certificate[0])
-    assert "are no certificate with its key" in said
-    assert "give two PEM files that belong together" in said
+    assert "are not a certificate and its key" in said
+    assert "give two PEM files that match" in said
 
 
 def test_event_stream_ends_cleanly_when_the_service_stops(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_who_is_refused_is_told_when_to_come_back(clock):
     bucket = RateLimiter(rate=0.5, burst=1)
     bucket.acquire("a")
     clock.now += 0.5
-    with pytest.raises(RateLimitError, match=r"more than 0\.5 requests a second: wait 1\.5 s") as refused:
+    with pytest.raises(RateLimitError, match=r"more than 0\.5 requests per second: wait 1\.5 s") as refused:
         bucket.acquire("a")
     clock.now += refused.value.seconds
     bucket.acquire("a")

@@ -23,17 +23,17 @@ DAMAGED = {
     b"{": "Expecting property name",
     b'{"a": 1]': "line 1, column 8",
     b'{"a": 1}\n{': "Extra data in line 2, column 1",
-    b"\xff\xfe\x00": "is no JSON",
-    b'{"a": "\xe4"}': "is no JSON",
-    b'{"a": NaN}': "NaN is no number there: leave the entry out",
-    b"[Infinity]": "Infinity is no number",
-    b"[-Infinity]": "-Infinity is no number",
-    b'{"seed": 1, "dt": 1, "seed": 2}': "'seed' stands in it twice",
-    b'{"settings": {"islands": 1, "islands": 2}}': "'islands' stands in it twice",
+    b"\xff\xfe\x00": "is not valid JSON",
+    b'{"a": "\xe4"}': "is not valid JSON",
+    b'{"a": NaN}': "NaN is not a JSON number: omit the entry",
+    b"[Infinity]": "Infinity is not a JSON number",
+    b"[-Infinity]": "-Infinity is not a JSON number",
+    b'{"seed": 1, "dt": 1, "seed": 2}': "'seed' appears twice",
+    b'{"settings": {"islands": 1, "islands": 2}}': "'islands' appears twice",
     b"[" * 100_000: "nested too deeply",
     b'{"a":' * 100_000: "nested too deeply",
     b"[" * 100_000 + b"]" * 100_000: "nested too deeply",
-    b"9" * 100_000: "a number in it has 100000 digits",
+    b"9" * 100_000: "a number has 100000 digits",
 }
 
 
@@ -68,7 +68,7 @@ def test_json_that_is_no_job_is_invalid(service, body):
 def test_a_job_is_sent_as_json(service, media):
     order = json.dumps(spec(kept(service.store))).encode()
     detail = problem_of(sent(service, order, media), 415, "unsupported-media-type")
-    assert detail == f"the body is {media or 'of no type'}: send it as application/json"
+    assert detail == f"the body has {f'the type {media}' if media else 'no type'}: send it as application/json"
 
 
 def test_a_charset_beside_json_does_no_harm(service):
@@ -96,7 +96,7 @@ def test_names_are_escaped_in_pointers(service):
 def test_a_job_of_two_megabytes_is_refused_before_it_is_read(service):
     began = time.monotonic()
     detail = problem_of(sent(service, b" " * 2_000_000), 413, "too-large")
-    assert detail == "the request has more than 1000000 bytes, the most that is taken here"
+    assert detail == "the request has more than 1000000 bytes, the maximum of this path"
     assert time.monotonic() - began < 25.0
 
 
@@ -146,7 +146,7 @@ def test_an_upload_without_a_length_is_counted_as_it_comes(tmp_path):
             small, "/v1/datasets", "multipart/form-data; boundary=x", 6, head + b"1" * 100_000
         )
         assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
-        assert document["detail"] == "the request has more than 400000 bytes, the most that is taken here"
+        assert document["detail"] == "the request has more than 400000 bytes, the maximum of this path"
         assert not [path for path in small.settings.blobs.rglob("*") if path.is_file()]
 
 
@@ -161,7 +161,7 @@ def test_an_upload_without_a_length_is_counted_as_it_comes(tmp_path):
             b'--y\r\nContent-Disposition: form-data; name="file"\r\n\r\nt,u\r\n--y--\r\n',
             "multipart/form-data; boundary=y",
             422,
-            "/file: it is no file: send one with its name",
+            "/file: not a file: send a file with a file name",
         ),
         (
             b'--y\r\nContent-Disposition: form-data; name="file"; filename="' + b"x" * 10_240,
@@ -199,7 +199,7 @@ def test_a_name_that_stands_twice_is_found_among_as_many_as_a_body_holds():
     """A look at every name for each of them would keep all other requests waiting for minutes."""
     names = [f"{number:x}" for number in range(120_000)]
     body = json.dumps(dict.fromkeys(names)).encode()[:-1] + b', "1d4bf": 1}'
-    with pytest.raises(MalformedBodyError, match="'1d4bf' stands in it twice"):
+    with pytest.raises(MalformedBodyError, match="'1d4bf' appears twice"):
         read_json(body)
 
 

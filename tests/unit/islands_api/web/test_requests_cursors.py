@@ -58,7 +58,7 @@ def encoded(value):
     ],
 )
 def test_what_is_no_cursor_of_ours_is_refused(cursor):
-    with pytest.raises(SettingsError, match=r"is no cursor: give `next` of the page before as it is"):
+    with pytest.raises(SettingsError, match=r"is not a cursor: send `next` of the previous page unchanged"):
         decode_cursor(cursor)
 
 

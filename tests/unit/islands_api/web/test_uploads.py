@@ -51,7 +51,7 @@ def test_a_long_name_is_cut_to_what_a_file_may_be_called(given, tmp_path):
 )
 def test_a_name_that_tells_no_format_is_refused(given):
     with pytest.raises(
-        RecordError, match=r"its name has to end in one of \.csv, .*\.parquet.* export the record"
+        RecordError, match=r"its name must end in one of \.csv, .*\.parquet.* export the record"
     ):
         parse_file_name(given)
 
@@ -84,7 +84,7 @@ def test_one_byte_too_many_is_refused(compressed):
     assert receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 100) == told(b"x" * 100)
     with pytest.raises(PayloadTooLargeError) as refused:
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 99)
-    assert refused.value.detail == "a.csv has more than 0 MB unpacked, the most that is taken here"
+    assert refused.value.detail == "a.csv has more than 0 MB after decompression, the maximum here"
 
 
 def test_a_bomb_is_never_unpacked_beyond_the_limit():
@@ -101,7 +101,7 @@ def test_a_bomb_is_never_unpacked_beyond_the_limit():
 )
 def test_a_damaged_gzip_is_refused(sent):
     with pytest.raises(
-        RecordError, match=r"a\.csv\.gz is no gzip, or damaged \(.+\): compress the record anew"
+        RecordError, match=r"a\.csv\.gz is not a gzip file, or is damaged \(.+\): compress the record again"
     ):
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", True, 1000)
 
@@ -112,5 +112,5 @@ def test_a_damaged_gzip_is_refused(sent):
     ids=["plain", "no gzip", "gzip of nothing"],
 )
 def test_nothing_is_refused(sent, compressed):
-    with pytest.raises(RecordError, match=r"a\.csv is empty: export the record once more"):
+    with pytest.raises(RecordError, match=r"a\.csv is empty: export the record again"):
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 1000)
