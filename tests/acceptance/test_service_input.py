@@ -105,8 +105,16 @@ REFUSED = {
         "a.csv",
         (f"a.csv has a column {'y' * 40}... whose name has 100000 characters", "200 is the most", "shorter"),
     ),
-    "no gzip": (csv(), "a.csv.gz", ("a.csv.gz is not a gzip file, or is damaged", "compress the record again")),
-    "gzip cut short": (gzip.compress(csv())[:-50], "a.csv.gz", ("is not a gzip file, or is damaged", "compress")),
+    "no gzip": (
+        csv(),
+        "a.csv.gz",
+        ("a.csv.gz is not a gzip file, or is damaged", "compress the record again"),
+    ),
+    "gzip cut short": (
+        gzip.compress(csv())[:-50],
+        "a.csv.gz",
+        ("is not a gzip file, or is damaged", "compress"),
+    ),
     "line cut short": (
         csv() + b"2.0,1.0\n",
         "a.csv",

@@ -1,7 +1,7 @@
-"""A real browser before a real service: what every test of the page looks through.
+"""Fixtures for tests of the dashboard in a real browser with a real service.
 
-Without playwright or Chromium these tests are skipped. Fixtures live as long as a module: playwright keeps an
-event loop running in this thread meanwhile, and other modules' tests may need one of their own.
+Without playwright or Chromium these tests are skipped. Fixtures have module scope: playwright keeps an
+event loop running in this thread, and tests of other modules may need a separate one.
 """
 
 import json
@@ -18,8 +18,8 @@ from support.service_processes import Service, serving
 
 CHROMIUM = Path("/usr/bin/chromium")
 
-#: Puts a key where the page keeps it.
-KEPT = "sessionStorage.setItem('islands.key', {})"
+#: Stores a key in the session storage of the dashboard.
+STORE_KEY = "sessionStorage.setItem('islands.key', {})"
 
 _INSTALL = "install it with 'apt-get install --no-install-recommends chromium'"
 
@@ -31,7 +31,7 @@ def chromium() -> Iterator[Any]:
     )
     if not CHROMIUM.exists():
         pytest.skip(f"there is no {CHROMIUM}: {_INSTALL}")
-    # The machine may be busy; a page that is right is not waited for.
+    # The machine may be busy. Successful assertions do not wait.
     api.expect.set_options(timeout=20_000)
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
@@ -41,7 +41,7 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture
 def expect(chromium: Any) -> Any:
-    """Playwright's assertions, which wait until they hold."""
+    """Assertions of playwright, which wait until they are true."""
     from playwright.sync_api import expect
 
     return expect
@@ -49,7 +49,7 @@ def expect(chromium: Any) -> Any:
 
 @pytest.fixture
 def screens(chromium: Any) -> Iterator[Callable[..., Screen]]:
-    """Makes screens: each a browser of somebody else's, with nothing kept from before."""
+    """Factory of screens, each with a separate browser context without stored data."""
     made: list[Screen] = []
 
     def make(origin: str, width: int = 1280, height: int = 800, **options: Any) -> Screen:
@@ -60,13 +60,13 @@ def screens(chromium: Any) -> Iterator[Callable[..., Screen]]:
     yield make
     for screen in made:
         screen.page.context.close()
-    # Whatever else a test is about: nothing is asked of anybody else, ever.
+    # In every test: no request goes to another origin.
     assert [screen.foreign for screen in made] == [[]] * len(made)
 
 
 @pytest.fixture
 def quiet(screens: Callable[..., Screen]) -> Iterator[Callable[..., Screen]]:
-    """Makes screens in which nothing may go wrong."""
+    """Factory of screens on which no error or warning may occur."""
     made: list[Screen] = []
 
     def make(*arguments: Any, **options: Any) -> Screen:
@@ -79,7 +79,7 @@ def quiet(screens: Callable[..., Screen]) -> Iterator[Callable[..., Screen]]:
 
 @pytest.fixture(scope="module")
 def guarded(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
-    """What runs a service that needs a key, which its client has."""
+    """Factory of services that need a key; their client has one."""
 
     @contextmanager
     def run(*options: object) -> Iterator[Service]:
@@ -96,12 +96,12 @@ def guarded(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable
 
 @pytest.fixture
 def opened(quiet: Callable[..., Screen], service: Service) -> Callable[..., Any]:
-    """Opens an address of the module's service, with the key at hand."""
+    """Function that opens an address of the service of the module with a stored key."""
 
     def open_at(place: str, **options: Any) -> Any:
         screen = quiet(service.url, **options)
         secret = service.client.headers["Authorization"].removeprefix("Bearer ")
-        screen.page.add_init_script(KEPT.format(json.dumps(secret)))
+        screen.page.add_init_script(STORE_KEY.format(json.dumps(secret)))
         return screen.go(place)
 
     return open_at
@@ -109,6 +109,6 @@ def opened(quiet: Callable[..., Screen], service: Service) -> Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def desk(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A service that carries nothing out: a test plays the coordinator, and says what happens to a job."""
+    """A service without coordinators: tests change the state of jobs themselves."""
     with serving(tmp_path_factory.mktemp("desk") / "data", "--coordinators", 0) as service:
         yield service

@@ -1,4 +1,4 @@
-"""Charts, scales and numbers, in the browser that draws them."""
+"""Charts, scales and number formats, tested in the browser."""
 
 import math
 from collections.abc import Iterator
@@ -13,9 +13,9 @@ from support.service_processes import Service
 pytestmark = pytest.mark.ci
 
 CHART = """async ({ options, series }) => {
-  const { lineChart } = await import("/dashboard/chart.js");
+  const { makeLineChart } = await import("/dashboard/components/chart.js");
   const labels = { title: "Errors", x: { label: "generation" }, y: { label: "RMS error" } };
-  const chart = lineChart({ ...labels, ...options });
+  const chart = makeLineChart({ ...labels, ...options });
   document.getElementById("main").replaceChildren(chart.node);
   chart.draw(series);
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
@@ -26,7 +26,7 @@ LOG = {"y": {"label": "RMS error", "log": True}}
 
 @pytest.fixture(scope="module")
 def page(chromium: Any, desk: Service) -> Iterator[Any]:
-    """One page for all: a chart that is drawn takes the place of the one before."""
+    """One page for all tests: each chart replaces the previous one."""
     screen = Screen(chromium.new_page(viewport={"width": 1280, "height": 800}), desk.url)
     screen.go().get_by_role("heading", name="Jobs", exact=True).wait_for()
     yield screen.page
@@ -45,7 +45,7 @@ def draw(page: Any, series: list[dict[str, Any]], **options: Any) -> Any:
 
 
 def heights(chart: Any, name: str) -> list[float]:
-    """The ordinates of a line's path."""
+    """Return the ordinates of the path of a line."""
     path = chart.locator(f"path[data-name='{name}']").get_attribute("d")
     return [float(point.split()[1]) for point in path.replace("M", "L").split("L")[1:]]
 
@@ -77,7 +77,7 @@ def test_faint_series_are_drawn_without_an_entry_in_the_legend(page: Any) -> Non
     assert chart.locator(".legend li").all_text_contents() == ["best 0.500"]
 
 
-def test_a_line_is_broken_where_a_value_is_missing_or_has_no_logarithm(page: Any) -> None:
+def test_a_line_is_interrupted_at_missing_or_nonpositive_values(page: Any) -> None:
     points = [[0, 1.0], [1, None], [2, 0.1], [3, 0.0], [4, 0.01], [5, -1.0]]
     path = draw(page, [{"name": "a", "points": points}], **LOG).locator("path[data-name]").get_attribute("d")
     assert (path.count("M"), path.count("L")) == (3, 0)
@@ -85,7 +85,7 @@ def test_a_line_is_broken_where_a_value_is_missing_or_has_no_logarithm(page: Any
     assert "Infinity" not in path
 
 
-def test_a_chart_without_anything_to_draw_is_not_shown(page: Any) -> None:
+def test_a_chart_without_data_is_hidden(page: Any) -> None:
     for points in ([], [[0, None]], [[0, 0.0]]):
         assert draw(page, [{"name": "a", "points": points}], **LOG).is_hidden()
 
@@ -98,7 +98,7 @@ def test_a_single_point_and_a_constant_are_drawn(page: Any) -> None:
             assert all(10 <= height <= 214 for height in drawn)
 
 
-def test_arrow_keys_move_along_the_course_and_say_the_values(page: Any) -> None:
+def test_arrow_keys_move_the_pointer_and_announce_the_values(page: Any) -> None:
     series = [{"name": "a", "points": [[at, 1.0 / (at + 1)] for at in range(0, 50, 5)]}]
     plot = draw(page, series, **LOG).get_by_role("slider", name="Errors")
     plot.focus()
@@ -113,7 +113,7 @@ def test_arrow_keys_move_along_the_course_and_say_the_values(page: Any) -> None:
     assert (plot.get_attribute("aria-valuemin"), plot.get_attribute("aria-valuemax")) == ("0", "45")
 
 
-def test_the_mouse_reads_the_value_under_it_and_lets_go(page: Any) -> None:
+def test_the_mouse_shows_the_value_under_it_until_it_leaves(page: Any) -> None:
     chart = draw(page, [{"name": "a", "points": [[at, float(at + 1)] for at in range(11)]}])
     box = chart.locator(".plot").bounding_box()
     page.mouse.move(box["x"] + 58 + 1, box["y"] + 50)
@@ -122,17 +122,17 @@ def test_the_mouse_reads_the_value_under_it_and_lets_go(page: Any) -> None:
     assert chart.locator(".legend").text_content() == "a 11.0"
 
 
-def test_what_a_series_is_called_is_text(page: Any) -> None:
+def test_the_name_of_a_series_is_not_interpreted_as_markup(page: Any) -> None:
     name = "<img src=x onerror=alert(1)>"
     chart = draw(page, [{"name": name, "points": [[0, 1.0], [1, 2.0]]}])
     assert chart.locator(".legend li").text_content() == f"{name} 2.00"
     assert page.locator("img[src=x]").count() == 0
 
 
-def test_thinning_keeps_the_ends_and_the_extremes(page: Any) -> None:
+def test_downsampling_keeps_the_ends_and_the_extremes(page: Any) -> None:
     points = [[at, math.sin(at / 300)] for at in range(10_000)]
     points[4321][1], points[8765][1] = 50.0, -50.0
-    thin = call(page, "chart.js", "thinned", points, 100)
+    thin = call(page, "components/chart.js", "downsample", points, 100)
     assert len(thin) <= 2 * 100 + 2
     assert thin[0] == points[0]
     assert thin[-1] == points[-1]
@@ -141,27 +141,25 @@ def test_thinning_keeps_the_ends_and_the_extremes(page: Any) -> None:
     assert [point[0] for point in thin] == sorted({point[0] for point in thin})
 
 
-def test_the_nearest_point_is_the_nearest_one(page: Any) -> None:
+def test_the_nearest_point_matches_an_exhaustive_search(page: Any) -> None:
     points = [[0, 1], [2, 2], [10, 3]]
     for x, expected in ((-5, 0), (0.9, 0), (1.1, 2), (5.9, 2), (6.1, 10), (99, 10)):
-        assert call(page, "chart.js", "nearest", points, x)[0] == expected
+        assert call(page, "components/chart.js", "findNearest", points, x)[0] == expected
 
 
 @pytest.mark.parametrize(
     ("low", "high"), [(0, 1), (-3.2, 7.7), (0, 500), (1e-9, 3e-9), (2, 2.0001), (0, 1e6)]
 )
-def test_round_marks_lie_within_an_axis_and_are_neither_few_nor_many(
-    page: Any, low: float, high: float
-) -> None:
-    ticks = call(page, "scale.js", "roundTicks", low, high, 6)
+def test_round_ticks_are_within_the_axis_and_of_suitable_number(page: Any, low: float, high: float) -> None:
+    ticks = call(page, "lib/scale.js", "roundTicks", low, high, 6)
     assert 2 <= len(ticks) <= 7
     assert all(low - 1e-9 * (high - low) <= tick <= high + 1e-9 * (high - low) for tick in ticks)
     assert ticks == sorted(set(ticks))
 
 
-def test_marks_of_a_whole_axis_are_whole(page: Any) -> None:
+def test_ticks_of_an_integer_axis_are_integers(page: Any) -> None:
     for last in (1, 2, 3, 4, 7, 9, 25):
-        ticks = call(page, "scale.js", "roundTicks", 0.6, last + 0.4, 8, True)
+        ticks = call(page, "lib/scale.js", "roundTicks", 0.6, last + 0.4, 8, True)
         assert all(tick == int(tick) for tick in ticks)
         assert len(ticks) >= 1
 
@@ -169,8 +167,8 @@ def test_marks_of_a_whole_axis_are_whole(page: Any) -> None:
 @pytest.mark.parametrize(
     ("low", "high"), [(5e-3, 7e-3), (1e-3, 2e-2), (1e-12, 1e5), (0.9, 1.1), (1e-3, 1e-2)]
 )
-def test_marks_of_a_logarithmic_axis_lie_within_it(page: Any, low: float, high: float) -> None:
-    ticks = call(page, "scale.js", "logTicks", low, high, 6)
+def test_ticks_of_a_logarithmic_axis_are_within_it(page: Any, low: float, high: float) -> None:
+    ticks = call(page, "lib/scale.js", "logTicks", low, high, 6)
     assert 2 <= len(ticks) <= 9
     assert all(low * (1 - 1e-6) <= tick <= high * (1 + 1e-6) for tick in ticks)
 
@@ -187,8 +185,8 @@ def test_marks_of_a_logarithmic_axis_lie_within_it(page: Any, low: float, high: 
         (None, "–"),
     ],
 )
-def test_numbers_are_written_with_significant_digits(page: Any, value: float | None, written: str) -> None:
-    assert call(page, "numbers.js", "number", value) == written
+def test_numbers_are_formatted_with_significant_digits(page: Any, value: float | None, written: str) -> None:
+    assert call(page, "lib/numbers.js", "formatNumber", value) == written
 
 
 @pytest.mark.parametrize(
@@ -202,14 +200,14 @@ def test_numbers_are_written_with_significant_digits(page: Any, value: float | N
         (90_000, "1 d 1 h"),
     ],
 )
-def test_time_spans_are_written_by_their_greatest_units(page: Any, seconds: float, written: str) -> None:
-    assert call(page, "numbers.js", "duration", seconds) == written
+def test_durations_are_formatted_with_their_largest_units(page: Any, seconds: float, written: str) -> None:
+    assert call(page, "lib/numbers.js", "formatDuration", seconds) == written
 
 
-def test_best_and_worst_stand_for_islands_that_are_too_many(page: Any) -> None:
+def test_many_islands_are_summarised_by_best_and_worst(page: Any) -> None:
     points = [{"generation": g, "islands": [4.0 ** -(i % 3) for i in range(20)]} for g in range(3)]
     points[0]["islands"][0] = None
-    series = call(page, "course.js", "islandSeries", points)
+    series = call(page, "components/convergence.js", "makeIslandSeries", points)
     named = [each for each in series if not each.get("faint")]
     assert len(series) == 22
     assert [(each["name"], each["points"][-1][1]) for each in named] == [
@@ -219,19 +217,20 @@ def test_best_and_worst_stand_for_islands_that_are_too_many(page: Any) -> None:
     assert series[0]["points"][0][1] is None
 
 
-def test_a_figure_of_the_browsers_own_store_does_not_turn_the_clock_back(page: Any) -> None:
-    """It comes with the moment at which the service sent it first."""
+def test_a_cached_figure_does_not_change_the_clock(page: Any) -> None:
+    """The cached response has the date of the first one."""
     headers = {"Date": "Thu, 01 Jan 2026 00:00:00 GMT", "Cache-Control": "private, max-age=86400, immutable"}
     page.route("**/kept.svg", lambda route: route.fulfill(headers=headers, body="<svg/>"))
-    told = page.evaluate("""async () => {
-      const [api, clock] = await Promise.all([import("/dashboard/api.js"), import("/dashboard/clock.js")]);
-      await api.json("/healthz");
-      await api.blob("/kept.svg");
-      return clock.age(new Date(Date.now() - 7_300_000).toISOString()).textContent;
+    age = page.evaluate("""async () => {
+      const modules = [import("/dashboard/lib/api.js"), import("/dashboard/lib/clock.js")];
+      const [api, clock] = await Promise.all(modules);
+      await api.getJson("/healthz");
+      await api.getBlob("/kept.svg");
+      return clock.makeAge(new Date(Date.now() - 7_300_000).toISOString()).textContent;
     }""")
     page.unroute("**/kept.svg")
-    assert told == "2 h ago"
+    assert age == "2 h ago"
 
 
-def test_a_long_history_is_thinned_without_losing_its_end(page: Any) -> None:
-    assert call(page, "course.js", "halved", list(range(10))) == [0, 2, 4, 6, 8, 9]
+def test_halving_a_history_keeps_its_last_point(page: Any) -> None:
+    assert call(page, "components/convergence.js", "halve", list(range(10))) == [0, 2, 4, 6, 8, 9]

@@ -1,4 +1,4 @@
-"""The page of a discrepancy job, while a coordinator that the test plays carries it out."""
+"""Page of a discrepancy job; the test acts as the coordinator."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,14 +22,14 @@ SUMMARY = {"verdict": "named", "effects": ["thermal-drift"], "reduction_percent"
 PAGE = b"<!DOCTYPE html><title>piezo.csv: named</title><h1>piezo.csv against bouc-wen-piezo</h1>"
 
 
-def diagnosed(desk: Service, **summary: Any) -> JobOutcome:
-    """What a diagnosis brings; its report is on the disk."""
+def make_outcome(desk: Service, **summary: Any) -> JobOutcome:
+    """Return the outcome of a diagnosis, with a stored report."""
     blobs = Blobs(desk.folder / "blobs")
     artefacts = {REPORT: blobs.write(PAGE), EXTENDED: blobs.write(b"{}")}
     return JobOutcome(JobState.SUCCEEDED, {}, summary={**SUMMARY, **summary}, artefacts=artefacts)
 
 
-def submitted(desk: Service, **changes: Any) -> str:
+def submit_diagnosis(desk: Service, **changes: Any) -> str:
     spec = {"dataset": desk.dataset, "input": "u_V", "output": "y_um", "tolerance": {"dp": 0.01}}
     simulation = {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}
     answer = desk.ask("POST", "/v1/discrepancies", json={**spec, "simulation": simulation, **changes})
@@ -37,17 +37,17 @@ def submitted(desk: Service, **changes: Any) -> str:
     return str(answer.json()["id"])
 
 
-def test_a_diagnosis_is_followed_and_says_what_it_found(
+def test_the_page_of_a_diagnosis_shows_progress_and_result(
     quiet: Callable[..., Screen], desk: Service, expect: Any, tmp_path: Path
 ) -> None:
-    job = submitted(desk, name="piezo")
+    job = submit_diagnosis(desk, name="piezo")
     page = quiet(desk.url).go(f"#/jobs/{job}")
     with stored(desk) as store:
         lease = taken(store, job)
         store.leases.report(lease, ProgressReport({"phase": "looking for each of 32 effects"}))
-        expect(page.locator(".stand .words")).to_have_text("looking for each of 32 effects")
-        store.leases.finish(lease, diagnosed(desk))
-    expect(page.locator(".stand .words")).to_have_text("named: thermal-drift")
+        expect(page.locator(".status .progress-text")).to_have_text("looking for each of 32 effects")
+        store.leases.finish(lease, make_outcome(desk))
+    expect(page.locator(".status .progress-text")).to_have_text("named: thermal-drift")
     findings = page.locator(".findings")
     expect(findings.locator("p")).to_have_text([line.strip() for line in WORDS.split("\n")])
     assert findings.locator("b").count() == 0
@@ -63,34 +63,36 @@ def test_a_diagnosis_is_followed_and_says_what_it_found(
     saved.value.save_as(tmp_path / "report.html")
     assert (tmp_path / "report.html").read_bytes() == PAGE
     with page.expect_download() as saved:
-        page.get_by_role("button", name="Save the mended simulation").click()
+        page.get_by_role("button", name="Save the extended simulation").click()
     assert saved.value.suggested_filename == f"extended-{job[:8]}.json"
 
 
-def test_a_long_finding_does_not_leave_a_narrow_screen(
+def test_a_long_result_fits_on_a_narrow_screen(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
-    job = submitted(desk)
+    job = submit_diagnosis(desk)
     with stored(desk) as store:
         effects = ["thermal-drift", "rate-dependent-loop", "second-hysteresis"]
-        store.leases.finish(taken(store, job), diagnosed(desk, effects=effects))
+        store.leases.finish(taken(store, job), make_outcome(desk, effects=effects))
     page = quiet(desk.url, width=380).go(f"#/jobs/{job}")
     for place in (f"#/jobs/{job}", "#/jobs"):
         page.goto(f"{desk.url}/{place}")
-        expect(page.locator(".words", has_text="second-hysteresis").first).to_be_visible()
+        expect(page.locator(".progress-text", has_text="second-hysteresis").first).to_be_visible()
         wide, seen = (page.evaluate(f"document.documentElement.{each}Width") for each in ("scroll", "client"))
         assert wide <= seen
 
 
-def test_the_list_says_what_was_found(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
-    jobs = [submitted(desk, name=name) for name in ("one", "two")]
+def test_the_list_shows_the_verdict_of_a_diagnosis(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
+    jobs = [submit_diagnosis(desk, name=name) for name in ("one", "two")]
     nothing = {"verdict": "nothing", "effects": [], "reduction_percent": None}
     with stored(desk) as store:
-        store.leases.finish(taken(store, jobs[0]), diagnosed(desk))
-        store.leases.finish(taken(store, jobs[1]), diagnosed(desk, **nothing))
+        store.leases.finish(taken(store, jobs[0]), make_outcome(desk))
+        store.leases.finish(taken(store, jobs[1]), make_outcome(desk, **nothing))
     page = quiet(desk.url).go()
     for job, words in zip(jobs, ("named: thermal-drift", "nothing"), strict=True):
-        expect(page.locator(f"tr[data-job='{job}'] .words")).to_have_text(words)
+        expect(page.locator(f"tr[data-job='{job}'] .progress-text")).to_have_text(words)
     page.get_by_role("link", name="two").first.click()
     expect(page.get_by_role("button", name="Save the report")).to_be_visible()
-    assert page.get_by_role("button", name="Save the mended simulation").count() == 0
+    assert page.get_by_role("button", name="Save the extended simulation").count() == 0

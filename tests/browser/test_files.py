@@ -1,5 +1,6 @@
-"""The files of the page: all of them served, none of them large, nothing inline, nothing from elsewhere."""
+"""Files of the dashboard: all are served and small, without inline code or other origins."""
 
+import posixpath
 import re
 
 import pytest
@@ -7,42 +8,45 @@ import pytest
 from islands_api.web.middleware import SECURITY_HEADERS
 from islands_api.web.routes.page import DASHBOARD_DIR, FILES
 
-TEXTS = {path.name: path.read_text(encoding="utf-8") for path in sorted(DASHBOARD_DIR.iterdir())}
+PATHS = sorted(path for path in DASHBOARD_DIR.rglob("*") if path.is_file())
+TEXTS = {path.relative_to(DASHBOARD_DIR).as_posix(): path.read_text(encoding="utf-8") for path in PATHS}
 SCRIPTS = {name: text for name, text in TEXTS.items() if name.endswith(".js")}
 
-#: Names of formats, which nobody asks for.
+#: Namespaces, which are never requested.
 _NAMESPACES = ("http://www.w3.org/2000/svg", "http://www.w3.org/1998/Math/MathML")
 
 
-def test_every_file_of_the_folder_is_served() -> None:
+def test_every_file_of_the_dashboard_is_served() -> None:
     assert set(TEXTS) == set(FILES)
 
 
-def test_every_module_is_fetched_at_once_with_the_page() -> None:
-    preloaded = set(re.findall(r'rel="modulepreload" href="dashboard/([\w.]+)"', TEXTS["index.html"]))
+def test_every_module_is_preloaded() -> None:
+    preloaded = set(re.findall(r'rel="modulepreload" href="dashboard/([\w./]+)"', TEXTS["index.html"]))
     assert preloaded == set(SCRIPTS) - {"islands.js"}
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_a_module_imports_what_is_served(name: str) -> None:
-    imported = re.findall(r'^(?:import|export)[^;]*?"(\./[^"]+)";', SCRIPTS[name], re.MULTILINE)
-    assert {path.removeprefix("./") for path in imported} <= set(FILES)
+def test_a_module_imports_only_served_files(name: str) -> None:
+    imported = re.findall(r'^(?:import|export)[^;]*?"(\.[^"]+)";', SCRIPTS[name], re.MULTILINE)
+    assert {posixpath.normpath(posixpath.join(posixpath.dirname(name), path)) for path in imported} <= set(
+        FILES
+    )
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_a_module_says_why_it_exists(name: str) -> None:
+def test_a_module_starts_with_a_description(name: str) -> None:
     assert re.match(r"/\*\*\s", SCRIPTS[name])
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_a_file_stays_small_enough_to_read(name: str) -> None:
+def test_a_file_has_fewer_than_300_lines(name: str) -> None:
     lines = TEXTS[name].splitlines()
     assert len(lines) < 300
     assert name.endswith(".svg") or max(map(len, lines)) <= 110
 
 
-def test_nothing_is_inline() -> None:
-    """The policy would block it, and is not to be weakened for it."""
+def test_the_page_has_no_inline_scripts_or_styles() -> None:
+    """The content security policy forbids both."""
     page = TEXTS["index.html"]
     assert not re.search(r"<style|\sstyle=|\son\w+=|<script(?![^>]*\ssrc=)|javascript:", page)
     assert "unsafe" not in SECURITY_HEADERS["Content-Security-Policy"]
@@ -50,7 +54,7 @@ def test_nothing_is_inline() -> None:
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_no_text_becomes_markup_or_code(name: str) -> None:
+def test_a_module_never_turns_text_into_markup_or_code(name: str) -> None:
     forbidden = (
         r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|srcdoc|text/html"
     )
@@ -58,6 +62,6 @@ def test_no_text_becomes_markup_or_code(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_a_file_names_no_other_site(name: str) -> None:
+def test_a_file_refers_to_no_other_site(name: str) -> None:
     addresses = re.findall(r"(?:https?:)?//[\w.-]+\.\w+[\w./-]*", TEXTS[name])
     assert set(addresses) <= set(_NAMESPACES)

@@ -1,4 +1,4 @@
-"""One job's page, while a coordinator that the test plays carries it out."""
+"""Page of an identification job; the test acts as the coordinator."""
 
 from collections.abc import Callable
 from math import sqrt
@@ -17,7 +17,7 @@ PROBLEM = {"type": "invalid-record", "title": "The job failed", "detail": "row 7
 
 
 def legend(page: Any) -> list[float]:
-    """The values of the islands' chart, in full."""
+    """Return the values of the chart of the islands with full precision."""
     chart = page.locator("figure.chart").first
     return [float(each) for each in chart.locator("data").evaluate_all("all => all.map((one) => one.value)")]
 
@@ -27,7 +27,7 @@ def island_errors(generation: int, islands: int = 2) -> list[float]:
 
 
 @pytest.mark.ci
-def test_the_course_grows_with_the_events_and_is_the_history(
+def test_the_convergence_chart_grows_with_the_events(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo")
@@ -38,22 +38,20 @@ def test_the_course_grows_with_the_events_and_is_the_history(
         expect(page.locator(".title .state")).to_have_text("running")
         for first, last in ((0, 40), (41, 90), (91, 200)):
             advance(store, lease, first, last)
-            expect(page.locator(".stand .words")).to_have_text(f"{last} / 500")
-            expect(page.locator("figure.chart .place").first).to_have_text(f"generation {last}")
+            expect(page.locator(".status .progress-text")).to_have_text(f"{last} / 500")
+            expect(page.locator("figure.chart .position").first).to_have_text(f"generation {last}")
             assert legend(page) == pytest.approx(island_errors(last))
     expect(page.get_by_text("about 6.0 s")).to_be_visible()
     lines = page.locator("figure.chart").first.locator("path.line[data-name]")
-    # One point for each generation that was reported, none twice, none left out.
+    # One point for each reported generation.
     assert [line.get_attribute("d").count("L") for line in lines.all()] == [200, 200]
     sizes = page.locator("figure.chart").last
     expect(sizes.locator("circle.line")).to_have_count(5)
-    expect(sizes.locator(".place")).to_have_text("terms 5")
+    expect(sizes.locator(".position")).to_have_text("terms 5")
 
 
 @pytest.mark.ci
-def test_a_failure_is_told_in_the_services_words(
-    quiet: Callable[..., Screen], desk: Service, expect: Any
-) -> None:
+def test_a_failed_job_shows_its_problem(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
         store.leases.finish(taken(store, job), JobOutcome(JobState.FAILED, problem=PROBLEM))
@@ -65,7 +63,7 @@ def test_a_failure_is_told_in_the_services_words(
 
 
 @pytest.mark.ci
-def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
+def test_a_queued_job_is_cancelled_resumed_and_deleted_if_confirmed(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500, name="piezo")
@@ -74,7 +72,7 @@ def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
     page.get_by_role("button", name="Cancel").focus()
     page.keyboard.press("Enter")
     expect(state).to_have_text("cancelled")
-    # The button is gone; whoever works by keyboard is not thrown back to the page's beginning.
+    # The button is hidden, but the keyboard focus does not return to the start of the page.
     expect(page.get_by_role("heading", level=1)).to_be_focused()
     assert desk.job(job)["state"] == "cancelled"
     expect(page.get_by_role("status")).to_have_text("piezo: cancelled")
@@ -82,7 +80,7 @@ def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
     expect(state).to_have_text("queued")
     page.get_by_role("button", name="Cancel").click()
     page.get_by_role("button", name="Delete").click()
-    expect(dialog).to_contain_text("piezo goes with its models")
+    expect(dialog).to_contain_text("piezo is deleted with its models")
     page.keyboard.press("Enter")
     expect(dialog).to_have_count(0)
     page.get_by_role("button", name="Delete").click()
@@ -96,7 +94,7 @@ def test_what_waits_is_cancelled_resumed_and_only_deleted_after_a_yes(
 
 
 @pytest.mark.ci
-def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
+def test_a_running_job_is_cancelling_until_its_coordinator_stops(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500)
@@ -109,11 +107,13 @@ def test_what_runs_is_cancelling_until_its_coordinator_lets_go(
         expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
         store.leases.finish(lease, JobOutcome(JobState.CANCELLED))
     expect(page.locator(".title .state")).to_have_text("cancelled")
-    expect(page.locator(".stand .words")).to_have_text("10 / 500")
+    expect(page.locator(".status .progress-text")).to_have_text("10 / 500")
 
 
 @pytest.mark.nightly
-def test_what_somebody_else_resumes_is_seen(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_a_job_resumed_by_another_client_is_updated(
+    quiet: Callable[..., Screen], desk: Service, expect: Any
+) -> None:
     job = desk.submit(500)
     desk.ask("POST", f"/v1/jobs/{job}/cancel")
     page = quiet(desk.url).go(f"#/jobs/{job}")
@@ -122,11 +122,11 @@ def test_what_somebody_else_resumes_is_seen(quiet: Callable[..., Screen], desk: 
     expect(page.locator(".title .state")).to_have_text("queued")
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 5)
-    expect(page.locator(".stand .words")).to_have_text("5 / 500")
+    expect(page.locator(".status .progress-text")).to_have_text("5 / 500")
 
 
 @pytest.mark.nightly
-def test_an_answer_that_comes_late_does_not_bring_back_what_was(
+def test_a_late_response_does_not_restore_an_old_state(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500)
@@ -145,7 +145,7 @@ def test_an_answer_that_comes_late_does_not_bring_back_what_was(
 
 
 @pytest.mark.ci
-def test_a_reload_keeps_the_place(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
+def test_a_reload_keeps_the_scroll_position(quiet: Callable[..., Screen], desk: Service, expect: Any) -> None:
     job = desk.submit(500)
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 30)
@@ -155,13 +155,13 @@ def test_a_reload_keeps_the_place(quiet: Callable[..., Screen], desk: Service, e
     page.evaluate("scrollTo(0, 320)")
     page.reload()
     expect(page.locator("figure.chart").first).to_be_visible()
-    # The policy lets no text become code, so that playwright itself cannot wait for an expression.
+    # The security policy forbids evaluating text, so `wait_for_function` of playwright does not work.
     eventually(lambda: page.evaluate("scrollY") == 320)
     assert page.url.endswith(f"#/jobs/{job}")
 
 
 @pytest.mark.ci
-def test_every_island_has_a_line_however_many_there_are(
+def test_every_island_has_a_line_for_any_number_of_islands(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500, settings={"islands": 20})
@@ -175,9 +175,7 @@ def test_every_island_has_a_line_however_many_there_are(
 
 
 @pytest.mark.ci
-def test_a_job_that_is_not_there_is_said_not_to_be(
-    screens: Callable[..., Screen], desk: Service, expect: Any
-) -> None:
+def test_an_unknown_job_shows_a_message(screens: Callable[..., Screen], desk: Service, expect: Any) -> None:
     page = screens(desk.url).go("#/jobs/nope")
     expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
     expect(page.locator("main")).to_contain_text("there is no job 'nope'")
@@ -186,7 +184,7 @@ def test_a_job_that_is_not_there_is_said_not_to_be(
 
 
 @pytest.mark.ci
-def test_a_job_that_is_deleted_while_it_is_looked_at_is_gone(
+def test_a_job_deleted_by_another_client_shows_a_message(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500)
@@ -198,7 +196,9 @@ def test_a_job_that_is_deleted_while_it_is_looked_at_is_gone(
 
 
 @pytest.mark.ci
-def test_the_settings_and_the_data_are_those_of_the_job(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_the_page_shows_the_settings_and_the_data_set_of_a_job(
+    quiet: Callable[..., Screen], desk: Service
+) -> None:
     page = quiet(desk.url).go(f"#/jobs/{desk.submit(321, rows='0:3500')}")
     page.locator("table code", has_text="y_um").wait_for()
     shown = dict(
@@ -235,16 +235,16 @@ EQUATIONS = {
 
 @pytest.mark.ci
 @pytest.mark.parametrize("source", EQUATIONS)
-def test_nothing_but_mathematics_comes_in_with_an_equation(
+def test_an_equation_contains_only_mathematics(
     screens: Callable[..., Screen], desk: Service, source: str
 ) -> None:
     screen = screens(desk.url)
     page = screen.go()
     found = page.evaluate(
         """async (source) => {
-          const { mathOf } = await import("/dashboard/equation.js");
+          const { parseMath } = await import("/dashboard/components/equation.js");
           try {
-            const math = mathOf(source);
+            const math = parseMath(source);
             const all = [math, ...math.querySelectorAll("*")];
             const names = all.flatMap((node) => [...node.attributes].map((each) => each.name));
             return { text: math.textContent, names, own: all.every((node) => node instanceof MathMLElement) };

@@ -1,4 +1,4 @@
-"""The page before a service that asks for a key."""
+"""Dashboard of a service that needs a key."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -20,14 +20,14 @@ def locked(guarded: Callable[..., Any]) -> Iterator[Service]:
 
 @pytest.fixture
 def key(locked: Service) -> str:
-    """A key of somebody new, with which the test, too, asks the service."""
-    secret = made(locked, "read", "write")
+    """A key of a new owner, which the client of the test uses, too."""
+    secret = make_key(locked, "read", "write")
     locked.client.headers["Authorization"] = f"Bearer {secret}"
     locked._dataset = ""
     return secret
 
 
-def made(service: Service, *scopes: str, owner: str | None = None) -> str:
+def make_key(service: Service, *scopes: str, owner: str | None = None) -> str:
     with stored(service) as store:
         return store.keys.create("test", frozenset(scopes), owner)[1]
 
@@ -38,12 +38,12 @@ def enter(page: Any, secret: str) -> None:
 
 
 @pytest.mark.ci
-def test_a_key_is_asked_for_refused_if_wrong_and_kept_if_right(
+def test_the_key_form_rejects_wrong_keys_and_keeps_a_valid_one(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
     job = locked.submit(500, name="mine")
     page = screens(locked.url).go(f"#/jobs/{job}")
-    expect(page.get_by_role("heading", name="This service asks for a key")).to_be_visible()
+    expect(page.get_by_role("heading", name="This service needs a key")).to_be_visible()
     expect(page.get_by_role("alert")).to_contain_text("this service needs a key")
     expect(page.get_by_label("Key")).to_be_focused()
     enter(page, "islands_wrong")
@@ -66,7 +66,7 @@ def test_a_key_is_asked_for_refused_if_wrong_and_kept_if_right(
 @pytest.mark.ci
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 360])
-def test_the_question_can_be_read_by_everybody(
+def test_the_key_form_has_sufficient_contrast(
     screens: Callable[..., Screen], locked: Service, width: int, scheme: str
 ) -> None:
     page = screens(locked.url, width=width, color_scheme=scheme).go()
@@ -75,19 +75,19 @@ def test_the_question_can_be_read_by_everybody(
 
 
 @pytest.mark.ci
-def test_the_key_stands_in_no_address(screens: Callable[..., Screen], locked: Service, key: str) -> None:
+def test_the_key_is_in_no_url(screens: Callable[..., Screen], locked: Service, key: str) -> None:
     screen = screens(locked.url)
-    asked: list[str] = []
-    screen.page.on("request", lambda request: asked.append(request.url))
+    send_request: list[str] = []
+    screen.page.on("request", lambda request: send_request.append(request.url))
     page = screen.go()
     enter(page, key)
     page.get_by_role("heading", name="No jobs yet").wait_for()
-    assert len(asked) > 5
-    assert not [url for url in [*asked, page.url] if key in url]
+    assert len(send_request) > 5
+    assert not [url for url in [*send_request, page.url] if key in url]
 
 
 @pytest.mark.ci
-def test_the_events_of_a_job_come_with_the_key(
+def test_event_streams_are_opened_with_the_key(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
     job = locked.submit(500)
@@ -97,23 +97,23 @@ def test_the_events_of_a_job_come_with_the_key(
         lease = taken(store, job)
         for last in (5, 6, 7):
             advance(store, lease, last, last)
-            expect(page.locator(".stand .words")).to_have_text(f"{last} / 500")
+            expect(page.locator(".status .progress-text")).to_have_text(f"{last} / 500")
 
 
 @pytest.mark.ci
-def test_another_ones_jobs_are_not_seen(
+def test_jobs_of_another_owner_are_hidden(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
     job = locked.submit(500, name="mine")
     page = screens(locked.url).go(f"#/jobs/{job}")
-    enter(page, made(locked, "read"))
+    enter(page, make_key(locked, "read"))
     expect(page.get_by_role("heading", name="There is no such job")).to_be_visible()
     page.get_by_role("link", name="Show all jobs").click()
     expect(page.get_by_role("heading", name="No jobs yet")).to_be_visible()
 
 
 @pytest.mark.nightly
-def test_a_revoked_key_is_asked_for_again_with_the_reason(
+def test_a_revoked_key_shows_the_key_form_with_the_reason(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
     page = screens(locked.url).go()
@@ -126,14 +126,14 @@ def test_a_revoked_key_is_asked_for_again_with_the_reason(
 
 
 @pytest.mark.nightly
-def test_what_a_key_does_not_allow_is_said(
+def test_an_action_without_its_scope_shows_a_problem(
     screens: Callable[..., Screen], locked: Service, key: str, expect: Any
 ) -> None:
     job = locked.submit(500)
     with stored(locked) as store:
         owner = store.keys.find(key).owner
     page = screens(locked.url).go(f"#/jobs/{job}")
-    enter(page, made(locked, "read", owner=owner))
+    enter(page, make_key(locked, "read", owner=owner))
     page.get_by_role("button", name="Cancel").click()
     banner = page.locator(".banner")
     expect(banner).to_contain_text("the key has the scopes read, but this request needs write")

@@ -1,4 +1,4 @@
-"""The list of jobs, as somebody sees it."""
+"""List of jobs on the dashboard."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,14 +20,14 @@ def row(page: Any, job: str) -> Any:
     return page.locator(f"tr[data-job='{job}']")
 
 
-def test_a_job_shows_up_and_passes_through_its_states(
+def test_a_new_job_appears_and_changes_its_state(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     page = quiet(desk.url).go()
     job = desk.submit(500, name="tank, level 3")
     state, bar = row(page, job).locator(".state"), row(page, job).locator("progress")
     expect(state).to_have_text("queued")
-    expect(row(page, job)).to_contain_text("waits for its turn")
+    expect(row(page, job)).to_contain_text("waiting")
     with stored(desk) as store:
         lease = taken(store, job)
         advance(store, lease, 0, 125)
@@ -42,7 +42,7 @@ def test_a_job_shows_up_and_passes_through_its_states(
     assert row(page, job).locator("td").last.text_content() == "1"
 
 
-def test_a_strangers_markup_is_text(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_markup_in_a_job_name_is_shown_as_text(quiet: Callable[..., Screen], desk: Service) -> None:
     job = desk.submit(500, name=HOSTILE)
     page = quiet(desk.url).go()
     link = row(page, job).get_by_role("link")
@@ -54,7 +54,7 @@ def test_a_strangers_markup_is_text(quiet: Callable[..., Screen], desk: Service)
     assert page.locator("main script, main img").count() == 0
 
 
-def test_a_filter_shows_the_jobs_of_its_state(
+def test_a_filter_shows_only_jobs_in_its_state(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     waiting, other = desk.submit(500), desk.submit(500)
@@ -73,7 +73,7 @@ def test_a_filter_shows_the_jobs_of_its_state(
     expect(page.get_by_text("No job is succeeded.")).to_be_visible()
 
 
-def test_pages_hold_every_job_once_while_others_come_in(
+def test_pages_show_each_job_once_while_jobs_are_added(
     quiet: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     jobs = [desk.submit(500) for _ in range(55)]
@@ -91,9 +91,7 @@ def test_pages_hold_every_job_once_while_others_come_in(
     expect(row(page, late)).to_be_visible()
 
 
-def test_what_is_focused_stays_focused_while_the_list_changes(
-    quiet: Callable[..., Screen], desk: Service
-) -> None:
+def test_the_focus_is_kept_while_the_list_changes(quiet: Callable[..., Screen], desk: Service) -> None:
     job = desk.submit(500)
     page = quiet(desk.url).go()
     link = row(page, job).get_by_role("link")
@@ -106,7 +104,7 @@ def test_what_is_focused_stays_focused_while_the_list_changes(
     assert page.url.endswith(f"#/jobs/{job}")
 
 
-def test_nothing_is_asked_for_while_nobody_looks(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_a_hidden_page_sends_no_requests(quiet: Callable[..., Screen], desk: Service) -> None:
     desk.submit(500)
     screen = quiet(desk.url)
     asked: list[str] = []
@@ -133,7 +131,7 @@ def test_nothing_is_asked_for_while_nobody_looks(quiet: Callable[..., Screen], d
     assert looked_at(hidden=False) >= 5
 
 
-def test_a_refusal_is_told_in_the_services_words(
+def test_a_rejected_request_shows_its_problem(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     desk.submit(500)
@@ -146,7 +144,7 @@ def test_a_refusal_is_told_in_the_services_words(
     expect(banner).to_have_count(0)
 
 
-def test_an_unknown_address_leads_to_the_list(quiet: Callable[..., Screen], desk: Service) -> None:
+def test_an_unknown_address_redirects_to_the_list(quiet: Callable[..., Screen], desk: Service) -> None:
     for place in ("#/nonsense", "#/jobs/", "#/jobs/a/b", "#%zz"):
         page = quiet(desk.url).go(place)
         page.get_by_role("heading", name="Jobs", exact=True).wait_for()

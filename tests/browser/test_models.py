@@ -1,4 +1,4 @@
-"""The models of a job on the page: equation, metrics, figures and files."""
+"""Models of a job on the dashboard: equation, metrics, figures and exports."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -17,16 +17,18 @@ from support.screen import Screen
 from support.service_processes import Service
 from support.stores import LONG, taken
 
-#: What the page may take on its way: its files, and the list with what it shows. A job's history and models
-#: come on top; they grow with the search.
-MOST_BYTES = 120_000
+#: Maximum number of transferred bytes: the files of the dashboard and the list of jobs. The history and the
+#: models of a job are not counted, because they grow with the search.
+MAX_BYTES = 120_000
 
-#: Milliseconds until something is seen, and how often it may take what a page of a few words takes: 180 to
-#: 230 ms were measured on a busy machine.
-MOST_MS, MOST_TIMES = 2000, 20
+#: Maximum first contentful paint in milliseconds; 180 to 230 ms were measured on a busy machine.
+MAX_PAINT_MS = 2000
+
+#: Maximum ratio of the first contentful paint to that of a page with a few words.
+MAX_PAINT_RATIO = 20
 
 
-#: Bytes that were transferred, of the page's files and of data; the first contentful paint in milliseconds.
+#: Transferred bytes of files and of data, and the first contentful paint in milliseconds.
 MEASURED = """() => {
   const entries = ["navigation", "resource"].flatMap((kind) => performance.getEntriesByType(kind));
   const total = (chosen) => chosen.reduce((sum, entry) => sum + entry.transferSize, 0);
@@ -38,14 +40,14 @@ MEASURED = """() => {
 
 @pytest.fixture(scope="module")
 def service(guarded: Callable[..., Any]) -> Iterator[Service]:
-    """A service that carries nothing out."""
+    """A service without coordinators."""
     with guarded("--coordinators", 0) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def finished(service: Service) -> str:
-    """A job that has succeeded: this process carries it out, as a coordinator does."""
+    """A succeeded job, executed by the test process."""
     job = service.submit(60, name="piezo, 2 islands")
     with stored(service) as store:
         lease = taken(store, job)
@@ -56,7 +58,7 @@ def finished(service: Service) -> str:
 
 
 @pytest.mark.ci
-def test_a_finished_job_shows_its_models_with_the_metrics_of_the_service(
+def test_a_finished_job_shows_its_models_with_their_metrics(
     opened: Callable[..., Any], service: Service, finished: str, expect: Any
 ) -> None:
     page = opened(f"#/jobs/{finished}")
@@ -76,7 +78,7 @@ def test_a_finished_job_shows_its_models_with_the_metrics_of_the_service(
 
 
 @pytest.mark.ci
-def test_the_equation_is_mathematics_that_reads_as_the_model_does(
+def test_the_equation_is_mathml_that_matches_the_model(
     opened: Callable[..., Any], service: Service, finished: str, expect: Any
 ) -> None:
     model = json.loads(service.models(finished))["items"][1]
@@ -94,45 +96,43 @@ def test_the_equation_is_mathematics_that_reads_as_the_model_does(
 
 
 @pytest.mark.ci
-def test_figures_are_drawn_when_they_come_into_sight(
+def test_figures_are_loaded_when_they_scroll_into_view(
     opened: Callable[..., Any], finished: str, expect: Any
 ) -> None:
     page = opened("#/jobs")
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.goto(f"{page.url.partition('#')[0]}#/jobs/{finished}/models/3")
-    expect(page.locator(".gallery .drawn")).to_have_count(4)
+    expect(page.locator(".gallery .rendered")).to_have_count(4)
     page.wait_for_load_state("networkidle")
     assert not [url for url in asked if "/figures/" in url]
-    page.locator(".drawn").first.scroll_into_view_if_needed()
-    expect(page.get_by_text("Being drawn…").first).to_be_visible()
-    page.locator(".drawn").last.scroll_into_view_if_needed()
+    page.locator(".rendered").first.scroll_into_view_if_needed()
+    expect(page.get_by_text("Drawing…").first).to_be_visible()
+    page.locator(".rendered").last.scroll_into_view_if_needed()
     expect(page.locator(".gallery img")).to_have_count(4, timeout=60_000)
     for name in ("Free run", "Hysteresis loop", "Held input", "Residual correlations"):
         picture = page.get_by_role("img", name=f"{name}, drawn by the service")
         expect(picture).to_be_visible()
         eventually(lambda shown=picture: shown.evaluate("img => img.complete && img.naturalWidth > 300"))
-    page.get_by_text("as figures for a report").click()
-    page.locator(".search .drawn").last.scroll_into_view_if_needed()
+    page.get_by_text("Figures of the search").click()
+    page.locator(".search .rendered").last.scroll_into_view_if_needed()
     expect(page.locator(".search img")).to_have_count(4, timeout=60_000)
 
 
 @pytest.mark.ci
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 360])
-def test_models_can_be_read_by_everybody(
+def test_the_models_panel_has_sufficient_contrast(
     opened: Callable[..., Any], finished: str, expect: Any, width: int, scheme: str
 ) -> None:
     page = opened(f"#/jobs/{finished}", width=width, color_scheme=scheme)
     expect(page.locator(".equation math")).to_be_visible()
-    expect(page.locator(".gallery .drawn")).to_have_count(4)
+    expect(page.locator(".gallery .rendered")).to_have_count(4)
     assert unreadable(page) == []
 
 
 @pytest.mark.ci
-def test_a_model_is_taken_along_as_a_file(
-    opened: Callable[..., Any], service: Service, finished: str
-) -> None:
+def test_a_model_is_saved_as_a_file(opened: Callable[..., Any], service: Service, finished: str) -> None:
     page = opened(f"#/jobs/{finished}/models/2")
     for button, form, name in (("C", "c", "model-02.c"), ("LaTeX", "latex", "model-02.tex")):
         with page.expect_download() as saved:
@@ -147,19 +147,17 @@ def test_a_model_is_taken_along_as_a_file(
 
 
 @pytest.mark.ci
-def test_every_kind_of_export_has_its_button(opened: Callable[..., Any], finished: str, expect: Any) -> None:
+def test_every_export_format_has_a_button(opened: Callable[..., Any], finished: str, expect: Any) -> None:
     from islands.io.export import EXPORTS
 
     page = opened(f"#/jobs/{finished}")
-    expect(page.locator(".take button")).not_to_have_count(0)
-    shown = page.locator(".take button").evaluate_all("all => all.map((one) => one.dataset.format)")
+    expect(page.locator(".exports button")).not_to_have_count(0)
+    shown = page.locator(".exports button").evaluate_all("all => all.map((one) => one.dataset.format)")
     assert set(shown) == set(EXPORTS)
 
 
 @pytest.mark.ci
-def test_another_model_is_chosen_without_leaving_and_kept_by_a_reload(
-    opened: Callable[..., Any], finished: str, expect: Any
-) -> None:
+def test_a_selected_model_is_kept_by_a_reload(opened: Callable[..., Any], finished: str, expect: Any) -> None:
     page = opened(f"#/jobs/{finished}")
     expect(page.get_by_role("heading", name="Model 1")).to_be_visible()
     page.evaluate("document.querySelector('h1').dataset.same = 'yes'")
@@ -175,7 +173,7 @@ def test_another_model_is_chosen_without_leaving_and_kept_by_a_reload(
 
 
 @pytest.mark.ci
-def test_the_page_is_small_and_soon_there(
+def test_the_page_is_small_and_loads_quickly(
     opened: Callable[..., Any],
     screens: Callable[..., Screen],
     service: Service,
@@ -184,7 +182,7 @@ def test_the_page_is_small_and_soon_there(
 ) -> None:
     painted = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
     bare = screens(service.url).go("healthz")
-    # Not `wait_for_function`: to poll it evaluates a string in the page, which the security policy forbids.
+    # Not `wait_for_function`: it evaluates a string in the page, which the security policy forbids.
     plain = eventually(lambda: bare.evaluate(painted))
     for place, ready in (("#/jobs", "tbody tr"), (f"#/jobs/{finished}", ".equation math")):
         page = opened(place)
@@ -192,5 +190,5 @@ def test_the_page_is_small_and_soon_there(
         page.wait_for_load_state("networkidle")
         eventually(lambda page=page: page.evaluate(painted))
         files, data, first = page.evaluate(MEASURED)
-        assert files + (data if place == "#/jobs" else 0) < MOST_BYTES
-        assert first < max(MOST_MS, MOST_TIMES * plain)
+        assert files + (data if place == "#/jobs" else 0) < MAX_BYTES
+        assert first < max(MAX_PAINT_MS, MAX_PAINT_RATIO * plain)

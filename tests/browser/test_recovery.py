@@ -1,4 +1,4 @@
-"""The page while the service is away, and after: it comes back by itself, where it was."""
+"""Dashboard during and after an outage of the service: it reconnects and keeps its state."""
 
 import os
 import signal
@@ -16,11 +16,11 @@ from support.stores import taken
 
 
 @contextmanager
-def away(service: Service) -> Iterator[None]:
-    """Kill the doors, and keep the supervisor from starting them again before the block ends."""
+def outage(service: Service) -> Iterator[None]:
+    """Kill the web server; the supervisor restarts it only after the block."""
     os.kill(service.process.pid, signal.SIGSTOP)
     try:
-        # A child of a stopped parent stays a zombie, which nobody can connect to.
+        # The child of a stopped parent remains a zombie, which accepts no connections.
         kill(service.one("api"))
         eventually(lambda: not service.pids("api"))
         yield
@@ -30,7 +30,7 @@ def away(service: Service) -> Iterator[None]:
 
 
 @pytest.mark.ci
-def test_the_list_says_that_the_service_is_away_and_recovers(
+def test_the_list_shows_an_outage_and_recovers(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500, name="before")
@@ -38,21 +38,21 @@ def test_the_list_says_that_the_service_is_away_and_recovers(
     tried: list[str] = []
     page.on("requestfailed", lambda request: tried.append(request.url))
     expect(page.locator(f"tr[data-job='{job}']")).to_be_visible()
-    with away(desk):
-        expect(page.locator(".banner.away")).to_contain_text("The service does not answer.")
+    with outage(desk):
+        expect(page.locator(".banner.unavailable")).to_contain_text("The service does not answer.")
         page.wait_for_timeout(4000)
-        # Less and less often: 0.5, 1, 2 and 4 s apart.
+        # With increasing intervals: 0.5, 1, 2 and 4 s.
         assert 2 <= len(tried) <= 5
-        # What was known stays on the screen.
+        # The last known data remain visible.
         assert page.locator(f"tr[data-job='{job}']").is_visible()
     later = desk.submit(500, name="after")
     expect(page.locator(f"tr[data-job='{later}']")).to_be_visible()
     expect(page.locator(".banner")).to_have_count(0)
-    expect(page.get_by_role("status")).to_have_text("The service is back.")
+    expect(page.get_by_role("status")).to_have_text("The service is available again.")
 
 
 @pytest.mark.ci
-def test_a_job_goes_on_where_its_stream_was_cut(
+def test_the_page_of_a_job_continues_after_a_broken_stream(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500)
@@ -68,18 +68,18 @@ def test_a_job_goes_on_where_its_stream_was_cut(
             ),
         )
         page = screen.go(f"#/jobs/{job}")
-        expect(page.locator(".stand .words")).to_have_text("50 / 500")
+        expect(page.locator(".status .progress-text")).to_have_text("50 / 500")
         advance(store, lease, 51, 60)
-        expect(page.locator(".stand .words")).to_have_text("60 / 500")
+        expect(page.locator(".status .progress-text")).to_have_text("60 / 500")
         seen = desk.job(job)["version"]
-        with away(desk):
-            expect(page.locator(".banner.away")).to_be_visible()
+        with outage(desk):
+            expect(page.locator(".banner.unavailable")).to_be_visible()
             advance(store, lease, 61, 99)
             advance(store, lease, 100, 140)
-        expect(page.locator(".stand .words")).to_have_text("140 / 500")
+        expect(page.locator(".status .progress-text")).to_have_text("140 / 500")
         expect(page.locator(".banner")).to_have_count(0)
         advance(store, lease, 141, 150)
-        expect(page.locator("figure.chart .place").first).to_have_text("generation 150")
+        expect(page.locator("figure.chart .position").first).to_have_text("generation 150")
     assert int(resumed[0]) < seen
     assert set(resumed[1:]) == {str(seen)}
     line = page.locator("figure.chart").first.locator("path.line[data-name]").first
@@ -89,7 +89,7 @@ def test_a_job_goes_on_where_its_stream_was_cut(
 
 
 @pytest.mark.nightly
-def test_a_killed_service_is_back_before_anybody_does_anything(
+def test_the_page_recovers_automatically_from_a_killed_service(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
     job = desk.submit(500)
@@ -99,14 +99,14 @@ def test_a_killed_service_is_back_before_anybody_does_anything(
     desk.ready()
     with stored(desk) as store:
         advance(store, taken(store, job), 0, 7)
-    expect(page.locator(".stand .words")).to_have_text("7 / 500")
+    expect(page.locator(".status .progress-text")).to_have_text("7 / 500")
 
 
 @pytest.mark.nightly
-def test_a_page_that_is_opened_while_the_service_fails_says_so(
+def test_a_page_opened_during_an_outage_shows_it(
     screens: Callable[..., Screen], desk: Service, expect: Any
 ) -> None:
-    """As behind a proxy, or with a database that is away: the answer is 503, and then it is not."""
+    """As behind a proxy or during a database outage, the first responses are 503."""
     job = desk.submit(500)
     page = screens(desk.url).page
     detail = "the database does not answer: try again in a moment"
@@ -117,7 +117,7 @@ def test_a_page_that_is_opened_while_the_service_fails_says_so(
         ),
     )
     page.goto(desk.url)
-    expect(page.locator(".banner.away")).to_contain_text(detail)
+    expect(page.locator(".banner.unavailable")).to_contain_text(detail)
     page.unroute("**/v1/jobs?*")
     expect(page.locator(f"tr[data-job='{job}']")).to_be_visible()
     expect(page.locator(".banner")).to_have_count(0)

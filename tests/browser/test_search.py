@@ -1,4 +1,4 @@
-"""A search that a coordinator carries out, watched and cancelled on the page."""
+"""Search executed by a coordinator, followed and cancelled on the dashboard."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -9,8 +9,8 @@ from support.service_processes import Service
 
 pytestmark = pytest.mark.nightly
 
-#: Notes every state that a badge shows.
-NOTED = """(selector) => {
+#: Records every state that a badge shows.
+RECORD_STATES = """(selector) => {
   const badge = document.querySelector(selector);
   window.noted = [badge.textContent];
   new MutationObserver(() => window.noted.push(badge.textContent)).observe(badge, { childList: true });
@@ -23,7 +23,7 @@ def service(guarded: Callable[..., Any]) -> Iterator[Service]:
         yield running
 
 
-def test_a_search_is_watched_from_the_list_through_its_states(
+def test_the_list_shows_all_states_of_a_search(
     opened: Callable[..., Any], service: Service, expect: Any
 ) -> None:
     service.submit(5, name="before")
@@ -32,14 +32,14 @@ def test_a_search_is_watched_from_the_list_through_its_states(
     job = service.submit(700, name="watched")
     badge = f"tr[data-job='{job}'] .state"
     expect(page.locator(badge)).to_be_visible()
-    page.evaluate(NOTED, badge)
+    page.evaluate(RECORD_STATES, badge)
     expect(page.locator(badge)).to_have_text("succeeded", timeout=60_000)
     order = ["queued", "running", "succeeded"]
     noted = page.evaluate("noted")
     assert noted == [word for word in order if word in noted]
     assert "running" in noted
     page.get_by_role("link", name="watched").click()
-    expect(page.locator(".stand .words")).to_have_text("700 / 700")
+    expect(page.locator(".status .progress-text")).to_have_text("700 / 700")
 
 
 def test_a_running_search_is_cancelled_from_the_page(
@@ -49,10 +49,10 @@ def test_a_running_search_is_cancelled_from_the_page(
     page = opened(f"#/jobs/{job}")
     expect(page.locator(".title .state")).to_have_text("running")
     expect(page.locator("figure.chart").first).to_be_visible(timeout=60_000)
-    expect(page.locator("figure.chart .place").first).not_to_have_text("generation 0")
+    expect(page.locator("figure.chart .position").first).not_to_have_text("generation 0")
     page.get_by_role("button", name="Cancel").click()
     expect(page.locator(".title .state")).to_have_text("cancelled", timeout=60_000)
     assert service.job(job)["state"] == "cancelled"
     reached = int(service.job(job)["progress"]["generation"])
-    shown = page.locator("figure.chart .place").first.text_content().split()[-1]
+    shown = page.locator("figure.chart .position").first.text_content().split()[-1]
     assert 0 < int(shown) <= reached

@@ -1,4 +1,4 @@
-"""What a newcomer is told: three commands, which do what they say, word for word."""
+"""Instructions for the first job: the three commands on the page work as written."""
 
 import os
 import shutil
@@ -23,7 +23,7 @@ from support.stores import taken
 
 @pytest.fixture(scope="module")
 def commands(chromium: Any, desk: Service) -> dict[str, str]:
-    """The commands by their headings, as they stand on the page of a service without jobs."""
+    """Commands by heading, read from the page of a service without jobs."""
     screen = Screen(chromium.new_page(), desk.url)
     page = screen.go()
     page.get_by_role("heading", name="No jobs yet").wait_for()
@@ -58,19 +58,19 @@ def run(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def jobs(desk: Service) -> list[str]:
+def list_jobs(desk: Service) -> list[str]:
     return [job["id"] for job in desk.ask("GET", "/v1/jobs").json()["items"]]
 
 
 @pytest.fixture
-def carried_out(desk: Service) -> Iterator[Any]:
-    """Runs a command that waits for its job, and meanwhile carries that out."""
+def run_with_coordinator(desk: Service) -> Iterator[Any]:
+    """Function that runs a command and finishes the job that it waits for."""
     with ThreadPoolExecutor(1) as pool, stored(desk) as store:
 
         def carry_out(*command: Any) -> subprocess.CompletedProcess[str]:
-            before = set(jobs(desk))
+            before = set(list_jobs(desk))
             done = pool.submit(run, *command)
-            new = eventually(lambda: set(jobs(desk)) - before or done.done())
+            new = eventually(lambda: set(list_jobs(desk)) - before or done.done())
             assert new is not True, done.result()
             lease = taken(store, new.pop())
             store.leases.finish(lease, JobOutcome(JobState.SUCCEEDED, {}, summary={"equation": "y(k) = 42"}))
@@ -81,16 +81,18 @@ def carried_out(desk: Service) -> Iterator[Any]:
 
 @pytest.mark.ci
 def test_the_command_line_submits_and_watches(
-    commands: dict[str, str], folder: Path, carried_out: Any
+    commands: dict[str, str], folder: Path, run_with_coordinator: Any
 ) -> None:
-    done = carried_out(folder, "sh", "-ec", commands["Command line"])
+    done = run_with_coordinator(folder, "sh", "-ec", commands["Command line"])
     assert done.returncode == 0, done.stderr
     assert "rank" in done.stdout
 
 
 @pytest.mark.nightly
-def test_the_client_submits_and_waits(commands: dict[str, str], folder: Path, carried_out: Any) -> None:
-    done = carried_out(folder, sys.executable, "-c", commands["Python"])
+def test_the_client_submits_and_waits(
+    commands: dict[str, str], folder: Path, run_with_coordinator: Any
+) -> None:
+    done = run_with_coordinator(folder, sys.executable, "-c", commands["Python"])
     assert done.returncode == 0, done.stderr
     assert done.stdout == "y(k) = 42\n"
 
@@ -102,13 +104,13 @@ def test_curl_uploads_and_submits(commands: dict[str, str], folder: Path, desk: 
     uploaded = run(folder, "sh", "-ec", f"{upload} --silent --show-error --fail")
     assert uploaded.returncode == 0, uploaded.stderr
     dataset = uploaded.stdout.partition('"id":"')[2].partition('"')[0]
-    submitted = run(folder, "sh", "-ec", submit.replace("THE ID IN THE ANSWER", dataset) + " -sSf")
+    submitted = run(folder, "sh", "-ec", submit.replace("THE ID IN THE RESPONSE", dataset) + " -sSf")
     assert submitted.returncode == 0, submitted.stderr
-    assert submitted.stdout.partition('"id":"')[2].partition('"')[0] in jobs(desk)
+    assert submitted.stdout.partition('"id":"')[2].partition('"')[0] in list_jobs(desk)
 
 
 @pytest.mark.ci
-def test_the_welcome_makes_room_for_the_first_job(
+def test_the_instructions_disappear_with_the_first_job(
     chromium: Any, commands: dict[str, str], desk: Service, expect: Any
 ) -> None:
     assert list(commands) == ["Command line", "Python", "curl"]

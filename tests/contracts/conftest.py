@@ -1,4 +1,4 @@
-"""A running service for the contracts of its doors: one a file, emptied before every test."""
+"""Running service for the contract tests of the REST interface: one per file, emptied before every test."""
 
 import pytest
 

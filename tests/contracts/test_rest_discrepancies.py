@@ -1,4 +1,4 @@
-"""Discrepancy jobs over REST: jobs as all others are, with a result and a report of their own."""
+"""Discrepancy jobs over REST: submission, validation, result, report and extended simulation."""
 
 import json
 import re
@@ -8,12 +8,22 @@ import sys
 import pytest
 
 from islands_service.domain.job import DISCREPANCY, JobOutcome, JobState, ProgressReport
-from support.service import HIDDEN, diagnosed, held, hidden, identified, kept, parsed, problem_of, served
+from support.service import (
+    HIDDEN,
+    held,
+    hidden,
+    kept,
+    parse_events,
+    problem_of,
+    run_diagnosis,
+    run_identification,
+    served,
+)
 from support.stores import LONG, claimed
 
 TERM = {"regressor": "y(k-1)", "parameter": 0.5}
 
-#: What `served` takes for a model.
+#: A valid model file for the data set of the tests.
 MODEL = {
     "schema": "islands.model/1",
     "inputs": ["u_V"],
@@ -24,22 +34,22 @@ MODEL = {
 
 @pytest.fixture(scope="module")
 def finished(serve):
-    """A service with a job that has found what was hidden, and that job."""
+    """A service with a finished diagnosis of a record with an injected effect, and the id of the job."""
     with serve() as running:
-        yield running, diagnosed(running, hidden(running.settings.data_dir))
+        yield running, run_diagnosis(running, hidden(running.settings.data_dir))
 
 
-def submitted(service, headers=None, /, **order):
+def submit_diagnosis(service, headers=None, /, **order):
     return service.client.post("/v1/discrepancies", json=order, headers=headers)
 
 
-def of_model(*terms, **changes):
+def make_model_simulation(*terms, **changes):
     model = {**MODEL, **({"terms": [{**TERM, "regressor": text} for text in terms]} if terms else {})}
     return {"simulation": {"kind": "model", "model": {**model, **changes}}}
 
 
-def test_it_is_a_job_among_the_others(service, order):
-    answer = submitted(service, **order, name="piezo", priority=5)
+def test_a_discrepancy_job_is_listed_cancelled_and_resumed_like_any_job(service, order):
+    answer = submit_diagnosis(service, **order, name="piezo", priority=5)
     assert answer.status_code == 202
     job = answer.json()
     assert answer.headers["location"] == f"/v1/jobs/{job['id']}"
@@ -60,22 +70,22 @@ def test_it_is_a_job_among_the_others(service, order):
     )
 
 
-def test_one_key_is_one_job_of_one_kind(service, order):
+def test_an_idempotency_key_identifies_one_job_of_one_kind(service, order):
     key = {"Idempotency-Key": "k1"}
-    first = submitted(service, key, **order)
-    again = submitted(service, key, **order)
+    first = submit_diagnosis(service, key, **order)
+    again = submit_diagnosis(service, key, **order)
     assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
     assert again.json() == first.json()
-    problem_of(submitted(service, key, **{**order, "seed": 1}), 422, "idempotency-conflict")
+    problem_of(submit_diagnosis(service, key, **{**order, "seed": 1}), 422, "idempotency-conflict")
     other = service.submit(key, dataset=order["dataset"], inputs=["u_V"], output="y_um")
     problem_of(other, 422, "idempotency-conflict")
 
 
-def test_it_takes_a_place_in_the_quota(tmp_path):
+def test_a_discrepancy_job_counts_towards_the_quota(tmp_path):
     with served(tmp_path, max_active=1) as service:
         order = held(kept(service.store))
-        assert submitted(service, **order).status_code == 202
-        problem_of(submitted(service, **order), 429, "quota-exceeded")
+        assert submit_diagnosis(service, **order).status_code == 202
+        problem_of(submit_diagnosis(service, **order), 429, "quota-exceeded")
 
 
 @pytest.mark.parametrize(
@@ -84,19 +94,19 @@ def test_it_takes_a_place_in_the_quota(tmp_path):
         {"simulation": {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}, "tolerance": {"dp": 0.01}},
         {"input": "u_V+1"},
         {"seed": 2**63 - 1, "channels": ["t_s"], "output": "y_um"},
-        of_model(),
+        make_model_simulation(),
     ],
 )
-def test_what_can_be_asked_is_accepted_as_it_was_said(service, order, changes):
-    if "channels" in changes:  # time is a column like others; what it does to the sampling is looked at
+def test_a_valid_request_is_accepted_and_stored_unchanged(service, order, changes):
+    if "channels" in changes:  # a time channel would define the sampling time
         order["dataset"] = service.upload(b"a,u_V,y_um\n" + b"1,2,3\n2,3,5\n4,1,9\n" * 20).json()["id"]
         changes = {**changes, "channels": ["a"], "dt": 0.1}
-    answer = submitted(service, **{**order, **changes})
+    answer = submit_diagnosis(service, **{**order, **changes})
     assert answer.status_code == 202, answer.text
     assert answer.json()["spec"] == {**order, **changes}
 
 
-#: What no service carries out: what is changed, the type, what the message says.
+#: Invalid requests: changed fields, problem type, part of the message.
 REFUSED = {
     "unknown tolerance": (
         {"tolerance": {"mass": 0.1}},
@@ -146,20 +156,24 @@ REFUSED = {
         "invalid-model",
         "m.json is no model file of schema islands.model/1",
     ),
-    "no regressor": (of_model("z(k-1)"), "invalid-model", "terms.0.regressor"),
-    "no text": (of_model(equation="\ud800"), "invalid-model", "is no model file"),
+    "no regressor": (make_model_simulation("z(k-1)"), "invalid-model", "terms.0.regressor"),
+    "no text": (make_model_simulation(equation="\ud800"), "invalid-model", "is no model file"),
     "far back": (
-        of_model("y(k-9999)"),
+        make_model_simulation("y(k-9999)"),
         "invalid-settings",
         "reaches 9999 samples back, and 1000 is the most",
     ),
-    "long": (of_model(*["y(k-1)"] * 101), "invalid-settings", "has 101 terms, and 100 is the most"),
+    "long": (
+        make_model_simulation(*["y(k-1)"] * 101),
+        "invalid-settings",
+        "has 101 terms, and 100 is the most",
+    ),
     "tolerance": (
         {"tolerance": {"dp": 1.5}},
         "invalid-request",
         "/tolerance/dp: Input should be less than 1",
     ),
-    "long text": (of_model(equation="y" * 60_000), "invalid-settings", "and 50000 is the most"),
+    "long text": (make_model_simulation(equation="y" * 60_000), "invalid-settings", "and 50000 is the most"),
     "long name": (
         {"simulation": {"kind": "bouc-wen-piezo", "parameters": {"d" * 60_000: 1.0}}},
         "invalid-settings",
@@ -171,7 +185,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_could_only_fail_is_refused_at_the_door(service, order, case):
+def test_a_request_that_could_only_fail_is_rejected(service, order, case):
     changes, kind, words = REFUSED[case]
     answer = service.client.post(
         "/v1/discrepancies",
@@ -184,28 +198,28 @@ def test_what_could_only_fail_is_refused_at_the_door(service, order, case):
 
 @pytest.mark.timeout(20)
 @pytest.mark.parametrize("power", ["**99", "^99", "** 9_9", "**(99)", "**0x63"])
-def test_a_model_of_towering_powers_is_not_read(service, order, power):
-    """Each power multiplies the factors of the one within it: four of them would take all memory."""
+def test_a_model_with_nested_powers_is_rejected_quickly(service, order, power):
+    """Each power multiplies the factors of the inner one: expanding four of them would take all memory."""
     tower = "y(k-1)*u(k-1)"
     for _ in range(4):
         tower = f"({tower}){power}"
-    answer = submitted(service, **{**order, **of_model(tower)})
+    answer = submit_diagnosis(service, **{**order, **make_model_simulation(tower)})
     assert "too long, or of too high a degree" in problem_of(answer, 422, "invalid-settings")
 
 
 @pytest.mark.ci
-def test_a_record_that_leaves_a_doubt_is_read_once_more(service, order):
+def test_a_record_with_an_inconclusive_preview_is_inspected_again(service, order):
     lines = b"u_V,y_um,s\n" + b"".join(b"%d,%d,%d\n" % (k % 7, k % 5, k % 3) for k in range(500))
     order["dataset"] = service.upload(lines).json()["id"]
-    detail = problem_of(submitted(service, **order), 422, "invalid-record")
+    detail = problem_of(submit_diagnosis(service, **order), 422, "invalid-record")
     assert "has no time column" in detail
-    assert submitted(service, **order, dt=0.1).status_code == 202
-    detail = problem_of(submitted(service, **order, dt=0.1, rows="0:9000"), 422, "invalid-record")
+    assert submit_diagnosis(service, **order, dt=0.1).status_code == 202
+    detail = problem_of(submit_diagnosis(service, **order, dt=0.1, rows="0:9000"), 422, "invalid-record")
     assert "rows 0:9000 are not a part of it" in detail
-    problem_of(submitted(service, **{**order, "dataset": "0-csv"}), 404, "no-such-dataset")
+    problem_of(submit_diagnosis(service, **{**order, "dataset": "0-csv"}), 404, "no-such-dataset")
 
 
-def test_what_was_hidden_is_found(finished):
+def test_a_diagnosis_names_the_injected_effect(finished):
     service, job = finished
     result = service.client.get(f"/v1/jobs/{job}/result").json()
     assert (result["schema"], result["verdict"]) == ("islands.discrepancy/1", "named")
@@ -221,7 +235,7 @@ def test_what_was_hidden_is_found(finished):
     assert [effect["name"] for effect in extended.json()["effects"]] == [HIDDEN]
 
 
-def test_the_report_is_one_page_that_needs_and_may_do_nothing_else(finished):
+def test_the_report_is_self_contained_and_has_a_strict_policy(finished):
     service, job = finished
     answer = service.client.get(f"/v1/jobs/{job}/report")
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
@@ -233,9 +247,9 @@ def test_the_report_is_one_page_that_needs_and_may_do_nothing_else(finished):
     assert not re.findall(r'(?:src|href)="(?!data:)', answer.text)
 
 
-def test_its_events_say_where_it_is(finished):
+def test_the_events_of_a_diagnosis_show_its_phases(finished):
     service, job = finished
-    events = parsed(service.client.get(f"/v1/jobs/{job}/events").text)
+    events = parse_events(service.client.get(f"/v1/jobs/{job}/events").text)
     assert [number for number, _, _ in events] == list(range(1, len(events) + 1))
     kinds = [kind for _, kind, _ in events]
     assert (kinds[:2], kinds[-1], set(kinds[2:-1])) == (["queued", "running"], "succeeded", {"progress"})
@@ -252,31 +266,31 @@ def test_its_events_say_where_it_is(finished):
         *("/models/1/simulation", "/figures", "/figures/record.svg", "/history"),
     ],
 )
-def test_what_a_search_alone_has_is_not_there(finished, of):
+def test_resources_of_a_search_do_not_exist_for_a_diagnosis(finished, of):
     service, job = finished
     detail = problem_of(service.client.get(f"/v1/jobs/{job}{of}"), 404, "not-found")
-    assert f"job {job} is of the kind discrepancy, and only those of the kind identification" in detail
+    assert f"job {job} is of the kind discrepancy, but only jobs of the kind identification" in detail
     assert "/report" in detail
 
 
-def test_a_search_has_no_simulation_to_extend(service):
-    job = identified(service)
+def test_a_search_has_no_extended_simulation(service):
+    job = run_identification(service)
     detail = problem_of(service.client.get(f"/v1/jobs/{job}/extended"), 404, "not-found")
-    assert "is of the kind identification, and only those of the kind discrepancy" in detail
+    assert "is of the kind identification, but only jobs of the kind discrepancy" in detail
 
 
-def test_where_nothing_was_named_there_is_nothing_to_extend(service, order):
-    job = submitted(service, **order).json()["id"]
+def test_a_diagnosis_without_effects_has_no_extended_simulation(service, order):
+    job = submit_diagnosis(service, **order).json()["id"]
     found = JobOutcome(JobState.SUCCEEDED, {"verdict": "nothing"}, summary={"verdict": "nothing"})
     service.store.leases.finish(claimed(service.store), found)
     detail = problem_of(service.client.get(f"/v1/jobs/{job}/extended"), 404, "not-found")
-    assert "found nothing" in detail
+    assert "its verdict is nothing" in detail
 
 
-def test_before_it_has_ended_it_says_so(service, order):
-    job = submitted(service, **order).json()["id"]
+def test_results_of_a_running_diagnosis_are_not_ready(service, order):
+    job = submit_diagnosis(service, **order).json()["id"]
     lease = service.store.leases.claim("test", LONG)
-    service.store.leases.report(lease, ProgressReport({"phase": "what is left over"}))
+    service.store.leases.report(lease, ProgressReport({"phase": "residual analysis"}))
     for of in ("/result", "/report", "/extended"):
         detail = problem_of(service.client.get(f"/v1/jobs/{job}{of}"), 409, "not-finished")
         assert "wait until it has succeeded" in detail
@@ -298,8 +312,8 @@ print([name for name in sys.modules if name.startswith(("islands.kernels", "isla
 
 
 @pytest.mark.ci
-def test_a_door_needs_no_kernels_to_know_a_model():
-    order = {"dataset": "0-csv", "input": "u_V", "output": "y_um", **of_model()}
+def test_validation_of_a_model_imports_no_numerical_packages():
+    order = {"dataset": "0-csv", "input": "u_V", "output": "y_um", **make_model_simulation()}
     command = [sys.executable, "-c", WEIGHT, json.dumps(order)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n[]\n"

@@ -1,4 +1,4 @@
-"""Faults behind the doors: a full disk and a lost database are told as such, and what was accepted stays."""
+"""Faults over REST: full disks, database outages and failed figures are reported and lose no accepted job."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ from islands_service.store.tables import models, results
 from support.databases import server
 from support.disks import filled
 from support.processes import eventually
-from support.service import PATIENCE, csv, identified, parsed, problem_of, queued, served, spec
+from support.service import PATIENCE, csv, parse_events, problem_of, queued, run_identification, served, spec
 from support.stores import FOUND, claimed
 
 
@@ -26,19 +26,19 @@ def disk(small_disk):
     return small_disk(6_000_000, nr_inodes=400)
 
 
-def wordy(word):
-    """A record of half a megabyte."""
+def make_large_record(word):
+    """Make a record of half a megabyte."""
     return csv(20_000).replace(b"y_um", word)
 
 
 @pytest.mark.ci
-def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, serve):
+def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
     with serve(disk) as service:
         dataset = service.upload(csv()).json()["id"]
         job = service.submit(**spec(dataset)).json()
         filler = filled(disk)
         refused = [
-            service.upload(wordy(b"y_mm")),
+            service.upload(make_large_record(b"y_mm")),
             *(service.submit(**spec(dataset, name="x" * 200, seed=seed)) for seed in range(300)),
         ]
         full = [answer for answer in refused if answer.status_code != 202]
@@ -53,7 +53,7 @@ def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, serve
         assert service.client.get("/readyz").status_code == 200
         accepted = {answer.json()["id"] for answer in refused if answer.status_code == 202} | {job["id"]}
         filler.unlink()
-        assert service.upload(wordy(b"y_mm")).status_code == 201
+        assert service.upload(make_large_record(b"y_mm")).status_code == 201
         answer = service.submit(**spec(dataset, seed=7))
         assert answer.status_code == 202
         listed = service.client.get("/v1/jobs", params={"limit": 200}).json()["items"]
@@ -62,22 +62,22 @@ def test_a_full_disk_is_told_and_reads_go_on_and_room_is_found_again(disk, serve
 
 
 @pytest.mark.ci
-def test_no_room_for_a_figure_is_told_as_such(disk, serve):
+def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
     with serve(disk) as service:
-        path = f"/v1/jobs/{identified(service)}/models/1/figures/loop.svg"
+        path = f"/v1/jobs/{run_identification(service)}/models/1/figures/loop.svg"
         filler = filled(disk)
         assert "make room" in problem_of(service.client.get(path), 507, "storage-full")
         filler.unlink()
         assert service.client.get(path).status_code == 200
 
 
-def test_no_room_to_receive_an_upload_is_told_as_such(disk, serve, monkeypatch):
-    """The framework keeps what is more than a megabyte in the system's temporary folder."""
+def test_a_full_disk_during_an_upload_is_reported_as_such(disk, serve, monkeypatch):
+    """The framework stores uploads of more than a megabyte in the temporary folder of the system."""
     with serve() as service:
         monkeypatch.setattr(tempfile, "tempdir", str(disk))
         filler = filled(disk)
         detail = problem_of(service.upload(csv() + b"\n" * 2_000_000), 507, "storage-full")
-        assert "make room" in detail
+        assert "free some" in detail
         filler.unlink()
         dataset = service.upload(csv()).json()["id"]
         with suppress(OSError):
@@ -89,19 +89,19 @@ def test_no_room_to_receive_an_upload_is_told_as_such(disk, serve, monkeypatch):
 
 
 @pytest.fixture
-def postgres_of_our_own():
+def own_postgres():
     with server() as own:
         yield own
 
 
 @pytest.mark.ci
-def test_a_database_that_goes_away_and_comes_back(tmp_path, postgres_of_our_own):
-    own = postgres_of_our_own
+def test_the_service_survives_a_database_outage(tmp_path, own_postgres):
+    own = own_postgres
     with served(tmp_path, database=own.url) as service:
         dataset = service.upload(csv()).json()["id"]
         job = service.submit({"Idempotency-Key": "k"}, **spec(dataset)).json()
         events = []
-        watcher = threading.Thread(target=lambda: events.extend(_followed(service, job["id"])))
+        watcher = threading.Thread(target=lambda: events.extend(_read_events(service, job["id"])))
         watcher.start()
         eventually(lambda: "islands_event_streams 1.0" in service.client.get("/metrics").text)
         assert service.client.get("/readyz").status_code == 200
@@ -135,20 +135,20 @@ def test_a_database_that_goes_away_and_comes_back(tmp_path, postgres_of_our_own)
         ]
 
 
-def _followed(service, job):
-    """Follow a job through the outage: a stream that was open stays open."""
+def _read_events(service, job):
+    """Follow a job through an outage; an open stream stays open."""
     with httpx.Client(base_url=service.url, timeout=PATIENCE, verify=False) as client:
-        return parsed(client.get(f"/v1/jobs/{job}/events").text)
+        return parse_events(client.get(f"/v1/jobs/{job}/events").text)
 
 
-def test_postgresql_is_never_asked_for_what_it_cannot_hold(tmp_path, prepared_postgres):
-    """A zero byte is an error of the database there, and a defect of ours if it gets through."""
+def test_text_with_zero_bytes_never_reaches_postgresql(tmp_path, prepared_postgres):
+    """PostgreSQL rejects zero bytes, which would be reported as a defect of the service."""
     with served(tmp_path, database=prepared_postgres) as service:
         for path in ("/v1/jobs/%00", "/v1/datasets/%00", "/v1/jobs?cursor=WzEuMCwgImFcdTAwMDBiIl0"):
             assert service.client.get(path).status_code == 422, path
 
 
-def test_text_of_strangers_is_kept_by_postgresql_as_by_sqlite(tmp_path, prepared_postgres):
+def test_special_characters_are_stored_by_postgresql(tmp_path, prepared_postgres):
     with served(tmp_path, database=prepared_postgres) as service:
         name = "Größe 😀 'quoted' \"twice\" \\ % _"
         job = queued(service.store, name=name)
@@ -160,15 +160,15 @@ def test_text_of_strangers_is_kept_by_postgresql_as_by_sqlite(tmp_path, prepared
 
 
 @pytest.fixture(scope="module")
-def drawing(serve):
-    """A service whose figures cannot be drawn: what stands in their way is put there by each test."""
+def figure_service(serve):
+    """A service for tests that make figures fail."""
     with serve() as running:
         yield running
 
 
-def spoilt(service, table, **values):
-    """Identify a record, and spoil what the store holds of it; return the path of a figure."""
-    job = identified(service)
+def corrupt_row(service, table, **values):
+    """Identify a record and corrupt a row of its job in the store; return the path of a figure."""
+    job = run_identification(service)
     service.store.database.write(
         lambda connection: connection.execute(update(table).where(table.c.job_id == job).values(**values))
     )
@@ -176,59 +176,61 @@ def spoilt(service, table, **values):
 
 
 @pytest.mark.nightly
-def test_a_figure_that_cannot_be_drawn_says_why_in_words_for_people(drawing):
-    detail = problem_of(drawing.client.get(spoilt(drawing, models, file="{}")), 500, "failed")
+def test_a_figure_of_a_damaged_model_has_a_readable_error(figure_service):
+    detail = problem_of(
+        figure_service.client.get(corrupt_row(figure_service, models, file="{}")), 500, "failed"
+    )
     assert "cannot be drawn: model 1" in detail
 
 
 @pytest.mark.nightly
-def test_a_defect_of_drawing_stands_in_the_log_alone_and_is_not_met_again_at_once(drawing):
-    path = spoilt(drawing, results, document='{"settings": {"islands": 1}}')
-    drawing.logs.clear()
-    said = [problem_of(drawing.client.get(path), 500, "failed") for _ in range(2)]
+def test_a_defect_while_drawing_is_logged_and_not_retried_at_once(figure_service):
+    path = corrupt_row(figure_service, results, document='{"settings": {"islands": 1}}')
+    figure_service.logs.clear()
+    said = [problem_of(figure_service.client.get(path), 500, "failed") for _ in range(2)]
     assert said[0] == said[1]
     assert said[0].endswith("cannot be drawn: the log of the service gives the reason")
-    (entry,) = [each for each in drawing.logs if each["event"] == "drawing failed"]
+    (entry,) = [each for each in figure_service.logs if each["event"] == "drawing failed"]
     assert entry["reason"].endswith("KeyError: 'search'")
 
 
 @pytest.mark.nightly
-def test_a_lost_record_and_a_database_that_is_away_are_told_as_such_where_a_figure_is_wanted(drawing):
-    path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
-    doors = drawing.app.state.islands
-    gone = doors.settings.model_copy(update={"database": "sqlite:////nowhere/islands.db"})
-    drawing.app.state.islands = replace(doors, settings=gone)
+def test_figures_report_a_lost_blob_and_an_unavailable_database(figure_service):
+    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/loop.svg"
+    state = figure_service.app.state.islands
+    gone = state.settings.model_copy(update={"database": "sqlite:////nowhere/islands.db"})
+    figure_service.app.state.islands = replace(state, settings=gone)
     try:
-        answer = drawing.client.get(path)
+        answer = figure_service.client.get(path)
     finally:
-        drawing.app.state.islands = doors
+        figure_service.app.state.islands = state
     problem_of(answer, 503, "store-unavailable")
     assert "nowhere" not in answer.text
-    (blob,) = [each for each in doors.settings.blobs.glob("??/*") if each.read_bytes() == csv(400)]
+    (blob,) = [each for each in state.settings.blobs.glob("??/*") if each.read_bytes() == csv(400)]
     data = blob.read_bytes()
     blob.unlink()
-    answer = drawing.client.get(path)
+    answer = figure_service.client.get(path)
     blob.write_bytes(data)
     problem_of(answer, 500, "no-such-blob")
     assert str(blob.parent.parent) not in answer.text
 
 
-def test_a_drawing_that_takes_too_long_is_not_begun_again_at_once(drawing, monkeypatch):
-    path = f"/v1/jobs/{identified(drawing)}/models/1/figures/loop.svg"
+def test_a_figure_that_timed_out_is_not_retried_at_once(figure_service, monkeypatch):
+    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/loop.svg"
     monkeypatch.setattr(figures, "_DRAWING_TIMEOUT", 0.1)
-    detail = problem_of(drawing.client.get(path), 500, "failed")
+    detail = problem_of(figure_service.client.get(path), 500, "failed")
     assert "take longer than" in detail
     monkeypatch.undo()
-    assert problem_of(drawing.client.get(path), 500, "failed") == detail
+    assert problem_of(figure_service.client.get(path), 500, "failed") == detail
 
 
-def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
+def test_a_failed_figure_is_retried_later(monkeypatch):
     failures, error = figures.FigureFailures(), figures.FigureError("no")
     monkeypatch.setattr(figures, "_MAX_FAILURES", 2)
     for job in ("a", "b", "a", "c"):
         failures.remember(job, 1, error)
     for job, rank in (("b", 1), ("a", 2), ("a", None)):
-        failures.refuse(job, rank)  # forgotten, or never tried
+        failures.refuse(job, rank)  # evicted, or never failed
     for job in ("a", "c"):
         with pytest.raises(figures.FigureError, match="no"):
             failures.refuse(job, 1)
@@ -238,8 +240,8 @@ def test_what_could_not_be_drawn_is_tried_again_in_a_while(monkeypatch):
 
 
 @pytest.mark.nightly
-def test_a_process_that_draws_may_take_only_so_much(tmp_path):
-    """It reads the files of strangers, too."""
+def test_the_figure_process_has_memory_and_cpu_limits(tmp_path):
+    """The process reads untrusted files."""
     script = (
         "import resource, sys\n"
         "from islands_service.reports import figure_worker\n"
@@ -256,6 +258,6 @@ def test_a_process_that_draws_may_take_only_so_much(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
     )
-    told, limits = done.stdout.splitlines()
-    assert told == "there is no job 'job'"
+    message, limits = done.stdout.splitlines()
+    assert message == "there is no job 'job'"
     assert [int(each) for each in limits.split()] == [8_000_000_002, 600]

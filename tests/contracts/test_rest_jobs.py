@@ -1,4 +1,4 @@
-"""Jobs over REST: accepted once, waited for, listed whole, and changed as their state allows."""
+"""Jobs over REST: submission, idempotency, conditional requests, pages, state changes and history."""
 
 import threading
 import time
@@ -23,12 +23,12 @@ def ids(answer):
     return [job["id"] for job in answer.json()["items"]]
 
 
-def in_state(service, state):
-    """Bring a job to a state; no other may be waiting."""
+def make_job_in_state(service, state):
+    """Make a job in a state; no other job may be queued. Return its id."""
     return job_in(service.store, state, LOCAL_OWNER).id
 
 
-def test_an_accepted_job_is_where_the_answer_says(service, order):
+def test_an_accepted_job_is_at_the_location_of_the_response(service, order):
     answer = service.submit(**order, priority=5)
     assert answer.status_code == 202
     assert answer.headers["retry-after"] == "1"
@@ -40,7 +40,7 @@ def test_an_accepted_job_is_where_the_answer_says(service, order):
     assert job["spec"] == {key: value for key, value in order.items() if key != "name"}
 
 
-def test_the_same_key_and_request_is_the_same_job(service, order):
+def test_a_repeated_request_with_a_key_returns_the_same_job(service, order):
     first = service.submit({"Idempotency-Key": "k1"}, **order)
     assert "idempotent-replayed" not in first.headers
     claimed(service.store)
@@ -51,8 +51,8 @@ def test_the_same_key_and_request_is_the_same_job(service, order):
     assert ids(service.client.get("/v1/jobs")) == [first.json()["id"]]
 
 
-def test_what_was_accepted_is_the_same_job_even_where_its_data_set_is_gone(service, order):
-    """A client that lost the first answer asks again, perhaps after somebody has tidied up."""
+def test_a_replay_returns_the_job_after_its_data_set_was_deleted(service, order):
+    """A client that lost the first response repeats its request, possibly after the data set was deleted."""
     first = service.submit({"Idempotency-Key": "k1"}, **order)
     service.client.post(f"{first.headers['location']}/cancel")
     assert service.client.delete(f"/v1/datasets/{order['dataset']}").status_code == 204
@@ -66,7 +66,7 @@ def test_what_was_accepted_is_the_same_job_even_where_its_data_set_is_gone(servi
 
 
 @pytest.mark.parametrize("change", [{"seed": 1}, {"name": "second"}, {"priority": 1}, {"preset": "narx"}])
-def test_the_same_key_and_another_request_is_refused(service, order, change):
+def test_another_request_with_the_same_key_is_rejected(service, order, change):
     first = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]
     answer = service.submit({"Idempotency-Key": "k1"}, **{**order, **change})
     detail = problem_of(answer, 422, "idempotency-conflict")
@@ -77,7 +77,7 @@ def test_the_same_key_and_another_request_is_refused(service, order, change):
     assert ids(service.client.get("/v1/jobs")) == [first]
 
 
-def test_a_key_is_its_owners_alone(service, order):
+def test_idempotency_keys_are_separate_for_each_owner(service, order):
     mine = service.submit({"Idempotency-Key": "k1"}, **order).json()["id"]
     header = service.key(owner="other")
     theirs = service.submit({"Idempotency-Key": "k1", **header}, **spec(kept(service.store, "other")))
@@ -86,11 +86,11 @@ def test_a_key_is_its_owners_alone(service, order):
 
 
 @pytest.mark.parametrize("key", ["", "x" * 256])
-def test_a_key_has_up_to_255_characters(service, order, key):
+def test_an_idempotency_key_has_1_to_255_characters(service, order, key):
     problem_of(service.submit({"Idempotency-Key": key}, **order), 422, "invalid-request")
 
 
-def test_sixteen_at_once_with_one_key_make_one_job(service, order):
+def test_concurrent_requests_with_one_key_make_one_job(service, order):
     with ThreadPoolExecutor(MANY) as pool:
         answers = list(pool.map(lambda _: service.submit({"Idempotency-Key": "k"}, **order), range(MANY)))
     assert {answer.status_code for answer in answers} == {202}
@@ -99,7 +99,7 @@ def test_sixteen_at_once_with_one_key_make_one_job(service, order):
     assert len(ids(service.client.get("/v1/jobs"))) == 1
 
 
-def test_what_has_not_changed_is_not_sent_again(service):
+def test_an_unchanged_job_is_answered_with_304(service):
     path = f"/v1/jobs/{queued(service.store).id}"
     tag = service.client.get(path).headers["etag"]
     assert tag == '"1"'
@@ -113,7 +113,7 @@ def test_what_has_not_changed_is_not_sent_again(service):
     assert (answer.status_code, answer.headers["etag"], answer.json()["version"]) == (200, '"2"', 2)
 
 
-def test_whoever_waits_is_answered_at_the_change(service):
+def test_a_waiting_request_is_answered_at_the_change(service):
     path = f"/v1/jobs/{queued(service.store).id}"
     threading.Timer(0.3, claimed, [service.store]).start()
     began = time.monotonic()
@@ -122,7 +122,7 @@ def test_whoever_waits_is_answered_at_the_change(service):
     assert 0.3 <= time.monotonic() - began < 15.0
 
 
-def test_whoever_waits_in_vain_is_told_so_in_time(service):
+def test_a_waiting_request_times_out_with_304(service):
     path = f"/v1/jobs/{queued(service.store).id}"
     began = time.monotonic()
     answer = service.client.get(path, params={"wait": 0.4}, headers={"If-None-Match": '"1"'})
@@ -131,15 +131,15 @@ def test_whoever_waits_in_vain_is_told_so_in_time(service):
 
 
 @pytest.mark.parametrize("headers", [{}, {"If-None-Match": '"0"'}])
-def test_whoever_does_not_know_the_job_does_not_wait(service, headers):
+def test_a_request_without_a_matching_etag_does_not_wait(service, headers):
     path = f"/v1/jobs/{queued(service.store).id}"
     began = time.monotonic()
     assert service.client.get(path, params={"wait": 20}, headers=headers).status_code == 200
     assert time.monotonic() - began < 15.0
 
 
-def test_nobody_waits_for_what_has_ended(service):
-    path = f"/v1/jobs/{in_state(service, JobState.SUCCEEDED)}"
+def test_a_request_for_an_ended_job_does_not_wait(service):
+    path = f"/v1/jobs/{make_job_in_state(service, JobState.SUCCEEDED)}"
     tag = service.client.get(path).headers["etag"]
     began = time.monotonic()
     answer = service.client.get(path, params={"wait": 20}, headers={"If-None-Match": tag})
@@ -148,8 +148,8 @@ def test_nobody_waits_for_what_has_ended(service):
     assert time.monotonic() - began < 15.0
 
 
-def walked(service, path, limit, between=lambda: None, **params):
-    """Read a list to its end, and do something between two pages."""
+def read_all_pages(service, path, limit, between=lambda: None, **params):
+    """Read all pages of a list, with a callback between two pages; return the ids."""
     found, cursor = [], None
     while True:
         given = {"limit": limit, **params} | ({} if cursor is None else {"cursor": cursor})
@@ -163,36 +163,38 @@ def walked(service, path, limit, between=lambda: None, **params):
 
 
 @pytest.mark.parametrize("limit", [1, 3, 7, 8, 200])
-def test_pages_show_every_job_once_while_others_come(service, limit):
+def test_pages_have_each_job_once_while_jobs_are_added(service, limit):
     before = sorted((job.created, job.id) for job in (queued(service.store) for _ in range(7)))
     newest_first = [identity for _, identity in reversed(before)]
-    assert walked(service, "/v1/jobs", limit) == newest_first
-    assert walked(service, "/v1/jobs", limit, lambda: queued(service.store)) == newest_first
+    assert read_all_pages(service, "/v1/jobs", limit) == newest_first
+    assert read_all_pages(service, "/v1/jobs", limit, lambda: queued(service.store)) == newest_first
 
 
-def test_pages_show_every_data_set_once_while_others_come(service):
+def test_pages_have_each_data_set_once_while_others_are_added(service):
     before = [kept(service.store, content=b"%d" % index) for index in range(7)]
     more = iter(range(100))
-    found = walked(service, "/v1/datasets", 2, lambda: kept(service.store, content=b"x%d" % next(more)))
+    found = read_all_pages(
+        service, "/v1/datasets", 2, lambda: kept(service.store, content=b"x%d" % next(more))
+    )
     assert sorted(found) == sorted(before)
 
 
-def test_pages_of_a_state_show_no_other(service):
-    running = {in_state(service, JobState.RUNNING) for _ in range(3)}
+def test_pages_of_a_state_contain_only_jobs_in_it(service):
+    running = {make_job_in_state(service, JobState.RUNNING) for _ in range(3)}
     waiting = {queued(service.store).id for _ in range(3)}
-    assert set(walked(service, "/v1/jobs", 2, state="queued")) == waiting
-    assert set(walked(service, "/v1/jobs", 2, state="running")) == running
-    assert walked(service, "/v1/jobs", 2, state="failed") == []
+    assert set(read_all_pages(service, "/v1/jobs", 2, state="queued")) == waiting
+    assert set(read_all_pages(service, "/v1/jobs", 2, state="running")) == running
+    assert read_all_pages(service, "/v1/jobs", 2, state="failed") == []
 
 
 @pytest.mark.parametrize("path", ["/v1/jobs", "/v1/datasets"])
 @pytest.mark.parametrize("cursor", ["x", "!!!", "bnVsbA", "WzEsMl0", "WzFlOTk5LCJhIl0"])
-def test_garbage_is_no_cursor(service, path, cursor):
+def test_invalid_cursors_are_rejected(service, path, cursor):
     detail = problem_of(service.client.get(path, params={"cursor": cursor}), 422, "invalid-settings")
     assert detail == f"{cursor!r} is not a cursor: send `next` of the previous page unchanged"
 
 
-#: What may be asked in which state, and what follows; in all others it is a conflict.
+#: States in which an action is allowed, and the following state; all others are conflicts.
 ALLOWED = {
     "cancel": {"queued": "cancelled", "running": "running"},
     "resume": {"failed": "queued", "cancelled": "queued"},
@@ -202,8 +204,8 @@ ALLOWED = {
 
 @pytest.mark.parametrize("state", JobState)
 @pytest.mark.parametrize("ask", ALLOWED)
-def test_a_state_allows_what_it_allows(service, ask, state):
-    path = f"/v1/jobs/{in_state(service, state)}"
+def test_actions_are_allowed_only_in_certain_states(service, ask, state):
+    path = f"/v1/jobs/{make_job_in_state(service, state)}"
     before = service.client.get(path).json()
     answer = service.client.delete(path) if ask == "delete" else service.client.post(f"{path}/{ask}")
     if state not in ALLOWED[ask]:
@@ -218,13 +220,13 @@ def test_a_state_allows_what_it_allows(service, ask, state):
         assert answer.json()["cancel_requested"] == (ask == "cancel")
 
 
-def test_to_cancel_twice_is_to_cancel(service):
-    path = f"/v1/jobs/{in_state(service, JobState.RUNNING)}"
+def test_cancelling_a_job_twice_is_allowed(service):
+    path = f"/v1/jobs/{make_job_in_state(service, JobState.RUNNING)}"
     first = service.client.post(f"{path}/cancel")
     assert service.client.post(f"{path}/cancel").json() == first.json()
 
 
-def test_a_data_set_goes_when_no_job_needs_it(service, order):
+def test_a_data_set_is_deleted_only_if_no_job_needs_it(service, order):
     path = f"/v1/datasets/{order['dataset']}"
     job = service.submit(**order).json()["id"]
     detail = problem_of(service.client.delete(path), 409, "dataset-in-use")
@@ -236,8 +238,8 @@ def test_a_data_set_goes_when_no_job_needs_it(service, order):
 
 
 @pytest.mark.parametrize("state", ["queued", "running", "failed", "cancelled"])
-def test_a_job_without_a_result_says_so(service, state):
-    path = f"/v1/jobs/{in_state(service, JobState(state))}"
+def test_the_result_of_an_unfinished_job_is_not_ready(service, state):
+    path = f"/v1/jobs/{make_job_in_state(service, JobState(state))}"
     assert service.client.get(f"{path}/models").json() == {"items": []}
     for of in (
         "/result",
@@ -252,7 +254,7 @@ def test_a_job_without_a_result_says_so(service, state):
         assert ("wait" in detail) == (state in ("queued", "running"))
 
 
-def test_the_course_of_a_search_is_read_from_a_generation_on(service):
+def test_the_history_of_a_search_starts_after_a_generation(service):
     job = queued(service.store).id
     lease = claimed(service.store)
     for generation in range(5):
@@ -265,7 +267,7 @@ def test_the_course_of_a_search_is_read_from_a_generation_on(service):
     assert service.client.get(path, params={"after": 99}).json()["items"] == []
 
 
-def test_the_course_of_many_islands_comes_in_pages_that_can_be_sent(service):
+def test_the_history_of_many_islands_has_small_pages(service):
     asked = {**spec("0-csv"), "settings": {"islands": 256}}
     job, _ = service.store.jobs.submit(Submission(LOCAL_OWNER, asked))
     points = tuple((at, 60 * at, {"3": 0.5}, (1.0 / 3.0,) * 256) for at in range(400))
@@ -280,7 +282,7 @@ def test_the_course_of_many_islands_comes_in_pages_that_can_be_sent(service):
     assert sizes == [390, 10, 0]
 
 
-def test_a_job_of_another_version_says_so_where_a_figure_is_wanted(service):
+def test_figures_of_a_job_of_another_version_are_rejected(service):
     job, _ = service.store.jobs.submit(Submission(LOCAL_OWNER, {**spec("0-csv"), "colour": "red"}))
     service.store.leases.finish(claimed(service.store), FOUND)
     answer = service.client.get(f"/v1/jobs/{job.id}/models/1/figures/loop.svg")
@@ -289,8 +291,8 @@ def test_a_job_of_another_version_says_so_where_a_figure_is_wanted(service):
     assert "submit it again" in detail
 
 
-def test_a_figure_that_a_browser_keeps_is_kept_for_its_key_alone(service):
-    job = in_state(service, JobState.SUCCEEDED)
+def test_cached_figures_vary_with_the_key(service):
+    job = make_job_in_state(service, JobState.SUCCEEDED)
     blob = service.app.state.islands.blobs.write(b"<svg/>" * 1000)
     service.store.results.keep(job, {"1/loop.svg": blob})
     headers = service.client.get(f"/v1/jobs/{job}/models/1/figures/loop.svg").headers

@@ -1,4 +1,4 @@
-"""Keys: without one nothing is seen, with one what is its owner's and its scopes allow, and not too fast."""
+"""API keys over REST: authentication, scopes, owners, quotas and rate limits."""
 
 import socket
 import time
@@ -16,7 +16,7 @@ def shared(serve):
         yield running
 
 
-#: Every route that needs a key, and the scope that it needs.
+#: Routes that need a key, and the scope that they need.
 GUARDED = {
     ("GET", "/v1/jobs"): "read",
     ("POST", "/v1/jobs"): "write",
@@ -45,12 +45,12 @@ GUARDED = {
     ("GET", "/metrics"): "metrics",
 }
 
-#: Routes that show nothing of anybody, and need no key.
+#: Public routes.
 OPEN = {("GET", "/healthz"), ("GET", "/readyz"), ("GET", "/problems/{kind}")}
 
 
-def asked(service, method, path, headers):
-    """Ask with a body where one is due."""
+def send_request(service, method, path, headers):
+    """Send a request, with a body if the route needs one."""
     path = path.format(job="0" * 32, dataset="0" * 32, rank=1, figure="loop")
     body = {"json": spec("0-csv")} if (method, path) == ("POST", "/v1/jobs") else {}
     if path == "/v1/discrepancies":
@@ -70,32 +70,32 @@ def test_every_route_is_open_or_guarded(service):
 
 
 @pytest.mark.parametrize(("method", "path"), GUARDED)
-def test_without_a_key_nothing_is_seen(service, method, path):
+def test_requests_without_a_valid_key_are_rejected(service, method, path):
     for headers in ({}, {"Authorization": "Basic aTpp"}, {"Authorization": "Bearer"}):
-        answer = asked(service, method, path, headers)
+        answer = send_request(service, method, path, headers)
         assert "this service needs a key" in problem_of(answer, 401, "no-key")
         assert answer.headers["www-authenticate"].startswith("Bearer")
-    answer = asked(service, method, path, {"Authorization": "Bearer islands_wrong"})
+    answer = send_request(service, method, path, {"Authorization": "Bearer islands_wrong"})
     assert problem_of(answer, 401, "no-key").startswith("the key is unknown")
 
 
 @pytest.mark.parametrize(("method", "path"), GUARDED)
-def test_a_key_opens_what_its_scopes_allow(service, method, path):
+def test_a_key_allows_only_the_routes_of_its_scopes(service, method, path):
     needed = GUARDED[method, path]
     others = sorted(SCOPES.keys() - {needed})
-    answer = asked(service, method, path, service.key(*others))
+    answer = send_request(service, method, path, service.key(*others))
     assert problem_of(answer, 403, "scope-missing") == (
         f"the key has the scopes {', '.join(others)}, but this request needs {needed}: ask for another key"
     )
-    assert asked(service, method, path, service.key(needed)).status_code in (200, 404, 422)
+    assert send_request(service, method, path, service.key(needed)).status_code in (200, 404, 422)
 
 
 @pytest.mark.parametrize("path", ["/healthz", "/readyz", "/problems/no-key", "/openapi.json", "/"])
-def test_what_shows_nothing_of_anybody_needs_no_key(service, path):
+def test_public_routes_need_no_key(service, path):
     assert service.client.get(path).status_code == 200
 
 
-def test_a_key_sees_its_owners_own_alone(service):
+def test_a_key_shows_only_the_data_of_its_owner(service):
     mine, theirs = service.key(owner="me"), service.key(owner="them")
     seen = {"me": queued(service.store, "me").id, "them": queued(service.store, "them").id}
     kept(service.store, "me")
@@ -118,7 +118,7 @@ def test_the_same_bytes_of_two_owners_are_two_data_sets(service):
     assert service.client.get(path, headers=theirs).status_code == 200
 
 
-def test_a_secret_is_kept_nowhere(service):
+def test_secrets_are_neither_stored_nor_logged(service):
     secret = service.key()["Authorization"].removeprefix("Bearer ")
     service.client.get("/v1/jobs", headers={"Authorization": f"Bearer {secret}"})
     for path in service.settings.data_dir.rglob("*"):
@@ -144,7 +144,7 @@ def test_a_stream_ends_with_its_key(service, monkeypatch, end):
     problem_of(service.client.get(path, headers=mine), 401, "no-key")
 
 
-def test_an_owner_has_so_many_jobs_and_no_more(service):
+def test_the_number_of_active_jobs_of_an_owner_is_limited(service):
     mine, theirs = service.key(owner="me"), service.key(owner="them")
     order = spec(kept(service.store, "me"))
     jobs = [service.submit(mine, **order, seed=seed).json()["id"] for seed in range(3)]
@@ -157,7 +157,7 @@ def test_an_owner_has_so_many_jobs_and_no_more(service):
     assert service.submit(mine, **order, seed=9).status_code == 202
 
 
-def test_an_owner_has_so_many_bytes_and_no_more(service):
+def test_the_stored_bytes_of_an_owner_are_limited(service):
     mine = service.key()
 
     def upload(samples):
@@ -180,8 +180,8 @@ def strict(serve):
         yield running
 
 
-def counted(service, headers, most=60):
-    """Ask until it is refused for asking; return how often it was not, and the refusal."""
+def count_accepted(service, headers, most=60):
+    """Send requests until one is rate-limited; return the number of accepted ones and the last response."""
     for count in range(most):
         answer = service.client.get("/v1/jobs", headers=headers)
         if answer.status_code == 429:
@@ -189,9 +189,9 @@ def counted(service, headers, most=60):
     return most, answer
 
 
-def test_a_key_asks_so_often_and_another_one_is_not_held_up(strict):
+def test_the_rate_limit_applies_to_each_key_separately(strict):
     mine, theirs = strict.key(), strict.key()
-    count, answer = counted(strict, mine)
+    count, answer = count_accepted(strict, mine)
     assert 20 <= count <= 30
     detail = problem_of(answer, 429, "too-many-requests")
     assert "more than 2 requests per second: wait" in detail
@@ -202,9 +202,9 @@ def test_a_key_asks_so_often_and_another_one_is_not_held_up(strict):
 
 
 @pytest.mark.parametrize(("wrong", "least"), [({"Authorization": "Bearer islands_guess"}, 2), ({}, 20)])
-def test_an_address_guesses_so_often(strict, wrong, least):
+def test_the_rate_of_invalid_keys_of_an_address_is_limited(strict, wrong, least):
     mine = strict.key()
-    count, answer = counted(strict, wrong)
+    count, answer = count_accepted(strict, wrong)
     assert least <= count <= least + 10
     assert "wait" in problem_of(answer, 429, "too-many-requests")
     assert int(answer.headers["retry-after"]) >= 1
@@ -212,7 +212,7 @@ def test_an_address_guesses_so_often(strict, wrong, least):
     assert strict.client.get("/healthz").status_code == 200
 
 
-def test_a_wrong_key_is_told_so_however_small_the_burst(serve):
+def test_the_first_invalid_key_is_reported_even_with_a_small_burst(serve):
     with serve(require_keys=True, rate=2.0, burst=3) as few:
         wrong = {"Authorization": "Bearer islands_guess"}
         problem_of(few.client.get("/v1/jobs", headers=wrong), 401, "no-key")
@@ -220,14 +220,14 @@ def test_a_wrong_key_is_told_so_however_small_the_burst(serve):
 
 
 @pytest.mark.parametrize("path", ["/v1/datasets", "/v1/jobs"])
-def test_a_strangers_body_is_not_even_received(service, path):
-    """Nobody answers before a body has come to its end, unless he does not want it."""
-    with socket.create_connection(("127.0.0.1", service.port), PATIENCE) as stranger:
-        stranger.sendall(
+def test_a_request_without_a_key_is_rejected_before_its_body(service, path):
+    """The response must arrive before the body is complete."""
+    with socket.create_connection(("127.0.0.1", service.port), PATIENCE) as client:
+        client.sendall(
             f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 900000\r\n"
             "Content-Type: multipart/form-data; boundary=x\r\n\r\n--x\r\n".encode()
         )
-        assert stranger.recv(100).startswith(b"HTTP/1.1 401 ")
+        assert client.recv(100).startswith(b"HTTP/1.1 401 ")
 
 
 @pytest.mark.parametrize(
@@ -238,6 +238,6 @@ def test_a_strangers_body_is_not_even_received(service, path):
         ([("file", ("a.csv", csv())), *[("inputs", (None, "u"))] * 300], "Too many fields"),
     ],
 )
-def test_a_form_holds_a_file_and_a_few_short_words(service, form, why):
+def test_forms_with_too_many_or_too_large_parts_are_rejected(service, form, why):
     answer = service.client.post("/v1/datasets", files=form, headers=service.key())
     assert why in problem_of(answer, 400, "bad-request")

@@ -1,4 +1,4 @@
-"""Problems: what is not a success has one form, says what to do, and shows nothing of our insides."""
+"""Problems over REST: every error response is a problem document and reveals no internals."""
 
 import re
 
@@ -36,7 +36,7 @@ def late():
 
 
 async def doubt():
-    raise CommitUnknownError("connection to server at 10.0.0.7 failed: nobody knows whether it was written")
+    raise CommitUnknownError("connection to server at 10.0.0.7 failed: it is unknown whether it was written")
 
 
 async def lost():
@@ -64,12 +64,10 @@ async def half():
         ("POST", "/openapi.json", "GET, HEAD"),
     ],
 )
-def test_a_method_that_is_not_allowed_is_told_those_that_are(service, method, path, allowed):
+def test_a_wrong_method_is_rejected_with_the_allowed_ones(service, method, path, allowed):
     path = path.format(job=queued(service.store).id)
     answer = service.client.request(method, path)
-    assert (
-        problem_of(answer, 405, "method-not-allowed") == f"{path} does not accept {method}: use {allowed}"
-    )
+    assert problem_of(answer, 405, "method-not-allowed") == f"{path} does not accept {method}: use {allowed}"
     assert answer.headers["allow"] == allowed
 
 
@@ -93,7 +91,7 @@ def test_a_method_that_is_not_allowed_is_told_those_that_are(service, method, pa
         "//v1/jobs",
     ],
 )
-def test_where_nothing_is_nothing_is_found(service, path):
+def test_unknown_paths_are_not_found(service, path):
     url = httpx.URL(service.url).copy_with(raw_path=path.encode())
     problem_of(service.client.get(url), 404, "not-found")
 
@@ -122,7 +120,7 @@ def test_where_nothing_is_nothing_is_found(service, path):
         "/v1/jobs/{job}/figures/A.svg",
     ],
 )
-def test_a_parameter_out_of_its_range_is_named(service, path):
+def test_a_parameter_out_of_range_is_named_in_the_problem(service, path):
     answer = service.client.get(path.format(job=queued(service.store).id))
     detail = problem_of(answer, 422, "invalid-request")
     (error,) = answer.json()["errors"]
@@ -141,7 +139,7 @@ def test_a_parameter_out_of_its_range_is_named(service, path):
 
 
 @pytest.mark.parametrize("header", ["-1", "x", "1.5", str(2**63)])
-def test_a_header_out_of_its_range_is_named(service, header):
+def test_a_header_out_of_range_is_named_in_the_problem(service, header):
     path = f"/v1/jobs/{queued(service.store).id}/events"
     answer = service.client.get(path, headers={"Last-Event-ID": header})
     assert problem_of(answer, 422, "invalid-request").startswith("last-event-id: ")
@@ -161,25 +159,25 @@ def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
     assert isinstance(entry["exc_info"], ZeroDivisionError | KeyError)
 
 
-def test_what_may_have_been_done_is_not_told_as_undone(service):
-    """Whoever takes it for that sends it again, and does it twice."""
+def test_an_unknown_commit_is_not_reported_as_failed(service):
+    """A client that believes that it failed would repeat the request and create a duplicate."""
     answer = service.client.post("/doubt")
     detail = problem_of(answer, 504, "store-in-doubt")
-    assert "nobody knows whether it was written" in detail
-    assert "ask again under the same idempotency key" in detail
+    assert CommitUnknownError.__doc__ in detail
+    assert "repeat the request with the same idempotency key" in detail
     assert "10.0.0.7" not in answer.text
     assert "retry-after" not in answer.headers
 
 
-def test_where_data_lies_is_told_to_nobody_but_the_log(service):
+def test_paths_of_blobs_appear_only_in_the_log(service):
     service.logs.clear()
     answer = service.client.get("/lost")
-    assert "has lost a file" in problem_of(answer, 500, "no-such-blob")
+    assert problem_of(answer, 500, "no-such-blob") == BlobNotFoundError.__doc__
     assert "/srv" not in answer.text
     assert "/srv/islands/blobs" in service.logs[0]["reason"]
 
 
-def test_an_answer_that_breaks_off_is_not_taken_for_a_whole_one(service):
+def test_a_truncated_response_is_an_error_for_the_client(service):
     service.logs.clear()
     with pytest.raises(httpx.RemoteProtocolError, match="incomplete"):
         service.client.get("/half")
@@ -194,7 +192,7 @@ def test_a_defect_ends_neither_the_connection_nor_the_service(service):
 
 
 @pytest.mark.parametrize("path", ["/healthz", "/nothing", "/v1/jobs", "/defect", "/", "/v1/jobs?limit=0"])
-def test_every_answer_has_safe_headers(service, path):
+def test_every_response_has_security_headers(service, path):
     headers = service.client.get(path).headers
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["x-frame-options"] == "DENY"
@@ -206,7 +204,7 @@ def test_every_answer_has_safe_headers(service, path):
     assert not [name for name in headers if name.startswith("access-control")]
 
 
-def test_a_request_id_is_kept_if_it_is_one(service):
+def test_a_valid_request_id_of_the_client_is_kept(service):
     def given(sent):
         headers = {"X-Request-ID": sent.encode("latin-1")}
         return service.client.get("/healthz", headers=headers).headers["x-request-id"]
@@ -217,7 +215,7 @@ def test_a_request_id_is_kept_if_it_is_one(service):
     assert all(re.fullmatch("[0-9a-f]{16}", each) for each in made)
 
 
-def test_every_type_of_problem_is_explained_where_it_points_to(service):
+def test_every_problem_type_is_described_at_its_path(service):
     types = {problem.type: problem for problem in PROBLEMS.values()}
     for kind, problem in types.items():
         answer = service.client.get(f"/problems/{kind}")
@@ -235,14 +233,14 @@ def test_the_guide_of_the_rest_api_lists_every_type_of_problem():
     assert sorted(rows) == sorted({(each.type, str(int(each.status))) for each in PROBLEMS.values()})
 
 
-def test_one_type_has_one_status():
+def test_each_problem_type_has_one_status():
     by_type = {}
     for problem in PROBLEMS.values():
         by_type.setdefault(problem.type, set()).add((problem.status, problem.title))
     assert all(len(found) == 1 for found in by_type.values())
 
 
-def test_the_form_of_a_problem_is_documented(service):
+def test_the_problem_document_is_in_the_openapi_schema(service):
     schema = service.client.get("/openapi.json").json()["components"]["schemas"]["ProblemDocument"]
     assert schema["properties"].keys() == FORM | {"errors"}
     answer = service.client.get("/nothing")

@@ -1,4 +1,4 @@
-"""Strangers who know the documentation alone: schemathesis over the whole OpenAPI, and 0 failures."""
+"""Property-based tests of the whole REST interface with schemathesis, from the OpenAPI document alone."""
 
 import re
 import sqlite3
@@ -10,11 +10,11 @@ from importlib.util import find_spec
 
 import pytest
 
-from support.service import identified, served
+from support.service import run_identification, served
 from support.stores import FAILED
 
-#: Phases of a run, the operations that it leaves out or takes alone, and the seconds that it may take. The
-#: first and the last end by themselves; what is deleted could not be looked at any more.
+#: Runs: phases, selection of operations, and time limit in seconds, which the first and the last run do not
+#: reach. Deletions have a separate run because other tests need the deleted data.
 RUNS = {
     "coverage": ("examples,coverage", ["--exclude-method", "DELETE"], 240),
     "links": ("stateful", ["--exclude-method", "DELETE"], 30),
@@ -22,11 +22,14 @@ RUNS = {
     "deleting": ("examples,coverage", ["--include-method", "DELETE"], 60),
 }
 
-#: What a data set and a job are called in the documentation's examples: they are there.
-DATASET, JOB = "9f86d081884c7d659a2feaa0c55ad015-csv", "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
+#: Id of the data set in the examples of the documentation; it exists in the tested service.
+DATASET = "9f86d081884c7d659a2feaa0c55ad015-csv"
 
-#: Where valid data may be refused for what no schema can say: columns that a data set has not, a cursor of
-#: another's making, a name that is no file's.
+#: Id of the job in the examples of the documentation; it exists, too.
+JOB = "0b8f6c1f3d0e4b6f9a3f5a0d1c2b3a4e"
+
+#: Configuration of schemathesis. The listed operations may reject data that are valid by the schema: columns
+#: that the data set does not have, invented cursors, unsuitable file names.
 CONFIGURATION = f"""
 [dictionaries]
 job = {{ values = ["{JOB}"] }}
@@ -44,7 +47,7 @@ include-name = [
 ]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "401", "403", "404", "409", "422", "429"]
 
-# Jobs of one kind have them, and a job of the other says so, however new it is.
+# Only jobs of one kind have these resources: 404 for a new job of the other kind is correct.
 [[operations]]
 include-name = [
     "GET /v1/jobs/{{job}}/extended", "GET /v1/jobs/{{job}}/figures", "GET /v1/jobs/{{job}}/history",
@@ -58,10 +61,10 @@ OWNER = "me"
 
 @pytest.fixture
 def folder(tmp_path):
-    """A data folder in which what the examples speak of is there, with a result and its figures."""
+    """A data folder with the data set and the job of the examples, including a result and figures."""
     folder = tmp_path / "data"
     with served(folder) as service:
-        job = identified(service, islands=2)
+        job = run_identification(service, islands=2)
         dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]
         for path in ("report", "models/1/simulation"):
             assert service.client.get(f"/v1/jobs/{job}/{path}").status_code == 200
@@ -77,12 +80,12 @@ def folder(tmp_path):
 
 
 @contextmanager
-def working(store):
-    """End every job that comes: whoever follows one that waits for ever waits as long."""
-    over = threading.Event()
+def finish_all_jobs(store):
+    """Finish every new job, so that no event stream stays open for ever."""
+    stop = threading.Event()
 
     def work():
-        while not over.wait(0.1):
+        while not stop.wait(0.1):
             while (lease := store.leases.claim("test", 600.0)) is not None:
                 store.leases.finish(lease, FAILED)
 
@@ -91,24 +94,24 @@ def working(store):
     try:
         yield
     finally:
-        over.set()
+        stop.set()
         worker.join()
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(find_spec("schemathesis") is None, reason="pip install schemathesis")
 @pytest.mark.parametrize("run", RUNS)
-def test_nobody_finds_an_answer_that_is_not_documented(folder, tmp_path, run):
-    """Examples, coverage, fuzzing and links; about two minutes for all runs.
+def test_schemathesis_finds_no_undocumented_response(folder, tmp_path, run):
+    """Run examples, coverage, fuzzing and links; all runs take about two minutes.
 
-    By hand, on a service that runs, with a key if it needs one::
+    To run it by hand on a running service, with a key if it needs one::
 
         schemathesis run http://127.0.0.1:8000/openapi.json --max-time 600 --continue-on-failure \\
             --header "Authorization: Bearer islands_..."
     """
     phases, chosen, seconds = RUNS[run]
     (tmp_path / "schemathesis.toml").write_text(CONFIGURATION)
-    with served(folder, require_keys=True, rate=0.0) as service, working(service.store):
+    with served(folder, require_keys=True, rate=0.0) as service, finish_all_jobs(service.store):
         key = service.key("read", "write", "metrics", owner=OWNER)["Authorization"]
         command = [sys.executable, "-m", "schemathesis.cli", "--no-color", "run"]
         command += [
@@ -123,5 +126,5 @@ def test_nobody_finds_an_answer_that_is_not_documented(folder, tmp_path, run):
         assert done.returncode == 0, done.stdout[-20_000:] + done.stderr[-5_000:]
         assert not [entry for entry in service.logs if entry["event"] in ("defect", "request failed")]
     selected, tested = (int(re.search(rf"{word}: (\d+)", done.stdout)[1]) for word in ("Selected", "Tested"))
-    assert tested == selected or run == "links"  # which lead to what was made before, and not everywhere
+    assert tested == selected or run == "links"  # links do not reach every operation
     assert int(re.search(r"(\d+) generated, \1 passed", done.stdout)[1]) >= tested

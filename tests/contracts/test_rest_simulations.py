@@ -1,4 +1,4 @@
-"""Which simulations a service takes: extended ones and linear ones, and no program of anybody's."""
+"""Simulations that the service accepts: extended and linear ones, but no user programs."""
 
 import json
 
@@ -21,7 +21,7 @@ def extended(core=None, **changes):
     return document if core is None else {**document, "core": core}
 
 
-def submitted(service, order, simulation):
+def submit_diagnosis(service, order, simulation):
     return service.client.post("/v1/discrepancies", json={**order, "simulation": simulation})
 
 
@@ -48,8 +48,8 @@ ACCEPTED = {
 
 
 @pytest.mark.parametrize("case", ACCEPTED)
-def test_a_simulation_of_ours_is_accepted_as_it_was_said(service, order, case):
-    answer = submitted(service, order, ACCEPTED[case])
+def test_a_built_in_simulation_is_accepted_unchanged(service, order, case):
+    answer = submit_diagnosis(service, order, ACCEPTED[case])
     assert answer.status_code == 202, answer.text
     assert answer.json()["spec"]["simulation"] == ACCEPTED[case]
 
@@ -69,7 +69,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_none_of_ours_is_refused_at_the_door(service, order, case):
+def test_an_unsupported_simulation_is_rejected(service, order, case):
     simulation, words = REFUSED[case]
     answer = service.client.post(
         "/v1/discrepancies",

@@ -1,36 +1,36 @@
-"""A page in a browser, and all that went wrong in it or left this machine."""
+"""Browser page with its errors and its requests to other origins."""
 
 from typing import Any
 
 
 class Screen:
-    """What somebody has before them.
+    """Browser page of the dashboard.
 
-    ``complaints`` are errors and warnings of the page, ``foreign`` what it asked of anybody else.
+    ``complaints`` has the errors and warnings of the page, ``foreign`` the URLs of requests to other origins.
     """
 
     def __init__(self, page: Any, origin: str) -> None:
         self.page, self.origin = page, origin
         self.complaints: list[str] = []
         self.foreign: list[str] = []
-        page.on("console", self._said)
+        page.on("console", self._record_message)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("dialog", self._asked)
-        page.on("request", self._requested)
+        page.on("dialog", self._dismiss_dialog)
+        page.on("request", self._record_request)
 
-    def _said(self, message: Any) -> None:
+    def _record_message(self, message: Any) -> None:
         if message.type in ("error", "warning"):
             self.complaints.append(f"{message.text} {message.location}")
 
-    def _asked(self, dialog: Any) -> None:
-        self.complaints.append(f"a dialog of a script: {dialog.message}")
+    def _dismiss_dialog(self, dialog: Any) -> None:
+        self.complaints.append(f"script dialog: {dialog.message}")
         dialog.dismiss()
 
-    def _requested(self, request: Any) -> None:
+    def _record_request(self, request: Any) -> None:
         if not request.url.startswith((self.origin, f"blob:{self.origin}")):
             self.foreign.append(request.url)
 
-    def go(self, place: str = "") -> Any:
-        """Open an address of the page, as by hand, and return the page."""
-        self.page.goto(f"{self.origin}/{place}")
+    def go(self, address: str = "") -> Any:
+        """Open an address relative to the origin and return the page."""
+        self.page.goto(f"{self.origin}/{address}")
         return self.page

@@ -1,7 +1,7 @@
-"""The service in tests: the application behind a real server in a thread, records, and jobs in every state.
+"""Service for tests: the application in a real server in a thread, records, and jobs in every state.
 
-No process is started and no Ray: what a coordinator would do is done to the store. The server is uvicorn on a
-free port of the loopback address, so that streams, limits and headers are those of the real thing.
+No process and no Ray is started: tests act as the coordinator on the store. The server is uvicorn on a free
+loopback port, so that streams, limits and headers are those of production.
 """
 
 import hashlib
@@ -30,19 +30,20 @@ from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.tables import metadata
 
-#: Seconds after which a test's request has failed.
+#: Timeout of requests in seconds.
 PATIENCE = 30.0
 
-JSON, PROBLEM = "application/json", "application/problem+json"
+#: Media type of problems.
+PROBLEM = "application/problem+json"
 
 
-#: Figures that the result of a job with one model has.
+#: Names of the figures of a job with one model.
 FIGURES = ("record", "front", "convergence", "islands", "free-run", "loop", "hold", "residuals")
 
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """A service that answers, and what stands behind its doors."""
+    """Running service with its client, application, store, settings and logs."""
 
     url: str
     client: httpx.Client
@@ -62,14 +63,14 @@ class Service:
         return self.client.post("/v1/jobs", json=spec, headers=headers)
 
     def key(self, *scopes: str, **made: Any) -> dict[str, str]:
-        """Make a key; return the header that shows it."""
+        """Create a key; return the header that sends it."""
         _, secret = self.store.keys.create("test", frozenset(scopes or ("read", "write")), **made)
         return {"Authorization": f"Bearer {secret}"}
 
 
 @contextmanager
 def served(folder: Path, /, **changes: Any) -> Iterator[Service]:
-    """Serve an application of its own on a store in a folder, where ``islands.db`` may stand prepared."""
+    """Serve a new application with a store in a folder, which may already contain ``islands.db``."""
     settings = ServiceSettings(data_dir=folder, **changes)
     folder.mkdir(exist_ok=True)
     store = Store(settings.url)
@@ -83,7 +84,7 @@ def served(folder: Path, /, **changes: Any) -> Iterator[Service]:
 
 
 class _Server(uvicorn.Server):
-    """A server that says when it listens."""
+    """Server with an event that is set when it listens."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -98,7 +99,7 @@ class _Server(uvicorn.Server):
 
 @contextmanager
 def listening(app: FastAPI, **options: Any) -> Iterator[str]:
-    """Have an application answer at a URL; the options are uvicorn's."""
+    """Serve an application and yield its URL; the options are those of uvicorn."""
     config = uvicorn.Config(
         app,
         port=0,
@@ -121,7 +122,7 @@ def listening(app: FastAPI, **options: Any) -> Iterator[str]:
 
 
 def problem_of(response: httpx.Response, status: int, kind: str) -> str:
-    """Hold a refusal against the form that all have; return its detail."""
+    """Check that a response is a problem of a status and a type; return its detail."""
     assert response.headers["content-type"] == PROBLEM, (response.status_code, response.text)
     document = response.json()
     assert (response.status_code, document["type"]) == (status, f"/problems/{kind}"), document
@@ -132,7 +133,7 @@ def problem_of(response: httpx.Response, status: int, kind: str) -> str:
 
 
 def nothing_stored(service: Service) -> bool:
-    """Tell that no job, no data set and no blob is there."""
+    """Return whether there is no job, no data set and no blob."""
     files = [path for path in service.settings.blobs.rglob("*") if path.is_file()]
     return not (
         files
@@ -142,7 +143,7 @@ def nothing_stored(service: Service) -> bool:
 
 
 def columns(samples: int = 200) -> dict[str, np.ndarray]:
-    """A record: time, an input, an output that answers to it."""
+    """Make a record with a time, an input and an output that depends on it."""
     rng = np.random.default_rng(1)
     u = rng.normal(size=samples)
     y = np.zeros(samples)
@@ -152,7 +153,7 @@ def columns(samples: int = 200) -> dict[str, np.ndarray]:
 
 
 def csv(samples: int = 200, separator: str = ",", mark: str = ".", /, **cells: dict[int, str]) -> bytes:
-    """A record as text; ``y_um={7: "x"}`` puts a text into a cell, by the line of the file."""
+    """Make a record as text; ``y_um={7: "x"}`` replaces the cell in line 7 of the file."""
     record = columns(samples)
     lines = [separator.join(record)]
     lines += [
@@ -169,14 +170,14 @@ def csv(samples: int = 200, separator: str = ",", mark: str = ".", /, **cells: d
 
 
 def npz(**arrays: Any) -> bytes:
-    """An archive of NumPy's."""
+    """Make an archive of NumPy."""
     stream = io.BytesIO()
     np.savez(stream, **arrays)
     return stream.getvalue()
 
 
 def matlab_5() -> bytes:
-    """A record as MATLAB saves it by default."""
+    """Make a record in the default format of MATLAB."""
     import scipy.io
 
     stream = io.BytesIO()
@@ -185,7 +186,7 @@ def matlab_5() -> bytes:
 
 
 def matlab_73() -> bytes:
-    """A record as MATLAB saves what is large: HDF5."""
+    """Make a record in the HDF5 format of MATLAB (7.3)."""
     import h5py
 
     stream = io.BytesIO()
@@ -197,22 +198,25 @@ def matlab_73() -> bytes:
 
 
 def spec(dataset: str, /, **changes: Any) -> dict[str, Any]:
-    """What a job needs to say at least."""
+    """Return the smallest valid identification request."""
     return {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", **changes}
 
 
 def held(dataset: str, /, **changes: Any) -> dict[str, Any]:
-    """What a discrepancy job needs to say at least."""
+    """Return the smallest valid discrepancy request."""
     simulation = {"kind": "bouc-wen-piezo"}
     return {"dataset": dataset, "input": "u_V", "output": "y_um", "simulation": simulation, **changes}
 
 
-#: What is hidden in a record of `hidden`, and how well its simulation is known.
-HIDDEN, KNOWN = "thermal-drift", {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 0.01}
+#: Effect injected into a record of `hidden`.
+HIDDEN = "thermal-drift"
+
+#: Relative tolerances of the parameters of its simulation.
+KNOWN = {"A": 0.02, "beta": 0.02, "gamma": 0.02, "dp": 0.01}
 
 
 def hidden(folder: Path, seconds: float = 4.0) -> bytes:
-    """A record of a piezo actuator whose sensor follows a temperature, which its simulation does not know."""
+    """Make a record of a piezo actuator with thermal drift, which its simulation does not model."""
     from islands.performance.trials.injection.measurement import inject
 
     found = inject([HIDDEN], np.random.default_rng(4), seconds=seconds, band=(1.0, 4.0))
@@ -220,8 +224,8 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
     return (folder / "hidden.csv").read_bytes()
 
 
-def diagnosed(service: Service, content: bytes, /, **changes: Any) -> str:
-    """Upload a record and have a simulation held against it, here and now; return the job's id."""
+def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
+    """Upload a record, submit a diagnosis and execute it in this process; return the id of the job."""
     from islands.evolution.engine import SerialEngine
     from islands_service.coordinator.diagnosis_job import discrepancy
 
@@ -237,12 +241,12 @@ def diagnosed(service: Service, content: bytes, /, **changes: Any) -> str:
     return str(job["id"])
 
 
-#: A search that takes a second.
+#: Settings of a search that takes a second.
 QUICK = {"population": 20, "generations": 2, "max_terms": 3, "max_height": 2, "shooting": 20}
 
 
-def identified(service: Service, islands: int = 1) -> str:
-    """Upload a record and have a job identify it, here and now; return the job's id."""
+def run_identification(service: Service, islands: int = 1) -> str:
+    """Upload a record, submit an identification and execute it in this process; return the id of the job."""
     from islands.evolution.engine import SerialEngine
     from islands_service.coordinator.identification_job import identification
 
@@ -260,7 +264,7 @@ def identified(service: Service, islands: int = 1) -> str:
 
 
 def emptied(service: Service) -> Service:
-    """Forget everything that a service's store holds."""
+    """Delete all rows of the store of a service."""
 
     def operation(connection: Connection) -> None:
         for table in reversed(metadata.sorted_tables):
@@ -271,7 +275,7 @@ def emptied(service: Service) -> Service:
 
 
 def kept(store: Store, owner: str = LOCAL_OWNER, content: bytes = b"") -> str:
-    """Keep a clean data set without a file behind it; return its id."""
+    """Store a valid data set without a file; return its id."""
     number = hashlib.sha256(owner.encode() + content).hexdigest()
     column = {"minimum": -1.0, "maximum": 1.0, "mean": 0.0, "deviation": 1.0, "problem": ""}
     preview = {
@@ -287,17 +291,17 @@ def kept(store: Store, owner: str = LOCAL_OWNER, content: bytes = b"") -> str:
 
 
 def queued(store: Store, owner: str = LOCAL_OWNER, **changes: Any) -> Job:
-    """Submit a job past the doors."""
+    """Submit a job directly to the store."""
     return store.jobs.submit(Submission(owner, spec("0-csv"), **changes))[0]
 
 
 def ahead(service: Service, owner: str, **changes: Any) -> str:
-    """Submit a job past the doors, before all that wait; return its id."""
+    """Submit a job with the highest priority directly to the store; return its id."""
     return queued(service.store, owner, priority=100, **changes).id
 
 
-def parsed(stream: str) -> list[tuple[int, str, dict[str, Any]]]:
-    """Read server-sent events: number, kind, data."""
+def parse_events(stream: str) -> list[tuple[int, str, dict[str, Any]]]:
+    """Parse server-sent events: number, kind, data."""
     found = []
     for block in stream.split("\n\n"):
         if block and not block.startswith(":"):

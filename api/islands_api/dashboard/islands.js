@@ -1,15 +1,15 @@
-/** Where the page begins: which view an address shows, and what happens when the service wants a key. */
+/** Entry point: shows the page that the address selects, or the key form if the service needs a key. */
 
-import { connection, key } from "./api.js";
-import "./banner.js";
-import { el } from "./dom.js";
-import { mountJob } from "./job.js";
-import { mountJobs } from "./jobs.js";
-import { askForKey } from "./key.js";
+import "./components/banner.js";
+import { connection, key } from "./lib/api.js";
+import { el } from "./lib/dom.js";
+import { mountJob } from "./pages/job.js";
+import { mountJobs } from "./pages/jobs.js";
+import { mountKeyForm } from "./pages/key.js";
 
-const PLACE = "islands.place";
+const SCROLL_ITEM = "islands.place";
 
-/** What each address shows. A view that has `update` stays when only its details change. */
+/** Page of each address. A page that has `update` is kept if only its details change. */
 const ROUTES = [
   {
     pattern: /^\/jobs\/([^/]+)(?:\/models\/(\d+))?$/,
@@ -25,9 +25,9 @@ const ROUTES = [
 ];
 
 const main = document.getElementById("main");
-let shown = { view: null, end: new AbortController() };
+let current = { view: null, controller: new AbortController() };
 
-function route() {
+function matchRoute() {
   const [path, text = ""] = location.hash.slice(1).split("?");
   const query = new URLSearchParams(text);
   for (const entry of ROUTES) {
@@ -38,55 +38,56 @@ function route() {
 }
 
 function show() {
-  if (shown.view === "key") return;
-  const wanted = route();
-  if (wanted === null) {
+  if (current.view === "key") return;
+  const target = matchRoute();
+  if (target === null) {
     location.replace("#/jobs");
     return;
   }
-  if (wanted.view === shown.view && shown.update) {
-    shown.update(wanted.details(wanted.match));
+  if (target.view === current.view && current.update) {
+    current.update(target.details(target.match));
     return;
   }
-  const first = shown.view === null;
-  shown.end.abort();
-  const end = new AbortController();
-  shown = { view: wanted.view, end, ...wanted.mount(main, wanted.match, wanted.query, end.signal) };
-  tools();
+  const first = current.view === null;
+  current.controller.abort();
+  const controller = new AbortController();
+  const page = target.mount(main, target.match, target.query, controller.signal);
+  current = { view: target.view, controller, ...page };
+  renderTools();
   if (first) return;
   scrollTo(0, 0);
   main.querySelector("h1")?.focus({ preventScroll: true });
 }
 
-function lock({ detail }) {
-  if (shown.view === "key") return;
-  shown.end.abort();
+function showKeyForm({ detail }) {
+  if (current.view === "key") return;
+  current.controller.abort();
   key.forget();
-  shown = { view: "key", end: new AbortController() };
-  tools();
+  current = { view: "key", controller: new AbortController() };
+  renderTools();
   document.title = "Key · islands";
-  askForKey(main, detail, () => {
-    shown = { view: null, end: new AbortController() };
+  mountKeyForm(main, detail, () => {
+    current = { view: null, controller: new AbortController() };
     show();
   });
 }
 
-function tools() {
-  const leave = () => {
+function renderTools() {
+  const forgetKey = () => {
     key.forget();
-    shown = { ...shown, view: "left" };
+    current = { ...current, view: "signed-out" };
     show();
   };
-  const forget = el("button", { type: "button", class: "quiet", on: { click: leave } }, "Forget the key");
-  document.getElementById("tools").replaceChildren(...(key.get() && shown.view !== "key" ? [forget] : []));
+  const button = el("button", { type: "button", class: "quiet", on: { click: forgetKey } }, "Forget the key");
+  document.getElementById("tools").replaceChildren(...(key.get() && current.view !== "key" ? [button] : []));
 }
 
-/** After a reload, go on where the reader was, as soon as the page is long enough again. */
-function returnToPlace() {
+/** Restore the scroll position after a reload, as soon as the page is long enough. */
+function restoreScroll() {
   history.scrollRestoration = "manual";
-  const { hash, top } = JSON.parse(sessionStorage.getItem(PLACE) ?? "{}");
+  const { hash, top } = JSON.parse(sessionStorage.getItem(SCROLL_ITEM) ?? "{}");
   addEventListener("pagehide", () =>
-    sessionStorage.setItem(PLACE, JSON.stringify({ hash: location.hash, top: scrollY })));
+    sessionStorage.setItem(SCROLL_ITEM, JSON.stringify({ hash: location.hash, top: scrollY })));
   if (hash !== location.hash || !top) return;
   const observer = new ResizeObserver(() => {
     if (document.documentElement.scrollHeight < top + innerHeight) return;
@@ -95,12 +96,12 @@ function returnToPlace() {
   });
   const stop = () => observer.disconnect();
   observer.observe(document.body);
-  // Whoever moves is not moved.
+  // Stop as soon as the user scrolls or types.
   for (const kind of ["wheel", "keydown", "pointerdown"]) addEventListener(kind, stop, { once: true });
   setTimeout(stop, 5000);
 }
 
-connection.addEventListener("locked", lock);
+connection.addEventListener("unauthorised", showKeyForm);
 addEventListener("hashchange", show);
-returnToPlace();
+restoreScroll();
 show();

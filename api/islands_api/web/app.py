@@ -31,7 +31,7 @@ _GZIP_MIN_BYTES = 4000
 _DESCRIPTION = """Finds the equation behind measured data.
 
 Upload a record, submit a job, follow it, and download its models: small difference equations with metrics.
-Or compare a simulation with the record to find out what it gets wrong, and why (`/v1/discrepancies`).
+Or compare a simulation with the record to find its errors and their causes (`/v1/discrepancies`).
 Every error response is `application/problem+json`; its `detail` says what to do.
 A loopback address needs no key. Elsewhere send `Authorization: Bearer islands_...`."""
 

@@ -22,26 +22,26 @@ FILES = {
     "icon.svg": "image/svg+xml",
     "islands.css": _STYLE,
     "job.css": _STYLE,
-    "api.js": _SCRIPT,
-    "banner.js": _SCRIPT,
-    "chart.js": _SCRIPT,
-    "clock.js": _SCRIPT,
-    "confirm.js": _SCRIPT,
-    "course.js": _SCRIPT,
-    "dataset.js": _SCRIPT,
-    "diagnosis.js": _SCRIPT,
-    "dom.js": _SCRIPT,
-    "equation.js": _SCRIPT,
-    "figures.js": _SCRIPT,
     "islands.js": _SCRIPT,
-    "job.js": _SCRIPT,
-    "jobs.js": _SCRIPT,
-    "key.js": _SCRIPT,
-    "models.js": _SCRIPT,
-    "numbers.js": _SCRIPT,
-    "scale.js": _SCRIPT,
-    "state.js": _SCRIPT,
-    "watch.js": _SCRIPT,
+    "components/banner.js": _SCRIPT,
+    "components/chart.js": _SCRIPT,
+    "components/confirm.js": _SCRIPT,
+    "components/convergence.js": _SCRIPT,
+    "components/dataset.js": _SCRIPT,
+    "components/diagnosis.js": _SCRIPT,
+    "components/equation.js": _SCRIPT,
+    "components/figures.js": _SCRIPT,
+    "components/job_state.js": _SCRIPT,
+    "components/models.js": _SCRIPT,
+    "lib/api.js": _SCRIPT,
+    "lib/clock.js": _SCRIPT,
+    "lib/dom.js": _SCRIPT,
+    "lib/numbers.js": _SCRIPT,
+    "lib/polling.js": _SCRIPT,
+    "lib/scale.js": _SCRIPT,
+    "pages/job.js": _SCRIPT,
+    "pages/jobs.js": _SCRIPT,
+    "pages/key.js": _SCRIPT,
 }
 
 
@@ -58,7 +58,7 @@ async def index(if_none_match: Annotated[str | None, Header()] = None) -> Respon
     return _file_response("index.html", if_none_match)
 
 
-@router.get("/dashboard/{name}")
+@router.get("/dashboard/{name:path}")
 async def file(name: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
     """Return a file of the dashboard."""
     if name not in FILES:

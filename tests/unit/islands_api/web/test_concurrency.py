@@ -1,4 +1,4 @@
-"""What waits is carried out in a thread, as if it were here, and never left behind."""
+"""Blocking operations run in a thread with the context of their request and are never abandoned."""
 
 import asyncio
 import threading
@@ -9,60 +9,60 @@ import pytest
 
 from islands_api.web.concurrency import BlockingExecutor
 
-who: ContextVar[str] = ContextVar("who", default="nobody")
+request_name: ContextVar[str] = ContextVar("request_name", default="")
 
 
 @pytest.fixture
-def threads() -> Iterator[BlockingExecutor]:
+def executor() -> Iterator[BlockingExecutor]:
     opened = BlockingExecutor()
     yield opened
     opened.close()
 
 
-def test_an_operation_runs_in_a_thread_and_what_it_returns_or_raises_comes_back(
-    threads: BlockingExecutor,
+def test_an_operation_runs_in_a_thread_and_returns_or_raises(
+    executor: BlockingExecutor,
 ) -> None:
-    async def ask() -> None:
-        assert await threads.run(threading.get_ident) != threading.get_ident()
-        assert await threads.run(int, "ff", base=16) == 255
+    async def send() -> None:
+        assert await executor.run(threading.get_ident) != threading.get_ident()
+        assert await executor.run(int, "ff", base=16) == 255
         with pytest.raises(ZeroDivisionError):
-            await threads.run(lambda: 1 / 0)
+            await executor.run(lambda: 1 / 0)
 
-    asyncio.run(ask())
+    asyncio.run(send())
 
 
-def test_an_operation_knows_whose_request_it_serves(threads: BlockingExecutor) -> None:
-    """Every line of the log has its request's id."""
+def test_an_operation_has_the_context_of_its_request(executor: BlockingExecutor) -> None:
+    """Log entries of an operation have the id of its request."""
 
-    async def ask(name: str) -> str:
-        who.set(name)
+    async def send(name: str) -> str:
+        request_name.set(name)
         await asyncio.sleep(0)
-        return await threads.run(who.get)
+        return await executor.run(request_name.get)
 
-    async def all_ask() -> list[str]:
-        return await asyncio.gather(*(ask(name) for name in "abc"))
+    async def send_all() -> list[str]:
+        return await asyncio.gather(*(send(name) for name in "abc"))
 
-    assert asyncio.run(all_ask()) == ["a", "b", "c"]
+    assert asyncio.run(send_all()) == ["a", "b", "c"]
 
 
-def test_where_a_client_goes_away_its_operation_is_waited_for(threads: BlockingExecutor) -> None:
-    """What it works with, a file that is received perhaps, is closed only then."""
-    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
+def test_a_cancelled_request_waits_for_its_operation(executor: BlockingExecutor) -> None:
+    """Files that the operation uses are closed only afterwards."""
+    started, resume, ended = threading.Event(), threading.Event(), threading.Event()
 
     def operation() -> None:
-        begun.set()
-        go_on.wait(10.0)
+        started.set()
+        resume.wait(10.0)
         ended.set()
 
-    async def leave() -> None:
-        request = asyncio.create_task(threads.run(operation))
-        await asyncio.to_thread(begun.wait, 10.0)
+    async def cancel_request() -> None:
+        request = asyncio.create_task(executor.run(operation))
+        await asyncio.to_thread(started.wait, 10.0)
         request.cancel()
         await asyncio.sleep(0.05)
         assert not request.done()
-        go_on.set()
+        resume.set()
         with pytest.raises(asyncio.CancelledError):
             await request
         assert ended.is_set()
 
-    asyncio.run(leave())
+    asyncio.run(cancel_request())

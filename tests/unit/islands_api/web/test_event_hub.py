@@ -1,4 +1,4 @@
-"""The hub: everybody who watches sees every event once and in order, however late or lagging they are."""
+"""Event hub: every subscriber gets each event once and in order, even if it is late or slow."""
 
 import asyncio
 from contextlib import asynccontextmanager, suppress
@@ -15,7 +15,7 @@ from support.stores import CANCELLED, FOUND, LONG, brought_on, claimed, submitte
 
 
 @pytest.fixture(autouse=True)
-def quick(monkeypatch):
+def fast_polling(monkeypatch):
     monkeypatch.setattr(hubs, "POLL_SECONDS", 0.02)
     monkeypatch.setattr(hubs, "RETRY_SECONDS", 0.02)
 
@@ -27,7 +27,7 @@ def store(sqlite_database):
 
 
 @asynccontextmanager
-async def running(store):
+async def running_hub(store):
     hub = JobEventHub(store, BlockingExecutor())
     task = asyncio.create_task(hub.run())
     try:
@@ -38,8 +38,8 @@ async def running(store):
             await task
 
 
-async def told(stream, seen, most=1000):
-    """Note the numbers of a stream's events; silence is noted as None."""
+async def collect(stream, seen, most=1000):
+    """Collect the numbers of the events of a stream; idle periods are None."""
     async for event in stream:
         seen.append(None if event is None else event.number)
         if len(seen) >= most:
@@ -47,60 +47,62 @@ async def told(stream, seen, most=1000):
     return seen
 
 
-def watching(hub, store, job, after=0, alive=5.0):
+def open_stream(hub, store, job, after=0, alive=5.0):
     return hub.events(job.id, store.jobs.versions([job.id])[job.id], after, alive)
 
 
-def test_whoever_comes_late_sees_all_and_the_end(store):
-    async def scene():
+def test_a_late_subscriber_gets_all_events(store):
+    async def scenario():
         job = submitted(store)
         store.leases.finish(claimed(store), FOUND)
-        async with running(store) as hub:
-            return await told(watching(hub, store, job), [])
+        async with running_hub(store) as hub:
+            return await collect(open_stream(hub, store, job), [])
 
-    assert asyncio.run(scene()) == [1, 2, 3]
+    assert asyncio.run(scenario()) == [1, 2, 3]
 
 
 @pytest.mark.parametrize("after", range(12))
-def test_whoever_comes_back_sees_what_came_after(store, after):
-    async def scene():
+def test_a_returning_subscriber_gets_all_later_events(store, after):
+    async def scenario():
         job = submitted(store)
         lease = claimed(store)
         for generation in range(8):
             store.leases.report(lease, brought_on(generation))
-        async with running(store) as hub:
-            watcher = asyncio.create_task(told(watching(hub, store, job, after), []))
+        async with running_hub(store) as hub:
+            watcher = asyncio.create_task(collect(open_stream(hub, store, job, after), []))
             await asyncio.sleep(0.05)
             store.leases.report(lease, brought_on(8))
             store.leases.finish(lease, FOUND)
             return await asyncio.wait_for(watcher, 25.0)
 
-    assert asyncio.run(scene()) == list(range(after + 1, 13))
+    assert asyncio.run(scenario()) == list(range(after + 1, 13))
 
 
-def test_watchers_who_come_at_any_time_see_the_same(store):
-    """One who reads the past meets events that the feed does not know yet; nobody loses them by that."""
+def test_subscribers_at_any_time_get_the_same_events(store):
+    """A subscriber that reads old events may get some that the feed does not have yet; none gets lost."""
 
-    async def scene():
+    async def scenario():
         job = submitted(store)
         lease = claimed(store)
-        async with running(store) as hub:
+        async with running_hub(store) as hub:
             watchers = []
             for generation in range(60):
                 store.leases.report(lease, brought_on(generation))
-                watchers.append(asyncio.create_task(told(watching(hub, store, job, generation % 7), [])))
+                watchers.append(
+                    asyncio.create_task(collect(open_stream(hub, store, job, generation % 7), []))
+                )
                 await asyncio.sleep(0.005 * (generation % 5))
             store.leases.finish(lease, FOUND)
             return await asyncio.wait_for(asyncio.gather(*watchers), 25.0)
 
-    for generation, seen in enumerate(asyncio.run(scene())):
+    for generation, seen in enumerate(asyncio.run(scenario())):
         assert seen == list(range(generation % 7 + 1, 64))
 
 
-def test_a_reader_of_the_past_hides_nothing_from_those_who_wait(store):
-    """Between two looks of the hub: the feed is at 3, the job at 5, and somebody reads from the start."""
+def test_reading_old_events_hides_none_from_waiting_subscribers(store):
+    """Between two polls the feed is at event 3 and the job at 5; a third subscriber reads from the start."""
 
-    async def scene():
+    async def scenario():
         job = submitted(store)
         lease = claimed(store)
         hub = JobEventHub(store, BlockingExecutor())
@@ -108,60 +110,60 @@ def test_a_reader_of_the_past_hides_nothing_from_those_who_wait(store):
             store.leases.report(lease, brought_on(0))
             await hub._poll()
             assert [event.number for event in feed.recent] == [3]
-            waiting = watching(hub, store, job, after=2)
+            waiting = open_stream(hub, store, job, after=2)
             assert (await anext(waiting)).number == 3
             store.leases.report(lease, brought_on(1))
             store.leases.report(lease, brought_on(2))
-            past = await told(watching(hub, store, job), [], most=5)
+            past = await collect(open_stream(hub, store, job), [], most=5)
             store.leases.report(lease, brought_on(3))
             await hub._poll()
             following = [(await anext(waiting)).number for _ in range(3)]
             await waiting.aclose()
             return past, following
 
-    assert asyncio.run(scene()) == ([1, 2, 3, 4, 5], [4, 5, 6])
+    assert asyncio.run(scenario()) == ([1, 2, 3, 4, 5], [4, 5, 6])
 
 
-def test_silence_is_told(store):
-    async def scene():
+def test_an_idle_feed_yields_none(store):
+    async def scenario():
         job = submitted(store)
-        async with running(store) as hub:
-            return await told(watching(hub, store, job, alive=0.03), [], most=4)
+        async with running_hub(store) as hub:
+            return await collect(open_stream(hub, store, job, alive=0.03), [], most=4)
 
-    assert asyncio.run(scene()) == [1, None, None, None]
+    assert asyncio.run(scenario()) == [1, None, None, None]
 
 
-def test_a_resumed_job_is_followed_beyond_its_first_end(store):
-    async def scene():
+def test_a_resumed_job_is_followed_past_its_first_end(store):
+    async def scenario():
         job = submitted(store)
         store.leases.finish(claimed(store), CANCELLED)
         store.jobs.resume(job.owner, job.id)
-        async with running(store) as hub:
-            watcher = asyncio.create_task(told(watching(hub, store, job), []))
+        async with running_hub(store) as hub:
+            watcher = asyncio.create_task(collect(open_stream(hub, store, job), []))
             await asyncio.sleep(0.05)
             store.leases.finish(claimed(store), FOUND)
             return await asyncio.wait_for(watcher, 25.0)
 
-    assert asyncio.run(scene()) == [1, 2, 3, 4, 5, 6]
+    assert asyncio.run(scenario()) == [1, 2, 3, 4, 5, 6]
 
 
-def test_the_stream_of_a_job_that_is_deleted_ends(store):
-    async def scene():
+def test_the_stream_of_a_deleted_job_ends(store):
+    async def scenario():
         job = submitted(store)
-        async with running(store) as hub:
-            watcher = asyncio.create_task(told(watching(hub, store, job), []))
+        async with running_hub(store) as hub:
+            watcher = asyncio.create_task(collect(open_stream(hub, store, job), []))
             await asyncio.sleep(0.05)
             store.jobs.cancel(job.owner, job.id)
             store.jobs.delete(job.owner, job.id)
             return await asyncio.wait_for(watcher, 25.0)
 
-    assert asyncio.run(scene())[0] == 1
+    assert asyncio.run(scenario())[0] == 1
 
 
-def test_a_job_that_vanishes_between_two_questions_does_not_blind_the_hub(store, monkeypatch):
-    """The version was read, the events are gone: all others are still watched."""
+def test_a_job_deleted_during_a_poll_does_not_stop_the_hub(store, monkeypatch):
+    """The version was read before the deletion, the events after it; other jobs are still polled."""
 
-    async def scene():
+    async def scenario():
         doomed, other = submitted(store), submitted(store)
         store.jobs.cancel(doomed.owner, doomed.id)
         answer = store.jobs.events
@@ -172,24 +174,24 @@ def test_a_job_that_vanishes_between_two_questions_does_not_blind_the_hub(store,
             return answer(job, after)
 
         monkeypatch.setattr(store.jobs, "events", vanishing)
-        async with running(store) as hub:
+        async with running_hub(store) as hub:
             with hub.subscribe(doomed.id, 1):
-                watcher = asyncio.create_task(told(watching(hub, store, other), []))
+                watcher = asyncio.create_task(collect(open_stream(hub, store, other), []))
                 await asyncio.sleep(0.1)
                 store.jobs.cancel(other.owner, other.id)
                 return await asyncio.wait_for(watcher, 25.0)
 
     with structlog.testing.capture_logs() as logs:
-        assert asyncio.run(scene()) == [1, 2]
+        assert asyncio.run(scenario()) == [1, 2]
     assert logs == []
 
 
-def test_who_leaves_takes_nothing_from_those_who_stay(store):
-    async def scene():
+def test_a_leaving_subscriber_does_not_affect_the_others(store):
+    async def scenario():
         first, second = submitted(store), submitted(store)
-        async with running(store) as hub:
-            staying = asyncio.create_task(told(watching(hub, store, second), []))
-            leaving = asyncio.create_task(told(watching(hub, store, first), []))
+        async with running_hub(store) as hub:
+            staying = asyncio.create_task(collect(open_stream(hub, store, second), []))
+            leaving = asyncio.create_task(collect(open_stream(hub, store, first), []))
             await asyncio.sleep(0.05)
             store.jobs.cancel(first.owner, first.id)
             await asyncio.wait_for(leaving, 25.0)
@@ -197,11 +199,11 @@ def test_who_leaves_takes_nothing_from_those_who_stay(store):
             store.jobs.cancel(second.owner, second.id)
             return await asyncio.wait_for(staying, 25.0)
 
-    assert asyncio.run(scene()) == [1, 2]
+    assert asyncio.run(scenario()) == [1, 2]
 
 
-def test_a_defect_does_not_blind_the_hub(store, monkeypatch):
-    async def scene():
+def test_a_defect_during_a_poll_does_not_stop_the_hub(store, monkeypatch):
+    async def scenario():
         job = submitted(store)
         answer, calls = store.jobs.versions, []
 
@@ -211,19 +213,19 @@ def test_a_defect_does_not_blind_the_hub(store, monkeypatch):
                 raise ZeroDivisionError
             return answer(jobs)
 
-        async with running(store) as hub:
-            stream = watching(hub, store, job)
+        async with running_hub(store) as hub:
+            stream = open_stream(hub, store, job)
             monkeypatch.setattr(store.jobs, "versions", failing)
-            watcher = asyncio.create_task(told(stream, []))
+            watcher = asyncio.create_task(collect(stream, []))
             await asyncio.sleep(0.15)
             store.jobs.cancel(job.owner, job.id)
             return await asyncio.wait_for(watcher, 25.0)
 
-    assert asyncio.run(scene()) == [1, 2]
+    assert asyncio.run(scenario()) == [1, 2]
 
 
-def test_a_stream_outlives_a_database_that_is_away(store, monkeypatch):
-    async def scene():
+def test_a_stream_survives_a_database_outage(store, monkeypatch):
+    async def scenario():
         job = submitted(store)
         answer, calls = store.jobs.events, []
 
@@ -234,20 +236,20 @@ def test_a_stream_outlives_a_database_that_is_away(store, monkeypatch):
             return answer(job, after)
 
         monkeypatch.setattr(store.jobs, "events", away)
-        async with running(store) as hub:
-            watcher = asyncio.create_task(told(watching(hub, store, job), []))
+        async with running_hub(store) as hub:
+            watcher = asyncio.create_task(collect(open_stream(hub, store, job), []))
             await asyncio.sleep(0.05)
             store.jobs.cancel(job.owner, job.id)
             return await asyncio.wait_for(watcher, 25.0)
 
-    assert asyncio.run(scene()) == [1, 2]
+    assert asyncio.run(scenario()) == [1, 2]
 
 
-def test_waiting_ends_at_the_change_or_at_its_time(store):
-    async def scene():
+def test_waiting_ends_at_a_change_or_the_timeout(store):
+    async def scenario():
         job = submitted(store)
         loop = asyncio.get_running_loop()
-        async with running(store) as hub:
+        async with running_hub(store) as hub:
             with hub.subscribe(job.id, 1) as feed:
                 began = loop.time()
                 assert not await hub.wait(feed, 1, 0.2)
@@ -258,29 +260,29 @@ def test_waiting_ends_at_the_change_or_at_its_time(store):
                 assert loop.time() - began < 15.0
                 assert await hub.wait(feed, 1, 0.0)
 
-    asyncio.run(scene())
+    asyncio.run(scenario())
 
 
 def test_closing_ends_all_streams(store):
-    async def scene():
+    async def scenario():
         job = submitted(store)
-        async with running(store) as hub:
-            watchers = [asyncio.create_task(told(watching(hub, store, job), [])) for _ in range(5)]
+        async with running_hub(store) as hub:
+            watchers = [asyncio.create_task(collect(open_stream(hub, store, job), [])) for _ in range(5)]
             await asyncio.sleep(0.05)
             hub.close()
             return await asyncio.wait_for(asyncio.gather(*watchers), 25.0)
 
-    assert all(seen[0] == 1 for seen in asyncio.run(scene()))
+    assert all(seen[0] == 1 for seen in asyncio.run(scenario()))
 
 
-def test_nobody_is_looked_for_when_nobody_watches(store):
-    async def scene():
+def test_the_hub_has_no_feeds_without_subscribers(store):
+    async def scenario():
         job = submitted(store)
-        async with running(store) as hub:
-            await told(watching(hub, store, job), [], most=1)
-            async for _ in watching(hub, store, job):
+        async with running_hub(store) as hub:
+            await collect(open_stream(hub, store, job), [], most=1)
+            async for _ in open_stream(hub, store, job):
                 break
             await asyncio.sleep(0.05)
             return hub._feeds
 
-    assert asyncio.run(scene()) == {}
+    assert asyncio.run(scenario()) == {}

@@ -1,4 +1,4 @@
-"""Rate limits: everybody has so many requests at once and so many a second, and nobody uses up another's."""
+"""Rate limits: each client has a separate token bucket."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from islands_api.web.rate_limit import RateLimiter
 
 @pytest.fixture
 def clock(monkeypatch):
-    """A clock that goes on when it is told to."""
+    """A clock that the test advances."""
 
     class Clock:
         now = 100.0
@@ -18,32 +18,32 @@ def clock(monkeypatch):
     return Clock
 
 
-def taken(bucket, who, most=1000):
-    """How often somebody is let through."""
+def count_accepted(bucket, client, most=1000):
+    """Return the number of requests of a client that are accepted."""
     for count in range(most):
         try:
-            bucket.acquire(who)
+            bucket.acquire(client)
         except RateLimitError:
             return count
     return most
 
 
-def test_a_burst_is_let_through_and_then_so_many_a_second(clock):
+def test_a_full_bucket_allows_a_burst_and_refills_at_the_rate(clock):
     bucket = RateLimiter(rate=5.0, burst=20)
-    assert taken(bucket, "a") == 20
+    assert count_accepted(bucket, "a") == 20
     clock.now += 2.0
-    assert taken(bucket, "a") == 10
+    assert count_accepted(bucket, "a") == 10
     clock.now += 1000.0
-    assert taken(bucket, "a") == 20
+    assert count_accepted(bucket, "a") == 20
 
 
-def test_nobody_uses_up_what_is_anothers(clock):
+def test_each_client_has_a_separate_bucket(clock):
     bucket = RateLimiter(rate=5.0, burst=20)
-    assert taken(bucket, "a") == 20
-    assert taken(bucket, "b") == 20
+    assert count_accepted(bucket, "a") == 20
+    assert count_accepted(bucket, "b") == 20
 
 
-def test_who_is_refused_is_told_when_to_come_back(clock):
+def test_a_rejection_gives_the_time_to_wait(clock):
     bucket = RateLimiter(rate=0.5, burst=1)
     bucket.acquire("a")
     clock.now += 0.5
@@ -53,7 +53,7 @@ def test_who_is_refused_is_told_when_to_come_back(clock):
     bucket.acquire("a")
 
 
-def test_to_be_refused_costs_nothing(clock):
+def test_a_rejection_takes_no_tokens(clock):
     bucket = RateLimiter(rate=1.0, burst=1)
     bucket.acquire("a")
     for _ in range(100):
@@ -63,24 +63,24 @@ def test_to_be_refused_costs_nothing(clock):
     bucket.acquire("a")
 
 
-def test_a_dear_request_takes_more(clock):
+def test_an_expensive_request_takes_more_tokens(clock):
     bucket = RateLimiter(rate=1.0, burst=20)
     bucket.acquire("a", 10.0)
     bucket.acquire("a", 10.0)
     with pytest.raises(RateLimitError):
         bucket.acquire("a", 10.0)
-    assert taken(bucket, "a") == 0
+    assert count_accepted(bucket, "a") == 0
 
 
-def test_without_a_rate_nobody_is_refused(clock):
-    assert taken(RateLimiter(rate=0.0, burst=1), "a") == 1000
+def test_a_rate_of_zero_rejects_no_request(clock):
+    assert count_accepted(RateLimiter(rate=0.0, burst=1), "a") == 1000
 
 
-def test_strangers_take_up_no_memory_without_end(clock, monkeypatch):
+def test_the_number_of_buckets_is_bounded(clock, monkeypatch):
     monkeypatch.setattr(rate_limit, "_MAX_BUCKETS", 10)
     bucket = RateLimiter(rate=1.0, burst=2)
     bucket.acquire("first")
-    for stranger in range(1000):
-        bucket.acquire(f"address {stranger}")
+    for number in range(1000):
+        bucket.acquire(f"address {number}")
     assert len(bucket._buckets) == 10
-    assert taken(bucket, "first") == 2
+    assert count_accepted(bucket, "first") == 2

@@ -1,4 +1,4 @@
-"""Bodies of requests: what cannot be read is refused as that, whatever it is, and nothing is made of it."""
+"""Request bodies: malformed, oversized and wrongly typed bodies are rejected with clear errors."""
 
 import http.client
 import json
@@ -17,7 +17,7 @@ JSON_VALUES = st.recursive(
     lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
 )
 
-#: What is no JSON, or not as we take it, and what is said of it.
+#: Bodies that are not strict JSON, and a part of the error message.
 DAMAGED = {
     b"": "Expecting value in line 1, column 1",
     b"{": "Expecting property name",
@@ -38,45 +38,47 @@ DAMAGED = {
 
 
 @given(JSON_VALUES)
-def test_json_is_read_as_it_was_written(value):
+def test_json_round_trip(value):
     assert read_json(json.dumps(value).encode()) == value
 
 
 @pytest.mark.parametrize("body", DAMAGED, ids=lambda body: repr(body[:20]))
-def test_what_is_no_json_is_refused(body):
+def test_invalid_json_is_rejected(body):
     with pytest.raises(MalformedBodyError) as refused:
         read_json(body)
     assert DAMAGED[body] in refused.value.detail
 
 
-def sent(service, body, media="application/json", path="/v1/jobs"):
+def post_body(service, body, media="application/json", path="/v1/jobs"):
     headers = {} if media is None else {"Content-Type": media}
     return service.client.post(path, content=body, headers=headers)
 
 
 @pytest.mark.parametrize("body", [b"{", b'{"a": NaN}', b'{"a": 1, "a": 2}', b"[" * 100_000, b"\xff"])
 def test_a_damaged_body_is_a_bad_request(service, body):
-    assert problem_of(sent(service, body), 400, "bad-request").startswith("the body is")
+    assert problem_of(post_body(service, body), 400, "bad-request").startswith("the body is")
 
 
 @pytest.mark.parametrize("body", [b"", b"null", b"[]", b"7", b'"text"', b"{}"])
-def test_json_that_is_no_job_is_invalid(service, body):
-    problem_of(sent(service, body), 422, "invalid-request")
+def test_json_that_is_not_a_job_is_rejected(service, body):
+    problem_of(post_body(service, body), 422, "invalid-request")
 
 
 @pytest.mark.parametrize("media", [None, "text/plain", "application/xml", "multipart/form-data", "json", ";"])
-def test_a_job_is_sent_as_json(service, media):
+def test_a_job_with_another_media_type_is_rejected(service, media):
     order = json.dumps(spec(kept(service.store))).encode()
-    detail = problem_of(sent(service, order, media), 415, "unsupported-media-type")
-    assert detail == f"the body has {f'the type {media}' if media else 'no type'}: send it as application/json"
+    detail = problem_of(post_body(service, order, media), 415, "unsupported-media-type")
+    assert (
+        detail == f"the body has {f'the type {media}' if media else 'no type'}: send it as application/json"
+    )
 
 
-def test_a_charset_beside_json_does_no_harm(service):
+def test_a_charset_parameter_of_the_media_type_is_accepted(service):
     order = json.dumps(spec(kept(service.store))).encode()
-    assert sent(service, order, "Application/JSON; charset=utf-8").status_code == 202
+    assert post_body(service, order, "Application/JSON; charset=utf-8").status_code == 202
 
 
-def test_what_is_wrong_is_said_of_every_field_up_to_twenty(service):
+def test_a_problem_lists_at_most_twenty_invalid_fields(service):
     order = {f"field{index}": index for index in range(10_000)}
     answer = service.submit(**order)
     detail = problem_of(answer, 422, "invalid-request")
@@ -87,20 +89,20 @@ def test_what_is_wrong_is_said_of_every_field_up_to_twenty(service):
     assert len(answer.content) < 5000
 
 
-def test_names_are_escaped_in_pointers(service):
+def test_json_pointers_are_escaped(service):
     answer = service.submit(**spec("0-csv", **{"a/b~c": 1}))
     problem_of(answer, 422, "invalid-request")
     assert answer.json()["errors"][0]["pointer"] == "/a~1b~0c"
 
 
-def test_a_job_of_two_megabytes_is_refused_before_it_is_read(service):
+def test_a_job_of_two_megabytes_is_rejected_before_parsing(service):
     began = time.monotonic()
-    detail = problem_of(sent(service, b" " * 2_000_000), 413, "too-large")
+    detail = problem_of(post_body(service, b" " * 2_000_000), 413, "too-large")
     assert detail == "the request has more than 1000000 bytes, the maximum of this path"
     assert time.monotonic() - began < 25.0
 
 
-def test_who_announces_too_much_need_not_send_it(service):
+def test_a_large_content_length_is_rejected_before_the_body(service):
     connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=10)
     try:
         connection.putrequest("POST", "/v1/jobs")
@@ -112,8 +114,8 @@ def test_who_announces_too_much_need_not_send_it(service):
         connection.close()
 
 
-def chunked(service, path, media, chunks, piece):
-    """Send a body that does not say how long it is; return the status, the media type, and the document."""
+def post_chunked(service, path, media, chunks, piece):
+    """Send a chunked body; return the status, the media type and the document of the response."""
     connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=20)
     try:
         connection.putrequest("POST", path)
@@ -125,24 +127,24 @@ def chunked(service, path, media, chunks, piece):
                 connection.send(b"%x\r\n%s\r\n" % (len(piece), piece))
             connection.send(b"0\r\n\r\n")
         except (BrokenPipeError, ConnectionResetError):
-            pass  # it has said no before the end
+            pass  # rejected before the end of the body
         answer = connection.getresponse()
         return answer.status, answer.headers["content-type"], json.loads(answer.read())
     finally:
         connection.close()
 
 
-def test_a_body_without_a_length_is_counted_as_it_comes(service):
-    status, media, document = chunked(service, "/v1/jobs", "application/json", 12, b" " * 100_000)
+def test_a_chunked_body_is_limited_while_it_is_received(service):
+    status, media, document = post_chunked(service, "/v1/jobs", "application/json", 12, b" " * 100_000)
     assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
 
 
-def test_an_upload_without_a_length_is_counted_as_it_comes(tmp_path):
+def test_a_chunked_upload_is_limited_while_it_is_received(tmp_path):
     from support.service import served
 
     head = b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\n'
     with served(tmp_path, max_upload=300_000) as small:
-        status, media, document = chunked(
+        status, media, document = post_chunked(
             small, "/v1/datasets", "multipart/form-data; boundary=x", 6, head + b"1" * 100_000
         )
         assert (status, media, document["type"]) == (413, PROBLEM, "/problems/too-large")
@@ -172,9 +174,9 @@ def test_an_upload_without_a_length_is_counted_as_it_comes(tmp_path):
         (b"--y\r\nContent-Disposition: \xff\r\n\r\n", "multipart/form-data; boundary=y", 400, "of a form"),
     ],
 )
-def test_a_form_that_is_none_is_refused(service, body, media, status, words):
+def test_a_malformed_form_is_rejected(service, body, media, status, words):
     kind = {400: "bad-request", 415: "unsupported-media-type", 422: "invalid-request"}[status]
-    assert words in problem_of(sent(service, body, media, "/v1/datasets"), status, kind)
+    assert words in problem_of(post_body(service, body, media, "/v1/datasets"), status, kind)
 
 
 @pytest.mark.parametrize(
@@ -190,20 +192,20 @@ def test_a_form_that_is_none_is_refused(service, body, media, status, words):
         ({"output": "y" * 201}, "/output: String should have at most 200 characters"),
     ],
 )
-def test_a_form_says_what_of_it_cannot_be_used(service, form, words):
+def test_an_invalid_form_field_is_named_in_the_problem(service, form, words):
     assert words in problem_of(service.upload(csv(), **form), 422, "invalid-request")
 
 
 @pytest.mark.timeout(60)
-def test_a_name_that_stands_twice_is_found_among_as_many_as_a_body_holds():
-    """A look at every name for each of them would keep all other requests waiting for minutes."""
+def test_a_duplicate_among_120000_names_is_found_quickly():
+    """A quadratic search would block all other requests for minutes."""
     names = [f"{number:x}" for number in range(120_000)]
     body = json.dumps(dict.fromkeys(names)).encode()[:-1] + b', "1d4bf": 1}'
     with pytest.raises(MalformedBodyError, match="'1d4bf' appears twice"):
         read_json(body)
 
 
-def test_a_long_name_that_stands_twice_is_not_sent_back_whole():
+def test_a_long_duplicate_name_is_truncated_in_the_message():
     name = "n" * 100_000
     with pytest.raises(MalformedBodyError) as refused:
         read_json(f'{{"{name}": 1, "{name}": 2}}'.encode())

@@ -1,4 +1,4 @@
-"""Documents: what is written by hand is what the schemas say, and is JSON whatever is in it."""
+"""Response documents: they have the fields of their schemas and are valid JSON for any content."""
 
 import json
 import math
@@ -19,31 +19,31 @@ FLOATS = st.recursive(
 )
 
 
-def no_constant(text):
+def reject_constant(text):
     raise AssertionError(f"{text} is not JSON")
 
 
 @given(FLOATS)
-def test_what_is_written_is_json(content):
+def test_every_document_is_valid_json(content):
     try:
         text = JSONDocument(content).body.decode()
     except UnicodeEncodeError:
         return
     assert text == json_text(content)
-    json.loads(text, parse_constant=no_constant)
+    json.loads(text, parse_constant=reject_constant)
 
 
-def test_what_json_has_is_written_exactly():
+def test_json_values_are_written_exactly():
     content = {"a": [0.1, 1e-300, 2**60, None, True, "ü\u2028"], "b": {"c": -0.0}}
     assert json.loads(json_text(content)) == content
 
 
 @pytest.mark.parametrize("number", [math.inf, -math.inf, math.nan])
-def test_a_number_that_json_has_not_is_null(number):
+def test_numbers_that_json_lacks_are_null(number):
     assert json.loads(json_text({"a": (1.0, number), "b": number})) == {"a": [1.0, None], "b": None}
 
 
-def test_a_job_is_written_as_its_schema_says(service):
+def test_a_job_document_has_the_fields_of_its_schema(service):
     document = job_document(queued(service.store))
     assert list(document) == list(JobView.model_fields)
     view = JobView.model_validate(document)
@@ -51,14 +51,14 @@ def test_a_job_is_written_as_its_schema_says(service):
     assert {**document, "created": None, "updated": None} == {**dict(view), "created": None, "updated": None}
 
 
-def test_a_data_set_is_written_as_its_schema_says(service):
+def test_a_data_set_document_has_the_fields_of_its_schema(service):
     document = dataset_document(service.store.datasets.get("local", kept(service.store)))
     assert list(document) == list(DatasetView.model_fields)
     DatasetView.model_validate(document)
 
 
-def test_progress_without_an_end_does_not_hide_the_job(service):
-    """An error may be infinite; the page with that job, and all others on it, is shown nevertheless."""
+def test_an_infinite_error_does_not_hide_a_job(service):
+    """The best error may be infinite; the job and the page that contains it are sent nevertheless."""
     job = queued(service.store, priority=1)
     lease = service.store.leases.claim("test", 60.0)
     service.store.leases.report(lease, ProgressReport({"best_error": math.inf, "islands": [math.nan, 0.5]}))
@@ -69,7 +69,7 @@ def test_progress_without_an_end_does_not_hide_the_job(service):
     assert service.client.post(f"/v1/jobs/{job.id}/cancel").json()["progress"]["best_error"] is None
 
 
-def test_the_examples_are_valid():
+def test_the_examples_of_the_schemas_are_valid():
     for schema in (JobRequest, JobView):
         for example in schema.model_config["json_schema_extra"]["examples"]:
             schema.model_validate(example)

@@ -1,4 +1,4 @@
-"""Uploads: a stranger's name for a file names nothing else, and no more bytes come out than are allowed."""
+"""Uploads: file names are sanitised, and decompressed sizes are limited."""
 
 import gzip
 import hashlib
@@ -11,7 +11,7 @@ from islands.errors import RecordError
 from islands_api.web.problems import PayloadTooLargeError
 from islands_api.web.uploads import MAX_NAME_BYTES, parse_file_name, receive
 
-#: What strangers call a file, and what we do.
+#: File names of clients, and the names that are stored.
 NAMES = {
     "record.csv": "record.csv",
     "../../x.csv": "x.csv",
@@ -33,13 +33,13 @@ NAMES = {
 
 
 @pytest.mark.parametrize("given", NAMES)
-def test_a_name_is_a_file_of_its_own_in_no_folder(given):
+def test_file_names_are_sanitised(given):
     assert parse_file_name(given) == (NAMES[given], False)
     assert parse_file_name(f"{given}.GZ") == (NAMES[given], True)
 
 
 @pytest.mark.parametrize("given", ["x" * 10_240, "ü" * 300, "😀" * 300])
-def test_a_long_name_is_cut_to_what_a_file_may_be_called(given, tmp_path):
+def test_a_long_file_name_is_truncated(given, tmp_path):
     name, _ = parse_file_name(f"{given}.csv")
     assert given.startswith(name.removesuffix(".csv"))
     assert MAX_NAME_BYTES - 4 < len(name.encode()) <= MAX_NAME_BYTES
@@ -49,45 +49,45 @@ def test_a_long_name_is_cut_to_what_a_file_may_be_called(given, tmp_path):
 @pytest.mark.parametrize(
     "given", [None, "", ".", "..", "/", ".csv", "..csv", "csv", "x.exe", "x.csv.exe", ".gz"]
 )
-def test_a_name_that_tells_no_format_is_refused(given):
+def test_a_file_name_without_a_known_suffix_is_rejected(given):
     with pytest.raises(
         RecordError, match=r"its name must end in one of \.csv, .*\.parquet.* export the record"
     ):
         parse_file_name(given)
 
 
-def told(data):
-    """What is said of bytes that were received."""
+def describe(data):
+    """Return the expected size and SHA-256."""
     return len(data), hashlib.sha256(data).hexdigest()
 
 
-def test_what_is_received_is_what_was_sent():
+def test_received_bytes_equal_the_sent_bytes():
     sent, target = b"0123456789" * 300_000, io.BytesIO()
-    assert receive(io.BytesIO(sent), target, "a.csv", False, len(sent)) == told(sent)
+    assert receive(io.BytesIO(sent), target, "a.csv", False, len(sent)) == describe(sent)
     assert target.getvalue() == sent
 
 
 @pytest.mark.parametrize("spooled", [1, 1_000_000])
-def test_a_gzip_is_unpacked_from_a_file_as_the_framework_hands_it_over(spooled):
-    """It is open for writing too, which gzip takes for a wish to write."""
+def test_gzip_is_decompressed_from_a_spooled_file(spooled):
+    """The file is also open for writing, which `gzip.GzipFile` would take as its mode by default."""
     target = io.BytesIO()
     with tempfile.SpooledTemporaryFile(max_size=spooled) as source:
         source.write(gzip.compress(b"t,u\n") + gzip.compress(b"1,2\n"))
         source.seek(0)
-        assert receive(source, target, "a.csv", True, 100) == told(b"t,u\n1,2\n")
+        assert receive(source, target, "a.csv", True, 100) == describe(b"t,u\n1,2\n")
     assert target.getvalue() == b"t,u\n1,2\n"
 
 
 @pytest.mark.parametrize("compressed", [False, True])
-def test_one_byte_too_many_is_refused(compressed):
+def test_a_file_one_byte_above_the_limit_is_rejected(compressed):
     sent = gzip.compress(b"x" * 100) if compressed else b"x" * 100
-    assert receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 100) == told(b"x" * 100)
+    assert receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 100) == describe(b"x" * 100)
     with pytest.raises(PayloadTooLargeError) as refused:
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 99)
     assert refused.value.detail == "a.csv has more than 0 MB after decompression, the maximum here"
 
 
-def test_a_bomb_is_never_unpacked_beyond_the_limit():
+def test_a_gzip_bomb_is_not_decompressed_beyond_the_limit():
     target = io.BytesIO()
     with pytest.raises(PayloadTooLargeError):
         receive(io.BytesIO(gzip.compress(bytes(20_000_000))), target, "a.csv", True, 5_000_000)
@@ -99,7 +99,7 @@ def test_a_bomb_is_never_unpacked_beyond_the_limit():
     [b"t,u\n", gzip.compress(b"t,u\n")[:-4], gzip.compress(b"t,u\n" * 99)[:-12], b"\x1f\x8b\x08" + bytes(99)],
     ids=["none", "without its end", "cut short", "zeros"],
 )
-def test_a_damaged_gzip_is_refused(sent):
+def test_a_damaged_gzip_file_is_rejected(sent):
     with pytest.raises(
         RecordError, match=r"a\.csv\.gz is not a gzip file, or is damaged \(.+\): compress the record again"
     ):
@@ -111,6 +111,6 @@ def test_a_damaged_gzip_is_refused(sent):
     [(b"", False), (b"", True), (gzip.compress(b""), True)],
     ids=["plain", "no gzip", "gzip of nothing"],
 )
-def test_nothing_is_refused(sent, compressed):
+def test_an_empty_file_is_rejected(sent, compressed):
     with pytest.raises(RecordError, match=r"a\.csv is empty: export the record again"):
         receive(io.BytesIO(sent), io.BytesIO(), "a.csv", compressed, 1000)

@@ -1,8 +1,8 @@
-/** Elements, made from values and never from markup: no text of a stranger's becomes a tag. */
+/** DOM elements, made from values and never from markup, so that untrusted text cannot become a tag. */
 
 const SVG = "http://www.w3.org/2000/svg";
 
-function filled(node, attributes, children) {
+function fill(node, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (name === "on") {
       for (const [event, listener] of Object.entries(value)) node.addEventListener(event, listener);
@@ -14,29 +14,29 @@ function filled(node, attributes, children) {
   return node;
 }
 
-/** Make an HTML element. `on` holds listeners; an attribute that is null or false is left out. */
+/** Make an HTML element. `on` has the listeners; attributes that are null or false are omitted. */
 export const el = (name, attributes = {}, ...children) =>
-  filled(document.createElement(name), attributes, children);
+  fill(document.createElement(name), attributes, children);
 
 /** Make an SVG element. */
 export const svg = (name, attributes = {}, ...children) =>
-  filled(document.createElementNS(SVG, name), attributes, children);
+  fill(document.createElementNS(SVG, name), attributes, children);
 
-/** Make a listener that does something once at a time. A button that was disabled would lose the focus. */
-export const once = (action) => async ({ currentTarget: button }) => {
+/** Make a listener that ignores clicks while its action runs. A disabled button would lose the focus. */
+export const runOnceAtATime = (action) => async ({ currentTarget: button }) => {
   if (button.ariaDisabled) return;
   button.ariaDisabled = "true";
   await action();
   button.ariaDisabled = null;
 };
 
-/** Set an element's text where it differs: what is selected or read out stays undisturbed otherwise. */
-export function say(node, text) {
+/** Set the text of an element only if it differs, which preserves selections and screen reader output. */
+export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** Make a list of terms and what they are; entries without a value are left out. */
-export const facts = (entries) =>
+/** Make a description list; entries without a value are omitted. */
+export const makeFacts = (entries) =>
   el(
     "dl",
     { class: "facts" },
@@ -45,8 +45,8 @@ export const facts = (entries) =>
       .map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", {}, value))),
   );
 
-/** Make a table. A heading is a text, or a text and a class; a row is a list of cells' contents. */
-export function table(caption, headings, rows) {
+/** Make a table. A heading is a text, or a text and a class; a row is a list of cell contents. */
+export function makeTable(caption, headings, rows) {
   const classes = headings.map((heading) => (Array.isArray(heading) ? heading[1] : null));
   const names = headings.map((heading) => (Array.isArray(heading) ? heading[0] : heading));
   const body = rows.map((cells) =>
@@ -64,17 +64,17 @@ export function table(caption, headings, rows) {
   return el(
     "table",
     {},
-    el("caption", { class: "unseen" }, caption),
+    el("caption", { class: "visually-hidden" }, caption),
     el("thead", {}, el("tr", {}, head)),
     el("tbody", {}, body),
   );
 }
 
-/** Let something that may be too wide be scrolled sideways, by keyboard, too. */
-export const scrolled = (label, ...children) =>
+/** Make a container that scrolls sideways, also with the keyboard. */
+export const makeScrollable = (label, ...children) =>
   el("div", { class: "scrolled", tabindex: "0", role: "region", "aria-label": label }, children);
 
-/** Have screen readers say something. */
+/** Announce a text to screen readers. */
 export function announce(text) {
-  say(document.getElementById("announcer"), text);
+  setText(document.getElementById("announcer"), text);
 }

@@ -1,4 +1,4 @@
-"""Doors: who may knock at all, what Prometheus reads, and what the service says of itself."""
+"""Service-level REST behaviour: origins and host names, metrics, health checks and request log."""
 
 import json
 
@@ -11,8 +11,8 @@ from support.stores import FOUND, claimed
 
 
 @pytest.fixture
-def far(serve):
-    """A service that others can reach, and that needs keys."""
+def public_service(serve):
+    """A service that other machines can reach and that needs keys."""
     with serve(host="0.0.0.0") as running:
         yield running
 
@@ -32,7 +32,7 @@ def far(serve):
     ],
 )
 @pytest.mark.parametrize("method", ["GET", "POST"])
-def test_another_sites_page_gets_nothing(service, method, origin):
+def test_requests_from_pages_of_other_sites_are_rejected(service, method, origin):
     headers = {"Origin": origin.format(port=service.port)}
     body = json.dumps(spec(kept(service.store))).encode()
     answer = service.client.request(
@@ -43,7 +43,7 @@ def test_another_sites_page_gets_nothing(service, method, origin):
     assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
-def test_our_own_page_gets_everything(service):
+def test_requests_from_the_dashboard_are_accepted(service):
     headers = {"Origin": service.url}
     answer = service.submit(headers, **spec(kept(service.store)))
     assert answer.status_code == 202
@@ -51,7 +51,7 @@ def test_our_own_page_gets_everything(service):
 
 
 @pytest.mark.parametrize("asks", ["GET", "POST", "DELETE"])
-def test_a_browser_that_asks_for_another_site_is_refused(service, asks):
+def test_preflight_requests_for_other_sites_are_rejected(service, asks):
     headers = {"Origin": "https://evil.example", "Access-Control-Request-Method": asks}
     answer = service.client.options("/v1/jobs", headers=headers)
     problem_of(answer, 403, "cross-origin")
@@ -71,27 +71,27 @@ def test_a_browser_that_asks_for_another_site_is_refused(service, asks):
         "",
     ],
 )
-def test_a_name_that_another_site_lets_point_to_us_is_refused(service, host):
+def test_foreign_host_names_are_rejected(service, host):
     answer = service.client.get("/v1/jobs", headers={"Host": host})
     assert "it accepts only loopback names" in problem_of(answer, 403, "cross-origin")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost:{port}", "LOCALHOST", "[::1]:{port}", "[::1]"])
-def test_this_machines_own_names_are_answered(service, host):
+def test_loopback_host_names_are_accepted(service, host):
     headers = {"Host": host.format(port=service.port)}
     assert service.client.get("/v1/jobs", headers=headers).status_code == 200
 
 
-def test_where_keys_are_needed_any_name_will_do(far):
-    headers = {**far.key(), "Host": "islands.example.org"}
-    assert far.client.get("/v1/jobs", headers=headers).status_code == 200
+def test_a_service_with_keys_accepts_any_host_name(public_service):
+    headers = {**public_service.key(), "Host": "islands.example.org"}
+    assert public_service.client.get("/v1/jobs", headers=headers).status_code == 200
     headers["Origin"] = "https://islands.example.org"
-    assert far.client.get("/v1/jobs", headers=headers).status_code == 200
+    assert public_service.client.get("/v1/jobs", headers=headers).status_code == 200
     headers["Origin"] = "https://evil.example"
-    problem_of(far.client.get("/v1/jobs", headers=headers), 403, "cross-origin")
+    problem_of(public_service.client.get("/v1/jobs", headers=headers), 403, "cross-origin")
 
 
-def measured(service):
+def read_metrics(service):
     """Read the metrics: values by name and labels."""
     answer = service.client.get("/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=")
@@ -102,20 +102,20 @@ def measured(service):
     }
 
 
-def jobs_by_state(service):
-    found = measured(service)
+def count_jobs_by_state(service):
+    found = read_metrics(service)
     return {state: found["islands_jobs", (("state", state),)] for state in JobState}
 
 
-def test_metrics_count_jobs_as_they_stand(service):
-    assert set(jobs_by_state(service).values()) == {0.0}
+def test_metrics_show_the_current_state_of_jobs(service):
+    assert set(count_jobs_by_state(service).values()) == {0.0}
     for _ in range(3):
         queued(service.store)
     lease = claimed(service.store)
     service.store.leases.report(
         lease, ProgressReport({"evaluations_per_second": 120.5, "best_error": 0.25, "generation": 7})
     )
-    found = measured(service)
+    found = read_metrics(service)
     label = (("job", lease.job.id),)
     assert found["islands_evaluations_per_second", label] == 120.5
     assert found["islands_best_error", label] == 0.25
@@ -123,14 +123,20 @@ def test_metrics_count_jobs_as_they_stand(service):
     assert found["islands_leases", ()] == 1.0
     assert 0.0 <= found["islands_queue_oldest_seconds", ()] < 60.0
     service.store.leases.finish(lease, FOUND)
-    assert jobs_by_state(service) == {"queued": 2, "running": 0, "succeeded": 1, "failed": 0, "cancelled": 0}
-    assert ("islands_best_error", label) not in measured(service)
+    assert count_jobs_by_state(service) == {
+        "queued": 2,
+        "running": 0,
+        "succeeded": 1,
+        "failed": 0,
+        "cancelled": 0,
+    }
+    assert ("islands_best_error", label) not in read_metrics(service)
 
 
 def test_metrics_count_requests_by_route_and_not_by_path(service):
     def counts(route, method, status):
         label = (("method", method), ("route", route), ("status", status))
-        return measured(service).get(("islands_request_seconds_count", label), 0.0)
+        return read_metrics(service).get(("islands_request_seconds_count", label), 0.0)
 
     jobs = [queued(service.store).id for _ in range(3)]
     before = (
@@ -145,15 +151,17 @@ def test_metrics_count_requests_by_route_and_not_by_path(service):
     assert counts("none", "GET", "404") == before[1] + 3
     assert counts("none", "POST", "404") == before[2]
     routes = {
-        dict(labels)["route"] for name, labels in measured(service) if name == "islands_request_seconds_count"
+        dict(labels)["route"]
+        for name, labels in read_metrics(service)
+        if name == "islands_request_seconds_count"
     }
     paths = set(service.client.get("/openapi.json").json()["paths"])
     assert routes <= paths | {"none", "/", "/dashboard/{name}", "/openapi.json"}
 
 
-def test_metrics_count_what_was_accepted_once(service):
+def test_metrics_count_each_accepted_job_once(service):
     def accepted():
-        return measured(service)["islands_jobs_accepted_total", ()]
+        return read_metrics(service)["islands_jobs_accepted_total", ()]
 
     before, order = accepted(), spec(kept(service.store))
     for _ in range(3):
@@ -162,11 +170,11 @@ def test_metrics_count_what_was_accepted_once(service):
     assert accepted() == before + 1
 
 
-def test_no_stranger_makes_metrics_grow(service):
-    size = len(measured(service))
+def test_unknown_methods_do_not_add_metric_labels(service):
+    size = len(read_metrics(service))
     for method in ("PROPFIND", "MKCOL", "SEARCH", "LOCK"):
         service.client.request(method, "/v1/jobs")
-    labels = [dict(labels) for _, labels in measured(service)]
+    labels = [dict(labels) for _, labels in read_metrics(service)]
     assert {label["method"] for label in labels if "method" in label} <= {"GET", "POST", "OPTIONS", "other"}
     assert len(labels) - size < 40
 
@@ -176,7 +184,7 @@ def test_the_service_is_alive_and_ready(service):
     assert service.client.get("/readyz").json() == {"status": "ready"}
 
 
-def test_the_log_names_every_request_and_not_those_of_probes(service):
+def test_the_log_has_all_requests_except_health_checks(service):
     service.logs.clear()
     service.client.get("/v1/jobs?state=queued", headers={"X-Request-ID": "abc"})
     service.client.get("/healthz")

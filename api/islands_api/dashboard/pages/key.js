@@ -1,13 +1,13 @@
-/** Asks for a key when the service wants one. It is kept until the tab is closed, in no address. */
+/** Form for the key, shown if the service needs one. The key is kept until the tab is closed. */
 
-import { Away, ask, key } from "./api.js";
-import { el, say } from "./dom.js";
+import { Unavailable, key, sendRequest } from "../lib/api.js";
+import { el, setText } from "../lib/dom.js";
 
-/** Characters that may be sent in a header. */
-const SENDABLE = /^[\x21-\x7e]+$/;
+/** Characters that a header may contain. */
+const KEY_CHARACTERS = /^[\x21-\x7e]+$/;
 
-/** Show the question; `done()` once the service takes the key. */
-export function askForKey(host, problem, done) {
+/** Show the form; call `onAccepted()` once the service accepts the key. */
+export function mountKeyForm(host, problem, onAccepted) {
   const complaint = el("p", { class: "complaint", id: "complaint", role: "alert" }, problem?.message ?? "");
   const field = el("input", {
     id: "key",
@@ -22,19 +22,19 @@ export function askForKey(host, problem, done) {
   async function check(event) {
     event.preventDefault();
     const secret = field.value.trim();
-    if (!SENDABLE.test(secret)) {
-      say(complaint, "A key has letters, digits and underscores, and no spaces.");
+    if (!KEY_CHARACTERS.test(secret)) {
+      setText(complaint, "A key has letters, digits and underscores, and no spaces.");
       return;
     }
     submit.disabled = true;
     key.set(secret);
     try {
-      await ask("v1/jobs?limit=1");
-      done();
+      await sendRequest("v1/jobs?limit=1");
+      onAccepted();
     } catch (error) {
-      // A key without the scope `read` is a key; the problem says what it lacks.
-      if (!(error instanceof Away)) key.forget();
-      say(complaint, error.message);
+      // The service may reject the key, for example because it lacks the scope `read`.
+      if (!(error instanceof Unavailable)) key.forget();
+      setText(complaint, error.message);
       submit.disabled = false;
       field.select();
     }
@@ -44,13 +44,13 @@ export function askForKey(host, problem, done) {
     el(
       "form",
       { class: "key card", on: { submit: check } },
-      el("h1", { tabindex: "-1" }, "This service asks for a key"),
+      el("h1", { tabindex: "-1" }, "This service needs a key"),
       el(
         "p",
         { class: "soft" },
-        "Whoever runs it makes one with ",
+        "Its operator creates one with ",
         el("code", {}, "islands keys create --scope read --scope write"),
-        ". It is kept until this tab is closed.",
+        ". The key is kept until this tab is closed.",
       ),
       el("label", { for: "key" }, "Key"),
       el("div", { class: "row" }, field, submit),

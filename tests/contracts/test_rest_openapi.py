@@ -1,4 +1,4 @@
-"""Shapes: every route answers as its documentation says, from the first look to the last figure."""
+"""Responses of all routes match the OpenAPI document."""
 
 import json
 import re
@@ -14,12 +14,12 @@ from islands_api.web.routes.figures import SEARCH_FIGURES as NAMED
 from support.service import (
     columns,
     csv,
-    diagnosed,
     hidden,
-    identified,
     kept,
     problem_of,
     queued,
+    run_diagnosis,
+    run_identification,
     spec,
 )
 
@@ -32,7 +32,7 @@ def service(serve):
 
 @pytest.fixture(scope="module")
 def finished(service):
-    return identified(service, islands=2)
+    return run_identification(service, islands=2)
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +40,8 @@ def document(service):
     return service.client.get("/openapi.json").json()
 
 
-def matched(document, method, path):
-    """The documented path that a path is of."""
+def match_path(document, method, path):
+    """Return the path template of the OpenAPI document that matches a path."""
     patterns = {known: re.sub(r"\{\w+\}", "[^/]+", known) for known in document["paths"]}
     (known,) = [
         known
@@ -51,10 +51,10 @@ def matched(document, method, path):
     return known
 
 
-def conforms(document, answer):
-    """Hold an answer against what is documented of its route: status, media type, body, headers."""
+def check_response(document, answer):
+    """Check the status, media type, body and headers of a response against the OpenAPI document."""
     method, path = answer.request.method.lower(), answer.request.url.path
-    responses = document["paths"][matched(document, method, path)][method]["responses"]
+    responses = document["paths"][match_path(document, method, path)][method]["responses"]
     response = responses.get(str(answer.status_code)) or responses["default"]
     if answer.is_error:
         assert str(answer.status_code) not in responses
@@ -73,7 +73,7 @@ def conforms(document, answer):
     return answer
 
 
-def test_the_documentation_says_what_everything_is(document):
+def test_the_openapi_document_describes_every_operation(document):
     for schema in document["components"]["schemas"].values():
         Draft202012Validator.check_schema(schema)
     assert document["components"]["securitySchemes"]["key"]["type"] == "http"
@@ -91,7 +91,7 @@ def test_the_documentation_says_what_everything_is(document):
     )
 
 
-def test_every_example_is_valid(document):
+def test_every_example_of_the_openapi_document_is_valid(document):
     count = 0
     for name, schema in document["components"]["schemas"].items():
         for example in schema.get("examples", []):
@@ -124,20 +124,20 @@ def test_every_example_is_valid(document):
         "/problems/invalid-record",
     ],
 )
-def test_what_can_be_looked_at_is_as_documented(service, document, finished, path):
+def test_responses_of_get_requests_match_the_documentation(service, document, finished, path):
     dataset = service.client.get("/v1/datasets").json()["items"][0]["id"]
     answer = service.client.get(path.format(job=finished, dataset=dataset))
     assert answer.status_code == 200
-    conforms(document, answer)
+    check_response(document, answer)
 
 
-def test_what_can_be_done_is_as_documented(service, document):
+def test_responses_of_other_requests_match_the_documentation(service, document):
     content = csv(100)
-    dataset = conforms(document, service.upload(content))
+    dataset = check_response(document, service.upload(content))
     assert dataset.status_code == 201
-    assert conforms(document, service.upload(content)).status_code == 200
+    assert check_response(document, service.upload(content)).status_code == 200
     order = spec(dataset.json()["id"])
-    job = conforms(document, service.submit(**order))
+    job = check_response(document, service.submit(**order))
     path = job.headers["location"]
     for method, where, status in (
         ("POST", f"{path}/cancel", 202),
@@ -148,35 +148,35 @@ def test_what_can_be_done_is_as_documented(service, document):
         ("DELETE", path, 404),
         ("DELETE", dataset.headers["location"], 204),
     ):
-        assert conforms(document, service.client.request(method, where)).status_code == status
-    conforms(document, service.submit(**order))
-    conforms(document, service.upload(b""))
+        assert check_response(document, service.client.request(method, where)).status_code == status
+    check_response(document, service.submit(**order))
+    check_response(document, service.upload(b""))
     known = queued(service.store).id
     assert (
-        conforms(
+        check_response(
             document, service.client.get(f"/v1/jobs/{known}", headers={"If-None-Match": "*"})
         ).status_code
         == 304
     )
     service.client.post(f"/v1/jobs/{known}/cancel")
     ended = service.client.get(f"/v1/jobs/{known}/events", headers={"Last-Event-ID": "9"})
-    assert conforms(document, ended).status_code == 204
+    assert check_response(document, ended).status_code == 204
 
 
 @pytest.mark.ci
-def test_a_diagnosis_is_as_documented(service, document, tmp_path):
-    job = diagnosed(service, hidden(tmp_path))
+def test_responses_of_a_diagnosis_match_the_documentation(service, document, tmp_path):
+    job = run_diagnosis(service, hidden(tmp_path))
     for of in ("", "/events", "/result", "/report", "/extended"):
-        answer = conforms(document, service.client.get(f"/v1/jobs/{job}{of}"))
+        answer = check_response(document, service.client.get(f"/v1/jobs/{job}{of}"))
         assert answer.status_code == 200
-    assert conforms(document, service.client.get(f"/v1/jobs/{job}/models")).status_code == 404
+    assert check_response(document, service.client.get(f"/v1/jobs/{job}/models")).status_code == 404
     order = service.client.get(f"/v1/jobs/{job}").json()["spec"]
-    assert conforms(document, service.client.post("/v1/discrepancies", json=order)).status_code == 202
+    assert check_response(document, service.client.post("/v1/discrepancies", json=order)).status_code == 202
     refused = service.client.post("/v1/discrepancies", json={**order, "input": "u"})
-    assert conforms(document, refused).status_code == 422
+    assert check_response(document, refused).status_code == 422
 
 
-def test_a_model_is_the_one_of_the_result(service, finished):
+def test_a_model_equals_its_entry_in_the_result(service, finished):
     result = service.client.get(f"/v1/jobs/{finished}/result").json()
     models = service.client.get(f"/v1/jobs/{finished}/models").json()["items"]
     assert result["models"] == models
@@ -192,7 +192,7 @@ def test_a_model_is_the_one_of_the_result(service, finished):
 
 
 @pytest.mark.parametrize("form", EXPORTS)
-def test_a_model_is_taken_along_in_every_form(service, document, finished, form):
+def test_a_model_is_exported_in_every_format(service, document, finished, form):
     path = f"/v1/jobs/{finished}/models/1/export"
     answer = service.client.get(path, params={"format": form})
     assert answer.status_code == 200
@@ -204,15 +204,15 @@ def test_a_model_is_taken_along_in_every_form(service, document, finished, form)
     assert answer.headers["content-type"].partition(";")[0] in documented["responses"]["200"]["content"]
 
 
-def test_an_unknown_form_is_refused(service, finished):
+def test_an_unknown_export_format_is_rejected(service, finished):
     answer = service.client.get(f"/v1/jobs/{finished}/models/1/export", params={"format": "cobol"})
     detail = problem_of(answer, 422, "invalid-settings")
     assert "cobol" in detail
     assert "python" in detail
 
 
-def test_the_figures_that_are_named_are_those_of_the_galleries():
-    """The doors do not import the galleries: that would make every start wait for matplotlib."""
+def test_figure_names_match_the_figure_registry():
+    """The web service does not import the registry, because importing matplotlib would delay its start."""
     assert tuple(FIGURES) == MODEL_FIGURES
     assert tuple(SEARCH_FIGURES) == NAMED
 
@@ -220,33 +220,37 @@ def test_the_figures_that_are_named_are_those_of_the_galleries():
 @pytest.mark.parametrize(
     "path", ["figures/nothing.svg", "models/1/figures/nothing.svg", "models/1/figures/record.svg"]
 )
-def test_a_figure_that_there_is_not_is_not_drawn(service, finished, path):
+def test_an_unknown_figure_is_not_drawn(service, finished, path):
     detail = problem_of(service.client.get(f"/v1/jobs/{finished}/{path}"), 404, "not-found")
     assert "use one of" in detail
 
 
 @pytest.mark.nightly
-def test_every_figure_is_drawn_once_and_kept(service, document, finished):
+def test_every_figure_is_drawn_once_and_stored(service, document, finished):
     for of in ("", "/models/1"):
         names = service.client.get(f"/v1/jobs/{finished}{of}/figures").json()["items"]
         assert len(names) == 4
         for name in names:
-            answer = conforms(document, service.client.get(f"/v1/jobs/{finished}{of}/figures/{name}.svg"))
+            answer = check_response(
+                document, service.client.get(f"/v1/jobs/{finished}{of}/figures/{name}.svg")
+            )
             assert ET.fromstring(answer.text).tag.endswith("svg")
             assert answer.headers["cache-control"] == "private, max-age=86400, immutable"
     drawn = [entry["ms"] for entry in service.logs if entry.get("path", "").endswith(".svg")]
-    assert sum(ms > 300 for ms in drawn) == 2  # all figures of a thing are drawn together
-    simulation = conforms(document, service.client.get(f"/v1/jobs/{finished}/models/1/simulation")).json()
+    assert sum(ms > 300 for ms in drawn) == 2  # all figures of a search or a model are drawn together
+    simulation = check_response(
+        document, service.client.get(f"/v1/jobs/{finished}/models/1/simulation")
+    ).json()
     assert len(simulation["measured"]) == len(simulation["free_run"]) == len(simulation["time_s"]) == 100
     assert simulation["inputs"]["u_V"] == pytest.approx(columns(400)["u_V"][300:], abs=1e-6)
-    report = conforms(document, service.client.get(f"/v1/jobs/{finished}/report"))
+    report = check_response(document, service.client.get(f"/v1/jobs/{finished}/report"))
     assert report.text.startswith("<!DOCTYPE html>")
     assert "script" not in report.headers["content-security-policy"]
 
 
 @pytest.mark.nightly
-def test_a_figure_of_a_record_that_is_gone_says_what_is_missing(service):
-    job = identified(service)
+def test_a_figure_of_a_deleted_record_is_rejected(service):
+    job = run_identification(service)
     dataset = service.client.get(f"/v1/jobs/{job}").json()["spec"]["dataset"]
     problem_of(service.client.get(f"/v1/jobs/{job}/figures/islands.svg"), 404, "not-found")
     assert service.client.delete(f"/v1/datasets/{dataset}").status_code == 204
@@ -255,7 +259,7 @@ def test_a_figure_of_a_record_that_is_gone_says_what_is_missing(service):
         assert dataset in detail
 
 
-def test_a_data_sets_preview_says_what_is_in_it(service):
+def test_the_preview_of_a_data_set_describes_its_columns(service):
     preview = service.upload(csv(123), "größe.csv").json()["preview"]
     assert (preview["samples"], preview["time"], preview["dt"], preview["warnings"]) == (123, "t_s", 0.01, [])
     for column, (name, values) in zip(preview["columns"], columns(123).items(), strict=True):

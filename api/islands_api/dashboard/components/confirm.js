@@ -1,9 +1,9 @@
-/** Asks before something is done that cannot be undone. */
+/** Confirmation dialog for actions that cannot be undone. */
 
-import { el } from "./dom.js";
+import { el } from "../lib/dom.js";
 
-/** Ask; resolve to whether the answer was yes. Escape says no. */
-export function confirmed(title, text, action) {
+/** Ask for confirmation; resolve to true if confirmed. Escape cancels. */
+export function askConfirmation(title, text, action) {
   return new Promise((resolve) => {
     const close = (value) => ({ click: () => dialog.close(value) });
     const dialog = el(

@@ -1,4 +1,4 @@
-"""Whether everybody can read the page: small and large, light and dark, by eye, by keyboard and aloud."""
+"""Accessibility: screen sizes, colour schemes, contrast, keyboard and screen readers."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ SIZES = ((1280, 800), (360, 800))
 
 @pytest.fixture(scope="module")
 def places(desk: Service) -> dict[str, str]:
-    """Addresses of everything that can be seen without a result."""
+    """Addresses of all views without a result."""
     problem = {"title": "The job failed", "detail": "data.csv, line 8, column y_um is empty: " + "x" * 200}
     failed = desk.submit(500, name="a-name-without-a-space-" * 8)
     cancelled = desk.submit(500, name="cancelled")
@@ -36,7 +36,7 @@ def places(desk: Service) -> dict[str, str]:
 
 def opened(screen: Screen, place: str) -> Any:
     page = screen.go(place if place.startswith("#") else f"#/jobs/{place}")
-    ready = "tbody tr, .nothing" if place.startswith("#") else "figure.chart, .failure"
+    ready = "tbody tr, .empty" if place.startswith("#") else "figure.chart, .failure"
     page.locator(ready).first.wait_for()
     if not place.startswith("#"):
         page.locator("table code", has_text="y_um").wait_for()
@@ -46,7 +46,7 @@ def opened(screen: Screen, place: str) -> Any:
 @pytest.mark.parametrize("name", ["list", "nothing", "failed", "running"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "height"), SIZES)
-def test_everything_fits_and_stands_out(
+def test_every_page_fits_and_has_sufficient_contrast(
     quiet: Callable[..., Screen],
     desk: Service,
     places: dict[str, str],
@@ -59,7 +59,7 @@ def test_everything_fits_and_stands_out(
     assert unreadable(page) == []
 
 
-def test_figures_stand_in_columns(
+def test_numbers_are_aligned_in_columns(
     quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
 ) -> None:
     page = opened(quiet(desk.url), places["list"])
@@ -67,18 +67,18 @@ def test_figures_stand_in_columns(
     assert "tabular-nums" in style
 
 
-def test_a_state_is_told_by_more_than_its_colour(
+def test_a_state_has_a_symbol_in_addition_to_its_colour(
     quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
 ) -> None:
     page = opened(quiet(desk.url), places["list"])
-    told = page.locator("tbody .state").evaluate_all(
+    badges = page.locator("tbody .state").evaluate_all(
         "all => all.map((one) => [one.textContent, getComputedStyle(one, '::before').content])"
     )
-    assert {word for word, _ in told} == {"queued", "running", "cancelled", "failed"}
-    assert len({sign for _, sign in told}) == 4
+    assert {word for word, _ in badges} == {"queued", "running", "cancelled", "failed"}
+    assert len({sign for _, sign in badges}) == 4
 
 
-def test_whoever_has_no_mouse_gets_everywhere(
+def test_all_controls_are_reachable_by_keyboard(
     quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
 ) -> None:
     page = opened(quiet(desk.url), places["running"])
@@ -94,16 +94,14 @@ def test_whoever_has_no_mouse_gets_everywhere(
         "islands",
         "← Jobs",
         "Cancel",
-        "Error of every island",
+        "Error of each island",
         "Best error by number of terms",
     } <= reached
     assert "Columns of the data set" in reached
 
 
-def test_moments_are_told_in_universal_time(
-    quiet: Callable[..., Screen], desk: Service, places: dict[str, str]
-) -> None:
-    """Whatever time zone, and whatever time, the machine of whoever looks has."""
+def test_times_are_shown_in_utc(quiet: Callable[..., Screen], desk: Service, places: dict[str, str]) -> None:
+    """Independent of the time zone and the clock of the machine of the browser."""
     screen = quiet(desk.url, timezone_id="Asia/Tokyo")
     screen.page.clock.install(time="2031-01-01T00:00:00Z")
     page = opened(screen, places["running"])

@@ -1,4 +1,4 @@
-"""Orders over REST on a real record: what its columns, rows and times allow is accepted, and nothing else."""
+"""Validation of identification jobs over REST against the columns, rows and times of a real record."""
 
 import asyncio
 from dataclasses import replace
@@ -7,8 +7,8 @@ import pytest
 
 from support.service import csv, emptied, npz, problem_of, spec
 
-#: A record whose names are as strange as a table of text can have them.
-STRANGE = ['u "in" V', "y\nout", "v;|\tw", "größe 😀", "<b>&amp;", "u+1"]
+#: Unusual column names that a text table can have.
+UNUSUAL_NAMES = ['u "in" V', "y\nout", "v;|\tw", "größe 😀", "<b>&amp;", "u+1"]
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def dataset(service):
         {"name": "Größe 😀 <b>'\"&", "priority": -100},
     ],
 )
-def test_what_can_be_done_is_accepted_as_it_was_said(service, dataset, changes):
+def test_a_valid_job_is_accepted_and_stored_unchanged(service, dataset, changes):
     answer = service.submit(**spec(dataset, **changes))
     assert answer.status_code == 202
     said = {**answer.json()["spec"], "name": answer.json()["name"], "priority": answer.json()["priority"]}
@@ -70,15 +70,15 @@ def test_what_can_be_done_is_accepted_as_it_was_said(service, dataset, changes):
         ({"validation": {"dataset": "0-csv"}}, "no-such-dataset", "there is no data set '0-csv'"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_what_to_do(service, dataset, changes, kind, words):
+def test_an_invalid_job_is_rejected_with_instructions(service, dataset, changes, kind, words):
     before = service.client.get("/v1/jobs").json()
     answer = service.submit(**spec(dataset, **changes))
     assert words in problem_of(answer, 404 if kind == "no-such-dataset" else 422, kind)
     assert service.client.get("/v1/jobs").json() == before
 
 
-def test_a_number_beyond_all_numbers_is_not_accepted(service, dataset):
-    """1e999 is JSON, and infinite when it is read; a job that holds it could never be shown."""
+def test_an_infinite_number_is_rejected(service, dataset):
+    """1e999 is valid JSON and parsed as infinity; a job that contains it could not be sent as JSON."""
     body = b'{"dataset": "%s", "inputs": ["u_V"], "output": "y_um", "settings": {"tolerance": 1e999}}'
     answer = service.client.post(
         "/v1/jobs", content=body % dataset.encode(), headers={"Content-Type": "application/json"}
@@ -89,20 +89,22 @@ def test_a_number_beyond_all_numbers_is_not_accepted(service, dataset):
     assert service.client.get("/v1/jobs").status_code == 200
 
 
-def test_columns_may_be_called_anything(service):
-    header = ",".join('"' + name.replace('"', '""') + '"' for name in STRANGE)
-    lines = [",".join(str((k * (index + 3)) % 7 + k % 3) for index in range(len(STRANGE))) for k in range(60)]
+def test_columns_with_unusual_names_are_accepted(service):
+    header = ",".join('"' + name.replace('"', '""') + '"' for name in UNUSUAL_NAMES)
+    lines = [
+        ",".join(str((k * (index + 3)) % 7 + k % 3) for index in range(len(UNUSUAL_NAMES))) for k in range(60)
+    ]
     stored = service.upload("\n".join([header, *lines]).encode()).json()
-    assert [column["name"] for column in stored["preview"]["columns"]] == STRANGE
-    order = {"dataset": stored["id"], "inputs": STRANGE[2:], "output": STRANGE[1], "dt": 0.1}
+    assert [column["name"] for column in stored["preview"]["columns"]] == UNUSUAL_NAMES
+    order = {"dataset": stored["id"], "inputs": UNUSUAL_NAMES[2:], "output": UNUSUAL_NAMES[1], "dt": 0.1}
     answer = service.submit(**order, settings={"library": ""})
     assert answer.status_code == 202, answer.text
-    assert answer.json()["spec"]["inputs"] == STRANGE[2:]
+    assert answer.json()["spec"]["inputs"] == UNUSUAL_NAMES[2:]
     assert service.client.get(answer.headers["location"]).json() == answer.json()
 
 
-def test_two_recordings_in_one_file_are_not_mixed(service):
-    """Each of their columns is sound, and none of one goes with those of the other."""
+def test_columns_of_two_recordings_cannot_be_combined(service):
+    """The columns are valid, but those of different recordings have different lengths."""
     names = ("u", "y", "v", "z")
     arrays = {
         name: [k % (index + 3) for k in range(60 if index < 2 else 90)] for index, name in enumerate(names)
@@ -114,16 +116,16 @@ def test_two_recordings_in_one_file_are_not_mixed(service):
     assert "channels of one record are of equal length" in problem_of(answer, 422, "invalid-record")
 
 
-def test_what_was_accepted_is_not_inspected_again(service, dataset):
-    """An inspection may take two minutes: a client that lost the answer asks again long before."""
-    order, doors = spec(dataset, rows="0:100"), service.app.state.islands
-    first = service.submit({"Idempotency-Key": "looked into"}, **order)
-    service.app.state.islands = replace(doors, inspection_slots=asyncio.Semaphore(0))
+def test_a_replayed_job_is_not_inspected_again(service, dataset):
+    """An inspection may take two minutes; a client that lost the response repeats its request earlier."""
+    order, state = spec(dataset, rows="0:100"), service.app.state.islands
+    first = service.submit({"Idempotency-Key": "inspected"}, **order)
+    service.app.state.islands = replace(state, inspection_slots=asyncio.Semaphore(0))
     try:
         again = service.client.post(
-            "/v1/jobs", json=order, headers={"Idempotency-Key": "looked into"}, timeout=3.0
+            "/v1/jobs", json=order, headers={"Idempotency-Key": "inspected"}, timeout=3.0
         )
     finally:
-        service.app.state.islands = doors
+        service.app.state.islands = state
     assert (again.status_code, again.headers["idempotent-replayed"]) == (202, "true")
     assert again.json() == first.json()

@@ -1,0 +1,93 @@
+/** Convergence of a search: the error of each island by generation, and the best error of each model size. */
+
+import { getJson } from "../lib/api.js";
+import { el } from "../lib/dom.js";
+import { poll } from "../lib/polling.js";
+import { COLOURS, makeLineChart } from "./chart.js";
+
+/** Maximum number of points kept; beyond it every other point is dropped. A screen shows no more. */
+const MAX_POINTS = 4000;
+
+/** Seconds between two requests for the history without an event of the job. */
+const REFRESH_SECONDS = 600;
+
+/** Convert a mean squared error of the service to an RMS error in the unit of the output. */
+const toRms = (error) => (Number.isFinite(error) ? Math.sqrt(error) : null);
+
+/** Make one series per island, plus the best and the worst if there are more islands than colours. */
+export function makeIslandSeries(points) {
+  const islands = points.at(-1)?.islands.length ?? 0;
+  const series = Array.from({ length: islands }, (_, island) => ({
+    name: `island ${island + 1}`,
+    points: points.map((point) => [point.generation, toRms(point.islands[island])]),
+    faint: islands > COLOURS,
+  }));
+  if (islands <= COLOURS) return series;
+  const makeEnvelope = (name, select) => ({
+    name: `${name} of ${islands} islands`,
+    points: points.map(({ generation, islands: errors }) => {
+      const finite = errors.filter(Number.isFinite);
+      return [generation, finite.length ? toRms(finite.reduce((a, b) => select(a, b))) : null];
+    }),
+  });
+  return [...series, makeEnvelope("best", Math.min), makeEnvelope("worst", Math.max)];
+}
+
+/** Make the series of the best error of each model size at the end of a history. */
+export function makeSizeSeries(points) {
+  const best = Object.entries(points.at(-1)?.best ?? {}).map(([size, error]) => [Number(size), toRms(error)]);
+  return [{ name: "best so far", points: best.sort(([a], [b]) => a - b) }];
+}
+
+/** Return every other point and the last one. */
+export const halve = (points) => points.filter((_, at) => at % 2 === 0 || at === points.length - 1);
+
+/** Make the panel of a job; `advance(job)` loads the history up to the generation of the job. */
+export function makeConvergencePanel(id, unit, signal) {
+  const label = unit ? `RMS error / ${unit}` : "RMS error";
+  const islands = makeLineChart({
+    title: "Error of each island",
+    x: { label: "generation", integer: true },
+    y: { label, log: true },
+  });
+  const sizes = makeLineChart({
+    title: "Best error by number of terms",
+    x: { label: "terms", integer: true },
+    y: { label, log: true },
+    marks: true,
+  });
+  const placeholder = el("p", { class: "soft" }, "There are no data before the first generation.");
+  let points = [];
+  let targetGeneration = -1;
+  let loadNow = null;
+
+  async function load() {
+    while ((points.at(-1)?.generation ?? -1) < targetGeneration && !signal.aborted) {
+      const after = points.at(-1)?.generation ?? -1;
+      const { items } = await getJson(`v1/jobs/${encodeURIComponent(id)}/history?after=${after}`, { signal });
+      if (items.length === 0) break;
+      points = points.concat(items);
+      while (points.length > MAX_POINTS) points = halve(points);
+      placeholder.hidden = true;
+      islands.draw(makeIslandSeries(points));
+      sizes.draw(makeSizeSeries(points));
+    }
+    return REFRESH_SECONDS;
+  }
+
+  return {
+    node: el(
+      "section",
+      { class: "card" },
+      el("h2", {}, "Convergence of the search"),
+      placeholder,
+      el("div", { class: "convergence" }, islands.node, sizes.node),
+    ),
+    advance(job) {
+      targetGeneration = job.progress?.generation ?? -1;
+      if (targetGeneration < 0) return;
+      if (loadNow === null) loadNow = poll(load, signal);
+      else loadNow();
+    },
+  };
+}

@@ -1,0 +1,124 @@
+/** Panels of the data set and the settings of a job. */
+
+import { Problem, getJson } from "../lib/api.js";
+import { el, makeFacts, makeScrollable, makeTable } from "../lib/dom.js";
+import { formatBytes, formatCount, formatNumber, formatShort } from "../lib/numbers.js";
+import { poll } from "../lib/polling.js";
+
+const STATISTICS = ["Minimum", "Maximum", "Mean", "Std. deviation"];
+
+function makeColumnTable({ preview }, spec) {
+  const hasRemarks = preview.columns.some((column) => column.problem);
+  const role = (name) => {
+    if (name === preview.time) return "time";
+    if (name === spec.output) return "output";
+    // `u_V+1` is the column `u_V` advanced by one sample.
+    const includesColumn = (names = []) =>
+      names.some((each) => each === name || each.replace(/\+\d+$/, "") === name);
+    if (includesColumn(spec.inputs ?? [spec.input])) return "input";
+    if (includesColumn(spec.channels)) return "channel";
+    return spec.simulation?.column === name ? "simulation" : "";
+  };
+  return makeTable(
+    "Columns of the data set",
+    [
+      ...["Column", "Unit", "Role"],
+      ...STATISTICS.map((name) => [name, "figure"]),
+      ...(hasRemarks ? ["Remark"] : []),
+    ],
+    preview.columns.map((column) => [
+      el("code", {}, column.name),
+      column.unit,
+      role(column.name),
+      formatNumber(column.minimum),
+      formatNumber(column.maximum),
+      formatNumber(column.mean),
+      formatNumber(column.deviation),
+      ...(hasRemarks ? [column.problem] : []),
+    ]),
+  );
+}
+
+function describeDataset(dataset, spec) {
+  const { preview } = dataset;
+  return [
+    makeFacts([
+      ["File", dataset.name],
+      ["Size", formatBytes(dataset.bytes)],
+      ["Samples", formatCount(preview.samples)],
+      ["Sampling time", preview.dt === null ? null : `${formatShort(preview.dt)} s`],
+    ]),
+    ...preview.warnings.map((warning) => el("p", { class: "complaint" }, warning)),
+    makeScrollable("Columns of the data set", makeColumnTable(dataset, spec)),
+  ];
+}
+
+/** Make the panel of a data set; `onUnitKnown(unit)` receives the unit of the output. */
+export function makeDatasetPanel(spec, onUnitKnown, signal) {
+  const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
+  poll(async () => {
+    try {
+      const dataset = await getJson(`v1/datasets/${encodeURIComponent(spec.dataset)}`, { signal });
+      body.replaceChildren(...describeDataset(dataset, spec));
+      onUnitKnown(dataset.preview.columns.find((column) => column.name === spec.output)?.unit ?? "");
+    } catch (error) {
+      if (!(error instanceof Problem) || error.status !== 404) throw error;
+      body.replaceChildren(el("p", { class: "soft" }, "The data set has been deleted."));
+      onUnitKnown("");
+    }
+    return Infinity;
+  }, signal);
+  return el("section", { class: "card" }, el("h2", {}, "Data set"), body);
+}
+
+function formatValidation({ validation: value }) {
+  if (value === undefined) return "default";
+  if (typeof value === "number") return `the last ${formatShort(100 * value)} %`;
+  return [`data set ${value.dataset}`, value.rows && `rows ${value.rows}`].filter(Boolean).join(", ");
+}
+
+/** Format the kind and the parameters of a simulation. */
+function formatSimulation({ kind, name, column, ...options }) {
+  const parameters = Object.entries(options.parameters ?? {}).map(
+    ([each, value]) => `${each} = ${formatShort(value)}`,
+  );
+  return [kind, name ?? column, parameters.join(", ")].filter(Boolean).join(": ");
+}
+
+/** List the settings that only a discrepancy job has. */
+const listDiagnosisFacts = ({ simulation, channels = [], tolerance = {} }) => [
+  ["Simulation", formatSimulation(simulation)],
+  ["Channels", channels.join(", ")],
+  ...Object.entries(tolerance).map(([name, value]) => [
+    `Tolerance of ${name}`,
+    `${formatShort(100 * value)} %`,
+  ]),
+];
+
+/** List the settings that only an identification has. */
+const listSearchFacts = (spec) => [
+  ["Preset", spec.preset ?? "default"],
+  ["Validated on", formatValidation(spec)],
+];
+
+/** Make the panel of the settings of a job. Settings that are not given have the default of the service. */
+export function makeSettingsPanel(spec) {
+  const changed = Object.entries(spec.settings ?? {}).map(([name, value]) => [
+    el("code", {}, name),
+    Array.isArray(value) ? value.join(", ") : String(value),
+  ]);
+  return el(
+    "section",
+    { class: "card" },
+    el("h2", {}, "Settings"),
+    makeFacts([
+      ["Inputs", (spec.inputs ?? [spec.input]).join(", ")],
+      ["Output", spec.output],
+      ...(spec.simulation ? listDiagnosisFacts(spec) : listSearchFacts(spec)),
+      ["Seed", String(spec.seed ?? "default")],
+      ["Rows", spec.rows],
+      ["Sampling time", spec.dt ? `${formatShort(spec.dt)} s` : null],
+      ...changed,
+    ]),
+  );
+}

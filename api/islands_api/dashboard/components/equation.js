@@ -1,0 +1,45 @@
+/** Equations: the MathML of the service, copied element by element so that only mathematics is inserted. */
+
+import { getText } from "../lib/api.js";
+
+const MATHML = "http://www.w3.org/1998/Math/MathML";
+
+/** Allowed elements and attributes: none that could load, run or style anything. */
+const ELEMENTS = new Set([
+  ...["math", "mrow", "mi", "mn", "mo", "mtext", "mspace", "mfrac", "msqrt", "mroot"],
+  ...["msup", "msub", "msubsup", "mover", "munder", "munderover", "mtable", "mtr", "mtd"],
+]);
+const ATTRIBUTES = new Set(["display", "form", "stretchy", "mathvariant", "lspace", "rspace", "width"]);
+
+/**
+ * Copy a MathML element into this document.
+ * @throws {Error} if it contains an element that is not allowed
+ */
+function copyMath(source) {
+  if (!ELEMENTS.has(source.localName)) throw new Error(`<${source.localName}> is not allowed in MathML`);
+  const node = document.createElementNS(MATHML, source.localName);
+  for (const { name, value } of source.attributes) if (ATTRIBUTES.has(name)) node.setAttribute(name, value);
+  for (const child of source.childNodes) {
+    if (child.nodeType === Node.ELEMENT_NODE) node.append(copyMath(child));
+    else if (child.nodeType === Node.TEXT_NODE) node.append(child.data);
+  }
+  return node;
+}
+
+/**
+ * Parse an equation.
+ * @throws {Error} if it is not MathML
+ */
+export function parseMath(source) {
+  // Without its namespace it is plain XML, which the browser neither styles nor runs.
+  const plain = source.replace(/\sxmlns="[^"]*"/, "");
+  const parsed = new DOMParser().parseFromString(plain, "application/xml");
+  if (parsed.querySelector("parsererror") || parsed.documentElement.localName !== "math")
+    throw new Error("the equation is not MathML");
+  return copyMath(parsed.documentElement);
+}
+
+/** Load the equation of a model. */
+export async function loadEquation(model, signal) {
+  return parseMath(await getText(`${model}/export?format=mathml`, { signal }));
+}

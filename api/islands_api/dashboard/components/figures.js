@@ -1,0 +1,60 @@
+/** Figures drawn by the service, loaded one at a time when they scroll into view. */
+
+import { getBlob } from "../lib/api.js";
+import { el } from "../lib/dom.js";
+
+const TITLES = {
+  "free-run": "Free run",
+  loop: "Hysteresis loop",
+  hold: "Held input",
+  residuals: "Residual correlations",
+  record: "Record",
+  front: "Error against number of terms",
+  convergence: "Convergence",
+  islands: "Islands",
+};
+
+/** Distance below the viewport at which a figure is loaded. */
+const PRELOAD_MARGIN = "150px";
+
+// The first request for a figure of a model draws all of them: parallel requests would only use connections.
+let lastTask = Promise.resolve();
+
+function enqueue(task) {
+  const result = lastTask.then(task);
+  lastTask = result.catch(() => {});
+  return result;
+}
+
+/** Make the figure at a path. */
+export function makeFigure(path, name, signal) {
+  const title = TITLES[name] ?? name;
+  const link = el("a", { class: "small", hidden: true, download: `${name}.svg` }, "SVG");
+  const paper = el("div", { class: "paper" });
+  const node = el("figure", { class: "rendered" }, el("figcaption", {}, el("h4", {}, title), link), paper);
+
+  async function load() {
+    paper.replaceChildren(el("p", { class: "drawing", role: "status" }, "Drawing…"));
+    try {
+      const image = await enqueue(() => getBlob(`${path}/${name}.svg`, { signal }));
+      const url = URL.createObjectURL(image);
+      signal.addEventListener("abort", () => URL.revokeObjectURL(url), { once: true });
+      link.href = url;
+      link.hidden = false;
+      paper.replaceChildren(el("img", { src: url, alt: `${title}, drawn by the service` }));
+    } catch (error) {
+      if (signal.aborted) return;
+      const retry = el("button", { type: "button", on: { click: load } }, "Try again");
+      paper.replaceChildren(el("p", { class: "complaint" }, error.message), retry);
+    }
+  }
+
+  const observer = new IntersectionObserver((entries) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    observer.disconnect();
+    load();
+  }, { rootMargin: PRELOAD_MARGIN });
+  observer.observe(node);
+  signal.addEventListener("abort", () => observer.disconnect(), { once: true });
+  return node;
+}

@@ -1,0 +1,55 @@
+/** State and progress of a job, for the list of jobs and the page of a job. */
+
+import { el, setText } from "../lib/dom.js";
+import { formatCount } from "../lib/numbers.js";
+import { formatVerdict, isDiagnosis } from "./diagnosis.js";
+
+export const STATES = ["queued", "running", "succeeded", "failed", "cancelled"];
+
+/** Return whether a job has ended; only a resumption can change it then. */
+export const isEnded = (job) => ["succeeded", "failed", "cancelled"].includes(job.state);
+
+/** Return the state of a job for display. */
+export const getState = (job) => (job.cancel_requested && !isEnded(job) ? "cancelling" : job.state);
+
+/** Return the name of a job. */
+export const getName = (job) => job.name || `Job ${job.id.slice(0, 8)}`;
+
+/** Make a badge with the state; `show(job)` updates it. */
+export function makeBadge() {
+  const node = el("span", { class: "state" });
+  return {
+    node,
+    show(job) {
+      node.className = `state ${getState(job)}`;
+      setText(node, getState(job));
+    },
+  };
+}
+
+function formatProgress(job) {
+  if (isDiagnosis(job) && job.summary) return formatVerdict(job.summary);
+  const { phase, note, generation, generations } = job.progress ?? {};
+  if (job.state === "queued" && generation === undefined) return "waiting";
+  if (generation === undefined) return note ?? phase ?? "";
+  const at = `${formatCount(generation)} / ${formatCount(generations)}`;
+  return job.state === "queued" ? `waiting to resume at ${at}` : at;
+}
+
+/** Make a progress bar with a text. It is full if a search succeeded, even before its last generation. */
+export function makeProgressBar() {
+  const bar = el("progress", { max: "1", value: "0", "aria-label": "Progress" });
+  const text = el("span", { class: "progress-text" });
+  return {
+    node: el("div", { class: "progress" }, bar, text),
+    show(job) {
+      const { generation = 0, generations = 1 } = job.progress ?? {};
+      bar.value = job.state === "succeeded" ? 1 : generation / Math.max(1, generations);
+      // The duration of a diagnosis is unknown.
+      if (isDiagnosis(job) && job.state === "running") bar.removeAttribute("value");
+      bar.className = getState(job);
+      text.classList.toggle("long", isDiagnosis(job));
+      setText(text, formatProgress(job));
+    },
+  };
+}

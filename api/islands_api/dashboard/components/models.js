@@ -1,0 +1,226 @@
+/** Models of a succeeded job: metrics, equation, figures and exports. */
+
+import { download, getJson } from "../lib/api.js";
+import { el, makeFacts, makeScrollable, makeTable, runOnceAtATime } from "../lib/dom.js";
+import { NONE, formatNumber, formatPercent, formatShort } from "../lib/numbers.js";
+import { poll } from "../lib/polling.js";
+import { showProblem } from "./banner.js";
+import { loadEquation } from "./equation.js";
+import { makeFigure } from "./figures.js";
+
+/** Display names of the export formats. */
+const EXPORTS = {
+  python: "Python",
+  c: "C",
+  matlab: "MATLAB",
+  latex: "LaTeX",
+  mathml: "MathML",
+  plain: "Text",
+  json: "JSON",
+};
+
+const PARTS = ["estimation", "validation"];
+
+/** Make an element with a formatted number; its value and title have the full precision. */
+function makeExactValue(value, format) {
+  if (typeof value !== "number") return NONE;
+  return el("data", { value: String(value), title: String(value) }, format(value));
+}
+
+const formatR2 = (value) =>
+  Math.abs(value) < 100 ? value.toFixed(5).replace("-", "−") : formatNumber(value);
+
+/** Make a metric of the free run, or the outcome (for example "diverged") if there is no value. */
+function makeMetric(model, part, name, format) {
+  const value = model.metrics[part].free_run[name];
+  const outcome = model.outcomes[part].free_run;
+  if (value === null && outcome !== "ok") return el("span", { class: "no" }, outcome);
+  return makeExactValue(value, format);
+}
+
+const HEADINGS = [
+  ...["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val."],
+  ...["Hold drift %", "Property 1", "Residuals"],
+];
+
+const makeVerdict = (passed, positive, negative) =>
+  el("span", { class: passed ? "yes" : "no" }, passed ? positive : negative);
+
+function makeRow(job, model) {
+  const { rank, physics, residual_tests: residuals } = model;
+  const drift = physics.hold_drift_percent;
+  const passed = residuals.tests.filter((test) => test.passed).length;
+  return [
+    el("a", { href: `#/jobs/${job}/models/${rank}`, "aria-label": `Model ${rank}` }, String(rank)),
+    String(model.size),
+    ...PARTS.flatMap((part) => [
+      makeMetric(model, part, "mape", formatNumber),
+      makeMetric(model, part, "r2", formatR2),
+    ]),
+    drift === null ? el("span", { class: "no" }, "diverged") : makeExactValue(drift, formatNumber),
+    makeVerdict(physics.property_1, "holds", "fails"),
+    makeVerdict(residuals.passed, "pass", `${passed} of ${residuals.tests.length}`),
+  ];
+}
+
+function makeModelTable(job, models) {
+  const headings = HEADINGS.map((name, at) => [name, at === 0 ? null : "figure"]);
+  const rows = models.map((model) => makeRow(job, model));
+  const modelTable = makeTable("Models, best on the validation data first", headings, rows);
+  modelTable.classList.add("models");
+  return modelTable;
+}
+
+function makeTermTable(model) {
+  return makeTable(
+    "Terms of the model",
+    ["Regressor", ["Parameter", "figure"], ["Standard error", "figure"]],
+    model.terms.map((term) => [
+      el("code", {}, term.regressor),
+      makeExactValue(term.parameter, (value) => formatNumber(value, 6)),
+      makeExactValue(term.standard_error, formatNumber),
+    ]),
+  );
+}
+
+/** Format the name of a residual test in the notation of the literature. */
+const formatTestName = (name) => name.replaceAll("xi", "ξ").replaceAll("2", "²").replaceAll("_", " ");
+
+function makeResidualTable({ residual_tests: { tests } }) {
+  return makeTable(
+    "Residual tests",
+    ["Correlation", ["Inside its limits", "figure"], ["Largest", "figure"], ["Limit", "figure"], "Verdict"],
+    tests.map((test) => [
+      formatTestName(test.name) + (test.input === null ? "" : `, input ${test.input + 1}`),
+      formatPercent(test.inside_percent),
+      formatNumber(test.largest),
+      formatNumber(test.limit),
+      test.note || makeVerdict(test.passed, "pass", "fail"),
+    ]),
+  );
+}
+
+const formatTarget = (target) => (typeof target === "number" ? `, target ${formatShort(target)}` : "");
+
+const listClusterSum = ({ cluster, sum: value, target }) => [
+  `Sum of cluster ${cluster}`,
+  `${formatShort(value)}${formatTarget(target)}`,
+];
+
+const listExcursion = ({ name, bounded, range_percent: range }) => [
+  `Range, ${name}`,
+  bounded ? formatPercent(range) : el("span", { class: "no" }, "diverges"),
+];
+
+function makeExportButtons(path, rank) {
+  const save = (form) =>
+    runOnceAtATime(() => download(`${path}/export?format=${form}`, `model-${rank}.txt`).catch(showProblem));
+  return Object.entries(EXPORTS).map(([form, name]) =>
+    el("button", { type: "button", "data-format": form, on: { click: save(form) } }, name));
+}
+
+function makeEquation(path, model, signal) {
+  const host = makeScrollable("Equation", el("code", { class: "plain" }, model.equation));
+  host.classList.add("equation");
+  loadEquation(path, signal).then(
+    (math) => host.replaceChildren(math),
+    // The plain text of the equation stays visible.
+    (error) => signal.aborted || showProblem(error),
+  );
+  return host;
+}
+
+function makeGallery(path, signal, skip = () => false) {
+  const host = el("div", { class: "gallery" });
+  poll(async () => {
+    const { items } = await getJson(`${path}/figures`, { signal });
+    const names = items.filter((name) => !skip(name));
+    host.replaceChildren(...names.map((name) => makeFigure(`${path}/figures`, name, signal)));
+    return Infinity;
+  }, signal);
+  return host;
+}
+
+function makeDetail(job, model, signal) {
+  const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
+  const { physics, information } = model;
+  return [
+    el("h3", { id: "model" }, `Model ${model.rank}`),
+    makeEquation(path, model, signal),
+    el(
+      "div",
+      { class: "row exports", role: "group", "aria-label": "Export the model as" },
+      el("span", { class: "soft", "aria-hidden": "true" }, "Export as"),
+      makeExportButtons(path, model.rank),
+    ),
+    el(
+      "div",
+      { class: "pair" },
+      el("div", {}, el("h4", {}, "Terms"), makeScrollable("Terms", makeTermTable(model))),
+      el(
+        "div",
+        {},
+        el("h4", {}, "Residual tests"),
+        makeScrollable("Residual tests", makeResidualTable(model)),
+      ),
+    ),
+    makeFacts([
+      ...physics.clusters.map(listClusterSum),
+      ...physics.excursions.map(listExcursion),
+      ["AIC", formatNumber(information.aic, 6)],
+      ["BIC", formatNumber(information.bic, 6)],
+    ]),
+    makeGallery(path, signal),
+  ];
+}
+
+/** Make the figures of the whole search, loaded when the section is opened. */
+function makeSearchFigures(job, islands, signal) {
+  const path = `v1/jobs/${encodeURIComponent(job)}`;
+  const title = el("summary", {}, "Figures of the search: record, Pareto front, convergence");
+  const node = el("details", { class: "search" }, title);
+  // The figure that compares islands needs at least two.
+  const open = () => node.append(makeGallery(path, signal, (name) => name === "islands" && islands < 2));
+  node.addEventListener("toggle", open, { once: true });
+  return node;
+}
+
+/** Make the panel of the models; `select(rank)` shows the details of a model, of the best one for null. */
+export function makeModelsPanel(job, rank, signal) {
+  const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
+  const article = el("article", { class: "model", "aria-labelledby": "model" });
+  let models = [];
+  let controller = new AbortController();
+
+  function select(newRank) {
+    rank = newRank;
+    const model = models.find((each) => each.rank === (newRank ?? 1)) ?? models[0];
+    if (!model || String(model.rank) === article.dataset.rank) return;
+    controller.abort();
+    controller = new AbortController();
+    article.dataset.rank = model.rank;
+    article.replaceChildren(...makeDetail(job.id, model, AbortSignal.any([signal, controller.signal])));
+    for (const link of body.querySelectorAll("table.models a")) {
+      const current = link.textContent === String(model.rank);
+      link.closest("tr").classList.toggle("current", current);
+      if (current) link.setAttribute("aria-current", "true");
+      else link.removeAttribute("aria-current");
+    }
+  }
+
+  poll(async () => {
+    models = (await getJson(`v1/jobs/${encodeURIComponent(job.id)}/models`, { signal })).items;
+    const note = el(
+      "p",
+      { class: "soft small" },
+      "Errors are those of the free run. The models are ranked by the validation data, so these errors are "
+        + "not an independent test.",
+    );
+    const overview = makeScrollable("Models", makeModelTable(job.id, models));
+    const islands = job.progress?.islands?.length ?? 0;
+    body.replaceChildren(overview, note, article, makeSearchFigures(job.id, islands, signal));
+    select(rank);
+    return Infinity;
+  }, signal);
+  return { node: el("section", { class: "card" }, el("h2", {}, "Models"), body), select };
+}

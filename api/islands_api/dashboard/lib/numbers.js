@@ -1,0 +1,61 @@
+/** Number formatting: significant digits, thin spaces, units of time and size. */
+
+export const NONE = "–";
+
+const SUPERSCRIPTS = { "-": "⁻", ...[..."⁰¹²³⁴⁵⁶⁷⁸⁹"] };
+
+/** Format a number with a number of significant digits; a dash if it is not finite. */
+export function formatNumber(value, digits = 3) {
+  if (typeof value !== "number" || !Number.isFinite(value)) return NONE;
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  let text;
+  if (size < 1e-3 || size >= 1e6) {
+    const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+    text = `${mantissa}×10${[...String(Number(exponent))].map((sign) => SUPERSCRIPTS[sign]).join("")}`;
+  } else {
+    text = size >= 10 ** digits ? value.toFixed(0) : value.toPrecision(digits);
+  }
+  return text.replace("-", "−");
+}
+
+/** Format a number without trailing zeros: `4`, `0.5`, `1×10⁻⁶`. */
+export function formatShort(value) {
+  const text = formatNumber(value, 12);
+  const [mantissa, exponent] = text.split("×");
+  const trimmed = mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa;
+  return exponent === undefined ? trimmed : `${trimmed}×${exponent}`;
+}
+
+/** Format a count with thousands separators. */
+export const formatCount = (value) =>
+  Number.isFinite(value) ? Math.round(value).toLocaleString("en").replaceAll(",", "\u202f") : NONE;
+
+/** Format a value in per cent. */
+export const formatPercent = (value, digits = 3) =>
+  Number.isFinite(value) ? `${formatNumber(value, digits)} %` : NONE;
+
+const UNITS = [
+  [86400, "d"],
+  [3600, "h"],
+  [60, "min"],
+  [1, "s"],
+];
+
+/** Format a duration with its two largest units: `2 h 5 min`. */
+export function formatDuration(seconds) {
+  if (!Number.isFinite(seconds)) return NONE;
+  if (seconds < 10) return `${Math.max(0, seconds).toFixed(1)} s`;
+  const rounded = Math.round(seconds);
+  const at = UNITS.findIndex(([size]) => rounded >= size);
+  const [[size, unit], [minor, minorUnit] = [1, ""]] = UNITS.slice(at, at + 2);
+  const rest = Math.floor((rounded % size) / minor);
+  const first = `${Math.floor(rounded / size)} ${unit}`;
+  return rest && minorUnit ? `${first} ${rest} ${minorUnit}` : first;
+}
+
+/** Format the size of a file. */
+export function formatBytes(value) {
+  const exponent = Math.min(3, Math.max(0, Math.floor(Math.log10(value || 1) / 3)));
+  return `${formatNumber(value / 1000 ** exponent)} ${["B", "kB", "MB", "GB"][exponent]}`;
+}

@@ -1,0 +1,109 @@
+/** Polling of the service, and following the events of a job. */
+
+import { clearBanner, showProblem } from "../components/banner.js";
+import { isEnded } from "../components/job_state.js";
+import { Problem, Unavailable, makeBackoff, sendRequest, sleep, streamEvents } from "./api.js";
+
+/** Seconds between two requests for a job that has ended, because another client may resume it. */
+const ENDED_POLL_SECONDS = 5;
+
+/** Minimum number of seconds until the next attempt after a problem. */
+const PROBLEM_RETRY_SECONDS = 5;
+
+function waitUntilVisible(signal) {
+  return new Promise((resolve) => {
+    const check = () => {
+      if (document.hidden && !signal.aborted) return;
+      document.removeEventListener("visibilitychange", check);
+      signal.removeEventListener("abort", check);
+      resolve();
+    };
+    document.addEventListener("visibilitychange", check);
+    signal.addEventListener("abort", check);
+    check();
+  });
+}
+
+/**
+ * Repeat a task until the signal aborts. The task returns the seconds until its next run, or Infinity to end.
+ * Hidden pages are not polled. Return a function that runs the task immediately.
+ */
+export function poll(task, signal) {
+  const backoff = makeBackoff();
+  let wake = new AbortController();
+  async function runOnce() {
+    try {
+      const seconds = await task();
+      backoff.reset();
+      clearBanner("poll");
+      return seconds;
+    } catch (error) {
+      if (signal.aborted || error.status === 401) return Infinity;
+      if (error instanceof Unavailable) return backoff.next();
+      showProblem(error, "poll");
+      if (error instanceof Problem) return Math.max(PROBLEM_RETRY_SECONDS, error.wait);
+      throw error;
+    }
+  }
+  async function run() {
+    for (;;) {
+      const seconds = await runOnce();
+      if (seconds === Infinity) return;
+      await sleep(seconds, AbortSignal.any([signal, wake.signal]));
+      wake = new AbortController();
+      await waitUntilVisible(signal);
+      if (signal.aborted) return;
+    }
+  }
+  run();
+  signal.addEventListener("abort", () => clearBanner("poll"), { once: true });
+  return () => wake.abort();
+}
+
+/**
+ * Follow a job: call `show(job)` at each change, and `lost(problem)` if the job does not exist.
+ * Return a function that takes a newer state of the job, received as the response to another request.
+ */
+export function followJob(id, { show, lost }, signal) {
+  const path = `v1/jobs/${encodeURIComponent(id)}`;
+  let current = null;
+
+  function update(job) {
+    if (current !== null && job.version < current.version) return;
+    current = job;
+    show(job);
+  }
+
+  async function check() {
+    const headers = current === null ? {} : { "If-None-Match": `"${current.version}"` };
+    const response = await sendRequest(path, { headers, signal });
+    if (response.status !== 304) update(await response.json());
+  }
+
+  async function followUntilEnd() {
+    // Progress events contain only a part of a job: load the whole job first, and after each change of state.
+    await check();
+    if (isEnded(current)) return ENDED_POLL_SECONDS;
+    for await (const event of streamEvents(`${path}/events`, current.version, signal)) {
+      if (event.kind === "progress") update({ ...current, version: event.id, progress: event.data });
+      else await check();
+      if (isEnded(current)) break;
+    }
+    return 0;
+  }
+
+  const wake = poll(async () => {
+    try {
+      return await followUntilEnd();
+    } catch (error) {
+      if (error.status !== 404) throw error;
+      lost(error);
+      return Infinity;
+    }
+  }, signal);
+
+  return (job) => {
+    update(job);
+    wake();
+  };
+}

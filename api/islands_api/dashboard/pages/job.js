@@ -1,0 +1,194 @@
+/** Page of a job: state, convergence, result, data set, settings and actions. */
+
+import { clearBanner, showProblem } from "../components/banner.js";
+import { askConfirmation } from "../components/confirm.js";
+import { makeConvergencePanel } from "../components/convergence.js";
+import { makeDatasetPanel, makeSettingsPanel } from "../components/dataset.js";
+import { isDiagnosis, makeFindingsPanel } from "../components/diagnosis.js";
+import { getName, getState, isEnded, makeBadge, makeProgressBar } from "../components/job_state.js";
+import { makeModelsPanel } from "../components/models.js";
+import { download, getJson, sendRequest } from "../lib/api.js";
+import { formatUtc, makeAge } from "../lib/clock.js";
+import { announce, el, makeFacts, runOnceAtATime, setText } from "../lib/dom.js";
+import { formatCount, formatDuration, formatNumber } from "../lib/numbers.js";
+import { followJob } from "../lib/polling.js";
+
+const getPath = (id) => `v1/jobs/${encodeURIComponent(id)}`;
+
+async function deleteJob(job) {
+  const contents = isDiagnosis(job) ? "findings and report" : "models, figures and history";
+  const text = `${getName(job)} is deleted with its ${contents}. This cannot be undone.`;
+  if (!(await askConfirmation("Delete this job?", text, "Delete it"))) return null;
+  await sendRequest(getPath(job.id), { method: "DELETE" });
+  location.hash = "#/jobs";
+  return null;
+}
+
+/** Actions on a job: name, condition and function, which returns the changed job or null. */
+const ACTIONS = [
+  {
+    name: "Cancel",
+    when: (job) => !isEnded(job) && !job.cancel_requested,
+    act: (job) => getJson(`${getPath(job.id)}/cancel`, { method: "POST" }),
+  },
+  {
+    name: "Resume",
+    when: (job) => ["failed", "cancelled"].includes(job.state),
+    act: (job) => getJson(`${getPath(job.id)}/resume`, { method: "POST" }),
+  },
+  {
+    name: "Save the result",
+    when: (job) => job.state === "succeeded",
+    act: (job) => download(`${getPath(job.id)}/result`, `result-${job.id.slice(0, 8)}.json`).then(() => null),
+  },
+  { name: "Delete", danger: true, when: isEnded, act: deleteJob },
+];
+
+/** Make the buttons; `updateJob(job)` receives the job that an action has changed. */
+function makeActions(updateJob, heading) {
+  let job = null;
+  const makeHandler = ({ act }) =>
+    runOnceAtATime(async () => {
+      clearBanner("problem");
+      try {
+        const changed = await act(job);
+        if (changed !== null) updateJob(changed);
+      } catch (error) {
+        showProblem(error);
+      }
+    });
+  const buttons = ACTIONS.map((action) =>
+    el(
+      "button",
+      {
+        type: "button",
+        hidden: true,
+        class: action.danger ? "danger" : null,
+        on: { click: makeHandler(action) },
+      },
+      action.name,
+    ),
+  );
+  return {
+    node: el("div", { class: "row actions" }, buttons),
+    show(newJob) {
+      job = newJob;
+      buttons.forEach((button, at) => {
+        const hadFocus = button === document.activeElement;
+        button.hidden = !ACTIONS[at].when(job);
+        if (hadFocus && button.hidden) heading.focus({ preventScroll: true });
+      });
+    },
+  };
+}
+
+const getSeconds = (job) => (Date.parse(job.finished ?? job.updated) - Date.parse(job.started)) / 1000;
+
+function makeJobFacts(job, unit) {
+  const progress = job.progress ?? {};
+  const { best_error: best, seconds_left: left, evaluations_per_second: rate } = progress;
+  const running = job.state === "running";
+  const bestError = Number.isFinite(best)
+    ? el("data", { value: best }, `${formatNumber(best)} ${unit}`)
+    : null;
+  return makeFacts([
+    ["Best error", bestError],
+    ["Evaluations", progress.evaluations === undefined ? null : formatCount(progress.evaluations)],
+    ["Per second", running && rate ? formatCount(rate) : null],
+    ["Time left", running && Number.isFinite(left) ? `about ${formatDuration(left)}` : null],
+    ["Duration", job.finished && job.started ? formatDuration(getSeconds(job)) : null],
+    ["Stopped by", job.summary?.ended_by],
+    ["Attempt", job.attempt > 1 ? String(job.attempt) : null],
+    ["Priority", job.priority ? String(job.priority) : null],
+    ["Submitted", makeAge(job.created)],
+    ["Started", job.started && formatUtc(job.started)],
+    ["Finished", job.finished && formatUtc(job.finished)],
+  ]);
+}
+
+function makeFailureCard(job) {
+  if (job.state !== "failed" || !job.problem) return null;
+  const { title, detail } = job.problem;
+  const heading = el("h2", {}, title ?? "The job failed");
+  return el("section", { class: "card failure" }, heading, el("p", {}, detail ?? ""));
+}
+
+/** Show a job in a host until the signal aborts; `update({rank})` shows another model. */
+export function mountJob(host, { id, rank }, signal) {
+  const heading = el("h1", { tabindex: "-1" }, "Job");
+  const state = makeBadge();
+  const bar = makeProgressBar();
+  const factsHost = el("div");
+  const failureHost = el("div");
+  const [convergenceHost, modelsHost, aboutHost] = [el("div"), el("div"), el("div", { class: "about" })];
+  const titleBar = el(
+    "div",
+    { class: "heading" },
+    el("div", { class: "title" }, heading, state.node),
+    el("code", { class: "soft small" }, id),
+  );
+  let [current, unit, convergence, models] = [null, "", null, null];
+
+  function build(job) {
+    const onUnitKnown = (value) => {
+      unit = value;
+      if (isDiagnosis(job)) return;
+      convergence = makeConvergencePanel(id, unit, signal);
+      convergenceHost.replaceChildren(convergence.node);
+      if (current) show(current);
+    };
+    aboutHost.replaceChildren(makeSettingsPanel(job.spec), makeDatasetPanel(job.spec, onUnitKnown, signal));
+    host.replaceChildren(
+      el("a", { class: "back", href: "#/jobs" }, "← Jobs"),
+      titleBar,
+      buttons.node,
+      el("section", { class: "card status", "aria-label": "Progress" }, bar.node, factsHost),
+      failureHost,
+      convergenceHost,
+      modelsHost,
+      aboutHost,
+    );
+  }
+
+  function show(job) {
+    if (current === null) build(job);
+    else if (getState(job) !== getState(current)) announce(`${getName(job)}: ${getState(job)}`);
+    current = job;
+    document.title = `${getName(job)} · islands`;
+    setText(heading, getName(job));
+    state.show(job);
+    bar.show(job);
+    buttons.show(job);
+    factsHost.replaceChildren(makeJobFacts(job, unit));
+    failureHost.replaceChildren(...[makeFailureCard(job)].filter(Boolean));
+    convergence?.advance(job);
+    if (isDiagnosis(job)) {
+      // Not replaced if present: a button in it may have the focus.
+      const succeeded = job.state === "succeeded";
+      if (succeeded !== modelsHost.hasChildNodes())
+        modelsHost.replaceChildren(...(succeeded ? [makeFindingsPanel(job)] : []));
+    } else if (job.state === "succeeded" && models === null) {
+      models = makeModelsPanel(job, rank, signal);
+      modelsHost.replaceChildren(models.node);
+    }
+  }
+
+  function lost(problem) {
+    document.title = "No such job · islands";
+    host.replaceChildren(
+      el("h1", { tabindex: "-1" }, "There is no such job"),
+      el("p", {}, problem.message),
+      el("p", {}, el("a", { href: "#/jobs" }, "Show all jobs")),
+    );
+  }
+
+  const updateJob = followJob(id, { show, lost }, signal);
+  const buttons = makeActions(updateJob, heading);
+  host.replaceChildren(el("p", { class: "loading" }, "Loading…"));
+  return {
+    update(details) {
+      rank = details.rank;
+      models?.select(rank);
+    },
+  };
+}
