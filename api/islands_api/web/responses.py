@@ -1,4 +1,4 @@
-"""From what the store knows to what goes over the wire, by hand: some ask a thousand times a second."""
+"""JSON documents of jobs and data sets, written by hand for speed: clients poll jobs very often."""
 
 import json
 from datetime import UTC, datetime
@@ -12,7 +12,7 @@ from islands_service.store.datasets import StoredDataset
 
 
 def job_document(job: Job) -> dict[str, Any]:
-    """Return a job as it goes over the wire: `islands_api.schemas.JobView`."""
+    """Convert a job to a document with the fields of `islands_api.schemas.JobView`."""
     return {
         "id": job.id,
         "kind": job.kind,
@@ -22,10 +22,10 @@ def job_document(job: Job) -> dict[str, Any]:
         "version": job.version,
         "attempt": job.attempt,
         "cancel_requested": job.cancel_requested,
-        "created": _time(job.created),
-        "updated": _time(job.updated),
-        "started": _time(job.started),
-        "finished": _time(job.finished),
+        "created": _format_time(job.created),
+        "updated": _format_time(job.updated),
+        "started": _format_time(job.started),
+        "finished": _format_time(job.finished),
         "spec": job.spec,
         "progress": job.progress,
         "summary": job.summary,
@@ -34,50 +34,53 @@ def job_document(job: Job) -> dict[str, Any]:
 
 
 def dataset_document(dataset: StoredDataset) -> dict[str, Any]:
-    """Return a data set as it goes over the wire: `islands_api.schemas.DatasetView`."""
+    """Convert a data set to a document with the fields of `islands_api.schemas.DatasetView`."""
     return {
         "id": dataset.id,
         "name": dataset.name,
         "sha256": dataset.blob,
         "bytes": dataset.bytes,
-        "created": _time(dataset.created),
+        "created": _format_time(dataset.created),
         "preview": dataset.preview,
     }
 
 
 class JSONDocument(JSONResponse):
-    """An answer that is made by hand."""
+    """JSON response without validation by a schema."""
 
     def render(self, content: Any) -> bytes:
-        """Write it as JSON."""
+        """Serialise the document."""
         return json_text(content).encode()
 
 
 class JSONItems(JSONDocument):
-    """A list of things, perhaps long: made in a thread, it lets others go on between two of them."""
+    """JSON response with a long list of items.
+
+    The items are serialised one by one, so that other threads can run in between.
+    """
 
     def render(self, content: Any) -> bytes:
-        """Write it as JSON."""
-        return b'{"items":[' + b",".join(json_text(each).encode() for each in content) + b"]}"
+        """Serialise the items."""
+        return b'{"items":[' + b",".join(json_text(item).encode() for item in content) + b"]}"
 
 
 def json_text(content: Any) -> str:
-    """Write JSON; a number that JSON does not have, such as an infinite error, is null."""
+    """Serialise to JSON; NaN and infinity, for example an infinite error, become null."""
     try:
         return json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     except ValueError:
-        return json_text(_finite(content))
+        return json_text(_replace_nonfinite(content))
 
 
-def _finite(content: Any) -> Any:
+def _replace_nonfinite(content: Any) -> Any:
     if isinstance(content, dict):
-        return {name: _finite(value) for name, value in content.items()}
+        return {name: _replace_nonfinite(value) for name, value in content.items()}
     if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
+        return [_replace_nonfinite(value) for value in content]
     return None if isinstance(content, float) and not isfinite(content) else content
 
 
-def _time(seconds: float | None) -> str | None:
+def _format_time(seconds: float | None) -> str | None:
     if seconds is None:
         return None
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
