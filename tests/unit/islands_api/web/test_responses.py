@@ -3,6 +3,7 @@
 import json
 import math
 import time
+from datetime import datetime
 
 import pytest
 from hypothesis import given
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from islands_api.schemas import DatasetView, JobRequest, JobView
 from islands_api.web.responses import JSONDocument, dataset_document, job_document, json_text
-from islands_service.domain.job import ProgressReport
+from islands_service.domain.job import Job, JobState, ProgressReport
 from support.service import kept, queued
 
 FLOATS = st.recursive(
@@ -49,6 +50,34 @@ def test_a_job_document_has_the_fields_of_its_schema(service):
     view = JobView.model_validate(document)
     assert view.created.timestamp() == pytest.approx(time.time(), abs=60)
     assert {**document, "created": None, "updated": None} == {**dict(view), "created": None, "updated": None}
+
+
+def test_a_job_document_with_all_values_round_trips_through_its_schema():
+    job = Job(
+        id="a",
+        owner="me",
+        kind="identification",
+        name="piezo",
+        spec={"dataset": "b"},
+        priority=-3,
+        state=JobState.FAILED,
+        version=9,
+        attempt=2,
+        cancel_requested=True,
+        progress={"generation": 7},
+        checkpoint="c",
+        summary={"equation": "y(k) = 0"},
+        problem={"title": "failed"},
+        created=1.5,
+        updated=4.125,
+        started=2.25,
+        finished=4.0,
+    )
+    view = JobView.model_validate_json(json_text(job_document(job)))
+    assert view.model_extra == {}
+    for field in JobView.model_fields:
+        value = getattr(view, field)
+        assert (value.timestamp() if isinstance(value, datetime) else value) == getattr(job, field)
 
 
 def test_a_data_set_document_has_the_fields_of_its_schema(service):
