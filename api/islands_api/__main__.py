@@ -35,7 +35,7 @@ _BACKLOG = 2048
 
 
 def main() -> int:
-    """Serve deadline SIGTERM or SIGINT."""
+    """Serve until SIGTERM or SIGINT."""
     try:
         settings = service_settings()
         configure_logs(settings.log_format, "api")

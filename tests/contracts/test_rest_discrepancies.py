@@ -260,15 +260,15 @@ def test_the_events_of_a_diagnosis_show_its_phases(finished):
 
 
 @pytest.mark.parametrize(
-    "of",
+    "resource",
     [
         *("/models", "/models/1", "/models/1/export", "/models/1/figures", "/models/1/figures/loop.svg"),
         *("/models/1/simulation", "/figures", "/figures/record.svg", "/history"),
     ],
 )
-def test_resources_of_a_search_do_not_exist_for_a_diagnosis(finished, of):
+def test_resources_of_a_search_do_not_exist_for_a_diagnosis(finished, resource):
     service, job = finished
-    detail = problem_of(service.client.get(f"/v1/jobs/{job}{of}"), 404, "not-found")
+    detail = problem_of(service.client.get(f"/v1/jobs/{job}{resource}"), 404, "not-found")
     assert f"job {job} is of the kind discrepancy, but only jobs of the kind identification" in detail
     assert "/report" in detail
 
@@ -291,8 +291,8 @@ def test_results_of_a_running_diagnosis_are_not_ready(service, order):
     job = submit_diagnosis(service, **order).json()["id"]
     lease = service.store.leases.claim("test", LONG)
     service.store.leases.report(lease, ProgressReport({"phase": "residual analysis"}))
-    for of in ("/result", "/report", "/extended"):
-        detail = problem_of(service.client.get(f"/v1/jobs/{job}{of}"), 409, "not-finished")
+    for resource in ("/result", "/report", "/extended"):
+        detail = problem_of(service.client.get(f"/v1/jobs/{job}{resource}"), 409, "not-finished")
         assert "wait until it has succeeded" in detail
     assert "islands_leases 1.0" in service.client.get("/metrics").text
 

@@ -203,21 +203,21 @@ ALLOWED = {
 
 
 @pytest.mark.parametrize("state", JobState)
-@pytest.mark.parametrize("ask", ALLOWED)
-def test_actions_are_allowed_only_in_certain_states(service, ask, state):
+@pytest.mark.parametrize("action", ALLOWED)
+def test_actions_are_allowed_only_in_certain_states(service, action, state):
     path = f"/v1/jobs/{make_job_in_state(service, state)}"
     before = service.client.get(path).json()
-    answer = service.client.delete(path) if ask == "delete" else service.client.post(f"{path}/{ask}")
-    if state not in ALLOWED[ask]:
+    answer = service.client.delete(path) if action == "delete" else service.client.post(f"{path}/{action}")
+    if state not in ALLOWED[action]:
         assert f"job {before['id']} is {state}: " in problem_of(answer, 409, "wrong-state")
         assert service.client.get(path).json() == before
-    elif ask == "delete":
+    elif action == "delete":
         assert (answer.status_code, answer.content) == (204, b"")
         problem_of(service.client.get(path), 404, "no-such-job")
     else:
-        assert (answer.status_code, answer.json()["state"]) == (202, ALLOWED[ask][state])
+        assert (answer.status_code, answer.json()["state"]) == (202, ALLOWED[action][state])
         assert answer.json() == service.client.get(path).json()
-        assert answer.json()["cancel_requested"] == (ask == "cancel")
+        assert answer.json()["cancel_requested"] == (action == "cancel")
 
 
 def test_cancelling_a_job_twice_is_allowed(service):

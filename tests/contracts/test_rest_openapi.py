@@ -227,12 +227,12 @@ def test_an_unknown_figure_is_not_drawn(service, finished, path):
 
 @pytest.mark.nightly
 def test_every_figure_is_drawn_once_and_stored(service, document, finished):
-    for of in ("", "/models/1"):
-        names = service.client.get(f"/v1/jobs/{finished}{of}/figures").json()["items"]
+    for resource in ("", "/models/1"):
+        names = service.client.get(f"/v1/jobs/{finished}{resource}/figures").json()["items"]
         assert len(names) == 4
         for name in names:
             answer = check_response(
-                document, service.client.get(f"/v1/jobs/{finished}{of}/figures/{name}.svg")
+                document, service.client.get(f"/v1/jobs/{finished}{resource}/figures/{name}.svg")
             )
             assert ET.fromstring(answer.text).tag.endswith("svg")
             assert answer.headers["cache-control"] == "private, max-age=86400, immutable"

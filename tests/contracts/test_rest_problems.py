@@ -160,7 +160,7 @@ def test_a_defect_shows_a_request_id_and_nothing_else(service, method, path):
 
 
 def test_an_unknown_commit_is_not_reported_as_failed(service):
-    """A client that believes that it failed would repeat the request and create a duplicate."""
+    """A client that takes it for a failure would repeat the request and create a duplicate."""
     answer = service.client.post("/doubt")
     detail = problem_of(answer, 504, "store-in-doubt")
     assert CommitUnknownError.__doc__ in detail

@@ -50,9 +50,9 @@ def test_requests_from_the_dashboard_are_accepted(service):
     assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
-@pytest.mark.parametrize("asks", ["GET", "POST", "DELETE"])
-def test_preflight_requests_for_other_sites_are_rejected(service, asks):
-    headers = {"Origin": "https://evil.example", "Access-Control-Request-Method": asks}
+@pytest.mark.parametrize("requested_method", ["GET", "POST", "DELETE"])
+def test_preflight_requests_for_other_sites_are_rejected(service, requested_method):
+    headers = {"Origin": "https://evil.example", "Access-Control-Request-Method": requested_method}
     answer = service.client.options("/v1/jobs", headers=headers)
     problem_of(answer, 403, "cross-origin")
     assert not [name for name in answer.headers if name.startswith("access-control")]

@@ -54,21 +54,21 @@ class KeyCache:
 
     def __init__(self, state: AppState) -> None:
         self._state = state
-        self._found: dict[str, tuple[float, Key | None]] = {}
+        self._cache: dict[str, tuple[float, Key | None]] = {}
 
     async def find(self, secret: str) -> Key | None:
         """Return the key of a secret, or None if there is none."""
         now = monotonic()
-        at, key = self._found.get(secret, (-KEY_CACHE_SECONDS, None))
-        if now - at >= KEY_CACHE_SECONDS:
+        cached_at, key = self._cache.get(secret, (-KEY_CACHE_SECONDS, None))
+        if now - cached_at >= KEY_CACHE_SECONDS:
             key = await self._state.run_blocking(self._state.store.keys.find, secret)
             if key is not None:
-                self._found = {
+                self._cache = {
                     cached: entry
-                    for cached, entry in self._found.items()
+                    for cached, entry in self._cache.items()
                     if now - entry[0] < KEY_CACHE_SECONDS
                 }
-                self._found[secret] = now, key
+                self._cache[secret] = now, key
         return key
 
     async def is_still_valid(self, caller: Principal) -> bool:

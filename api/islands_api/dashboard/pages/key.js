@@ -32,7 +32,7 @@ export function mountKeyForm(host, problem, onAccepted) {
       await sendRequest("v1/jobs?limit=1");
       onAccepted();
     } catch (error) {
-      // The service may reject the key, for example because it lacks the scope `read`.
+      // Forget a key that the service rejects, also one that only lacks the scope `read`.
       if (!(error instanceof Unavailable)) key.forget();
       setText(complaint, error.message);
       submit.disabled = false;

@@ -86,14 +86,14 @@ class FigureFailures:
     """Recent failures of figure processes: repeated attempts would delay the figures of other jobs."""
 
     def __init__(self) -> None:
-        self._check_figure: dict[tuple[str, int | None], tuple[float, IslandsError]] = {}
+        self._failures: dict[tuple[str, int | None], tuple[float, IslandsError]] = {}
 
     def remember(self, job: str, rank: int | None, error: IslandsError) -> None:
         """Store the error of a failed attempt."""
-        self._check_figure.pop((job, rank), None)
-        if len(self._check_figure) == _MAX_FAILURES:
-            del self._check_figure[next(iter(self._check_figure))]
-        self._check_figure[job, rank] = monotonic() + _FAILURE_SECONDS, error
+        self._failures.pop((job, rank), None)
+        if len(self._failures) == _MAX_FAILURES:
+            del self._failures[next(iter(self._failures))]
+        self._failures[job, rank] = monotonic() + _FAILURE_SECONDS, error
 
     def refuse(self, job: str, rank: int | None) -> None:
         """Raise the error of a recent failed attempt, if there is one.
@@ -102,7 +102,7 @@ class FigureFailures:
         ------
         FigureError, BlobNotFoundError
         """
-        until, error = self._check_figure.get((job, rank), (0.0, None))
+        until, error = self._failures.get((job, rank), (0.0, None))
         if error is not None and monotonic() < until:
             raise type(error)(*error.args)
 
