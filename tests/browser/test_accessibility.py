@@ -31,7 +31,7 @@ def places(desk: Service) -> dict[str, str]:
         store.leases.finish(taken(store, cancelled), JobOutcome(JobState.CANCELLED))
         advance(store, taken(store, running), 0, 212, islands=8)
     desk.submit(500, name="queued")
-    return {"list": "#/jobs", "nothing": "#/jobs?state=succeeded", "failed": failed, "running": running}
+    return {"list": "#/jobs", "empty": "#/jobs?state=succeeded", "failed": failed, "running": running}
 
 
 def opened(screen: Screen, place: str) -> Any:
@@ -43,7 +43,7 @@ def opened(screen: Screen, place: str) -> Any:
     return page
 
 
-@pytest.mark.parametrize("name", ["list", "nothing", "failed", "running"])
+@pytest.mark.parametrize("name", ["list", "empty", "failed", "running"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "height"), SIZES)
 def test_every_page_fits_and_has_sufficient_contrast(
