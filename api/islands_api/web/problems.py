@@ -1,7 +1,6 @@
 """Errors of the web service, and the table that maps each error to an HTTP problem (RFC 9457).
 
-To add an error, add an entry to `PROBLEMS`. Its type is documented in docs/how-to/use-the-rest-api.md and never
-changes.
+To add an error, add an entry to `PROBLEMS`. Its type never changes; docs/how-to/use-the-rest-api.md lists it.
 """
 
 from collections.abc import Mapping
