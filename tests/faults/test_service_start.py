@@ -61,7 +61,7 @@ def test_address_reachable_by_others_needs_a_key(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     said = refused("--data-dir", folder, "--host", "0.0.0.0", "--port", free_port())
     assert "0.0.0.0 can be reached by other machines, and there is no key" in said
-    assert "make one with 'islands keys create --scope read --scope write'" in said
+    assert "create one with 'islands keys create --scope read --scope write'" in said
     secret = succeed("keys", "create", "--scope", "read", "--data-dir", folder).split()[0]
     with serving(folder, "--host", "0.0.0.0", environment=API_ONLY) as service:
         assert service.client.get("/v1/jobs").status_code == 401
@@ -77,7 +77,7 @@ def test_api_without_a_valid_key_starts_when_a_key_is_created(tmp_path: Path) ->
         succeed("keys", "revoke", key, "--data-dir", folder)
         kill(service.one("api"))
         eventually(lambda: "api ended (2): it is started again" in service.log.read_text())
-        assert "there is no key: make one" in " ".join(service.log.read_text().split())
+        assert "there is no key: create one" in " ".join(service.log.read_text().split())
         succeed("keys", "create", "--scope", "read", "--data-dir", folder)
         service.ready()
 
