@@ -222,7 +222,7 @@ def test_a_discrepancy_job_says_what_was_submitted(client: Any, me: Any) -> None
     for call in (client.report, client.extended, client.result):
         with pytest.raises(ServiceError, match="wait until it has succeeded"):
             call(again)
-    with pytest.raises(ServiceError, match="only those of the kind identification"):
+    with pytest.raises(ServiceError, match="only jobs of the kind identification"):
         client.models(again)
 
 

@@ -41,12 +41,12 @@ def file_limit() -> Iterator[int]:
 
 
 def test_the_doors_open_as_many_files_as_they_may(file_limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doors, "_FILES", 300)
+    monkeypatch.setattr(doors, "_MAX_OPEN_FILES", 300)
     doors.raise_file_limit()
     assert resource.getrlimit(resource.RLIMIT_NOFILE) == (300, file_limit)
-    monkeypatch.setattr(doors, "_FILES", 200)  # never less than before
+    monkeypatch.setattr(doors, "_MAX_OPEN_FILES", 200)  # never less than before
     doors.raise_file_limit()
     assert resource.getrlimit(resource.RLIMIT_NOFILE) == (300, file_limit)
-    monkeypatch.setattr(doors, "_FILES", 10**12)
+    monkeypatch.setattr(doors, "_MAX_OPEN_FILES", 10**12)
     doors.raise_file_limit()
     assert file_limit == resource.RLIM_INFINITY or resource.getrlimit(resource.RLIMIT_NOFILE)[0] == file_limit
