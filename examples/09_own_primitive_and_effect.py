@@ -34,11 +34,11 @@ def soften(a):
 soft = islands.primitive("soften", soften, parity=-1, c="return a / (1.0 + fabs(a));")
 
 # %%
-# `parse` reads an expression with the built-in primitives and yours, and `model_of` makes a model from
+# `parse` reads an expression with the built-in primitives and yours, and `make_model` makes a model from
 # terms.
 table = islands.PRIMITIVES | {"soften": soft}
 terms = [("y(k-1)", 0.9), ("soften(u(k-1))", 0.5)]
-model = islands.model_of(((islands.parse(text, table), value) for text, value in terms), dt=0.1)
+model = islands.make_model(((islands.parse(text, table), value) for text, value in terms), dt=0.1)
 
 # %%
 # Simulate it on a record. A free run reads the output in the first sample only (one per lag), so the rest

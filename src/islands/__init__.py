@@ -31,7 +31,7 @@ _PUBLIC = {
     "facade.result": ("FittedModel", "Result", "simulate"),
     "io.models": ("read_model", "write_model"),
     "io.records": ("read_record", "write_record"),
-    "model.model": ("Model", "model_of"),
+    "model.model": ("Model", "make_model"),
     "model.parsing": ("parse",),
     "model.primitives": ("PRIMITIVES", "primitive"),
 }

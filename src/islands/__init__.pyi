@@ -29,7 +29,7 @@ from islands.io.models import write_model as write_model
 from islands.io.records import read_record as read_record
 from islands.io.records import write_record as write_record
 from islands.model.model import Model as Model
-from islands.model.model import model_of as model_of
+from islands.model.model import make_model as make_model
 from islands.model.parsing import parse as parse
 from islands.model.primitives import PRIMITIVES as PRIMITIVES
 from islands.model.primitives import primitive as primitive

@@ -10,7 +10,7 @@ from islands.estimation.least_squares import least_squares
 from islands.estimation.parameter_constraints import CONSTRAINTS, Constraint, constraint, every_regressor
 from islands.model.clusters import OUTPUT_AT_REST, steady_state
 from islands.model.expression import Lagged
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.model.rendering import plain
@@ -102,7 +102,9 @@ def test_a_constrained_estimate_rests_where_it_is_put():
     found = CONSTRAINTS["hysteresis"].constrain(MODEL_14)
     psi = regressor_matrix([*found.regressors, Lagged(0, 0)], record, 10)
     theta = constrained_least_squares(psi[:-1], psi[-1], found.S, found.c).theta
-    chosen = model_of((item.expression, float(weight)) for item, weight in zip(MODEL_14, theta, strict=True))
+    chosen = make_model(
+        (item.expression, float(weight)) for item, weight in zip(MODEL_14, theta, strict=True)
+    )
     for level in (-2.0, 0.0, 3.0):
         held = free_run(chosen, Dataset(np.full(200, 1.5), np.full(200, level), 0.1)).y[10:]
         np.testing.assert_allclose(held, level, rtol=0, atol=1e-9)

@@ -245,13 +245,13 @@ def test_latex_never_puts_an_exponent_on_an_exponent_or_a_fraction(expression):
 DETERMINED = """
 from islands.model.clusters import clusters
 from islands.model.expression import Lagged, content, lags
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.equations import equation, latex_equation
 from islands.model.parsing import parse
 from islands.model.rendering import at_rest
 terms = ["max(y(k-3), u2(k-1))*tanh(u1(k-2))", "u1(k-1)*sign(u1(k-1) - u1(k-4))^3", "y(k-1)", "3", "u2(k-7)",
          "exp(phi1(u1(k-1), u1(k-2)))*y(k-2)", "sin(y(k-1) + 2*u2(k-3) - u1(k-1)*u2(k-1))", "2*y(k-9)"]
-model = model_of([(parse(text), 0.5) for text in terms], ("u1", "u2"))
+model = make_model([(parse(text), 0.5) for text in terms], ("u1", "u2"))
 print(equation(model)); print(latex_equation(model))
 for found in clusters(model.regressors):
     print(at_rest(found.steady_state, 2), found.members, found.weights)

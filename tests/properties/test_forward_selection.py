@@ -244,7 +244,9 @@ def test_a_warm_up_leaves_the_rows_before_it_out():
     y = hysteresis(u, 0.0, 1)
     y[:50] = np.random.default_rng(1).normal(size=50)
     data = Dataset(u, y, 0.1)
-    terms = islands.model_of([(islands.parse(text), value) for text, value in HYSTERESIS.items()]).regressors
+    terms = islands.make_model(
+        [(islands.parse(text), value) for text, value in HYSTERESIS.items()]
+    ).regressors
     assert estimate(terms, data).residual_variance > 1e-3
     assert estimate(terms, data, warm_up=53).residual_variance < 1e-25
 
@@ -258,7 +260,7 @@ def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
     names = ["y(k-1)", "u(k-1) - u(k-2)", "u(k-1)", "u(k-2)", "1", "u(k-3)", "u(k-3)^2", "y(k-1)*u(k-1)"]
     if verdict is Status.OK:
         names = ["y(k-1)", "u(k-1) - u(k-2)", "y(k-1)*u(k-1)"]
-    terms = islands.model_of([(islands.parse(text), 1.0) for text in names]).regressors
+    terms = islands.make_model([(islands.parse(text), 1.0) for text in names]).regressors
     found = estimate(terms, measured(samples=samples), constraints)
     if verdict is Status.OK:
         assert texts(found.model.regressors) == ["y(k-1)", "u(k-1) - u(k-2)"]
@@ -268,5 +270,5 @@ def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
 
 
 def test_a_structure_without_y_cannot_be_estimated_under_the_constraint():
-    terms = islands.model_of([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
+    terms = islands.make_model([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
     assert estimate(terms, measured(), "hysteresis").verdict is Status.INFEASIBLE

@@ -16,7 +16,7 @@ from islands.data.dataset import Dataset, join
 from islands.errors import RecordError
 from islands.kernels.summation import total
 from islands.model.expression import value
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.simulation.layout import WIDTHS, layout
 from islands.simulation.linked import LinkedModel
@@ -27,7 +27,7 @@ def model(inputs=1, **terms):
     """Make a model of ``name="parameter * text"`` terms; the names only tell them apart."""
     split = (term.split(" * ", 1) for term in terms.values())
     names = ("u",) if inputs == 1 else tuple(f"u{index + 1}" for index in range(inputs))
-    return model_of([(parse(text), float(parameter)) for parameter, text in split], names)
+    return make_model([(parse(text), float(parameter)) for parameter, text in split], names)
 
 
 #: Stable models of every kind that the kernel treats in its own way.

@@ -41,7 +41,7 @@ def record(inputs=1, seed=0):
 
 
 def model(terms, names=("u",), primitives=PRIMITIVES):
-    return islands.model_of(
+    return islands.make_model(
         [(islands.parse(text, primitives), value) for text, value in terms.items()], names
     )
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from islands.data.dataset import Dataset
 from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.model.expression import Apply, Constant, Lagged, Shift, value
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.primitives import ADD, MUL, PRIMITIVES
 from islands.model.regressor import regressor
 
@@ -94,7 +94,7 @@ def models(draw, inputs=INPUTS, most=5):
     """Models with parameters."""
     terms = draw(st.lists(st.tuples(regressors(inputs, 2), grid), min_size=1, max_size=most))
     names = ("u",) if inputs == 1 else tuple(f"u{index + 1}" for index in range(inputs))
-    return model_of([(item.expression, theta) for item, theta in terms], names)
+    return make_model([(item.expression, theta) for item, theta in terms], names)
 
 
 @st.composite

@@ -1,1 +1,4 @@
-"""The algebra of models: primitives, expressions, regressors, clusters, models and their text."""
+"""Expressions, regressors and NARX models, and their text (plain, LaTeX, MathML).
+
+Read `expression` first, then `regressor` and `model`.
+"""

@@ -1,6 +1,6 @@
-"""The table of candidate libraries for forward selection: what a structure may be made of.
+"""Table of candidate libraries for forward selection.
 
-A library turns (degree, lags, inputs) into regressors. Add one here and it can be chosen by name.
+A library maps (degree, lags, inputs) to candidate regressors. An entry of `LIBRARIES` can be chosen by name.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,25 +14,26 @@ from islands.model.model import canonical_order
 from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import Regressor, regressor
 
-#: A Gram matrix of this many candidates takes 128 MB; more is a job for evolution.
-MOST_CANDIDATES = 4000
+#: Maximum number of candidates of a library; their Gram matrix takes 128 MB. Use evolution for more.
+MAX_CANDIDATES = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class Library:
-    """A family of candidate regressors and the settings that suit it.
+    """A family of candidate regressors and its default settings.
 
     Attributes
     ----------
     build : callable
         ``build(degree, lags, inputs)`` returns the expressions, in any order.
     count : callable
-        ``count(degree, lags, inputs)`` returns how many they are, before any is made.
+        ``count(degree, lags, inputs)`` returns the number of expressions without building them.
     degree, lags : int
-        Defaults.
+        Default degree and default maximum lag in samples.
     constraints : str
-        The parameter constraint that usually goes with it.
+        Default parameter constraint.
     description : str
+        One-line description.
     """
 
     build: Callable[[int, int, int], list[Expression]]
@@ -44,24 +45,24 @@ class Library:
 
 
 def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regressor, ...]:
-    """Return a library's regressors in the order of their content.
+    """Return the regressors of a library in canonical order.
 
     Raises
     ------
     SettingsError
-        The library is unknown, a setting is out of range, or there would be too many candidates.
+        The library is unknown, a setting is out of range, or the library has more than `MAX_CANDIDATES`.
     """
     if degree < 1 or lags < 1:
-        raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
+        raise SettingsError(f"degree and lags must be at least 1, got {degree} and {lags}")
     library = library_named(name)
     count = library.count(degree, lags, inputs)
-    if count > MOST_CANDIDATES:
+    if count > MAX_CANDIDATES:
         raise SettingsError(
-            f"{count} candidates are more than a library may have ({MOST_CANDIDATES}): take a smaller degree "
-            "or fewer lags, or let evolution search"
+            f"{count} candidates exceed the limit of a library ({MAX_CANDIDATES}): use a smaller degree "
+            "or fewer lags, or search by evolution"
         )
-    made = (regressor(expression)[1] for expression in library.build(degree, lags, inputs))
-    return tuple(canonical_order(item for item in made if item))
+    regressors = (regressor(expression)[1] for expression in library.build(degree, lags, inputs))
+    return tuple(canonical_order(item for item in regressors if item))
 
 
 def library_named(name: str) -> Library:
@@ -70,13 +71,13 @@ def library_named(name: str) -> Library:
     Raises
     ------
     SettingsError
-        There is none of that name.
+        No library has that name.
     """
     return lookup(LIBRARIES, name, "library")
 
 
 def full_set(degree: int, output_lags: int, input_lags: int, inputs: int = 1) -> int:
-    """Return how many candidate terms a full polynomial set has, the constant included: equation (5)."""
+    """Return the number of terms of a full polynomial set, including the constant: equation (5)."""
     candidates = term = 1
     for power in range(1, degree + 1):
         term = term * (output_lags + inputs * input_lags + power - 1) // power
@@ -85,7 +86,7 @@ def full_set(degree: int, output_lags: int, input_lags: int, inputs: int = 1) ->
 
 
 def polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
-    """Return every monomial up to ``degree`` in all lagged signals, and the constant: equation (1)."""
+    """Return all monomials up to ``degree`` in the lagged signals, including the constant: equation (1)."""
     signals = [Lagged(channel, lag) for channel in range(inputs + 1) for lag in range(1, lags + 1)]
     return [_product(*factors) for factors in _monomials(signals, degree)]
 
@@ -93,16 +94,16 @@ def polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
 def phi_polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
     """Return the terms of rate-independent hysteresis, a part of equation (9).
 
-    They are y(k-1), and the products of one increment phi1 of an input, at most one direction phi2 of it,
-    and a monomial in y(k-1) and the inputs u(k-1), together of ``degree``, a direction not counted. First
-    differences alone are taken, down to lag ``lags``. Levels have lag 1 only: where the input is slow their
-    lags are interchangeable, and a difference of outputs would be chosen for its one-step-ahead fit and
-    diverge in a free run.
+    The terms are y(k-1) and products of one increment phi1 of an input, at most one direction phi2 of the
+    same input, and a monomial in y(k-1) and the inputs u(k-1). The total degree, not counting the direction,
+    is at most ``degree``. Increments are first differences down to lag ``lags``. Levels have lag 1 only. If
+    the input is slow, the lags of a level are interchangeable, and the selection would choose a difference
+    of outputs for its one-step-ahead fit; such a model diverges in a free run.
     """
     if lags < 2:
-        raise SettingsError("phi-polynomial needs lags of at least 2: a first difference reads two samples")
+        raise SettingsError("phi-polynomial needs lags of at least 2: a first difference uses two samples")
     levels = [Lagged(channel, 1) for channel in range(inputs + 1)]
-    made: list[Expression] = [Lagged(0, 1)]
+    terms: list[Expression] = [Lagged(0, 1)]
     for channel in range(1, inputs + 1):
         steps = [(Lagged(channel, lag), Lagged(channel, lag + 1)) for lag in range(1, lags)]
         directions: list[tuple[Expression, ...]] = [
@@ -110,12 +111,12 @@ def phi_polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
             *((Apply(PRIMITIVES["phi2"], step),) for step in steps),
         ]
         heads = [(Apply(PRIMITIVES["phi1"], step), *sign) for step in steps for sign in directions]
-        made += [_product(*head, *level) for head in heads for level in _monomials(levels, degree - 1)]
-    return made
+        terms += [_product(*head, *level) for head in heads for level in _monomials(levels, degree - 1)]
+    return terms
 
 
 def _count_phi_polynomial(degree: int, lags: int, inputs: int) -> int:
-    # Any of lags - 1 steps, with no direction or any of theirs, before every monomial of the levels.
+    # Each of lags - 1 increments, with no direction or one of lags - 1, times each monomial of the levels.
     return 1 + inputs * (lags - 1) * lags * full_set(degree - 1, 1, 1, inputs)
 
 
@@ -124,7 +125,7 @@ def _count_polynomial(degree: int, lags: int, inputs: int) -> int:
 
 
 def _monomials(signals: list[Lagged], degree: int) -> list[tuple[Expression, ...]]:
-    """Return the factors of every monomial, those of 1 (none) first."""
+    """Return the factors of every monomial; the constant (no factors) comes first."""
     return [
         factors for power in range(degree + 1) for factors in combinations_with_replacement(signals, power)
     ]

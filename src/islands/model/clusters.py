@@ -1,8 +1,9 @@
-"""Clusters: regressors that are the same function of the steady state, the paper's section 3.
+"""Clusters of regressors with the same steady state (the paper, section 3).
 
-At rest every lag of a signal has one value, ubar or ybar. A regressor with a phi factor is zero there and
-belongs to no cluster. The others are put together when their steady states are proportional: y(k-1) u(k-4)
-and y(k-6) u(k-10) both are ybar ubar. The sums of the parameters over each cluster decide the equilibria.
+In the steady state all lags of a signal have the same value, ubar or ybar. A regressor with a phi factor is
+then zero and belongs to no cluster. The others form a cluster if their steady states are proportional:
+y(k-1) u(k-4) and y(k-6) u(k-10) both become ybar ubar. The sums of the parameters over the clusters determine
+the equilibria.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from islands.model.expression import Apply, Expression, Lagged, Shift, content
 from islands.model.regressor import Regressor, canonical
 
-#: The steady state of y(k-1): its cluster is the one that Property 1 wants to sum to 1.
+#: Steady state of y(k-1). Property 1 requires that the parameters of its cluster sum to 1.
 OUTPUT_AT_REST = Lagged(0, 0)
 
 
@@ -22,11 +23,11 @@ class Cluster:
     Attributes
     ----------
     steady_state : Expression
-        Canonical, over signals of lag 0: ``Lagged(0, 0)`` is ybar.
+        Canonical expression in signals of lag 0: ``Lagged(0, 0)`` is ybar.
     members : tuple of int
         Positions of the regressors.
     weights : tuple of float
-        Each member at rest is its weight times the steady state.
+        Ratio of each member's steady state to ``steady_state``.
     """
 
     steady_state: Expression
@@ -41,17 +42,21 @@ class Cluster:
 
 
 def steady_state(regressor: Regressor) -> tuple[float, Expression]:
-    """Return (weight, expression) of a regressor at rest; the weight is 0 where a phi factor vanishes."""
-    return canonical(_at_rest(regressor.expression))
+    """Return (weight, expression) of a regressor's steady state; the weight is 0 if a phi factor vanishes."""
+    return canonical(_remove_lags(regressor.expression))
 
 
 def clusters(
     regressors: Sequence[Regressor],
     group: Callable[[Regressor], tuple[float, Expression]] = steady_state,
 ) -> tuple[Cluster, ...]:
-    """Group the regressors that do not vanish at rest; clusters stand in the order of their content.
+    """Group the regressors that do not vanish in the steady state; clusters are in canonical order.
 
-    Another ``group`` than the steady state may be given: a regressor's weight, 0 for none, and its group.
+    Parameters
+    ----------
+    regressors : sequence of Regressor
+    group : callable
+        Maps a regressor to its weight (0 if it belongs to no group) and its group.
     """
     groups: dict[Expression, list[tuple[int, float]]] = {}
     for position, regressor in enumerate(regressors):
@@ -68,13 +73,13 @@ def clusters(
     )
 
 
-def _at_rest(expression: Expression) -> Expression:
+def _remove_lags(expression: Expression) -> Expression:
     match expression:
         case Lagged(channel, _):
             return Lagged(channel, 0)
         case Shift(_, argument):
-            return _at_rest(argument)
+            return _remove_lags(argument)
         case Apply(primitive, arguments):
-            return Apply(primitive, tuple(_at_rest(argument) for argument in arguments))
+            return Apply(primitive, tuple(_remove_lags(argument) for argument in arguments))
         case _:
             return expression

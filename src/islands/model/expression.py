@@ -1,8 +1,8 @@
 """Expressions over lagged signals: the genes of evolution and the regressors of a model.
 
-An expression is a tree of four kinds of node, each a frozen value. The signals are numbered: channel 0 is the
-output y, channel i >= 1 the input u_i. A leaf on its own stands for one sample back, and a back-shift adds to
-the lags of everything under it, so ``q5(q5(u1))`` is ``u1(k-11)`` (the paper, section 5.1).
+An expression is an immutable tree with four kinds of node. Channel 0 is the output y, channel i >= 1 is the
+input u_i. A leaf has a lag of one sample by default. A back-shift adds to the lags of all leaves below it, so
+``q5(q5(u1))`` is ``u1(k-11)`` (the paper, section 5.1).
 """
 
 from collections.abc import Callable, Iterator
@@ -13,35 +13,36 @@ from islands.errors import ModelError
 
 @dataclass(frozen=True, slots=True)
 class Primitive:
-    """A function that may stand in an expression.
+    """A function for use in expressions.
 
-    A primitive is its plain Python function on floats; all else is what the algebra may assume of it. Two
-    primitives of one name are equal.
+    ``scalar`` defines the function. The other attributes declare properties for simplification and export.
+    Two primitives with the same name are equal.
 
     Attributes
     ----------
     name : str
-        As it is written in text: ``tanh``.
+        Name in plain text: ``tanh``.
     arity : int
         1 or 2.
     scalar : callable
-        ``arity`` floats to a finite float, for every finite argument ("protected"); built of arithmetic and
-        the functions of ``math``, so that it also compiles.
+        Maps ``arity`` finite floats to a finite float ("protected"). It uses only arithmetic and the
+        functions of ``math``, so that it can be compiled.
     latex : str
-        Format with ``{0}`` and ``{1}`` for the arguments.
+        Format string with ``{0}`` and ``{1}`` for the arguments.
     c, matlab : str
-        Body of a function of ``a`` (and ``b``): ``return a > b ? a : b;``, with the functions of math.h, and
-        in MATLAB ``r = max(a, b);``. Empty: a model with the primitive can't be exported there.
+        Body of a function of ``a`` (and ``b``): ``return a > b ? a : b;`` in C with the functions of math.h,
+        ``r = max(a, b);`` in MATLAB. If empty, a model with this primitive cannot be exported to that
+        language.
     parity : -1, 0 or 1
-        1: f(-x) = f(x). -1: f(-x) = -f(x). 0: neither. Unary primitives alone.
+        1: f(-x) = f(x). -1: f(-x) = -f(x). 0: neither. Only for unary primitives.
     degree : float or None
-        f(c x) = c^degree f(x) for every c > 0; None: not homogeneous. Unary primitives alone.
+        f(c x) = c^degree f(x) for every c > 0. None if not homogeneous. Only for unary primitives.
     commutative : bool
-        f(a, b) = f(b, a).
+        Whether f(a, b) = f(b, a).
     simplify : callable or None
-        The canonical arguments to an equal, simpler expression, or to None where there is none.
+        Maps the canonical arguments to an equal, simpler expression, or to None if it finds none.
     summary : str
-        Meaning in one line, for the reference.
+        One-line description for the reference.
     """
 
     name: str
@@ -59,7 +60,7 @@ class Primitive:
 
 @dataclass(frozen=True, slots=True)
 class Lagged:
-    """A signal some samples back: ``Lagged(0, 2)`` is y(k-2), ``Lagged(1, 1)`` is u1(k-1)."""
+    """A lagged signal: ``Lagged(0, 2)`` is y(k-2), ``Lagged(1, 1)`` is u1(k-1)."""
 
     channel: int
     lag: int = 1
@@ -74,27 +75,27 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """The back-shift operator: ``samples`` more on every lag of ``argument``."""
+    """The back-shift operator, which adds ``samples`` to every lag of ``argument``."""
 
     samples: int
     argument: "Expression"
     _hash: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        # Trees are looked up a million times in a search, and share their subtrees.
+        # A search looks up trees a million times, and trees share subtrees: compute the hash once.
         object.__setattr__(self, "_hash", hash((self.samples, self.argument)))
 
     def __hash__(self) -> int:
         return self._hash
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        # A hash is of one process alone.
+        # The hash is valid in this process only: do not pickle it.
         return Shift, (self.samples, self.argument)
 
 
 @dataclass(frozen=True, slots=True)
 class Apply:
-    """A primitive applied to its arguments; sums and products in canonical form take any number of them."""
+    """A primitive applied to its arguments. Canonical sums and products have any number of arguments."""
 
     primitive: Primitive
     arguments: "tuple[Expression, ...]"
@@ -114,7 +115,7 @@ Expression = Lagged | Constant | Shift | Apply
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
-    """Return the nodes directly under the root."""
+    """Return the child nodes of the root."""
     match expression:
         case Shift(_, argument):
             return (argument,)
@@ -125,7 +126,7 @@ def children(expression: Expression) -> tuple[Expression, ...]:
 
 
 def walk(expression: Expression) -> Iterator[Expression]:
-    """Yield every node, the root first, from left to right."""
+    """Yield every node in pre-order, from left to right."""
     yield expression
     for child in children(expression):
         yield from walk(child)
@@ -137,7 +138,7 @@ def height(expression: Expression) -> int:
 
 
 def unshifted(expression: Expression, samples: int = 0) -> Expression:
-    """Push every back-shift down to the leaves, ``samples`` more than written."""
+    """Replace every back-shift by larger lags at the leaves, and add ``samples`` to all lags."""
     match expression:
         case Lagged(channel, lag):
             return Lagged(channel, lag + samples)
@@ -157,12 +158,18 @@ def lags(expression: Expression) -> frozenset[tuple[int, int]]:
 
 
 def value(expression: Expression, signal: Callable[[int, int], float]) -> float:
-    """Evaluate an expression: the definition of its meaning, and the oracle of every kernel.
+    """Evaluate an expression. This is the reference implementation for the kernels.
 
     Parameters
     ----------
+    expression : Expression
     signal : callable
-        ``signal(channel, lag)`` returns the number that stands ``lag`` samples back in the channel.
+        ``signal(channel, lag)`` returns the value of the channel ``lag`` samples back.
+
+    Raises
+    ------
+    ModelError
+        The expression contains an unknown kind of node.
     """
     match expression:
         case Lagged(channel, lag):
@@ -177,11 +184,11 @@ def value(expression: Expression, signal: Callable[[int, int], float]) -> float:
             for other in values[1:]:
                 result = primitive.scalar(result, other)
             return result
-    raise ModelError(f"{expression!r} is no expression: use Lagged, Constant, Shift or Apply")
+    raise ModelError(f"{expression!r} is not an expression: use Lagged, Constant, Shift or Apply")
 
 
 def content(expression: Expression) -> tuple[object, ...]:
-    """Return a key that orders expressions by what they say, the same on every machine and in every run."""
+    """Return the key of the canonical order, which is the same on every machine and in every run."""
     match expression:
         case Lagged(channel, lag):
             return (0, channel, lag)

@@ -1,4 +1,4 @@
-"""A NARX model, linear in its parameters: y(k) = theta_1 psi_1 + theta_2 psi_2 + ... (equation (10))."""
+"""NARX model, linear in its parameters: y(k) = theta_1 psi_1 + theta_2 psi_2 + ... (equation (10))."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -10,20 +10,26 @@ from islands.model.regressor import Regressor, regressor
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """Regressors, and parameters once they are estimated.
+    """Regressors and, after estimation, their parameters.
 
     Attributes
     ----------
     regressors : tuple of Regressor
-        In the order of their content, each once.
+        In canonical order, without repetition.
     theta : tuple of float or None
-        One parameter for each; None before estimation.
+        One parameter per regressor. None before estimation.
     input_names, output_name
-        Columns of the record that the model speaks of; ``len(input_names)`` is the number of inputs.
+        Names of the columns of the record. ``len(input_names)`` is the number of inputs.
     dt : float or None
-        Sampling time in seconds that the parameters hold for; None where it does not matter.
+        Sampling time in seconds for which the parameters are valid. None if unspecified.
     standard_errors : tuple of float or None
-        Of the parameters, where they were estimated.
+        Standard errors of the parameters. None if unknown.
+
+    Raises
+    ------
+    ModelError
+        There is no regressor, the regressors are not in canonical order, the number of parameters or standard
+        errors differs from the number of regressors, or a regressor reads an input without a name.
     """
 
     regressors: tuple[Regressor, ...]
@@ -37,7 +43,7 @@ class Model:
         if not self.regressors:
             raise ModelError("a model has at least one regressor")
         if list(self.regressors) != canonical_order(self.regressors):
-            raise ModelError("a model's regressors stand in the order of their content, each once")
+            raise ModelError("a model's regressors must be in canonical order without repetition")
         for name in ("theta", "standard_errors"):
             values = getattr(self, name)
             if values is not None and len(values) != len(self.regressors):
@@ -60,17 +66,17 @@ class Model:
 
     @property
     def maximum_lag(self) -> int:
-        """Samples of history that the model needs before its first prediction."""
+        """Number of past samples that the model needs before its first prediction."""
         return max(item.maximum_lag for item in self.regressors)
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """The parameters of an estimated model.
+        """Parameters of an estimated model.
 
         Raises
         ------
         ModelError
-            They have not been estimated.
+            The parameters have not been estimated.
         """
         if self.theta is None:
             raise ModelError("the model has no parameters yet: estimate them first")
@@ -79,30 +85,31 @@ class Model:
     def with_parameters(
         self, theta: Sequence[float], standard_errors: Sequence[float] | None = None
     ) -> "Model":
-        """Return the model with parameters."""
+        """Return a copy of the model with the given parameters and standard errors."""
         errors = None if standard_errors is None else tuple(map(float, standard_errors))
         return replace(self, theta=tuple(map(float, theta)), standard_errors=errors)
 
 
 def canonical_order(regressors: Iterable[Regressor]) -> list[Regressor]:
-    """Return the regressors without repetition, in the order of their content."""
+    """Return the regressors in canonical order, without repetition."""
     return sorted(dict.fromkeys(regressors), key=lambda item: item.content)
 
 
-def model_of(
+def make_model(
     terms: Iterable[tuple[Expression, float]],
     input_names: tuple[str, ...] = ("u",),
     output_name: str = "y",
     dt: float | None = None,
 ) -> Model:
-    """Make a model of terms as they are written.
+    """Make a model from (expression, parameter) pairs.
 
-    They are brought into canonical form, factors go into the parameters, and equal regressors are merged.
+    Each expression is brought into canonical form. Numeric factors are moved into the parameters, and equal
+    regressors are merged.
 
     Raises
     ------
     ModelError
-        Nothing is left, or a term reads the present or the future.
+        No term remains, or a term reads the present or the future.
     """
     theta: dict[Regressor, float] = {}
     for expression, parameter in terms:

@@ -1,6 +1,6 @@
-"""Plain text to expressions.
+"""Parser of expressions in plain text.
 
-The text is a subset of Python's own syntax but for the caret, so Python's parser reads it.
+Except for the caret, the syntax is a subset of Python's, so Python's parser is used.
 """
 
 import ast
@@ -24,19 +24,20 @@ _OPERATORS: Mapping[type[ast.operator], str] = {
 
 
 def parse(text: str, primitives: Mapping[str, Primitive] = PRIMITIVES) -> Expression:
-    """Read an expression.
+    """Parse an expression.
 
     Parameters
     ----------
     text : str
-        As `plain` writes it.
+        Text in the format of `plain`.
     primitives : mapping
-        The functions that may stand in it, by name.
+        Allowed functions by name.
 
     Raises
     ------
     ModelError
-        It is no expression, or nested too deeply: the message shows the part that could not be read.
+        The text is not an expression, or it is nested too deeply. The message shows the part that cannot be
+        read.
     """
     try:
         tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
@@ -69,12 +70,12 @@ def _read(node: ast.expr, primitives: Mapping[str, Primitive]) -> Expression:
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             return _read_call(name, arguments, primitives)
     raise ModelError(
-        f"cannot read {ast.unparse(node)!r}: a leaf is y(k-1) or u(k-1), the rest + - * / ^ and functions"
+        f"cannot read {ast.unparse(node)!r}: use leaves y(k-1) and u(k-1), operators + - * / ^ and functions"
     )
 
 
 def _number(node: ast.Constant) -> float | None:
-    """Return a finite number, or None: True is no number, and 1e999 is none either."""
+    """Return a finite number. Return None for anything else, including True and 1e999."""
     match node.value:
         case bool():
             return None
@@ -84,7 +85,7 @@ def _number(node: ast.Constant) -> float | None:
 
 
 def _chain(node: ast.expr, operator: type[ast.operator]) -> list[ast.expr]:
-    """Return the operands of a * b * c, which Python reads as (a * b) * c."""
+    """Return the operands of a * b * c, which Python parses as (a * b) * c."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, operator):
         return [*_chain(node.left, operator), node.right]
     return [node]
@@ -98,7 +99,7 @@ def _factors(node: ast.expr, primitives: Mapping[str, Primitive]) -> tuple[Expre
             return (_read(base, primitives),) * power
         case ast.BinOp(op=ast.Pow()):
             raise ModelError(
-                f"cannot read {ast.unparse(node)!r}: a power is a whole number from 1 to {LARGEST_POWER}"
+                f"cannot read {ast.unparse(node)!r}: an exponent must be an integer from 1 to {LARGEST_POWER}"
             )
     return (_read(node, primitives),)
 
@@ -110,7 +111,7 @@ def _read_call(name: str, arguments: Sequence[ast.expr], primitives: Mapping[str
     if (shift := _BACK_SHIFT.fullmatch(name)) and len(arguments) == 1:
         return Shift(int(shift[1]), _read(arguments[0], primitives))
     if name not in primitives:
-        raise ModelError(f"unknown function {name!r}: known are {', '.join(primitives)}")
+        raise ModelError(f"unknown function {name!r}: use one of {', '.join(primitives)}")
     primitive = primitives[name]
     variadic = primitive in (ADD, MUL) and len(arguments) > 1
     if len(arguments) != primitive.arity and not variadic:

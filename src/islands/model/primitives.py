@@ -1,7 +1,7 @@
-"""The table of primitives: one entry here, and a function can be evolved, compiled, written and read.
+"""Table of primitives: the functions that can be evolved, compiled, written and parsed.
 
-The paper uses multiplication, subtraction and sign (its phi1 and phi2) and the back-shifts q1 .. q5. A user's
-own joins by name with `primitive`, a plain scalar function, in a table of the caller's.
+The paper uses multiplication, subtraction and sign (its phi1 and phi2) and the back-shifts q1 .. q5. Users
+define further primitives from scalar functions with `primitive` and pass them in a separate table.
 """
 
 import inspect
@@ -15,13 +15,13 @@ from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Expression, Primitive
 from islands.model.primitive_checks import check
 
-#: Names that stand for signals, time and back-shifts in text.
+#: Names of signals, time and back-shifts in text.
 SIGNALS = re.compile(r"y|u\d*|k|q\d+")
 
-#: Below this a divisor or a logarithm's argument counts as zero.
+#: A divisor or argument of a logarithm with a smaller absolute value counts as zero.
 TINY = 1e-9
 
-#: exp is clipped at this argument, so that a free run diverges by its bound and not by an overflow.
+#: Arguments of exp are clipped here, so that the bound of a free run detects divergence before an overflow.
 LARGEST_EXPONENT = 50.0
 
 
@@ -93,14 +93,14 @@ def _smaller(a: float, b: float) -> float:
     return a if a < b else b
 
 
-# Operators of every language need no function in C and MATLAB, nor does what is written as an operator in
-# canonical form (phi1, square) or in other primitives (phi2).
+# C and MATLAB code is missing for operators, and for primitives that the canonical form replaces by operators
+# (phi1, square) or by other primitives (phi2).
 MUL = Primitive("mul", 2, _multiply, r"{0} {1}", commutative=True, summary="`a*b`")
 ADD = Primitive("add", 2, _add, r"{0} + {1}", commutative=True, summary="`a + b`")
 SUB = Primitive("sub", 2, _subtract, r"{0} - {1}", summary="`a - b`")
 
 
-def _sign_of_sign(a: Expression) -> Expression | None:
+def _simplify_sign(a: Expression) -> Expression | None:
     return a if isinstance(a, Apply) and a.primitive == SIGN else None
 
 
@@ -113,28 +113,28 @@ SIGN = Primitive(
     matlab="r = (a > 0) - (a < 0);",
     parity=-1,
     degree=0.0,
-    simplify=_sign_of_sign,
+    simplify=_simplify_sign,
     summary="-1, 0 or 1; `sign(0)` is 0, so `sign(x)^2` is not simplified to 1",
 )
 
 
-def _difference(a: Expression, b: Expression) -> Expression:
+def _replace_phi1(a: Expression, b: Expression) -> Expression:
     return Apply(SUB, (a, b))
 
 
-def _sign_of_a_difference(a: Expression, b: Expression) -> Expression:
+def _replace_phi2(a: Expression, b: Expression) -> Expression:
     return Apply(SIGN, (Apply(SUB, (a, b)),))
 
 
-def _second_power(a: Expression) -> Expression:
+def _replace_square(a: Expression) -> Expression:
     return Apply(MUL, (a, a))
 
 
-def _third_power(a: Expression) -> Expression:
+def _replace_cube(a: Expression) -> Expression:
     return Apply(MUL, (a, a, a))
 
 
-def _simpler_quotient(a: Expression, b: Expression) -> Expression | None:
+def _simplify_quotient(a: Expression, b: Expression) -> Expression | None:
     if a == b:
         return Constant(1.0)
     if isinstance(b, Constant):
@@ -142,7 +142,7 @@ def _simpler_quotient(a: Expression, b: Expression) -> Expression | None:
     return None
 
 
-def _one_of_equals(a: Expression, b: Expression) -> Expression | None:
+def _simplify_extremum(a: Expression, b: Expression) -> Expression | None:
     return a if a == b else None
 
 
@@ -151,14 +151,14 @@ _BUILT_IN = (
     SUB,
     SIGN,
     Primitive(
-        "phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=_difference, summary="`a - b`, as `sub`"
+        "phi1", 2, _subtract, r"\left({0} - {1}\right)", simplify=_replace_phi1, summary="`a - b`, as `sub`"
     ),
     Primitive(
         "phi2",
         2,
         _sign_of_difference,
         r"\operatorname{{sign}}({0} - {1})",
-        simplify=_sign_of_a_difference,
+        simplify=_replace_phi2,
         summary="`sign(a - b)`, as `sign` and `sub`",
     ),
     ADD,
@@ -169,14 +169,14 @@ _BUILT_IN = (
         r"\frac{{{0}}}{{{1}}}",
         c=f"return fabs(b) < {TINY} ? 1.0 : a / b;",
         matlab=f"if abs(b) < {TINY}, r = 1; else, r = a / b; end",
-        simplify=_simpler_quotient,
+        simplify=_simplify_quotient,
         summary=f"`a/b`; 1 if the divisor is smaller than {TINY}, so that `x/x` is 1 everywhere",
     ),
     Primitive(
         "abs", 1, _absolute, r"\left|{0}\right|", "return fabs(a);", "r = abs(a);", 1, 1.0, summary="`|a|`"
     ),
-    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=_second_power, summary="`a^2`"),
-    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=_third_power, summary="`a^3`"),
+    Primitive("square", 1, _square, r"\left({0}\right)^{{2}}", simplify=_replace_square, summary="`a^2`"),
+    Primitive("cube", 1, _cube, r"\left({0}\right)^{{3}}", simplify=_replace_cube, summary="`a^3`"),
     Primitive(
         "sqrt",
         1,
@@ -218,7 +218,7 @@ _BUILT_IN = (
         c="return a > b ? a : b;",
         matlab="if a > b, r = a; else, r = b; end",
         commutative=True,
-        simplify=_one_of_equals,
+        simplify=_simplify_extremum,
     ),
     Primitive(
         "min",
@@ -228,7 +228,7 @@ _BUILT_IN = (
         c="return a < b ? a : b;",
         matlab="if a < b, r = a; else, r = b; end",
         commutative=True,
-        simplify=_one_of_equals,
+        simplify=_simplify_extremum,
     ),
 )
 
@@ -244,39 +244,40 @@ def primitive(
     c: str = "",
     matlab: str = "",
 ) -> Primitive:
-    """Make a primitive of the user's own from a plain scalar function, and check what it declares.
+    """Make a user-defined primitive from a scalar function, and check its declared properties.
 
     Parameters
     ----------
     name : str
-        A Python identifier that no built-in primitive and no signal has.
+        A Python identifier that differs from the names of built-in primitives and signals.
     scalar : callable
-        One or two floats to a float, of arithmetic and the functions of ``math``.
+        Maps one or two floats to a float with arithmetic and the functions of ``math``.
     latex : str
-        Format with ``{0}`` and ``{1}``; made of the name where it is empty.
+        Format string with ``{0}`` and ``{1}``. If empty, it is derived from the name.
     parity : -1, 0 or 1
-        As in `Primitive`.
+        Parity as in `Primitive`.
     commutative : bool
-        As in `Primitive`.
+        Whether the arguments can be exchanged, as in `Primitive`.
     c, matlab : str
-        As in `Primitive`: needed by whoever exports models as C or as MATLAB.
+        Function bodies as in `Primitive`. Required only to export models to C or MATLAB.
 
     Raises
     ------
     ModelError
-        The name is taken, the function takes other than one or two arguments, is not finite at zero, at a
-        negative or at a large argument, or is not as it declares, or the LaTeX is no format.
+        The name is taken or invalid, the function does not take one or two arguments, it is not finite at
+        zero, a negative or a large argument, it lacks a declared property, or the LaTeX is not a format
+        string.
     """
     free = name not in PRIMITIVES and not keyword.iskeyword(name) and not SIGNALS.fullmatch(name)
     if not (free and name.isidentifier()):
         raise ModelError(
-            f"{name!r} can't name a primitive: take an identifier that is not in use and not y, u, k, q1 .."
+            f"{name!r} cannot name a primitive: use an identifier that is not in use and not y, u, k, q1 .."
         )
-    arity = _arity(name, scalar)
+    arity = _count_arguments(name, scalar)
     if arity not in (1, 2):
-        raise ModelError(f"primitive {name!r} takes {arity} arguments: a primitive takes one or two")
+        raise ModelError(f"primitive {name!r} takes {arity} arguments: a primitive must take one or two")
     upright = name.replace("_", r"\_")
-    made = Primitive(
+    entry = Primitive(
         name,
         arity,
         scalar,
@@ -286,14 +287,14 @@ def primitive(
         parity=parity,
         commutative=commutative,
     )
-    check(made)
-    return made
+    check(entry)
+    return entry
 
 
-def _arity(name: str, scalar: Callable[..., float]) -> int:
+def _count_arguments(name: str, scalar: Callable[..., float]) -> int:
     try:
         return len(inspect.signature(scalar).parameters)
     except ValueError as error:
         raise ModelError(
-            f"primitive {name!r} does not tell its arguments: wrap it in a function of one or two"
+            f"primitive {name!r} has no signature: wrap it in a function of one or two arguments"
         ) from error

@@ -1,8 +1,8 @@
-"""Canonical form: one way to write every regressor, so that equal ones are seen to be equal.
+"""Regressors and their canonical form, which makes equal regressors compare equal.
 
-Back-shifts stand at the leaves, products and sums are flat and in the order of their content, factors that
-are numbers are taken out (a regressor's own factor belongs to its parameter), equal terms of a sum are
-merged. ``sign^3`` is ``sign``, but ``sign^2`` is never 1: it is 0 where the input rests.
+In canonical form, back-shifts are merged into the leaves, products and sums are flat and in canonical order,
+numeric factors are extracted (the factor of a regressor belongs to its parameter), and equal terms of a sum
+are merged. ``sign^3`` becomes ``sign``, but ``sign^2`` never becomes 1: it is 0 while the input is constant.
 """
 
 import math
@@ -25,18 +25,18 @@ from islands.model.rendering import plain
 
 _ONE = Constant(1.0)
 
-#: A sum of weights that is a smaller share of their sizes is the rounding of zero.
+#: A sum of weights whose ratio to the sum of their absolute values is not larger counts as zero.
 _ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
 class Regressor:
-    """An expression in canonical form, that reads the past alone. Make it with `regressor`."""
+    """An expression in canonical form that reads only past samples. Make it with `regressor`."""
 
     expression: Expression = field(compare=False)
-    #: The canonical text, inputs always numbered: it says all, and a string knows its hash.
+    #: Canonical text with numbered inputs. It identifies the regressor, and a string caches its hash.
     text: str = field(init=False, repr=False)
-    #: Key that orders regressors: first the plain ones, then products, by what they say.
+    #: Key of the canonical order.
     content: tuple[object, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -50,12 +50,12 @@ class Regressor:
 
     @property
     def degree(self) -> int:
-        """How many factors stand in the product, those of a constant not counted."""
-        return len(_arguments_of(self.expression, MUL))
+        """Number of factors of a product; 1 for any other expression."""
+        return len(_get_operands(self.expression, MUL))
 
     @property
     def maximum_lag(self) -> int:
-        """The deepest lag; 0 for a constant."""
+        """Largest lag; 0 for a constant."""
         return max((lag for _, lag in self.lags), default=0)
 
 
@@ -67,18 +67,18 @@ def regressor(expression: Expression) -> tuple[float, Regressor | None]:
     factor : float
         The expression equals ``factor`` times the regressor.
     regressor : Regressor or None
-        None where the expression is identically zero; then the factor is 0.
+        None if the expression is identically zero; the factor is then 0.
 
     Raises
     ------
     ModelError
-        A lag is under 1: the regressor would look at the present or the future. Or a number overflows.
+        A lag is less than 1 (the regressor would read the present or the future), or a number overflows.
     """
     factor, core = canonical(expression)
     for channel, lag in sorted(lags(core)):
         if lag < 1:
             raise ModelError(
-                f"a regressor reads the past alone: channel {channel} has lag {lag}, take 1 or more"
+                f"a regressor must read past samples only: channel {channel} has lag {lag}, use 1 or more"
             )
     return (factor, Regressor(core)) if factor else (0.0, None)
 
@@ -92,7 +92,7 @@ def canonical(expression: Expression) -> tuple[float, Expression]:
         The numbers in the expression overflow.
     """
     factor, core = _canonical(expression)
-    return _finite(factor), core
+    return _check_finite(factor), core
 
 
 def _canonical(expression: Expression) -> tuple[float, Expression]:
@@ -118,17 +118,17 @@ def _product(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
     cores: list[Expression] = []
     for number, core in parts:
         factor *= number
-        cores.extend(_arguments_of(core, MUL))
+        cores.extend(_get_operands(core, MUL))
     if factor == 0.0:
         return 0.0, _ONE
-    cores = sorted((core for core in _even_signs_apart(cores) if core != _ONE), key=content)
+    cores = sorted((core for core in _reduce_sign_powers(cores) if core != _ONE), key=content)
     if not cores:
         return factor, _ONE
     return factor, cores[0] if len(cores) == 1 else Apply(MUL, tuple(cores))
 
 
-def _even_signs_apart(cores: list[Expression]) -> list[Expression]:
-    """Reduce powers of a sign: odd ones to the first, even ones to the second, which is not 1 at rest."""
+def _reduce_sign_powers(cores: list[Expression]) -> list[Expression]:
+    """Reduce odd powers of a sign to the first, even powers to the second (which is 0 at rest, not 1)."""
     signs = [core for core in cores if isinstance(core, Apply) and core.primitive == SIGN]
     kept = [core for core in cores if core not in signs]
     for sign in dict.fromkeys(signs):
@@ -139,11 +139,11 @@ def _even_signs_apart(cores: list[Expression]) -> list[Expression]:
 def _sum(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
     weights: dict[Expression, list[float]] = {}
     for outer, core in parts:
-        for inner, term in _terms_of(core):
+        for inner, term in _get_terms(core):
             weights.setdefault(term, []).append(outer * inner)
     merged = ((core, sum(parts), sum(map(abs, parts))) for core, parts in weights.items())
-    # 0.1 + 0.2 - 0.3 is zero but for its rounding, and must vanish at rest as it does on paper. What has
-    # overflowed is kept (its share is NaN) and refused by whoever reads the number.
+    # 0.1 + 0.2 - 0.3 is zero except for rounding and must vanish. A weight that has overflowed is kept (its
+    # ratio is NaN); the check of the result then refuses it.
     terms = sorted(
         ((core, weight) for core, weight, size in merged if size and not abs(weight) / size <= _ROUNDING),
         key=lambda term: content(term[0]),
@@ -157,10 +157,10 @@ def _sum(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
     (first, _), (second, ratio) = scaled[:2]
     if len(scaled) == 2 and ratio == -1.0:
         return leading, Apply(SUB, (first, second))
-    return leading, Apply(ADD, tuple(_times(ratio, core) for core, ratio in scaled))
+    return leading, Apply(ADD, tuple(_multiply(ratio, core) for core, ratio in scaled))
 
 
-def _terms_of(core: Expression) -> list[tuple[float, Expression]]:
+def _get_terms(core: Expression) -> list[tuple[float, Expression]]:
     if isinstance(core, Apply) and core.primitive == SUB:
         return [(1.0, core.arguments[0]), (-1.0, core.arguments[1])]
     if isinstance(core, Apply) and core.primitive == ADD:
@@ -169,9 +169,13 @@ def _terms_of(core: Expression) -> list[tuple[float, Expression]]:
 
 
 def _function(primitive: Primitive, parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
-    """Fold constants, take signs and scales out of odd, even and homogeneous functions, order arguments."""
+    """Canonicalise a call.
+
+    Fold constants, extract signs and scales from odd, even and homogeneous functions, order the arguments
+    of commutative functions, and simplify.
+    """
     if all(core == _ONE for _, core in parts):
-        return _folded(primitive, [factor for factor, _ in parts]), _ONE
+        return _fold_constants(primitive, [factor for factor, _ in parts]), _ONE
     outer = 1.0
     if primitive.parity and parts[0][0] < 0.0:
         outer = float(primitive.parity)
@@ -179,7 +183,7 @@ def _function(primitive: Primitive, parts: list[tuple[float, Expression]]) -> tu
     if primitive.degree is not None and parts[0][0] > 0.0:
         outer *= parts[0][0] ** primitive.degree
         parts = [(1.0, parts[0][1])]
-    arguments = [_times(factor, core) for factor, core in parts]
+    arguments = [_multiply(factor, core) for factor, core in parts]
     if primitive.commutative:
         arguments.sort(key=content)
     simpler = primitive.simplify(*arguments) if primitive.simplify else None
@@ -189,7 +193,7 @@ def _function(primitive: Primitive, parts: list[tuple[float, Expression]]) -> tu
     return outer * factor, core
 
 
-def _folded(primitive: Primitive, numbers: list[float]) -> float:
+def _fold_constants(primitive: Primitive, numbers: list[float]) -> float:
     try:
         return float(primitive.scalar(*numbers))
     except (ArithmeticError, ValueError) as error:
@@ -198,17 +202,17 @@ def _folded(primitive: Primitive, numbers: list[float]) -> float:
         ) from error
 
 
-def _finite(number: float) -> float:
+def _check_finite(number: float) -> float:
     if not math.isfinite(number):
-        raise ModelError("the numbers in an expression overflow: write smaller ones")
+        raise ModelError("the numbers in an expression overflow: use smaller numbers")
     return number
 
 
-def _times(factor: float, core: Expression) -> Expression:
+def _multiply(factor: float, core: Expression) -> Expression:
     if core == _ONE:
-        return Constant(_finite(factor))
-    return core if factor == 1.0 else Apply(MUL, (Constant(_finite(factor)), *_arguments_of(core, MUL)))
+        return Constant(_check_finite(factor))
+    return core if factor == 1.0 else Apply(MUL, (Constant(_check_finite(factor)), *_get_operands(core, MUL)))
 
 
-def _arguments_of(core: Expression, primitive: Primitive) -> tuple[Expression, ...]:
+def _get_operands(core: Expression, primitive: Primitive) -> tuple[Expression, ...]:
     return core.arguments if isinstance(core, Apply) and core.primitive == primitive else (core,)

@@ -1,8 +1,8 @@
-"""Expressions as text: plain text that `islands.model.parsing` reads back, LaTeX and MathML.
+"""Rendering of expressions as plain text, LaTeX and MathML.
 
-Plain text is ``u(k-1)*sign(u(k-1) - u(k-2))``: infix ``+ - * / ^`` and the primitives by name, with the
-leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. where there are several inputs) and back-shifts
-``q2(...)``.
+Plain text has the form ``u(k-1)*sign(u(k-1) - u(k-2))``: infix operators ``+ - * / ^``, primitives by name,
+leaves ``y(k-1)``, ``u(k-1)`` (``u1(k-1)``, ``u2(k-1)`` .. if there are several inputs) and back-shifts
+``q2(...)``. `islands.model.parsing` parses it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,15 +12,24 @@ from itertools import groupby
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive, Shift
 from islands.model.primitives import ADD, MUL, SUB
 
-#: A larger power is written as a product of powers: text from outside must not ask for millions of factors.
+#: Largest exponent in text. A larger power is written as a product of powers. The limit prevents untrusted
+#: text from creating millions of factors.
 LARGEST_POWER = 99
 
-#: How tightly text holds together: a sum is put in brackets inside a product, a product inside a power.
-_SUM, _PRODUCT, _ATOM = 0, 1, 2
+# Precedence of the rendered text: a sum needs brackets inside a product, a product inside a power.
+
+#: Precedence of a sum or a negative number.
+_SUM = 0
+
+#: Precedence of a product.
+_PRODUCT = 1
+
+#: Precedence of a leaf, a call or a bracketed expression.
+_ATOM = 2
 
 
 def plain(expression: Expression, inputs: int = 1) -> str:
-    """Write an expression so that `parse` reads the same expression back."""
+    """Write an expression as plain text that `parse` converts back to the same expression."""
     return _plain(expression, inputs)[0]
 
 
@@ -29,11 +38,11 @@ def _plain(expression: Expression, inputs: int) -> tuple[str, int]:
         case Lagged(channel, lag):
             return f"{_name(channel, inputs)}(k-{lag})" if lag else f"{_name(channel, inputs)}(k)", _ATOM
         case Constant(number):
-            return _digits(number), _binding(number)
+            return _digits(number), _number_precedence(number)
         case Shift(samples, argument):
             return f"q{samples}({plain(argument, inputs)})", _ATOM
         case Apply(primitive, (_, _, *_) as arguments) if primitive in (ADD, SUB):
-            # A sum inside a sum is written as a call: infix would be read back as one flat sum.
+            # A sum inside a sum is written as a call, because infix would be parsed as one flat sum.
             parts = [_operand(argument, inputs, _PRODUCT, (ADD, SUB)) for argument in arguments]
             return (" + " if primitive == ADD else " - ").join(parts), _SUM
         case Apply(primitive, (_, _, *_) as arguments) if primitive == MUL:
@@ -55,8 +64,8 @@ def _plain_product(factors: Sequence[Expression], inputs: int) -> str:
 
 
 def plain_factor(expression: Expression, inputs: int, as_call: tuple[Primitive, ...] = ()) -> str:
-    """Write an expression as it stands inside a product."""
-    # A quotient binds like a product, and a*b/c is read as (a*b)/c.
+    """Write an expression as a factor of a product, in brackets if necessary."""
+    # A quotient has the precedence of a product, and a*b/c is parsed as (a*b)/c.
     text = _operand(expression, inputs, _PRODUCT, as_call)
     return f"({text})" if isinstance(expression, Apply) and expression.primitive.name == "div" else text
 
@@ -73,16 +82,16 @@ def _digits(number: float) -> str:
     return repr(float(number)).removesuffix(".0")
 
 
-def _binding(number: float) -> int:
-    # Minus zero has a sign, too: -0^2 would be read as -(0^2).
+def _number_precedence(number: float) -> int:
+    # Minus zero has a sign as well: -0^2 would be parsed as -(0^2).
     return _SUM if _digits(number).startswith("-") else _ATOM
 
 
-def _operand(expression: Expression, inputs: int, binding: int, as_call: tuple[Primitive, ...] = ()) -> str:
+def _operand(expression: Expression, inputs: int, minimum: int, as_call: tuple[Primitive, ...] = ()) -> str:
     if isinstance(expression, Apply) and expression.primitive in as_call:
         return _call(expression.primitive, expression.arguments, inputs)
-    text, own = _plain(expression, inputs)
-    return text if own >= binding else f"({text})"
+    text, precedence = _plain(expression, inputs)
+    return text if precedence >= minimum else f"({text})"
 
 
 def _call(primitive: Primitive, arguments: Sequence[Expression], inputs: int) -> str:
@@ -96,12 +105,12 @@ def _name(channel: int, inputs: int) -> str:
 
 
 def at_rest(expression: Expression, inputs: int = 1) -> str:
-    """Write a steady state, whose leaves have lag 0: ``y*u`` for ybar ubar, ``1`` for a constant."""
+    """Write a steady state (leaves of lag 0): ``y*u`` for ybar ubar, ``1`` for a constant."""
     return plain(expression, inputs).replace("(k)", "")
 
 
 def latex(expression: Expression, inputs: int = 1) -> str:
-    """Write an expression in LaTeX's mathematics, without dollars."""
+    """Write an expression in LaTeX without dollar signs."""
     return _latex(expression, inputs)[0]
 
 
@@ -112,11 +121,11 @@ def _latex(expression: Expression, inputs: int) -> tuple[str, int]:
             index = f"{name[1:]}," if len(name) > 1 else ""
             return f"{name[0]}_{{{index}k{f'-{lag}' if lag else ''}}}", _ATOM
         case Constant(number):
-            return latex_number(_digits(number)), _binding(number)
+            return latex_number(_digits(number)), _number_precedence(number)
         case Shift(samples, argument):
-            return f"q^{{-{samples}}} {_bracketed(argument, inputs, _ATOM)}", _PRODUCT
+            return f"q^{{-{samples}}} {_latex_operand(argument, inputs, _ATOM)}", _PRODUCT
         case Apply(primitive, arguments) if primitive in (ADD, SUB):
-            parts = [_bracketed(argument, inputs, _PRODUCT) for argument in arguments]
+            parts = [_latex_operand(argument, inputs, _PRODUCT) for argument in arguments]
             return (" + " if primitive == ADD else " - ").join(parts), _SUM
         case Apply(primitive, arguments) if primitive == MUL:
             return " ".join(_latex_powers(arguments, inputs)), _PRODUCT
@@ -128,8 +137,8 @@ def _latex_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
     parts: list[str] = []
     for factor, run in groupby(factors):
         power = len(list(run))
-        text = _bracketed(factor, inputs, _ATOM)
-        # No exponent stands on an exponent or a fraction, and no number directly behind another one.
+        text = _latex_operand(factor, inputs, _ATOM)
+        # Brackets separate an exponent from an exponent or a fraction, and a number from a preceding factor.
         bare = text[0] != "\\" or text[-1] == "}"
         if (power > 1 and bare and not isinstance(factor, Lagged)) or (
             parts and isinstance(factor, Constant)
@@ -139,32 +148,38 @@ def _latex_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
     return parts
 
 
-def _bracketed(expression: Expression, inputs: int, binding: int) -> str:
-    text, own = _latex(expression, inputs)
-    return text if own >= binding else rf"\left({text}\right)"
+def _latex_operand(expression: Expression, inputs: int, minimum: int) -> str:
+    text, precedence = _latex(expression, inputs)
+    return text if precedence >= minimum else rf"\left({text}\right)"
 
 
 def latex_factor(expression: Expression, inputs: int) -> str:
-    """Write an expression in LaTeX as it stands inside a product."""
-    return _bracketed(expression, inputs, _PRODUCT)
+    """Write an expression in LaTeX as a factor of a product, in brackets if necessary."""
+    return _latex_operand(expression, inputs, _PRODUCT)
 
 
 def latex_number(number: str) -> str:
-    """Write a number in LaTeX, given as Python writes it."""
+    """Convert a number from Python's notation to LaTeX."""
     mantissa, _, exponent = number.partition("e")
     return mantissa if not exponent else rf"{mantissa} \times 10^{{{int(exponent)}}}"
 
 
-#: U+2212 is the minus of mathematics, U+2062 a product without a sign, here a thin space (the parameter and
-#: a function's name would touch what follows), and U+2061 a call.
-MINUS, TIMES, _OF = "<mo>&#x2212;</mo>", '<mo rspace="0.17em">&#x2062;</mo>', "<mo>&#x2061;</mo>"
+#: Minus sign (U+2212).
+MINUS = "<mo>&#x2212;</mo>"
 
+#: Invisible product sign (U+2062) with a thin space, which separates a parameter from a function name.
+TIMES = '<mo rspace="0.17em">&#x2062;</mo>'
+
+#: Function application (U+2061).
+_APPLY = "<mo>&#x2061;</mo>"
+
+#: Format string of an absolute value.
 _ABSOLUTE = "<mrow><mo>|</mo>{0}<mo>|</mo></mrow>"
 
-#: Functions that are not written by their name, and on which no exponent may stand.
+#: Format strings of functions that are not written by name. They need brackets below an exponent.
 _MATHML = {
     "div": "<mfrac>{0}{1}</mfrac>",
-    "log": f"<mrow><mi>ln</mi>{_OF}{_ABSOLUTE}</mrow>",
+    "log": f"<mrow><mi>ln</mi>{_APPLY}{_ABSOLUTE}</mrow>",
     "sqrt": f"<msqrt>{_ABSOLUTE}</msqrt>",
 }
 
@@ -182,7 +197,7 @@ def _mathml(expression: Expression, inputs: int) -> tuple[str, int]:
             past = f"{MINUS}<mn>{lag}</mn>" if lag else ""
             return f"<msub><mi>{name[0]}</mi><mrow>{index}<mi>k</mi>{past}</mrow></msub>", _ATOM
         case Constant(number):
-            return mathml_number(_digits(number)), _binding(number)
+            return mathml_number(_digits(number)), _number_precedence(number)
         case Shift(samples, argument):
             shift = f"<msup><mi>q</mi><mrow>{MINUS}<mn>{samples}</mn></mrow></msup>"
             return f"<mrow>{shift}{TIMES}{_mathml_operand(argument, inputs, _ATOM)}</mrow>", _PRODUCT
@@ -199,10 +214,11 @@ def _mathml_powers(factors: Sequence[Expression], inputs: int) -> list[str]:
     parts: list[str] = []
     for factor, run in groupby(factors):
         power = len(list(run))
-        text, own = _mathml(factor, inputs)
-        # As in LaTeX, no exponent stands on a number or a fraction, and no number behind another one.
+        text, precedence = _mathml(factor, inputs)
+        # As in LaTeX, brackets separate an exponent from a number or a fraction, and a number from a
+        # preceding factor.
         tall = isinstance(factor, Apply) and factor.primitive.name in _MATHML and power > 1
-        if own < _ATOM or tall or (isinstance(factor, Constant) and (power > 1 or parts)):
+        if precedence < _ATOM or tall or (isinstance(factor, Constant) and (power > 1 or parts)):
             text = _mathml_brackets(text)
         parts.append(text if power == 1 else f"<msup>{text}<mn>{power}</mn></msup>")
     return parts
@@ -214,25 +230,25 @@ def _mathml_call(name: str, arguments: Sequence[str]) -> str:
     if name in _MATHML:
         return _MATHML[name].format(*arguments)
     safe = escape(name).encode("ascii", "xmlcharrefreplace").decode()
-    return f"<mrow><mi>{safe}</mi>{_OF}{_mathml_brackets('<mo>,</mo>'.join(arguments))}</mrow>"
+    return f"<mrow><mi>{safe}</mi>{_APPLY}{_mathml_brackets('<mo>,</mo>'.join(arguments))}</mrow>"
 
 
 def _mathml_brackets(text: str) -> str:
     return f"<mrow><mo>(</mo>{text}<mo>)</mo></mrow>"
 
 
-def _mathml_operand(expression: Expression, inputs: int, binding: int) -> str:
-    text, own = _mathml(expression, inputs)
-    return text if own >= binding else _mathml_brackets(text)
+def _mathml_operand(expression: Expression, inputs: int, minimum: int) -> str:
+    text, precedence = _mathml(expression, inputs)
+    return text if precedence >= minimum else _mathml_brackets(text)
 
 
 def mathml_factor(expression: Expression, inputs: int) -> str:
-    """Write an expression in MathML as it stands inside a product."""
+    """Write an expression in MathML as a factor of a product, in brackets if necessary."""
     return _mathml_operand(expression, inputs, _PRODUCT)
 
 
 def mathml_number(number: str) -> str:
-    """Write a number in MathML, given as Python writes it."""
+    """Convert a number from Python's notation to MathML."""
     mantissa, _, exponent = number.removeprefix("-").partition("e")
     sign = MINUS if number.startswith("-") else ""
     power = f"<mo>&#xD7;</mo><msup><mn>10</mn>{mathml_number(str(int(exponent)))}</msup>" if exponent else ""

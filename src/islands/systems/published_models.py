@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from islands.errors import lookup
-from islands.model.model import Model, model_of
+from islands.model.model import Model, make_model
 from islands.model.parsing import parse
 
 
@@ -33,7 +33,7 @@ class Published:
 
 
 def _model(terms: Mapping[str, float], dt: float) -> Model:
-    return model_of(((parse(text), value) for text, value in terms.items()), ("u_V",), "y_um", dt)
+    return make_model(((parse(text), value) for text, value in terms.items()), ("u_V",), "y_um", dt)
 
 
 _MODEL_12 = {

@@ -13,7 +13,7 @@ from islands.discrepancy.interfaces.force import add_output_forces
 from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import ModelError
-from islands.model.model import Model, model_of
+from islands.model.model import Model, make_model
 from islands.model.regressor import Regressor
 from islands.simulation.linked import LinkedModel
 
@@ -101,7 +101,7 @@ class NarxSimulator:
         own = zip(model.regressors, model.parameters, strict=True)
         terms = [(item.expression, parameter) for item, parameter in own]
         terms += [(term.at(shape[SLOPE]), shape[term.name]) for term in self._missing]
-        return model_of(terms, model.input_names, model.output_name, model.dt)
+        return make_model(terms, model.input_names, model.output_name, model.dt)
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """See `islands.discrepancy.interfaces.simulator.Simulator`."""

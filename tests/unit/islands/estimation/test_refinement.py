@@ -9,7 +9,7 @@ from islands.data.dataset import Dataset, join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.estimation.refinement import RefinedModel, _Residual, refine
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run, multiple_shooting
@@ -32,7 +32,7 @@ CLUSTERED = {
 
 
 def model(terms):
-    return model_of((parse(text), theta) for text, theta in terms.items())
+    return make_model((parse(text), theta) for text, theta in terms.items())
 
 
 def driven(terms, samples=600, seed=0, noise=0.0):
@@ -270,7 +270,7 @@ def test_what_the_kernel_would_not_check_is_refused():
     record = driven(HYSTERESIS)
     with pytest.raises(ModelError, match="no parameters yet"):
         refine(replace(model(HYSTERESIS), theta=None), record, 50)
-    two_inputs = model_of([(parse("y(k-1)"), 1.0), (parse("u2(k-1)"), 0.1)], ("u1", "u2"))
+    two_inputs = make_model([(parse("y(k-1)"), 1.0), (parse("u2(k-1)"), 0.1)], ("u1", "u2"))
     with pytest.raises(RecordError, match="the model has 2 inputs"):
         refine(two_inputs, record, 50)
     with pytest.raises(SettingsError, match="reads 2 samples back, the warm-up has 1"):

@@ -20,7 +20,7 @@ def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
             "free_run": Metrics(nan, nan, free_run, nan),
         },
     }
-    model = islands.model_of([(islands.parse(text), theta) for text in terms])
+    model = islands.make_model([(islands.parse(text), theta) for text in terms])
     return RankedModel(model, Assessment(errors, {}, None, None, None, 0))
 
 

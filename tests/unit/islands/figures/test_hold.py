@@ -8,7 +8,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.figures.hold import draw_holds
 from islands.figures.style import save
-from islands.model.model import Model, model_of
+from islands.model.model import Model, make_model
 from islands.model.parsing import parse
 from islands.validation.physics import LEVELS, check_physics
 
@@ -33,7 +33,7 @@ def record() -> Dataset:
 def model(**terms: float) -> Model:
     """A model with parameters of y(k-1), of an increment, and of u(k-1)."""
     texts = {"y": "y(k-1)", "du": "phi1(u(k-1), u(k-2))", "u": "u(k-1)"}
-    return model_of([(parse(texts[name]), value) for name, value in terms.items()], ("u_V",), "y_um", 0.01)
+    return make_model([(parse(texts[name]), value) for name, value in terms.items()], ("u_V",), "y_um", 0.01)
 
 
 STILL = model(y=1.0, du=0.15)
@@ -128,7 +128,7 @@ def test_the_word_diverged_stands_where_a_line_ends(bursting):
 
 def test_where_some_levels_diverge_the_drift_of_the_others_is_said(record, tmp_path):
     # Above 12 V in the mean the pole is outside the unit circle.
-    unstable = model_of(
+    unstable = make_model(
         [(parse("y(k-1)"), 0.88), (parse("y(k-1)*u(k-1)"), 0.01), (parse("u(k-1)"), 0.01)],
         ("u_V",),
         "y_um",
@@ -144,7 +144,9 @@ def test_several_inputs_move_together_as_shares_of_their_amplitude(record):
     both = Dataset(
         np.column_stack([record.u, 2 * record.u]), record.y, 0.01, ("u_V", "T_K"), "y_um", ("V", "K"), "um"
     )
-    two = model_of([(parse("y(k-1)"), 1.0), (parse("phi1(u2(k-1), u2(k-2))"), 0.05)], ("u_V", "T_K"), "y_um")
+    two = make_model(
+        [(parse("y(k-1)"), 1.0), (parse("phi1(u2(k-1), u2(k-2))"), 0.05)], ("u_V", "T_K"), "y_um"
+    )
     left = draw_holds(two, both).axes[0]
     assert left.get_ylabel() == "inputs / amplitude"
     assert left.get_yticks() == pytest.approx(LEVELS)

@@ -7,13 +7,13 @@ import pytest
 from islands.data.split import Split
 from islands.evolution.search_result import RankedModel
 from islands.figures.registry import FIGURES
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.validation.assessment import assess
 from support.searches import record
 
 #: Slow to forget how it began: where a free run begins shows in its error.
-MODEL = model_of([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
+MODEL = make_model([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 
 
 @pytest.mark.parametrize("warm_up", [None, 60])

@@ -17,7 +17,7 @@ from islands.figures.hold import draw_holds
 from islands.figures.hysteresis_loop import draw_loop
 from islands.figures.residuals import draw_residual_correlations
 from islands.figures.style import save
-from islands.model.model import Model, model_of
+from islands.model.model import Model, make_model
 from islands.model.parsing import parse
 from islands.validation.residual_tests import residual_tests
 
@@ -40,7 +40,7 @@ def record(samples: int, inputs: int = 1, scale: float = 1.0, dt: float = 1e-3, 
 
 
 def leaking(pole: float) -> Model:
-    return model_of([(parse("y(k-1)"), pole), (parse("u(k-1)"), 0.02)], ("u0_V",), "y_um", 1e-3)
+    return make_model([(parse("y(k-1)"), pole), (parse("u(k-1)"), 0.02)], ("u0_V",), "y_um", 1e-3)
 
 
 @cache

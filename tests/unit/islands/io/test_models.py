@@ -76,7 +76,7 @@ def test_a_structure_without_parameters_is_read_back_as_one():
 
 def test_a_users_own_primitive_is_read_where_it_is_given():
     known = islands.PRIMITIVES | {"halved": islands.primitive("halved", halved, parity=-1)}
-    model = islands.model_of([(islands.parse("halved(y(k-1))", known), 0.5)])
+    model = islands.make_model([(islands.parse("halved(y(k-1))", known), 0.5)])
     assert model_from_json(model_json(model), primitives=known) == model
     with pytest.raises(ModelError, match=r"terms\.0\.regressor: unknown function 'halved': known are mul"):
         model_from_json(model_json(model))
@@ -256,7 +256,7 @@ def test_a_model_is_not_written_where_there_is_no_folder(tmp_path):
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_a_model_whose_numbers_are_not_finite_is_not_written(number, tmp_path):
-    model = islands.model_of([(islands.parse("y(k-1)"), 0.5), (islands.parse("u(k-1)"), number)])
+    model = islands.make_model([(islands.parse("y(k-1)"), 0.5), (islands.parse("u(k-1)"), number)])
     with pytest.raises(ModelError, match=r"cannot be written: terms\.1\.parameter: Input should be a finite"):
         write_model(model, tmp_path / "model.json")
     assert not (tmp_path / "model.json").exists()

@@ -11,7 +11,7 @@ from islands.data.dataset import Dataset
 from islands.kernels.simulate import BEYOND, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
 from islands.model.expression import value
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
@@ -41,7 +41,7 @@ def run(model, record, interval, bound=1e6, patient=True, wanted=True):
 
 def echo():
     """A model that predicts the input one sample back, so that a test writes its predictions into u."""
-    return model_of([(parse("u(k-1)"), 1.0)])
+    return make_model([(parse("u(k-1)"), 1.0)])
 
 
 def record(u=None, y=None, segments=(SAMPLES,), seed=5):
@@ -76,7 +76,7 @@ def width(request, monkeypatch):
 
 @pytest.fixture
 def damped():
-    return model_of([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
+    return make_model([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
 
 
 @pytest.mark.parametrize("interval", [1, 2, 7, CHUNK, CHUNK + 1, None])
@@ -241,7 +241,7 @@ def test_the_ending_tells_of_a_divergence(patient, step, width):
 def test_what_is_allowed_ends_a_simulation_only_beyond_it_and_changes_nothing_else(
     interval, share, chosen, seed
 ):
-    model = model_of([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
+    model = make_model([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
     data = record(segments=SEGMENTS, seed=seed)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("islands.simulation.layout.WIDTHS", (chosen,))

@@ -6,7 +6,7 @@ from math import comb
 import pytest
 
 from islands.errors import SettingsError
-from islands.model.candidate_library import LIBRARIES, MOST_CANDIDATES, candidates, full_set, library_named
+from islands.model.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, library_named
 from islands.model.clusters import steady_state
 from islands.model.expression import Apply
 from islands.model.model import canonical_order
@@ -147,7 +147,7 @@ def test_a_library_that_is_too_large_is_refused_before_it_is_made():
 def test_what_counts_is_the_library_and_not_the_full_set():
     # 435 897 monomials of degree 5 in 16 + 16 lags, of which phi-polynomial has a hundredth.
     assert full_set(5, 16, 16) == 435_897
-    assert len(candidates("phi-polynomial", 5, 16, 1)) == 1 + 15 * 16 * 15 == 3601 <= MOST_CANDIDATES
+    assert len(candidates("phi-polynomial", 5, 16, 1)) == 1 + 15 * 16 * 15 == 3601 <= MAX_CANDIDATES
 
 
 @pytest.mark.parametrize("ask", [library_named, lambda name: candidates(name, 2, 2, 1)])

@@ -8,14 +8,14 @@ from hypothesis import given
 
 from islands.model.equations import equation, latex_equation, mathml_equation
 from islands.model.expression import Apply, Lagged, Primitive
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.model.rendering import mathml
 from support.strategies import models, regressors
 
 U, Y = Lagged(1, 1), Lagged(0, 1)
 
-MODEL_12 = model_of(
+MODEL_12 = make_model(
     [
         (parse("y(k-1)"), 1.0),
         (parse("phi1(u(k-1), u(k-2))"), 0.77),
@@ -44,7 +44,7 @@ def test_the_latex_of_the_papers_model_12_rounds_to_the_digits_asked_for():
 
 
 def test_an_equation_without_parameters_numbers_them():
-    bare = model_of(
+    bare = make_model(
         [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("u1", "u2")
     )
     bare = type(bare)(bare.regressors, input_names=bare.input_names)
@@ -55,14 +55,14 @@ def test_an_equation_without_parameters_numbers_them():
 
 
 def test_an_equation_shows_very_small_and_negative_parameters():
-    model = model_of([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
+    model = make_model([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
     assert equation(model) == "y(k) = -1.5e-07*y(k-1) - 2*u(k-1) - 0.25"
     assert latex_equation(model) == r"y_{k} = -1.5 \times 10^{-7} \, y_{k-1} - 2 \, u_{k-1} - 0.25"
 
 
 def test_a_quotient_keeps_its_brackets_behind_its_parameter():
     # 0.5*u/y would be read as (0.5*u)/y, another regressor: division is protected.
-    assert equation(model_of([(parse("u(k-1)/y(k-1)"), 0.5)])) == "y(k) = 0.5*(u(k-1)/y(k-1))"
+    assert equation(make_model([(parse("u(k-1)/y(k-1)"), 0.5)])) == "y(k) = 0.5*(u(k-1)/y(k-1))"
 
 
 @given(models(inputs=2))
@@ -204,7 +204,7 @@ def test_a_row_of_mathml_is_short_or_a_single_term(model):
 
 def test_a_short_equation_is_no_table():
     written = mathml_equation(
-        model_of([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
+        make_model([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
     )
     assert "mtable" not in written
     assert seen_in(written) == "y(k) =  - 1.5e-7*y(k-1) - 2*u(k-1) - 0.25"
@@ -224,7 +224,7 @@ def test_the_mathml_of_the_papers_model_12_has_two_rows_and_the_digits_asked_for
 
 
 def test_mathml_without_parameters_numbers_them():
-    named = model_of(
+    named = make_model(
         [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("a", "b")
     )
     bare = type(named)(named.regressors, input_names=named.input_names)

@@ -5,7 +5,7 @@ from hypothesis import given
 
 from islands.errors import ModelError
 from islands.model.expression import Constant
-from islands.model.model import Model, canonical_order, model_of
+from islands.model.model import Model, canonical_order, make_model
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.model.rendering import plain
@@ -75,7 +75,7 @@ def test_with_parameters_gives_a_model_of_its_own():
 
 
 def test_model_of_moves_factors_into_the_parameters_and_merges_equal_terms():
-    made = model_of(
+    made = make_model(
         [
             (parse("2*u(k-1)*y(k-1)"), 0.5),
             (parse("phi1(u(k-2), u(k-1))"), 0.25),
@@ -91,23 +91,23 @@ def test_model_of_moves_factors_into_the_parameters_and_merges_equal_terms():
 
 
 def test_model_of_terms_that_cancel_keeps_a_parameter_of_zero():
-    made = model_of([(parse("u(k-1) - u(k-2)"), 1.0), (parse("u(k-2) - u(k-1)"), 1.0)])
+    made = make_model([(parse("u(k-1) - u(k-2)"), 1.0), (parse("u(k-2) - u(k-1)"), 1.0)])
     assert made.theta == (0.0,)
 
 
 def test_model_of_nothing_but_zero_terms_is_refused():
     with pytest.raises(ModelError, match="a model has at least one regressor"):
-        model_of([(parse("phi2(u(k-1), u(k-1))"), 1.0), (Constant(0.0), 2.0)])
+        make_model([(parse("phi2(u(k-1), u(k-1))"), 1.0), (Constant(0.0), 2.0)])
 
 
 def test_model_of_a_term_that_looks_ahead_is_refused():
     with pytest.raises(ModelError, match="reads the past alone: channel 1 has lag 0"):
-        model_of([(parse("y(k-1)"), 1.0), (parse("u(k)"), 1.0)])
+        make_model([(parse("y(k-1)"), 1.0), (parse("u(k)"), 1.0)])
 
 
 @given(models(inputs=2))
 def test_a_model_made_of_its_own_terms_is_the_same_model(model):
-    again = model_of(
+    again = make_model(
         [(item.expression, theta) for item, theta in zip(model.regressors, model.parameters, strict=True)][
             ::-1
         ],

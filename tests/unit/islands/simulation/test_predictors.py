@@ -10,7 +10,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.model.expression import value
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, Status
@@ -20,7 +20,7 @@ SAMPLES = 300
 
 
 def model(*terms):
-    return model_of([(parse(text), parameter) for parameter, text in terms])
+    return make_model([(parse(text), parameter) for parameter, text in terms])
 
 
 def record(u=None, segments=()):

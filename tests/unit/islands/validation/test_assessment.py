@@ -20,7 +20,7 @@ SHOOTING = 7
 
 
 def model(terms, names=("u",)):
-    return islands.model_of([(islands.parse(text), theta) for text, theta in terms.items()], names)
+    return islands.make_model([(islands.parse(text), theta) for text, theta in terms.items()], names)
 
 
 LINEAR = model({"y(k-1)": 0.7, "u(k-1)": 0.5, "u(k-2)": 0.2})

@@ -14,7 +14,7 @@ AMPLITUDE, MIDDLE = 10.0, 5.0
 
 
 def model(terms, names=("u",)):
-    return islands.model_of([(islands.parse(text), theta) for text, theta in terms.items()], names)
+    return islands.make_model([(islands.parse(text), theta) for text, theta in terms.items()], names)
 
 
 def record(period=PERIOD, periods=5, **changes):

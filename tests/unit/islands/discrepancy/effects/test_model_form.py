@@ -13,7 +13,7 @@ from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.io.models import model_from_json
 from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
-from islands.model.model import Model, model_of
+from islands.model.model import Model, make_model
 from islands.model.parsing import parse
 from islands.performance.trials.cases import CORES
 from islands.performance.trials.injection.measurement import FaultyRecord, inject
@@ -45,7 +45,7 @@ def started(extended: ExtendedSimulator, hiding: FaultyRecord) -> np.ndarray:
 
 def model(**terms: str) -> Model:
     split = (term.split(" * ", 1) for term in terms.values())
-    return model_of([(parse(text), float(parameter)) for parameter, text in split])
+    return make_model([(parse(text), float(parameter)) for parameter, text in split])
 
 
 def test_terms_that_are_missing_do_nothing_until_they_have_coefficients(extended: ExtendedSimulator) -> None:

@@ -132,7 +132,7 @@ def test_the_first_samples_and_what_lies_behind_the_last_are_left_as_they_are(sa
 @needs_compiler
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
 def test_a_columns_name_cannot_break_the_file(name, folder):
-    exported = islands.model_of([(islands.parse("u(k-1)"), 2.0)], (name,), name)
+    exported = islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name)
     data = Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
     assert simulated(exported, data, folder).tolist() == [0.5, 2.0]
 
@@ -140,7 +140,7 @@ def test_a_columns_name_cannot_break_the_file(name, folder):
 @pytest.mark.parametrize("kind", ["c", "matlab"])
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
 def test_a_columns_name_is_read_back_from_its_line_of_the_comment(name, kind):
-    text = export(islands.model_of([(islands.parse("u(k-1)"), 2.0)], (name,), name), kind)
+    text = export(islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name), kind)
     assert text.isascii()
     (line,) = (line for line in text.split("\n") if "Inputs u = " in line)
     for signal in ("Inputs u = ", "output y = "):

@@ -105,7 +105,7 @@ def test_octave_runs_whatever_stands_in_a_model(tmp_path_factory, random_models,
 @needs_octave
 def test_a_columns_name_cannot_break_the_file(tmp_path):
     data = islands.Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
-    named = [islands.model_of([(islands.parse("u(k-1)"), 2.0)], (name,), name) for name in HOSTILE_NAMES]
+    named = [islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name) for name in HOSTILE_NAMES]
     found = simulated([(each, data) for each in named], tmp_path)
     assert [y.tolist() for y in found] == [[0.5, 2.0]] * len(HOSTILE_NAMES)
 

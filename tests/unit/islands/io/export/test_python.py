@@ -98,7 +98,7 @@ def test_every_program_says_which_column_an_input_is(kind, quote):
 
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
 def test_a_columns_name_cannot_break_the_module(name):
-    made = module(islands.model_of([(islands.parse("u(k-1)"), 2.0)], (name,), name))
+    made = module(islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name))
     assert f"Inputs u = {name}; output y = {name};" in made["__doc__"]
     assert made["simulate"]([1.0, 2.0], [0.5]) == [0.5, 2.0]
 

@@ -9,7 +9,7 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.io.checkpoints import read_checkpoint, write_hall
 from islands.io.records import write_record
-from islands.model.model import model_of
+from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.simulation.predictors import free_run
 from islands_api.cli import identify_run as command
@@ -115,13 +115,13 @@ def test_a_diverging_test_is_said_and_stored_as_null_never_as_a_number(tmp_path,
             return free_run(self.model, tested)
 
     result = Diverging()
-    result.model = model_of([(parse("y(k-1)"), 2.0)])
+    result.model = make_model([(parse("y(k-1)"), 2.0)])
     command._test(result, record(), tmp_path)
     document = json.loads((tmp_path / "test.json").read_text())
     assert list(document) == ["outcome"]
     assert document["outcome"].startswith("diverged: |y| left")
     assert "MAPE" not in capsys.readouterr().out
-    result.model = model_of([(parse("y(k-1)"), 1.0)])
+    result.model = make_model([(parse("y(k-1)"), 1.0)])
     still = record()
     command._test(result, Dataset(still.u, np.ones(700), 0.01), tmp_path)
     document = json.loads((tmp_path / "test.json").read_text())
