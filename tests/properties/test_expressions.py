@@ -197,7 +197,7 @@ def test_a_number_in_front_belongs_to_the_parameter(expression, number):
 @given(expressions(height=2), leaves().map(lambda leaf: Lagged(leaf.channel, 0)))
 def test_a_regressor_never_looks_at_the_present(expression, present):
     assume(canonical(expression)[0] != 0.0)
-    with pytest.raises(ModelError, match=rf"reads the past alone: channel {present.channel} has lag 0"):
+    with pytest.raises(ModelError, match=rf"reads only past samples: channel {present.channel} has lag 0"):
         regressor(product(expression, present))
 
 

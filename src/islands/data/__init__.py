@@ -1,1 +1,4 @@
-"""Records of measured or simulated data."""
+"""Records of measured or simulated data and their split into estimation and validation data.
+
+Read `dataset` first.
+"""

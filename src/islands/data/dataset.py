@@ -1,4 +1,4 @@
-"""A record: inputs and one output on a common, uniform time grid, in one or several recordings."""
+"""Record of inputs and one output on a common uniform time grid, in one or several recordings."""
 
 from dataclasses import dataclass, replace
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from islands.errors import RecordError
 
-#: Part by which the sampling times of joined recordings may differ: a printed time column tells no more.
+#: Largest relative difference between equal sampling times. A printed time column is not more precise.
 SAME_DT = 1e-3
 
 
@@ -20,27 +20,27 @@ class Dataset:
     u : ndarray, shape (samples, inputs)
         The inputs, finite.
     y : ndarray, shape (samples,)
-        The output, never infinite. NaN marks a missing value: a free run reads the output in its warm-up
-        alone, so the rest may be missing; estimation asks for a complete one.
+        The output, never infinite. NaN marks a missing value. A free run reads the output only during its
+        warm-up, so the rest may be missing. Estimation requires a complete output.
     dt : float
         Sampling time in seconds.
     input_names, output_name
-        Column names, as measured: ``u_V``.
+        Column names, such as ``u_V``.
     input_units, output_unit
-        Units, ``""`` where unknown.
+        Units. Empty if unknown.
     segments : tuple of int
-        Lengths in samples of the recordings that follow one another; they sum to ``samples``. No regressor
-        reaches across a boundary.
+        Lengths of the consecutive recordings in samples; they sum to ``samples``. No regressor reaches across
+        a boundary.
     start : float
         Time of the first sample in seconds.
     sha256 : str
-        Hash of the file that the record came from, in hexadecimal; "" where there is none.
+        Hexadecimal hash of the source file. Empty if unknown.
 
     Raises
     ------
     RecordError
-        Shapes, names, units, segments or ``dt`` do not fit together, there is no sample, or a value is
-        infinite or a missing input.
+        Shapes, names, units, segments or ``dt`` are inconsistent, there is no sample, a value is infinite, or
+        an input is missing.
     """
 
     u: NDArray[np.float64]
@@ -65,7 +65,9 @@ class Dataset:
                 f"got {np.shape(self.u)} and {np.shape(self.y)}"
             )
         inputs = u.shape[1]
-        names = self.input_names if len(self.input_names) == inputs else _numbered(self.input_names, inputs)
+        names = (
+            self.input_names if len(self.input_names) == inputs else _number_names(self.input_names, inputs)
+        )
         units = ("",) * inputs if tuple(self.input_units) == ("",) else tuple(self.input_units)
         if len(units) != inputs:
             raise RecordError(f"{inputs} inputs need {inputs} units, got {units}")
@@ -76,7 +78,7 @@ class Dataset:
             raise RecordError(
                 f"the segments' lengths {segments} must be positive and sum to the {len(y)} samples"
             )
-        _refuse_non_finite(u, y, names, self.output_name)
+        _check_finite(u, y, names, self.output_name)
         for array in (u, y):
             array.setflags(write=False)
         for field, value in (
@@ -100,18 +102,18 @@ class Dataset:
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Time of every sample in seconds, shape (samples,), without a pause between recordings."""
+        """Time of every sample in seconds, shape (samples,). Recordings follow each other without a pause."""
         return self.start + self.dt * np.arange(self.samples, dtype=np.float64)
 
     @property
     def bounds(self) -> tuple[tuple[int, int], ...]:
-        """First sample and one past the last of every segment."""
+        """First sample of every segment and the sample after its last."""
         ends = np.cumsum(self.segments)
         return tuple((int(end) - length, int(end)) for end, length in zip(ends, self.segments, strict=True))
 
     @property
     def output_range(self) -> float:
-        """``max(y) - min(y)`` over the samples that are there (NaN: none); scale of MAPE, equation (7)."""
+        """``max(y) - min(y)`` of the known samples (NaN if there is none); scale of MAPE, equation (7)."""
         present = self.y[~np.isnan(self.y)]
         return float(np.ptp(present)) if present.size else float("nan")
 
@@ -119,7 +121,7 @@ class Dataset:
         return self.samples
 
     def first_inputs(self, count: int) -> "Dataset":
-        """Return the record with its first inputs alone: what was read beside them is not one."""
+        """Return the record with only its first ``count`` inputs."""
         return replace(
             self,
             u=self.u[:, :count],
@@ -128,7 +130,7 @@ class Dataset:
         )
 
     def __getitem__(self, rows: slice) -> "Dataset":
-        """Return the samples of a slice (step 1) as a record of its own; segments are cut, none is joined."""
+        """Return the samples of a slice (step 1) as a separate record; segments are cut but not joined."""
         first, last, step = rows.indices(self.samples)
         if step != 1 or last <= first:
             raise RecordError(f"take a non-empty slice of step 1 of the record's {self.samples} samples")
@@ -146,7 +148,7 @@ class Dataset:
         )
 
 
-def _refuse_non_finite(
+def _check_finite(
     u: NDArray[np.float64], y: NDArray[np.float64], names: tuple[str, ...], output: str
 ) -> None:
     if not np.isfinite(u).all():
@@ -161,28 +163,28 @@ def _refuse_non_finite(
         )
 
 
-def _numbered(names: tuple[str, ...], inputs: int) -> tuple[str, ...]:
+def _number_names(names: tuple[str, ...], inputs: int) -> tuple[str, ...]:
     if names == ("u",):
         return tuple(f"u{index + 1}" for index in range(inputs))
     raise RecordError(f"{inputs} inputs need {inputs} names, got {names}")
 
 
 def join(recordings: tuple[Dataset, ...]) -> Dataset:
-    """Join several recordings of one system; each stays a segment of its own.
+    """Join several recordings of one system; each remains a separate segment.
 
     Raises
     ------
     RecordError
-        There is none, or they differ in names, units or sampling time.
+        There is no recording, or the recordings differ in names, units or sampling time.
     """
     if not recordings:
-        raise RecordError("no recording is given: join one or more")
+        raise RecordError("there is no recording to join: give at least one")
     first = recordings[0]
     for other in recordings[1:]:
         same = (other.input_names, other.output_name, other.input_units, other.output_unit)
         if same != (first.input_names, first.output_name, first.input_units, first.output_unit):
             raise RecordError(
-                "recordings of one system have the same columns and units: rename or convert them first"
+                "recordings of one system must have the same columns and units: rename or convert them first"
             )
         if abs(other.dt - first.dt) > SAME_DT * first.dt:
             raise RecordError(

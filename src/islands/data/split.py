@@ -1,4 +1,4 @@
-"""Which part of the data estimates and which validates."""
+"""Split of the data into an estimation part and a validation part."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,15 @@ from islands.errors import RecordError, SettingsError
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Data that estimates parameters and data that selects among the models estimated.
+    """Estimation data and validation data.
 
-    The columns' names may differ (``u_est_V``, ``u_val_V``): inputs correspond by their order.
+    Parameters are estimated on the estimation data. Models are selected on the validation data. Column names
+    may differ (``u_est_V``, ``u_val_V``), because inputs are matched by position.
 
     Attributes
     ----------
     estimation, validation : Dataset
-        Records of one system.
+        Records of the same system.
 
     Raises
     ------
@@ -41,9 +42,9 @@ class Split:
 
 
 def split(record: Dataset, fraction: float = 0.25) -> Split:
-    """Keep the last ``fraction`` of the record for validation.
+    """Split off the last ``fraction`` of the record for validation.
 
-    The validation part warms up on samples of its own, so nothing of the estimation part is used there.
+    The warm-up of the validation part uses samples of that part, never of the estimation part.
 
     Raises
     ------
@@ -59,12 +60,12 @@ def split(record: Dataset, fraction: float = 0.25) -> Split:
 
 
 def split_data(record: Dataset, validation: Dataset | float) -> Split:
-    """Return estimation and validation data: two records, or two parts of one record.
+    """Return the split of two records, or of one record and a validation fraction.
 
     Raises
     ------
     RecordError
-        The validation data has another number of inputs or sampling time.
+        The validation data has a different number of inputs or sampling time.
     SettingsError
         The fraction leaves a part empty.
     """

@@ -1,1 +1,4 @@
-"""Parameters from data: least squares, constrained least squares, forward orthogonal regression."""
+"""Estimation of parameters: least squares, constrained least squares, forward orthogonal regression.
+
+Read `estimate` first.
+"""

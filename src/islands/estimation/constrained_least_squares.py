@@ -1,7 +1,7 @@
 """Constrained least squares, equation (4), in the null space of the constraints.
 
-``S theta = c`` is met by ``theta = theta_p + Z eta`` with ``S Z = 0``; eta is free, so the constraints hold
-whatever the data say, and the result equals equation (4) without its three inverses.
+``theta = theta_p + Z eta`` with ``S Z = 0`` meets ``S theta = c`` for every eta, so the constraints hold for
+any data. The result equals equation (4) but needs none of its three inverses.
 """
 
 import numpy as np
@@ -11,14 +11,15 @@ from scipy.linalg import qr
 from islands.estimation.least_squares import Estimate, factor, failed_estimate, solve
 from islands.simulation.outcome import EvaluationOutcome, Status
 
-#: Rows of S that keep less than this share of their norm are combinations of the others.
+#: A normalised row of S with a smaller pivot is a linear combination of the other rows. Also the relative
+#: tolerance of its right-hand side.
 _REDUNDANT = 1e-10
 
 
 def constrained_least_squares(
     psi: NDArray[np.float64], y: NDArray[np.float64], S: NDArray[np.float64], c: NDArray[np.float64]
 ) -> Estimate:
-    """Estimate the parameters that minimise ``|y - Psi theta|`` under ``S theta = c``.
+    """Estimate the parameters that minimise ``|y - Psi theta|`` subject to ``S theta = c``.
 
     Parameters
     ----------
@@ -27,28 +28,32 @@ def constrained_least_squares(
     y : ndarray, shape (rows,)
         The target.
     S : ndarray, shape (constraints, terms)
-        No row may be a combination of the others.
+        Constraint matrix. No row may be a linear combination of the others.
     c : ndarray, shape (constraints,)
-        What the rows sum to.
+        Right-hand side of the constraints.
 
     Returns
     -------
     Estimate
-        INFEASIBLE where a constraint is redundant or contradicts the others, or there are more than terms.
+        INFEASIBLE if a constraint is redundant or contradicts the others, or if there are more constraints
+        than terms.
     """
-    made = factor(psi, y)
-    if isinstance(made, EvaluationOutcome):
-        return failed_estimate(len(psi), made)
-    found = null_space(S / made.scale, c)
+    factors = factor(psi, y)
+    if isinstance(factors, EvaluationOutcome):
+        return failed_estimate(len(psi), factors)
+    found = null_space(S / factors.scale, c)
     if isinstance(found, EvaluationOutcome):
         return failed_estimate(len(psi), found)
-    return solve(made, *found)
+    return solve(factors, *found)
 
 
 def null_space(
     S: NDArray[np.float64], c: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | EvaluationOutcome:
-    """Return a particular solution of ``S theta = c`` and an orthonormal basis of the null space of S."""
+    """Return a particular solution of ``S theta = c`` and an orthonormal basis of the null space of S.
+
+    Return INFEASIBLE with the first offending constraint if a row is zero, redundant or contradictory.
+    """
     constraints, terms = S.shape
     if not constraints:
         return np.zeros(terms), np.eye(terms)

@@ -1,4 +1,4 @@
-"""From a structure to a model: constraint, regressor matrix, constrained least squares."""
+"""Parameter estimation of a structure: constraint, regressor matrix, constrained least squares."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from islands.simulation.outcome import EvaluationOutcome
 
 @dataclass(frozen=True, slots=True)
 class FittedStructure:
-    """A model with parameters, and the variance of its equation error (the residual one step ahead)."""
+    """A model with parameters, and the variance of its equation error (the one-step-ahead residual)."""
 
     model: Model
     residual_variance: float
@@ -30,15 +30,17 @@ def estimate(
 
     Parameters
     ----------
+    regressors : sequence of Regressor
+    record : Dataset
     constraints : str
-        An entry of ``CONSTRAINTS``; a regressor whose parameter it forces to zero is left out.
+        Name of an entry of ``CONSTRAINTS``. Regressors whose parameter is forced to zero are removed.
     warm_up : int or None
-        Samples before the first row; None takes the deepest lag.
+        Number of samples before the first row. None is the largest lag.
 
     Returns
     -------
     FittedStructure or EvaluationOutcome
-        The failure's outcome: INFEASIBLE, SINGULAR or TOO_FEW_ROWS.
+        An outcome INFEASIBLE, SINGULAR or TOO_FEW_ROWS after a failure.
     """
     constrained = constraint(constraints).constrain(canonical_order(regressors))
     if isinstance(constrained, EvaluationOutcome):

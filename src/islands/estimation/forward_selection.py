@@ -1,9 +1,9 @@
-"""Forward selection over a library: the classical answer, and the bar that evolution has to beat.
+"""Forward selection over a candidate library: the classical method and the baseline for evolution.
 
-Under a constraint the selection runs in its null space: what is fixed goes to the target's side, the rest of
-the library is written as increments that keep the constraint, and the error reduction ratio is that of the
-increments. Selecting first and constraining afterwards would spend the ratio on terms that the constraint
-then forbids.
+Under a constraint, the selection runs in the null space of the constraint. Fixed terms move to the target,
+the rest of the library is rewritten as increments that preserve the constraint, and the error reduction
+ratio (ERR) is computed for the increments. A selection that ignores the constraint would choose terms that
+the constraint then forbids.
 """
 
 from collections.abc import Sequence
@@ -22,21 +22,22 @@ Structure = tuple[Regressor, ...]
 def forward_selection(
     library: Sequence[Regressor], record: Dataset, constraints: str = "none", max_terms: int = 10
 ) -> tuple[Structure, ...] | EvaluationOutcome:
-    """Return nested structures, each the one before it and the candidate with the largest ERR.
+    """Return nested structures; each adds the candidate with the largest ERR to the previous one.
 
     Parameters
     ----------
     library : sequence of Regressor
-        In the order of their content; ties go to the first.
+        Candidates in canonical order. Ties go to the first.
+    record : Dataset
     constraints : str
-        An entry of ``CONSTRAINTS``.
+        Name of an entry of ``CONSTRAINTS``.
     max_terms : int
-        The largest structure's number of regressors.
+        Maximum number of regressors of a structure.
 
     Returns
     -------
     tuple of structures, or EvaluationOutcome
-        Regressors in the order of their content. INFEASIBLE where the library cannot meet the constraint.
+        Regressors in canonical order. INFEASIBLE if the library cannot meet the constraint.
     """
     found = constraint(constraints).directions(library)
     if isinstance(found, EvaluationOutcome):
@@ -44,10 +45,10 @@ def forward_selection(
     warm_up = max(item.maximum_lag for item in library)
     gram = gram_matrix([*(direction.expression for direction in found.free), found.target], record, warm_up)
     structures = [tuple(found.fixed)] if found.fixed else []
-    chosen: list[Regressor] = list(found.fixed)
+    selected: list[Regressor] = list(found.fixed)
     for position in froe(gram, max_terms=max_terms).order:
-        chosen += found.free[position].regressors
-        structure = tuple(canonical_order(chosen))
+        selected += found.free[position].regressors
+        structure = tuple(canonical_order(selected))
         if len(structure) > max_terms:
             break
         structures.append(structure)

@@ -1,4 +1,4 @@
-"""Forward orthogonal regression by error reduction ratio (FROE), equation (6), on inner products alone."""
+"""Forward orthogonal regression by error reduction ratio (FROE), equation (6), from inner products."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ from islands.kernels.err_selection import select
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Candidates in the order of their selection.
+    """Candidates in order of selection.
 
     Attributes
     ----------
     order : tuple of int
         Positions among the candidates.
     err : tuple of float
-        Error reduction ratio of each: the share of the target's sum of squares that it explains on top of
-        those before it. They sum to 1 at most.
+        Error reduction ratio of each candidate: the fraction of the target's sum of squares that it explains
+        in addition to those selected before. The ratios sum to at most 1.
     """
 
     order: tuple[int, ...]
@@ -26,21 +26,21 @@ class Selection:
 
 
 def froe(gram: NDArray[np.float64], tolerance: float = 0.0, max_terms: int | None = None) -> Selection:
-    """Select candidates one after the other, each time the one with the largest error reduction ratio.
+    """Select candidates one by one, each time the one with the largest error reduction ratio.
 
     Parameters
     ----------
     gram : ndarray, shape (candidates + 1, candidates + 1)
-        Inner products of the candidates and, last, the target.
+        Inner products of the candidates and, in the last row and column, of the target.
     tolerance : float
-        Stop when no candidate left has a larger error reduction ratio.
+        Stop if no remaining candidate has a larger error reduction ratio.
     max_terms : int or None
-        Stop at this number.
+        Maximum number of selected candidates.
 
     Returns
     -------
     Selection
-        With n terms it begins the selection with n + 1. Ties go to the first candidate.
+        A selection of n terms is a prefix of the selection of n + 1 terms. Ties go to the first candidate.
     """
     candidates = len(gram) - 1
     limit = candidates if max_terms is None else min(max_terms, candidates)

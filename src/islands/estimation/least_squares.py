@@ -1,4 +1,4 @@
-"""Least squares, equation (2), through an orthogonal factorisation: no inverse is ever formed."""
+"""Least squares, equation (2), by an orthogonal factorisation without matrix inverses."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from islands.kernels.qr import orthogonalise
 from islands.kernels.summation import total
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
-#: A regressor that keeps less than this share of its norm depends on those before it.
+#: A regressor is linearly dependent if orthogonalisation leaves a smaller fraction of its norm.
 DEPENDENT = 1e-11
 
 
@@ -22,11 +22,12 @@ class Estimate:
     Attributes
     ----------
     theta : ndarray, shape (terms,)
-        NaN where the outcome is a failure.
+        NaN after a failure.
     standard_errors : ndarray, shape (terms,)
-        Square roots of the diagonal of the parameters' covariance, as if the equation error were white.
+        Square roots of the diagonal of the parameter covariance, under the assumption of a white equation
+        error.
     residual_variance : float
-        Residual sum of squares over rows less free parameters.
+        Residual sum of squares divided by (rows - free parameters).
     outcome : EvaluationOutcome
         OK, SINGULAR, INFEASIBLE or TOO_FEW_ROWS.
     """
@@ -39,20 +40,20 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QRFactor:
-    """``Psi = Q R`` with the columns of R scaled to norm 1: all that estimation needs of a record.
+    """Factorisation ``Psi = Q R`` with the columns of R scaled to norm 1.
 
     Attributes
     ----------
     triangle : ndarray, shape (terms, terms)
         R, upper triangular, each column divided by its norm.
     scale : ndarray, shape (terms,)
-        Those norms: a parameter is the scaled one divided by it.
+        Norms of the columns of R. A parameter is the scaled parameter divided by its norm.
     projection : ndarray, shape (terms,)
         Q'y.
     residual : float
-        Sum of squares of y that no parameters can explain.
+        Sum of squares of the part of y that is orthogonal to Psi.
     rows : int
-        Rows of Psi.
+        Number of rows of Psi.
     """
 
     triangle: NDArray[np.float64]
@@ -75,12 +76,12 @@ def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | Evalu
     Returns
     -------
     QRFactor or EvaluationOutcome
-        TOO_FEW_ROWS, or SINGULAR with the position of the first regressor that depends on those before it.
+        TOO_FEW_ROWS, or SINGULAR with the position of the first linearly dependent regressor.
 
     Raises
     ------
     RecordError
-        The target has another number of rows: the kernel would read beyond its end.
+        The target has a different number of rows; the kernel would read out of bounds.
     """
     terms, rows = psi.shape
     if y.shape != (rows,):
@@ -88,7 +89,7 @@ def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | Evalu
     if rows <= terms:
         return EvaluationOutcome(Status.TOO_FEW_ROWS, f"{rows} rows for {terms} parameters")
     triangle, projection = np.empty((terms, terms)), np.empty(terms)
-    # The kernel works in place on contiguous rows of float64; the caller's may be a transposed view.
+    # The kernel works in place on contiguous float64 rows; the caller's array may be a transposed view.
     q, residual = np.array(psi, dtype=np.float64, order="C"), np.array(y, dtype=np.float64)
     dependent = orthogonalise(q, residual, triangle, projection, DEPENDENT)
     if dependent >= 0:
@@ -107,27 +108,28 @@ def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
     y : ndarray, shape (rows,)
         The target.
     """
-    made = factor(psi, y)
-    if isinstance(made, EvaluationOutcome):
-        return failed_estimate(len(psi), made)
-    return solve(made, np.zeros(len(psi)), np.eye(len(psi)))
+    factors = factor(psi, y)
+    if isinstance(factors, EvaluationOutcome):
+        return failed_estimate(len(psi), factors)
+    return solve(factors, np.zeros(len(psi)), np.eye(len(psi)))
 
 
-def solve(made: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.float64]) -> Estimate:
+def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.float64]) -> Estimate:
     """Minimise over ``scaled theta = particular + basis eta``.
 
     Parameters
     ----------
+    factors : QRFactor
     particular : ndarray, shape (terms,)
-        One admissible scaled parameter vector.
+        A scaled parameter vector that meets the constraints.
     basis : ndarray, shape (terms, free)
-        Directions that keep it admissible, orthonormal.
+        Orthonormal basis of the directions that preserve the constraints.
     """
     terms, free = basis.shape
-    remainder = made.projection - made.triangle @ particular
+    remainder = factors.projection - factors.triangle @ particular
     if not free:
-        return _estimate(made, particular, np.zeros((terms, terms)), float(remainder @ remainder), 0)
-    q, r = qr(made.triangle @ basis, mode="economic")
+        return _make_estimate(factors, particular, np.zeros((terms, terms)), float(remainder @ remainder), 0)
+    q, r = qr(factors.triangle @ basis, mode="economic")
     if np.abs(np.diag(r)).min() <= DEPENDENT:
         return failed_estimate(
             terms, EvaluationOutcome(Status.SINGULAR, "the free directions depend on each other")
@@ -135,19 +137,23 @@ def solve(made: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.flo
     right = q.T @ remainder
     scaled = particular + basis @ solve_triangular(r, right)
     spread = solve_triangular(r, basis.T, trans="T")
-    missed = remainder - q @ right
-    return _estimate(made, scaled, spread.T @ spread, float(missed @ missed), free)
+    unexplained = remainder - q @ right
+    return _make_estimate(factors, scaled, spread.T @ spread, float(unexplained @ unexplained), free)
 
 
-def _estimate(
-    made: QRFactor, scaled: NDArray[np.float64], covariance: NDArray[np.float64], missed: float, free: int
+def _make_estimate(
+    factors: QRFactor,
+    scaled: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    unexplained: float,
+    free: int,
 ) -> Estimate:
-    variance = (made.residual + missed) / (made.rows - free)
-    errors = np.sqrt(variance * np.maximum(np.diag(covariance), 0.0)) / made.scale
-    return Estimate(scaled / made.scale, errors, variance, OK)
+    variance = (factors.residual + unexplained) / (factors.rows - free)
+    errors = np.sqrt(variance * np.maximum(np.diag(covariance), 0.0)) / factors.scale
+    return Estimate(scaled / factors.scale, errors, variance, OK)
 
 
 def failed_estimate(terms: int, outcome: EvaluationOutcome) -> Estimate:
-    """Return the estimate of a failure."""
-    nothing = np.full(terms, np.nan)
-    return Estimate(nothing, nothing, np.nan, outcome)
+    """Return an estimate of NaN with the outcome of a failure."""
+    undefined = np.full(terms, np.nan)
+    return Estimate(undefined, undefined, np.nan, outcome)

@@ -1,7 +1,7 @@
-"""The table of parameter constraints: what a model's parameters must obey whatever the data say.
+"""Table of parameter constraints that hold exactly for any data.
 
-An entry groups regressors and says what the parameters of a group sum to: ``S theta = c``. Add one here and
-it can be chosen by name; a search evaluates it in its kernel.
+An entry groups regressors and prescribes the sum of the parameters of each group: ``S theta = c``. An entry
+of `CONSTRAINTS` can be chosen by name, and the kernel of a search evaluates it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,14 +21,16 @@ from islands.simulation.outcome import EvaluationOutcome, Status
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Constrained:
-    """Regressors that can meet a constraint, and the constraint on their parameters.
+    """Regressors and the constraint ``S theta = c`` on their parameters.
 
     Attributes
     ----------
     regressors : tuple of Regressor
-        Those whose parameter is not forced to zero.
+        Regressors whose parameter is not forced to zero.
     S : ndarray, shape (constraints, terms)
+        Constraint matrix.
     c : ndarray, shape (constraints,)
+        Right-hand side.
     """
 
     regressors: tuple[Regressor, ...]
@@ -38,14 +40,14 @@ class Constrained:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """A way in which a constrained model may grow.
+    """A direction of the null space: a candidate that a constrained model can add.
 
     Attributes
     ----------
     expression : Expression
-        What is added: a regressor, or a difference of two that keeps their cluster's sum as it is.
+        A regressor, or a difference of two regressors that preserves the sum of their cluster.
     regressors : tuple of Regressor
-        Those that the model then has.
+        Regressors that the model must then contain.
     """
 
     expression: Expression
@@ -54,15 +56,16 @@ class Direction:
 
 @dataclass(frozen=True, slots=True)
 class Directions:
-    """The null space of a constraint over a library, one direction a candidate.
+    """The null space of a constraint over a library.
 
     Attributes
     ----------
     target : Expression
-        What the directions explain: y(k), less what the constraint fixes.
+        Target of the selection: y(k) minus the part that the constraint fixes.
     fixed : tuple of Regressor
-        Regressors that every model has.
+        Regressors of every model.
     free : tuple of Direction
+        Candidates.
     """
 
     target: Expression
@@ -72,20 +75,20 @@ class Directions:
 
 @dataclass(frozen=True, slots=True)
 class Constraint:
-    """An entry of the table: sums of parameters over groups of regressors that have no member in common.
+    """An entry of the table: sums of parameters over disjoint groups of regressors.
 
     Attributes
     ----------
     group : callable
-        A regressor's weight in the sum, and what its group has in common; with the weight 0 it has no group.
+        Maps a regressor to its weight in the sum and the key of its group. With weight 0 it is in no group.
     sums : mapping
-        What the weighted parameters of a group sum to where that is not zero; a structure has to have these
-        groups.
+        Nonzero sums of the weighted parameters by group. A structure must contain these groups.
     lacking : str
-        What is said of a structure that has not.
+        Reason of the failure of a structure that lacks one of these groups.
     directions : callable
-        The same for a library from which regressors are selected.
+        Maps a candidate library to the null space of the constraint.
     description : str
+        One-line description.
     """
 
     group: Callable[[Regressor], tuple[float, Expression]]
@@ -95,9 +98,9 @@ class Constraint:
     description: str
 
     def constrain(self, regressors: Sequence[Regressor]) -> Constrained | EvaluationOutcome:
-        """Return the constraint on given regressors.
+        """Return the constraint on the given regressors.
 
-        A regressor alone in a group that sums to zero has the parameter zero and is left out.
+        The only regressor of a group with sum zero has a zero parameter and is removed.
         """
         groups = clusters(regressors, self.group)
         alone = {
@@ -117,25 +120,25 @@ class Constraint:
 
 _PRESENT = Lagged(0, 0)
 
-#: Property 1 of the paper, section 3: with these sums every output is an equilibrium at constant input.
+#: Property 1 (the paper, section 3): with these sums every output is an equilibrium at constant input.
 PROPERTY_1: Mapping[Expression, float] = MappingProxyType({OUTPUT_AT_REST: 1.0})
 
 
 def free(_regressor: Regressor) -> tuple[float, Expression]:
-    """Put no regressor into any group."""
+    """Assign the regressor to no group."""
     return 0.0, _PRESENT
 
 
 def every_regressor(library: Sequence[Regressor]) -> Directions:
-    """Let a model grow by any regressor."""
+    """Return the unconstrained directions: every regressor is a candidate."""
     return Directions(_PRESENT, (), tuple(Direction(item.expression, (item,)) for item in library))
 
 
 def increments(library: Sequence[Regressor]) -> Directions | EvaluationOutcome:
-    """Let a model grow by what vanishes at rest: y(k) - y(k-1) is explained by increments alone.
+    """Return the directions that vanish in the steady state, which explain y(k) - y(k-1).
 
-    Within a cluster that is the difference of a regressor and the cluster's first; a regressor with a phi
-    factor vanishes by itself. So the selection sees the constraint, and estimation has none left to repair.
+    They are the regressors with a phi factor and, within a cluster, the differences of a regressor and the
+    cluster's first regressor. A model selected from them can meet the constraint.
     """
     groups = clusters(library)
     output = next((group for group in groups if is_output(group)), None)
@@ -160,7 +163,7 @@ def increments(library: Sequence[Regressor]) -> Directions | EvaluationOutcome:
 def _difference(
     left: tuple[Regressor | Expression, float], right: tuple[Regressor | Expression, float]
 ) -> Expression:
-    """Return ``left / its weight - right / its weight``, up to a factor."""
+    """Return the difference of the two terms, each divided by its weight, up to a factor."""
     terms = [
         Apply(MUL, (Constant(sign / weight), item.expression if isinstance(item, Regressor) else item))
         for sign, (item, weight) in ((1.0, left), (-1.0, right))
@@ -169,7 +172,7 @@ def _difference(
 
 
 def is_output(cluster: Cluster) -> bool:
-    """Tell whether a cluster is that of y itself."""
+    """Return whether the steady state of the cluster is y."""
     return cluster.steady_state == OUTPUT_AT_REST
 
 
@@ -193,6 +196,6 @@ def constraint(name: str) -> Constraint:
     Raises
     ------
     SettingsError
-        There is none of that name.
+        No constraint has that name.
     """
     return lookup(CONSTRAINTS, name, "constraints")

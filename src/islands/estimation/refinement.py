@@ -1,8 +1,8 @@
-"""Refinement: parameters polished on the simulation error, within the null space of the constraints.
+"""Refinement of parameters on the simulation error, within the null space of the constraints.
 
-Least squares minimises the error one step ahead; what counts is the error over an interval. Levenberg (1944)
-and Marquardt (1963): damped Gauss-Newton steps on the multiple-shooting residual. The constraints keep
-holding, since only directions that leave them as they are are searched.
+Least squares minimises the one-step-ahead error. Refinement minimises the multiple-shooting error by damped
+Gauss-Newton steps (Levenberg 1944, Marquardt 1963). The constraints remain satisfied because the steps are
+restricted to their null space.
 """
 
 from dataclasses import dataclass
@@ -22,19 +22,28 @@ from islands.simulation.layout import layout
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound, multiple_shooting
 
-#: Step of a central difference, in units of a parameter's size: between truncation and rounding.
-_DIFFERENCE = 1e-5
+#: Relative step of a central difference, a compromise between truncation and rounding errors.
+_DIFFERENCE_STEP = 1e-5
 
-#: The damping at the start, what multiplies it after a failed and a successful step, and where it gives up.
-_DAMPING, _UP, _DOWN, _GIVE_UP = 1e-3, 10.0, 0.2, 1e9
+#: Initial damping.
+_INITIAL_DAMPING = 1e-3
 
-#: A relative gain of the squared error under this ends the search.
-_GAIN = 1e-8
+#: Factor of the damping after a failed step.
+_DAMPING_INCREASE = 10.0
+
+#: Factor of the damping after a successful step.
+_DAMPING_DECREASE = 0.2
+
+#: Refinement ends when the damping reaches this value.
+_MAX_DAMPING = 1e9
+
+#: Refinement ends when a step reduces the squared error by a smaller relative amount.
+_MIN_GAIN = 1e-8
 
 
 @dataclass(frozen=True, slots=True)
 class RefinedModel:
-    """A model with polished parameters, the mean squared error before and after, and the steps taken."""
+    """A refined model, its mean squared error before and after, and the number of accepted steps."""
 
     model: Model
     before: float
@@ -50,51 +59,54 @@ def refine(
     warm_up: int | None = None,
     max_steps: int = 30,
 ) -> RefinedModel | EvaluationOutcome:
-    """Polish a model's parameters on the error of multiple shooting.
+    """Refine the parameters of a model on the multiple-shooting error.
 
     Parameters
     ----------
     model : Model
-        With parameters that meet the constraints.
+        Model with parameters that meet the constraints.
+    record : Dataset
     interval : int or None
-        Samples of a shooting interval; None is the free run.
+        Length of a shooting interval in samples. None is the free run.
     constraints : str
-        An entry of ``CONSTRAINTS``; it keeps holding.
+        Name of an entry of ``CONSTRAINTS``. The refined model meets it.
     warm_up : int or None
-        Samples before the first prediction; None takes the deepest lag.
+        Number of samples before the first prediction. None is the largest lag.
     max_steps : int
-        Accepted steps at the most.
+        Maximum number of accepted steps.
 
     Returns
     -------
     RefinedModel or EvaluationOutcome
-        With standard errors from the Jacobian at the end. INFEASIBLE where the constraint refuses the model
-        or one of its regressors, DIVERGED where the model diverges as it is.
+        A model with standard errors from the final Jacobian. INFEASIBLE if the structure cannot meet the
+        constraint or contains a regressor whose parameter is forced to zero, DIVERGED if the initial model
+        diverges.
 
     Raises
     ------
     ModelError
         The model has no parameters.
     RecordError
-        The record is incomplete, has another number of inputs, or is too short.
+        The record is incomplete, has a different number of inputs, or is too short.
     SettingsError
-        The warm-up is shorter than the model's deepest lag, or the interval is under 1.
+        The warm-up is shorter than the model's largest lag, the interval is less than 1, or the constraint
+        is unknown.
     """
     constrained = constraint(constraints).constrain(model.regressors)
     if isinstance(constrained, EvaluationOutcome):
         return constrained
     if constrained.regressors != model.regressors:
         return EvaluationOutcome(
-            Status.INFEASIBLE, "the constraint forces a parameter to zero: leave its term out"
+            Status.INFEASIBLE, "the constraint forces a parameter to zero: remove its term"
         )
-    # It checks what the kernel does not: inputs, lags, the record's length.
+    # This call also checks the inputs, the lags and the length of the record, which the kernel does not.
     started = multiple_shooting(model, record, interval, warm_up)
     if not started.outcome:
         return started.outcome
     if np.isnan(started.mean_squared_error):
-        raise RecordError(f"{record.output_name} is missing somewhere: refinement needs every sample")
+        raise RecordError(f"{record.output_name} has missing samples: refinement needs every sample")
     theta = np.array(model.parameters)
-    # Each parameter in units of its own size: their sizes differ by many orders.
+    # Scale each parameter by its magnitude: the magnitudes differ by many orders.
     unit = np.where(theta == 0.0, 1.0, np.abs(theta))
     found = null_space(constrained.S * unit, constrained.c)
     if isinstance(found, EvaluationOutcome):
@@ -102,21 +114,21 @@ def refine(
     directions = unit[:, None] * found[1]
     residual = _Residual(model, record, interval, warm_up)
     error = residual(theta)
-    assert error is not None, "it did not diverge a moment ago"
+    assert error is not None, "the initial simulation did not diverge"
     before = residual.mean_square(error)
-    damping, steps = _DAMPING, 0
+    damping, steps = _INITIAL_DAMPING, 0
     normal, gradient = residual.normal_equations(theta, error, directions)
-    while steps < max_steps and damping < _GIVE_UP:
+    while steps < max_steps and damping < _MAX_DAMPING:
         damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
         candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
         trial = residual(candidate)
         if trial is None or not residual.mean_square(trial) < residual.mean_square(error):
-            damping *= _UP
+            damping *= _DAMPING_INCREASE
             continue
         gain = 1.0 - residual.mean_square(trial) / residual.mean_square(error)
-        theta, error, damping, steps = candidate, trial, damping * _DOWN, steps + 1
+        theta, error, damping, steps = candidate, trial, damping * _DAMPING_DECREASE, steps + 1
         normal, gradient = residual.normal_equations(theta, error, directions)
-        if gain < _GAIN:
+        if gain < _MIN_GAIN:
             break
     after = residual.mean_square(error)
     variance = after * error.size / max(1, error.size - directions.shape[1])
@@ -126,7 +138,7 @@ def refine(
 
 
 class _Residual:
-    """The multiple-shooting residual as a function of the parameters, summed in the written order."""
+    """The multiple-shooting residual as a function of the parameters, with sums in a fixed order."""
 
     def __init__(self, model: Model, record: Dataset, interval: int | None, warm_up: int | None) -> None:
         first = model.maximum_lag if warm_up is None else warm_up
@@ -138,7 +150,7 @@ class _Residual:
             self._predicted[start : start + length] = True
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Return prediction minus measurement over all predicted samples; None after a divergence."""
+        """Return prediction minus measurement over all predicted samples, or None after a divergence."""
         lanes = len(self._cut.start)
         predicted = np.empty(len(self._y))
         error, diverged = np.empty(lanes), np.empty(lanes, np.int64)
@@ -150,19 +162,21 @@ class _Residual:
         return np.ascontiguousarray((predicted - self._y)[self._predicted])
 
     def mean_square(self, error: NDArray[np.float64]) -> float:
-        """Return the mean of the squares."""
+        """Return the mean square of a residual."""
         return float(dot(error, 0, error, 0, error.size)) / error.size
 
     def normal_equations(
         self, theta: NDArray[np.float64], error: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return J'J and J'r for steps along the directions; one that diverges stands still (zeros)."""
+        """Return J'J and J'r for steps along the directions; a direction that diverges contributes zeros."""
         free = directions.shape[1]
         jacobian: NDArray[np.float64] = np.zeros((free, error.size))
         for j in range(free):
-            forward, backward = (self(theta + sign * _DIFFERENCE * directions[:, j]) for sign in (1.0, -1.0))
+            forward, backward = (
+                self(theta + sign * _DIFFERENCE_STEP * directions[:, j]) for sign in (1.0, -1.0)
+            )
             if forward is not None and backward is not None:
-                jacobian[j] = (forward - backward) / (2.0 * _DIFFERENCE)
+                jacobian[j] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
         normal: NDArray[np.float64] = np.empty((free, free))
         gradient: NDArray[np.float64] = np.empty(free)
         flat, rows = jacobian.reshape(-1), error.size

@@ -53,12 +53,12 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
         The library is unknown, a setting is out of range, or the library has more than `MAX_CANDIDATES`.
     """
     if degree < 1 or lags < 1:
-        raise SettingsError(f"degree and lags must be at least 1, got {degree} and {lags}")
+        raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
     library = library_named(name)
     count = library.count(degree, lags, inputs)
     if count > MAX_CANDIDATES:
         raise SettingsError(
-            f"{count} candidates exceed the limit of a library ({MAX_CANDIDATES}): use a smaller degree "
+            f"{count} candidates are more than a library may have ({MAX_CANDIDATES}): take a smaller degree "
             "or fewer lags, or search by evolution"
         )
     regressors = (regressor(expression)[1] for expression in library.build(degree, lags, inputs))

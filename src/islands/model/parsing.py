@@ -111,7 +111,7 @@ def _read_call(name: str, arguments: Sequence[ast.expr], primitives: Mapping[str
     if (shift := _BACK_SHIFT.fullmatch(name)) and len(arguments) == 1:
         return Shift(int(shift[1]), _read(arguments[0], primitives))
     if name not in primitives:
-        raise ModelError(f"unknown function {name!r}: use one of {', '.join(primitives)}")
+        raise ModelError(f"unknown function {name!r}: take one of {', '.join(primitives)}")
     primitive = primitives[name]
     variadic = primitive in (ADD, MUL) and len(arguments) > 1
     if len(arguments) != primitive.arity and not variadic:

@@ -93,8 +93,8 @@ def _smaller(a: float, b: float) -> float:
     return a if a < b else b
 
 
-# C and MATLAB code is missing for operators, and for primitives that the canonical form replaces by operators
-# (phi1, square) or by other primitives (phi2).
+# C and MATLAB need no function for operators, nor for primitives that the canonical form replaces by
+# operators (phi1, square) or by other primitives (phi2).
 MUL = Primitive("mul", 2, _multiply, r"{0} {1}", commutative=True, summary="`a*b`")
 ADD = Primitive("add", 2, _add, r"{0} + {1}", commutative=True, summary="`a + b`")
 SUB = Primitive("sub", 2, _subtract, r"{0} - {1}", summary="`a - b`")

@@ -78,7 +78,7 @@ def regressor(expression: Expression) -> tuple[float, Regressor | None]:
     for channel, lag in sorted(lags(core)):
         if lag < 1:
             raise ModelError(
-                f"a regressor must read past samples only: channel {channel} has lag {lag}, use 1 or more"
+                f"a regressor reads only past samples: channel {channel} has lag {lag}, take 1 or more"
             )
     return (factor, Regressor(core)) if factor else (0.0, None)
 
@@ -204,7 +204,7 @@ def _fold_constants(primitive: Primitive, numbers: list[float]) -> float:
 
 def _check_finite(number: float) -> float:
     if not math.isfinite(number):
-        raise ModelError("the numbers in an expression overflow: use smaller numbers")
+        raise ModelError("the numbers in an expression overflow: take smaller ones")
     return number
 
 

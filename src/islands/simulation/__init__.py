@@ -1,1 +1,4 @@
-"""Predictions of a model: one step ahead, multiple shooting, free run."""
+"""Simulation of models: one-step-ahead prediction, multiple shooting and free run.
+
+Read `predictors` first.
+"""

@@ -1,4 +1,4 @@
-"""Cut a record into shooting intervals and lay them out for the kernel as [block][time][lane]."""
+"""Layout of a record's shooting intervals in memory, in the kernel's order [block][time][lane]."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +8,8 @@ from islands.errors import RecordError, SettingsError
 from islands.kernels.simd import padded_size
 from islands.kernels.simulate import WIDTHS, Layout
 
-#: What an instruction costs besides the work on its row, in lanes.
-_OVERHEAD = 24
+#: Fixed cost of an instruction, in units of its cost per lane.
+_OVERHEAD_LANES = 24
 
 
 def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout:
@@ -17,18 +17,19 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
 
     Parameters
     ----------
+    record : Dataset
     warm_up : int
-        Measured samples before the first prediction of every segment, and before every interval.
+        Number of measured samples before the first prediction of every segment and interval.
     interval : int or None
-        Samples of a shooting interval: 1 is one-step-ahead, None is the free run over each whole segment. The
-        last, shorter interval of a segment counts as well.
+        Length of a shooting interval in samples: 1 is one-step-ahead, None is the free run over each whole
+        segment. The last interval of a segment may be shorter.
 
     Raises
     ------
     RecordError
-        No segment is longer than the warm-up, or the output is missing where an interval starts from it.
+        No segment is longer than the warm-up, or the output is missing in the warm-up of an interval.
     SettingsError
-        The interval is under 1.
+        The interval is less than 1.
     """
     if interval is not None and interval < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {interval}")
@@ -37,10 +38,10 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     signals = np.ascontiguousarray(np.vstack([record.y, record.u.T]))
     known = record.y[~np.isnan(record.y)]
     largest = float(np.abs(known).max()) if known.size else 0.0
-    width = min(WIDTHS, key=lambda lanes: -(-len(start) // lanes) * (lanes + _OVERHEAD))
+    width = min(WIDTHS, key=lambda lanes: -(-len(start) // lanes) * (lanes + _OVERHEAD_LANES))
     cuts = np.arange(0, len(start), width)
     if interval == 1:
-        # One step ahead needs no gathering: neighbouring lanes are neighbouring samples of one segment.
+        # One-step-ahead prediction needs no gathering: adjacent lanes are adjacent samples of one segment.
         cuts = np.union1d(cuts, np.flatnonzero(np.diff(start) != 1) + 1)
         lanes = np.diff(np.append(cuts, len(start)))
         padded = np.pad(signals, ((0, 0), (0, width)), mode="edge")
@@ -52,7 +53,7 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     offset = width * (np.cumsum(rows) - rows)
     gathered = padded_size(len(signals) * int(rows.sum()) * width).reshape(len(signals), -1)
     for cut, count, at, steps in zip(cuts, lanes, offset, rows, strict=True):
-        # A short lane goes on at the record's end; lanes that nobody has asked for repeat the first.
+        # A short lane is filled up to the end of the record; unused lanes repeat the first.
         samples = start[cut : cut + count] - warm_up + np.arange(steps)[:, None]
         block = gathered[:, at : at + steps * width].reshape(len(signals), steps, width)
         block[:, :, :count] = signals[:, np.minimum(samples, record.samples - 1)]
@@ -63,16 +64,16 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
 def _intervals(
     record: Dataset, warm_up: int, interval: int | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return first sample and length of every interval, in the order of time."""
+    """Return the first sample and the length of every interval, in time order."""
     step = interval or record.samples
     starts = [np.arange(begin + warm_up, end, step) for begin, end in record.bounds]
-    if not any(begun.size for begun in starts):
+    if not any(each.size for each in starts):
         longest = max(record.segments)
         raise RecordError(
             f"the longest recording has {longest} samples and the warm-up takes {warm_up}: "
             "take a longer recording, smaller lags or a shorter warm-up"
         )
-    ends = [np.full(begun.size, end) for begun, (_, end) in zip(starts, record.bounds, strict=True)]
+    ends = [np.full(each.size, end) for each, (_, end) in zip(starts, record.bounds, strict=True)]
     start = np.concatenate(starts)
     return start, np.minimum(step, np.concatenate(ends) - start)
 
@@ -85,5 +86,5 @@ def _check_warm_up(y: NDArray[np.float64], start: NDArray[np.int64], warm_up: in
         sample = first + int(np.flatnonzero(np.isnan(y[first : first + warm_up]))[0])
         raise RecordError(
             f"the output is missing at sample {sample}, where a simulation starts from it: "
-            "use a free run, which needs it in the first samples alone, or fill the gap"
+            "use a free run, which only needs the first samples, or fill the gap"
         )

@@ -1,4 +1,4 @@
-"""A model linked once: it runs free again and again, with other parameters and on other inputs."""
+"""Model with a compiled program, for repeated free runs with different parameters and inputs."""
 
 from dataclasses import dataclass, field
 
@@ -12,19 +12,19 @@ from islands.model.regressor import Regressor
 from islands.program.term_pool import link
 from islands.simulation.predictors import divergence_bound_of_range
 
-#: A single run stands in the first lane of the narrowest row.
+#: A single run uses the first lane of the narrowest row.
 _WIDTH = WIDTHS[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkedModel:
-    """Regressors of a model, linked: what `free_run` makes anew for each simulation is made once here.
+    """Regressors of a model with their program, which is built once instead of for every `free_run`.
 
     Attributes
     ----------
     regressors : tuple of Regressor
     warm_up : int
-        Samples before the first that is predicted: the deepest lag.
+        Number of samples before the first prediction: the largest lag.
     """
 
     regressors: tuple[Regressor, ...]
@@ -36,37 +36,37 @@ class LinkedModel:
         object.__setattr__(self, "_program", link(self.regressors))
 
     def __reduce__(self) -> tuple[type["LinkedModel"], tuple[tuple[Regressor, ...]]]:
-        # A program holds addresses of this process: another one links anew.
+        # The program contains addresses of this process. Another process builds it again.
         return LinkedModel, (self.regressors,)
 
     def free_run(
         self, theta: NDArray[np.float64], u: NDArray[np.float64], start: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Simulate one recording from its first samples on.
+        """Simulate one recording from its first samples.
 
         Parameters
         ----------
         theta : ndarray, shape (regressors,)
         u : ndarray, shape (samples, inputs)
         start : ndarray, shape (warm_up,)
-            The measured output before the first prediction.
+            Measured output before the first prediction.
 
         Returns
         -------
         ndarray, shape (samples,)
-            To the last bit what `free_run` predicts of a record whose output is missing behind the start: NaN
-            in the warm-up, and from where the run diverged.
+            Predictions, NaN during the warm-up and after a divergence. Bit-identical to `free_run` on a
+            record whose output is missing after the warm-up.
 
         Raises
         ------
         RecordError
-            The input is no longer than the warm-up.
+            The input is not longer than the warm-up.
         """
         samples, inputs = u.shape
         if samples <= self.warm_up:
             raise RecordError(f"the input has {samples} samples and the warm-up takes {self.warm_up}")
-        # One row lies a sample behind the other, as one step ahead: the lanes behind the first run on later
-        # samples, and nobody asks for them.
+        # As in the one-step-ahead layout, each row starts one sample after the previous one. Only the first
+        # lane is used; the others run on later samples and are ignored.
         signals = np.zeros((1 + inputs, samples + _WIDTH))
         signals[0, : self.warm_up] = start
         signals[1:, :samples] = u.T

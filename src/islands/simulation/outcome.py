@@ -1,6 +1,7 @@
-"""What becomes of an evaluation: success, or a failure that happens a thousand times in a search.
+"""Outcome of an evaluation: success or an expected failure.
 
-A failure is a value with a reason and advice, never an exception: exceptions are for a caller's mistake.
+A search produces thousands of failures, so a failure is a value with a reason and advice. Exceptions are only
+used for errors of the caller.
 """
 
 from dataclasses import dataclass
@@ -8,30 +9,30 @@ from enum import Enum
 
 
 class Status(Enum):
-    """The kinds of outcome; the value is the advice."""
+    """Kind of an outcome; the value is the advice."""
 
     OK = "nothing to do"
     DIVERGED = "the prediction left the bound: take fewer terms, other terms, or constrain the parameters"
     SINGULAR = (
-        "the regressors depend on each other on this data: remove one, or excite the system more richly"
+        "the regressors are linearly dependent on this data: remove one, or excite the system more richly"
     )
     INFEASIBLE = "the structure cannot meet the constraints: change either as the reason says"
     TOO_FEW_ROWS = (
         "there are not more rows than parameters: take a longer record, fewer terms or smaller lags"
     )
-    ABANDONED = "nothing to do: others are better"
+    ABANDONED = "nothing to do: other individuals are better"
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluationOutcome:
-    """A verdict and its reason.
+    """Status of an evaluation and its reason.
 
     Attributes
     ----------
     verdict : Status
-        Its name is the kind, its value the advice.
+        Status; its value is the advice.
     reason : str
-        What happened, where; empty for OK.
+        What happened and where. Empty for OK.
     """
 
     verdict: Status = Status.OK

@@ -1,4 +1,4 @@
-"""One-step-ahead, multiple shooting and free run: one kernel, three names (the paper, section 2)."""
+"""One-step-ahead prediction, multiple shooting and free run with the same kernel (the paper, section 2)."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
-#: A prediction that leaves this many times the output's range has diverged.
+#: A prediction has diverged if its absolute value exceeds this multiple of the output's scale.
 BOUND = 1e6
 
 
@@ -25,11 +25,11 @@ class Simulation:
     Attributes
     ----------
     y : ndarray, shape (samples,)
-        NaN in the warm-up of every segment, and from where an interval diverged to its end.
+        NaN during the warm-up of every segment, and from a divergence to the end of its interval.
     mean_squared_error : float
-        Over all predicted samples; infinite after a divergence, NaN where the measured output is missing.
+        Mean over all predicted samples. Infinite after a divergence, NaN if a measured output is missing.
     outcome : EvaluationOutcome
-        OK, or DIVERGED with the first sample where it did.
+        OK, or DIVERGED with the first diverged sample.
     """
 
     y: NDArray[np.float64]
@@ -38,14 +38,14 @@ class Simulation:
 
 
 def one_step_ahead(model: Model, record: Dataset, warm_up: int | None = None) -> Simulation:
-    """Predict every sample from the measured past."""
+    """Predict every sample from measured past samples."""
     return multiple_shooting(model, record, 1, warm_up)
 
 
 def free_run(
     model: Model, record: Dataset, warm_up: int | None = None, bound: float | None = None
 ) -> Simulation:
-    """Simulate every segment from its first samples on; the output is read in the warm-up alone."""
+    """Simulate every segment from its first samples; the output is only read during the warm-up."""
     return multiple_shooting(model, record, None, warm_up, bound)
 
 
@@ -56,23 +56,27 @@ def multiple_shooting(
     warm_up: int | None = None,
     bound: float | None = None,
 ) -> Simulation:
-    """Simulate intervals of ``interval`` samples, each from measured values (None: the whole segment).
+    """Simulate shooting intervals, each from measured values.
 
     Parameters
     ----------
+    model : Model
+    record : Dataset
+    interval : int or None
+        Length of an interval in samples. None is the whole segment.
     warm_up : int or None
-        Samples before the first prediction; None takes the model's deepest lag, all that it needs.
+        Number of samples before the first prediction. None is the model's largest lag.
     bound : float or None
-        A larger absolute prediction is a divergence; None takes `divergence_bound` the record.
+        A prediction with a larger absolute value has diverged. None is the `divergence_bound` of the record.
 
     Raises
     ------
     ModelError
         The model has no parameters.
     RecordError
-        The record has another number of inputs, or is too short, or its output is missing in a warm-up.
+        The record has a different number of inputs, is too short, or its output is missing in a warm-up.
     SettingsError
-        The warm-up is shorter than the model's deepest lag.
+        The warm-up is shorter than the model's largest lag, or the interval is less than 1.
     """
     if model.inputs != record.inputs:
         raise RecordError(
@@ -100,17 +104,17 @@ def multiple_shooting(
 
 
 def divergence_bound(record: Dataset) -> float:
-    """Return the absolute output beyond which a simulation of the record has diverged.
+    """Return the absolute output above which a simulation of the record has diverged.
 
-    It is `BOUND` times the output's range or largest value; where outputs are missing and what is left tells
-    no scale, at least `BOUND` of the output's unit.
+    The bound is `BOUND` times the larger of the output's range and its largest absolute value. If outputs are
+    missing or all are zero, it is at least `BOUND` in the output's unit.
     """
     known = record.y[~np.isnan(record.y)]
     return divergence_bound_of_range(known, complete=known.size == record.samples)
 
 
 def divergence_bound_of_range(known: NDArray[np.float64], complete: bool) -> float:
-    """Return the same from the measured outputs, all of the record's or those that are not missing."""
+    """Return the `divergence_bound` for the known outputs; ``complete`` means that no output is missing."""
     scale = float(max(np.ptp(known), np.abs(known).max())) if known.size else 0.0
     if not complete or scale == 0.0:
         scale = max(scale, 1.0)

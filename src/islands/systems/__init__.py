@@ -1,1 +1,4 @@
-"""Physical simulators and the signals that excite them: where records with a known truth come from."""
+"""Simulated physical systems and excitation signals, which provide records with known parameters.
+
+Read `catalogue` first.
+"""

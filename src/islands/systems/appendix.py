@@ -1,15 +1,17 @@
-"""The test systems S1 and S2 of equation (A.1) under soft and white inputs.
+"""Test systems S1 and S2 of equation (A.1) with soft and white inputs.
 
-What the paper leaves open, and what stands here:
+The paper leaves some details open. This module makes the following choices:
 
 * (A.1) prints S1 with ``y``, not ``y~``, on the right-hand side, but calls both systems output-error systems.
-  Here both recursions run on the noise-free output. Under the white and the rescaled soft input the median
-  variance of S1 differs by less than one per cent between the two readings.
-* The quoted SNRs are ``20 log10(var(y~) / var(e))``. So read, ``std(e) = 0.02`` and the *white* input give S1
-  51.5 on average over 1000 seeds (quoted: 51.47), ``var(e) = 0.04 var(y~)`` gives S2 27.96 (quoted: 28.05).
-* The soft input's scaling is not stated. Unscaled its variance is near 115 over 500 samples and S1 diverges.
-  ``rescaled`` has variance 0.20 and gives S1 a median SNR of 57.3; ``unit-gain``, a filter that passes
-  a constant unchanged, leaves a variance of 0.003 and an SNR of 15.4. The first is nearer: the default.
+  Here both recursions use the noise-free output. Under the white and the rescaled soft input the median
+  variance of S1 differs by less than one per cent between the two interpretations.
+* The quoted SNRs are interpreted as ``20 log10(var(y~) / var(e))``. Then ``std(e) = 0.02`` and the *white*
+  input give S1 51.5 on average over 1000 seeds (quoted: 51.47), and ``var(e) = 0.04 var(y~)`` gives S2 27.96
+  (quoted: 28.05).
+* The scaling of the soft input is not stated. Without scaling, its variance is near 115 over 500 samples and
+  S1 diverges. ``rescaled`` has variance 0.20 and gives S1 a median SNR of 57.3. ``unit-gain``, a filter that
+  passes a constant unchanged, has a variance of 0.003 and an SNR of 15.4. ``rescaled`` is the default because
+  its SNR is closer to the quoted one.
 """
 
 from collections.abc import Callable
@@ -22,54 +24,70 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 
-#: Samples of a training or a validation record.
+#: Length of a training or validation record in samples.
 SAMPLES = 500
-#: Variance of the white noise that becomes the soft input.
+
+#: Variance of the white noise that is filtered to the soft input, and of the rescaled soft input.
 SOFT_VARIANCE = 0.20
-#: Poles of the low-pass that softens it.
+
+#: Poles of the low-pass filter of the soft input.
 POLES = (0.95, 0.9)
 
-# What a seed is used for: the purposes of one seed share no draw.
-_SOFT_INPUT, _SOFT_NOISE, _WHITE_INPUT, _WHITE_NOISE = range(4)
+# Spawn keys: every purpose has an independent random stream for the same seed.
+
+#: Spawn key of the soft input.
+_SOFT_INPUT = 0
+
+#: Spawn key of the noise on the output under the soft input.
+_SOFT_NOISE = 1
+
+#: Spawn key of the white input.
+_WHITE_INPUT = 2
+
+#: Spawn key of the noise on the output under the white input.
+_WHITE_NOISE = 3
 
 Signal = NDArray[np.float64]
 
 
-def _rescaled(filtered: Signal) -> Signal:
+def _scale_to_variance(filtered: Signal) -> Signal:
     return filtered * float(np.sqrt(SOFT_VARIANCE) / filtered.std())
 
 
-def _unit_gain(filtered: Signal) -> Signal:
+def _scale_to_unit_gain(filtered: Signal) -> Signal:
     return filtered * float(np.prod(1.0 - np.array(POLES)))
 
 
-#: How the filtered noise is scaled; the first one is the default.
-SCALINGS: dict[str, Callable[[Signal], Signal]] = {"rescaled": _rescaled, "unit-gain": _unit_gain}
+#: Scalings of the filtered noise by name; the first is the default.
+SCALINGS: dict[str, Callable[[Signal], Signal]] = {
+    "rescaled": _scale_to_variance,
+    "unit-gain": _scale_to_unit_gain,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class OutputErrorSystem:
-    """A system whose output is measured with white noise that never enters the recursion.
+    """A system with white measurement noise that does not enter the recursion.
 
     Attributes
     ----------
     name : str
         ``s1`` or ``s2``.
-    respond : callable
-        Input of shape (samples,) to noise-free output of the same shape, from rest.
-    noise : callable
-        Noise-free output to the noise's standard deviation.
+    simulate : callable
+        Maps the input, shape (samples,), to the noise-free output from rest, same shape.
+    noise_std : callable
+        Maps the noise-free output to the standard deviation of the noise.
     """
 
     name: str
-    respond: Callable[[Signal], Signal]
-    noise: Callable[[Signal], float]
+    simulate: Callable[[Signal], Signal]
+    noise_std: Callable[[Signal], float]
 
 
-def respond_s1(u: Signal) -> Signal:
-    """Noise-free output of S1 from rest, shape (samples,); equation (A.1).
+def simulate_s1(u: Signal) -> Signal:
+    """Return the noise-free output of S1 from rest, shape (samples,); equation (A.1).
 
-    ``y~[k] = 0.75 y~[k-2] + 0.25 u[k-1] - 0.2 y~[k-2] u[k-1]``. It diverges where ``u`` stays below -1.25.
+    ``y~[k] = 0.75 y~[k-2] + 0.25 u[k-1] - 0.2 y~[k-2] u[k-1]``. It diverges while ``u`` is below -1.25.
     """
     y = [0.0] * len(u)
     drive = u.tolist()
@@ -79,8 +97,8 @@ def respond_s1(u: Signal) -> Signal:
     return np.array(y)
 
 
-def respond_s2(u: Signal) -> Signal:
-    """Noise-free output of S2 from rest, shape (samples,); equation (A.1).
+def simulate_s2(u: Signal) -> Signal:
+    """Return the noise-free output of S2 from rest, shape (samples,); equation (A.1).
 
     ``y~[k] = y~[k-1] y~[k-2] (2.5 + y~[k-1]) / (1 + y~[k-1]^2 + y~[k-2]^2) + u[k-11]``.
     """
@@ -92,21 +110,21 @@ def respond_s2(u: Signal) -> Signal:
     return np.array(y)
 
 
-S1 = OutputErrorSystem("s1", respond_s1, lambda _: 0.02)
-S2 = OutputErrorSystem("s2", respond_s2, lambda y: float(np.sqrt(0.04) * y.std()))
+S1 = OutputErrorSystem("s1", simulate_s1, lambda _: 0.02)
+S2 = OutputErrorSystem("s2", simulate_s2, lambda y: float(np.sqrt(0.04) * y.std()))
 
 
 def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> Signal:
-    """White Gaussian noise of variance 0.20 through a low-pass with poles 0.95 and 0.9, from rest.
+    """Filter white Gaussian noise of variance 0.20 by a low-pass with poles 0.95 and 0.9, from rest.
 
     Parameters
     ----------
     seed : int
-        Seeds the noise.
+        Seed of the noise.
     scaling : str
-        A name of `SCALINGS`: what becomes of the filtered noise's size.
+        Name of the scaling in `SCALINGS`.
     samples : int
-        Length.
+        Length in samples.
 
     Raises
     ------
@@ -121,14 +139,14 @@ def soft_input(seed: int, scaling: str = "rescaled", samples: int = SAMPLES) -> 
 
 
 def white_input(seed: int, samples: int = SAMPLES) -> Signal:
-    """White Gaussian noise of variance one, shape (samples,): the ideal input of the validation data."""
+    """Return white Gaussian noise of variance one, shape (samples,): the ideal input for validation data."""
     return _draw(seed, _WHITE_INPUT, samples)
 
 
 def soft_record(
     system: OutputErrorSystem, seed: int = 0, scaling: str = "rescaled", samples: int = SAMPLES
 ) -> Dataset:
-    """Make training data: the system under the soft input, its output with noise.
+    """Make training data: the system's noisy output under the soft input.
 
     Raises
     ------
@@ -141,7 +159,7 @@ def soft_record(
 
 
 def white_record(system: OutputErrorSystem, seed: int = 0, samples: int = SAMPLES) -> Dataset:
-    """Make validation data: the system under the white input, its output with noise.
+    """Make validation data: the system's noisy output under the white input.
 
     Raises
     ------
@@ -157,8 +175,8 @@ def _draw(seed: int, purpose: int, samples: int) -> Signal:
 
 
 def _measure(system: OutputErrorSystem, u: Signal, noise: Signal) -> Dataset:
-    clean = system.respond(u)
+    clean = system.simulate(u)
     if not np.isfinite(clean).all():
         sample = int(np.argmin(np.isfinite(clean)))
         raise RecordError(f"{system.name} diverged at sample {sample} under this input: take another seed")
-    return Dataset(u=u, y=clean + system.noise(clean) * noise, dt=1.0)
+    return Dataset(u=u, y=clean + system.noise_std(clean) * noise, dt=1.0)

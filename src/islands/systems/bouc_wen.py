@@ -1,9 +1,9 @@
-"""The Bouc-Wen piezoelectric actuator of case study 1, equation (11), and its records.
+"""Bouc-Wen piezoelectric actuator of case study 1, equation (11), and its records.
 
-Two families of records are kept apart. The *authors'* records are rebuilt from the notebook they published:
-they give the paper's figures, and in the estimation record the slope that drives ``h`` lags by one sample.
-The *consistent* records have no such lag, and their noise is filtered causally: one equation fits both parts.
-The golden tests hold the authors' records to 1e-12.
+There are two families of records. The *authors'* records are reproduced from their published notebook and
+give the paper's figures; in the estimation record the slope that drives ``h`` lags by one sample. The
+*consistent* records have no such lag and use causally filtered noise, so one equation describes both parts.
+The golden tests check the authors' records to 1e-12.
 """
 
 from dataclasses import dataclass
@@ -61,8 +61,8 @@ def simulate(
     dt : float
         Sampling time in seconds, which is the integration step.
     slope : ndarray, shape (samples - 1,), optional
-        ``u'`` in V/s, held over the step that follows each sample. Left out, the first difference of ``u``
-        over ``dt``: the voltage runs straight from sample to sample.
+        ``u'`` in V/s, constant over the step after each sample. The default is the first difference of ``u``
+        divided by ``dt``: linear interpolation of the voltage.
     h0 : float
         Hysteretic state at the first sample, um.
 
@@ -74,16 +74,16 @@ def simulate(
     Raises
     ------
     RecordError
-        The shapes do not fit together or ``dt`` is not positive.
+        The shapes are inconsistent or ``dt`` is not positive.
     """
     voltage = np.ascontiguousarray(u, dtype=np.float64)
     if voltage.ndim != 1 or voltage.size == 0:
-        raise RecordError(f"the voltage is a non-empty (samples,) array, got {voltage.shape}")
+        raise RecordError(f"the voltage must be a non-empty (samples,) array, got {voltage.shape}")
     if not dt > 0:
         raise RecordError(f"the sampling time must be a positive number of seconds, got {dt}")
     rate = np.diff(voltage) / dt if slope is None else np.ascontiguousarray(slope, dtype=np.float64)
     if rate.shape != (voltage.size - 1,):
-        raise RecordError(f"{voltage.size} samples have {voltage.size - 1} slopes, got {rate.shape}")
+        raise RecordError(f"{voltage.size} samples require {voltage.size - 1} slopes, got {rate.shape}")
     h = np.empty_like(voltage)
     _integrate(rate, dt, piezo.A, piezo.beta, piezo.gamma, h0, h)
     return piezo.dp * voltage - h
@@ -113,70 +113,70 @@ def _integrate(
 
 
 def authors_estimation(seed: int = AUTHORS_SEED) -> Dataset:
-    """Rebuild the authors' estimation record: 99 999 samples from 1.001 s on.
+    """Reproduce the authors' estimation record: 99 999 samples from 1.001 s on.
 
-    Noise of 450 V over 101 s, silent in the first and last second, passes a fifth-order 1 Hz Butterworth
-    low-pass forward and backward; the first second is dropped, and the slope lags by one sample. The record
-    does not begin at rest: ``h`` is zero at 1.0 s, where the voltage is already -6.7 V because the backward
-    filter looks ahead. The notebook's output jumps at that row, so it is dropped as well.
+    Noise of 450 V over 101 s, zero in the first and last second, is filtered forward and backward by a
+    fifth-order 1 Hz Butterworth low-pass. The first second is dropped, and the slope lags by one sample. The
+    record does not start at rest: ``h`` is zero at 1.0 s, when the voltage is already -6.7 V because the
+    backward filter is not causal. The notebook's output jumps at that row, so it is dropped as well.
 
     Parameters
     ----------
     seed : int
-        Seed of the legacy generator, below 2**32; another one gives another record of the same recipe.
+        Seed of the legacy generator, below 2**32. The default reproduces the published record.
     """
-    # The notebook's own grid: its steps differ from 1 ms in the twelfth digit, and the slopes feel it.
+    # The notebook's time grid: its steps differ from 1 ms in the twelfth digit, which affects the slopes.
     time = np.arange(0, 101, 1 / 1000)
     noise = np.random.RandomState(seed).normal(0, 450, size=time.size)
     noise[:1000] = 0
     noise[-1000:] = 0
-    # Transfer-function form as in the notebook: second-order sections would differ beyond 1e-12.
+    # Transfer-function form as in the notebook; second-order sections would differ by more than 1e-12.
     voltage: NDArray[np.float64] = scipy.signal.filtfilt(*scipy.signal.butter(5, 1 / 500, btype="low"), noise)
     slope = np.diff(voltage) / np.diff(time)
     u = voltage[1000:]
     y = simulate(BoucWenPiezo(), u, DT, slope=slope[999:-1])
-    return _record(u, y, start=1.0)[1:]
+    return _to_dataset(u, y, start=1.0)[1:]
 
 
 def authors_validation() -> Dataset:
-    """Rebuild the authors' validation record: 100 s of a 40 V, 1 Hz sine from 1.0 s on, slope not delayed.
+    """Reproduce the authors' validation record: 100 s of a 40 V, 1 Hz sine from 1.0 s on, slope not delayed.
 
-    It begins with ``h = 0`` at a voltage of zero to rounding.
+    The record starts with ``h = 0`` at a voltage of zero up to rounding.
     """
     time = np.arange(0, 101, 1 / 1000)[1000:]
     u = 40 * np.sin(2 * np.pi * time)
     y = simulate(BoucWenPiezo(), u, DT, slope=np.diff(u) / np.diff(time))
-    return _record(u, y, start=1.0)
+    return _to_dataset(u, y, start=1.0)
 
 
 def consistent_estimation(seed: Seed = 0, duration: float = 100.0, peak: float = 50.0) -> Dataset:
     """Make the consistent estimation record: causal low-pass noise of 1 Hz, slope not delayed.
 
-    The filter starts from rest, so the record begins with ``h = 0`` at a voltage below 1e-6 V.
+    The filter starts at rest, so the record starts with ``h = 0`` at a voltage below 1e-6 V.
 
     Parameters
     ----------
     seed : int or SeedSequence
-        Seeds the noise.
+        Seed of the noise.
     duration : float
         Length in seconds.
     peak : float
         Largest absolute voltage in V.
     """
-    return respond(filtered_noise(DT, duration, 1.0, seed, peak=peak))
+    return simulate_record(filtered_noise(DT, duration, 1.0, seed, peak=peak))
 
 
 def consistent_validation(duration: float = 20.0) -> Dataset:
     """Make the consistent validation record: a 40 V, 1 Hz sine of ``duration`` seconds from ``h = u = 0``."""
-    return respond(sine(DT, duration, 40.0, 1.0))
+    return simulate_record(sine(DT, duration, 40.0, 1.0))
 
 
-def respond(u: NDArray[np.float64]) -> Dataset:
-    """Record the paper's actuator under voltages ``u`` of shape (samples,), 1 ms apart, from ``h = 0``."""
-    return _record(u, simulate(BoucWenPiezo(), u, DT), start=0.0)
+def simulate_record(u: NDArray[np.float64]) -> Dataset:
+    """Simulate the paper's actuator from ``h = 0`` under voltages ``u``, shape (samples,), 1 ms apart."""
+    return _to_dataset(u, simulate(BoucWenPiezo(), u, DT), start=0.0)
 
 
-def _record(u: NDArray[np.float64], y: NDArray[np.float64], start: float) -> Dataset:
+def _to_dataset(u: NDArray[np.float64], y: NDArray[np.float64], start: float) -> Dataset:
     return Dataset(
         u=u,
         y=y,

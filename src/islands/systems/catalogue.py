@@ -1,4 +1,4 @@
-"""The table of simulated systems: what the command line lists and makes, and what the tests run through."""
+"""Table of simulated systems, which the command line lists and simulates."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,19 +13,18 @@ from islands.systems.bouc_wen import AUTHORS_SEED, DT
 
 @dataclass(frozen=True, slots=True)
 class SimulatedSystem:
-    """A simulated system and the records that can be made of it.
+    """A simulated system and its records.
 
     Attributes
     ----------
     name : str
-        How it is asked for.
+        Unique name.
     description : str
-        One line.
+        One-line description.
     variants, parts : tuple of str
-        Every variant has every part; the first of each is the usual one.
+        Names of the variants and parts. Every variant has every part. The first of each is the default.
     make : callable
-        ``make(variant, part, seed) -> Dataset``. Arguments of the tuples above; a part without chance in it
-        leaves the seed aside.
+        ``make(variant, part, seed) -> Dataset``. Deterministic parts ignore the seed.
     """
 
     name: str
@@ -35,8 +34,8 @@ class SimulatedSystem:
     make: Callable[[str, str, int], Dataset]
 
 
-# Each begins at u = 0, so h = 0 is where the actuator rests. The lagging slope belongs to the authors'
-# noise alone (their sine has none), so both variants share these tests of a model.
+# Each signal starts at u = 0, so h = 0 is an equilibrium. Only the authors' noise record has a lagging slope
+# (their sine record has none), so both variants share these test signals.
 _PIEZO_TESTS: Mapping[str, Callable[[], signals.Signal]] = {
     "sine-20V": lambda: signals.sine(DT, 20.0, 20.0, 1.0),
     "sine-0.25Hz": lambda: signals.sine(DT, 20.0, 40.0, 0.25),
@@ -48,7 +47,7 @@ _PIEZO_TESTS: Mapping[str, Callable[[], signals.Signal]] = {
     "minor-loops": lambda: signals.minor_loops(DT, amplitude=40.0, frequency=1.0),
 }
 
-# The authors' estimation record is fixed by its publication; legacy seeds have 32 bits.
+# The authors' estimation record has its published seed. Legacy seeds have 32 bits.
 _PIEZO_RECORDS: Mapping[tuple[str, str], Callable[[int], Dataset]] = {
     ("authors", "estimation"): lambda _: bouc_wen.authors_estimation(),
     ("authors", "validation"): lambda _: bouc_wen.authors_validation(),
@@ -61,13 +60,13 @@ _PIEZO_RECORDS: Mapping[tuple[str, str], Callable[[int], Dataset]] = {
 }
 
 
-def _piezo(variant: str, part: str, seed: int) -> Dataset:
+def _make_piezo_record(variant: str, part: str, seed: int) -> Dataset:
     if part in _PIEZO_TESTS:
-        return bouc_wen.respond(_PIEZO_TESTS[part]())
+        return bouc_wen.simulate_record(_PIEZO_TESTS[part]())
     return _PIEZO_RECORDS[variant, part](seed)
 
 
-def _appendix(system: appendix.OutputErrorSystem) -> Callable[[str, str, int], Dataset]:
+def _appendix_factory(system: appendix.OutputErrorSystem) -> Callable[[str, str, int], Dataset]:
     parts: Mapping[str, Callable[[str, int], Dataset]] = {
         "estimation": lambda scaling, seed: appendix.soft_record(system, seed, scaling),
         "validation": lambda _, seed: appendix.white_record(system, seed),
@@ -75,7 +74,7 @@ def _appendix(system: appendix.OutputErrorSystem) -> Callable[[str, str, int], D
     return lambda variant, part, seed: parts[part](variant, seed)
 
 
-#: Name to entry; a new system is one entry here.
+#: Systems by name.
 SYSTEMS: Mapping[str, SimulatedSystem] = {
     system.name: system
     for system in (
@@ -84,21 +83,21 @@ SYSTEMS: Mapping[str, SimulatedSystem] = {
             description="Piezoelectric actuator with Bouc-Wen hysteresis, equation (11)",
             variants=("authors", "consistent"),
             parts=("estimation", "validation", *_PIEZO_TESTS, "noise-2"),
-            make=_piezo,
+            make=_make_piezo_record,
         ),
         SimulatedSystem(
             name="s1",
             description="Bilinear output-error system S1 of equation (A.1); variants scale the soft input",
             variants=tuple(appendix.SCALINGS),
             parts=("estimation", "validation"),
-            make=_appendix(appendix.S1),
+            make=_appendix_factory(appendix.S1),
         ),
         SimulatedSystem(
             name="s2",
             description="Rational output-error system S2 of equation (A.1); variants scale the soft input",
             variants=tuple(appendix.SCALINGS),
             parts=("estimation", "validation"),
-            make=_appendix(appendix.S2),
+            make=_appendix_factory(appendix.S2),
         ),
     )
 }
@@ -112,22 +111,22 @@ def make_record(name: str, variant: str, part: str, seed: int = 0) -> Dataset:
     name, variant, part : str
         A key of `SYSTEMS` and a variant and a part of that entry.
     seed : int
-        Not negative. The same four arguments give the same bits.
+        Not negative. Equal arguments give bit-identical records.
 
     Raises
     ------
     SettingsError
-        One of the names is unknown, and the message lists those there are; or the seed is negative.
+        A name is unknown (the message lists the known names), or the seed is negative.
     """
-    system = SYSTEMS[_known("system", name, tuple(SYSTEMS))]
-    _known(f"variant of {name}", variant, system.variants)
-    _known(f"part of {name}", part, system.parts)
+    _check_name("system", name, tuple(SYSTEMS))
+    system = SYSTEMS[name]
+    _check_name(f"variant of {name}", variant, system.variants)
+    _check_name(f"part of {name}", part, system.parts)
     if seed < 0:
-        raise SettingsError(f"a seed is a whole number from 0 on, got {seed}")
+        raise SettingsError(f"a seed must not be negative, got {seed}")
     return system.make(variant, part, seed)
 
 
-def _known(kind: str, wanted: str, there: tuple[str, ...]) -> str:
-    if wanted not in there:
-        raise SettingsError(f"no {kind} is called {wanted!r}: there is {', '.join(there)}")
-    return wanted
+def _check_name(kind: str, name: str, known: tuple[str, ...]) -> None:
+    if name not in known:
+        raise SettingsError(f"no {kind} is called {name!r}: there is {', '.join(known)}")

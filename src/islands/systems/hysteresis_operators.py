@@ -1,4 +1,4 @@
-"""Elements that remember: play, a slider that sticks, the Bouc-Wen element; one pass over the samples."""
+"""Hysteresis operators: play, stick-slip slider and Bouc-Wen element, each a single pass over the samples."""
 
 import numpy as np
 
@@ -7,7 +7,10 @@ from islands.kernels.jit_cache import kernel
 
 @kernel
 def play(u, width, x):
-    """Follow ``u`` (samples,) with a play of half width ``width``, from ``u[0]`` on; write ``x``."""
+    """Apply a play operator of half width ``width`` to ``u`` (samples,), starting at ``u[0]``.
+
+    Write the output to ``x``.
+    """
     at = u[0]
     for k in range(u.size):
         if u[k] - width > at:
@@ -19,9 +22,10 @@ def play(u, width, x):
 
 @kernel
 def slider(u, breakaway, x):
-    """Follow ``u`` in slips: ``x`` rests until ``u`` is ``breakaway`` away, and then joins it.
+    """Apply a stick-slip slider to ``u``; write ``x``.
 
-    Between two samples ``u`` passes through every value: ``x`` slips as often as it is that far away.
+    ``x`` is constant until ``u`` differs from it by ``breakaway``, and then jumps to ``u``. Between two
+    samples ``u`` is continuous, so ``x`` can slip several times within a step.
     """
     at = u[0]
     for k in range(u.size):
@@ -33,8 +37,8 @@ def slider(u, breakaway, x):
 def bouc_wen(u, dt, A, beta, gamma, leak, rate, asymmetry, h0, h):
     """Integrate ``h' = A u' - b |u'| h - g u' |h| - leak h - asymmetry |u'| |h|`` with RK4; write ``h``.
 
-    The input runs straight from sample to sample; ``b`` and ``g`` are ``beta`` and ``gamma`` times
-    ``1 + rate |u'|``, where that is positive.
+    The input is interpolated linearly. ``b`` and ``g`` are ``beta`` and ``gamma`` times
+    ``max(0.05, 1 + rate |u'|)``.
     """
     at = h0
     h[0] = at
@@ -58,7 +62,7 @@ def bouc_wen(u, dt, A, beta, gamma, leak, rate, asymmetry, h0, h):
 
 
 def play_from(u, width):
-    """Return ``u`` behind a play of half width ``width``."""
+    """Return the output of a play operator of half width ``width`` with input ``u``."""
     x = np.empty_like(u)
     play(np.ascontiguousarray(u), width, x)
     return x

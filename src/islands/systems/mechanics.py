@@ -1,4 +1,4 @@
-"""What moves: elements that resist a coordinate, along a given motion or within a balance of forces."""
+"""Kernels for mechanical systems with force elements, along a given motion or in a balance of forces."""
 
 from functools import cache
 from typing import NamedTuple
@@ -11,39 +11,40 @@ from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
 
-#: Numbers that an element may have: its values, and behind them its constants.
+#: Maximum number of parameters of an element: its values, followed by its constants.
 WIDTH = 8
 
-#: The coordinate, its rate, the element's own state, its numbers.
+#: Arguments: coordinate, its rate, the element's state, pointer to the element's numbers.
 _SIGNATURE = types.float64(types.float64, types.float64, types.float64, types.CPointer(types.float64))
 
 
 class Elements(NamedTuple):
-    """Elements that act on one coordinate.
+    """Force elements that act on one coordinate.
 
     Attributes
     ----------
     forces : ndarray of int64, shape (elements,)
         Machine addresses of ``force(x, rate, z, numbers)``.
-    memories : ndarray of int64, shape (elements,)
-        Those of ``z' = memory(x, rate, z, numbers)``; 0 where there is no state.
+    state_derivatives : ndarray of int64, shape (elements,)
+        Machine addresses of ``z' = state_derivative(x, rate, z, numbers)``. 0 for elements without state.
     signs : ndarray, shape (elements,)
-        With which each force counts.
-    begins : ndarray, shape (elements,)
-        Their states at the first sample.
+        Factors of the forces.
+    initial_states : ndarray, shape (elements,)
+        States at the first sample.
     numbers : ndarray, shape (elements, WIDTH)
+        Values and constants of the elements.
     """
 
     forces: NDArray[np.int64]
-    memories: NDArray[np.int64]
+    state_derivatives: NDArray[np.int64]
     signs: NDArray[np.float64]
-    begins: NDArray[np.float64]
+    initial_states: NDArray[np.float64]
     numbers: NDArray[np.float64]
 
 
 @cache
 def compiled(function):
-    """Compile a plain scalar function of an element; its ``address`` is what `Elements` take."""
+    """Compile a scalar function of an element; `Elements` stores its ``address``."""
     return cfunc(_SIGNATURE, error_model="numpy")(function)
 
 
@@ -63,35 +64,35 @@ def _call(_typingctx, address, x, rate, z, numbers):
 
 @kernel
 def integrate_along(x, rate, dt, elements, total):
-    """Add up what elements do along a motion that is given; write ``total`` (samples,).
+    """Sum the forces of the elements along a given motion; write ``total`` (samples,).
 
-    Their states see the coordinate run straight from sample to sample.
+    The states are integrated by RK4 with a linearly interpolated coordinate.
     """
     total[:] = 0.0
     for e in range(elements.forces.size):
         numbers = elements.numbers.ctypes.data + 8 * WIDTH * e
-        force, memory, sign = elements.forces[e], elements.memories[e], elements.signs[e]
-        z = elements.begins[e]
+        force, derivative, sign = elements.forces[e], elements.state_derivatives[e], elements.signs[e]
+        z = elements.initial_states[e]
         for k in range(x.size):
             total[k] += sign * _call(force, x[k], rate[k], z, numbers)
-            if memory != 0 and k + 1 < x.size:
+            if derivative != 0 and k + 1 < x.size:
                 half, v = 0.5 * (x[k] + x[k + 1]), (x[k + 1] - x[k]) / dt
-                first = _call(memory, x[k], v, z, numbers)
-                second = _call(memory, half, v, z + 0.5 * dt * first, numbers)
-                third = _call(memory, half, v, z + 0.5 * dt * second, numbers)
-                fourth = _call(memory, x[k + 1], v, z + dt * third, numbers)
+                first = _call(derivative, x[k], v, z, numbers)
+                second = _call(derivative, half, v, z + 0.5 * dt * first, numbers)
+                third = _call(derivative, half, v, z + 0.5 * dt * second, numbers)
+                fourth = _call(derivative, x[k + 1], v, z + dt * third, numbers)
                 z += dt / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
 
 
 @kernel
-def _slopes(state, drive, mass, damping, stiffness, elements, slope):
-    """Write the rate of change of ``state``: coordinate, rate, and every element's own."""
+def _state_derivative(state, drive, mass, damping, stiffness, elements, slope):
+    """Write the derivative of ``state``: coordinate, rate, and the states of the elements."""
     force = drive - damping * state[1] - stiffness * state[0]
     for e in range(elements.forces.size):
         numbers = elements.numbers.ctypes.data + 8 * WIDTH * e
         force += elements.signs[e] * _call(elements.forces[e], state[0], state[1], state[2 + e], numbers)
-        if elements.memories[e] != 0:
-            slope[2 + e] = _call(elements.memories[e], state[0], state[1], state[2 + e], numbers)
+        if elements.state_derivatives[e] != 0:
+            slope[2 + e] = _call(elements.state_derivatives[e], state[0], state[1], state[2 + e], numbers)
         else:
             slope[2 + e] = 0.0
     slope[0] = state[1]
@@ -99,19 +100,20 @@ def _slopes(state, drive, mass, damping, stiffness, elements, slope):
 
 
 @kernel
-def integrate_motion(u, midway, dt, mass, damping, stiffness, elements, begins, x0, v0, x):
-    """Integrate ``m x'' + c x' + k x = u + forces`` by RK4, a step a sample; write ``x`` (samples,).
+def integrate_motion(u, intersample, dt, mass, damping, stiffness, elements, restarts, x0, v0, x):
+    """Integrate ``m x'' + c x' + k x = u + forces`` by RK4, one step per sample; write ``x`` (samples,).
 
-    ``midway`` (2, samples) is the input half a step and nearly a whole one behind each sample: it may jump at
-    the next one. Where ``begins`` is set the motion starts anew from ``x0`` and ``v0``; elements keep their
-    states.
+    ``intersample`` (2, samples) is the input half a step after each sample, and at the end of the step just
+    before the next sample, where the input may jump. At samples with ``restarts`` set, the motion restarts
+    from ``x0`` and ``v0``; the elements keep their states. ``x`` is NaN from the sample
+    at which the motion is not finite.
     """
     size = 2 + elements.forces.size
     state, at = np.zeros(size), np.empty(size)
-    state[2:] = elements.begins
+    state[2:] = elements.initial_states
     first, second, third, fourth = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
     for k in range(u.size):
-        if begins[k]:
+        if restarts[k]:
             state[0], state[1] = x0[k], v0[k]
         x[k] = state[0]
         if not np.isfinite(state[0]):
@@ -119,16 +121,16 @@ def integrate_motion(u, midway, dt, mass, damping, stiffness, elements, begins, 
             return
         if k + 1 == u.size:
             return
-        half, end = midway[0, k], midway[1, k]
-        _slopes(state, u[k], mass, damping, stiffness, elements, first)
+        half, end = intersample[0, k], intersample[1, k]
+        _state_derivative(state, u[k], mass, damping, stiffness, elements, first)
         for i in range(size):
             at[i] = state[i] + 0.5 * dt * first[i]
-        _slopes(at, half, mass, damping, stiffness, elements, second)
+        _state_derivative(at, half, mass, damping, stiffness, elements, second)
         for i in range(size):
             at[i] = state[i] + 0.5 * dt * second[i]
-        _slopes(at, half, mass, damping, stiffness, elements, third)
+        _state_derivative(at, half, mass, damping, stiffness, elements, third)
         for i in range(size):
             at[i] = state[i] + dt * third[i]
-        _slopes(at, end, mass, damping, stiffness, elements, fourth)
+        _state_derivative(at, end, mass, damping, stiffness, elements, fourth)
         for i in range(size):
             state[i] += dt / 6.0 * (first[i] + 2.0 * second[i] + 2.0 * third[i] + fourth[i])

@@ -1,7 +1,7 @@
-"""Models that the paper publishes: equations (12)-(14) with the parameters of Table 2.
+"""Models published in the paper: equations (12)-(14) with the parameters of Table 2.
 
-Terms are written here as the paper prints them; the model holds their canonical form, so a parameter's sign
-can differ where the paper writes a difference the other way round.
+The terms are written as in the paper. The models contain their canonical form, so the sign of a parameter
+differs if the paper writes a difference in the opposite order.
 """
 
 from collections.abc import Mapping
@@ -15,15 +15,16 @@ from islands.model.parsing import parse
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """A published model and the free-run errors of Table 1 that go with it.
+    """A published model and its free-run errors from Table 1.
 
     Attributes
     ----------
     model : Model
-        With the published parameters, rounded to three digits as printed.
+        Model with the published parameters, which are rounded to three digits.
     source : str
+        Equation, method and data.
     mape, r2 : tuple of float
-        Estimation and validation data.
+        Errors on the estimation data and on the validation data; MAPE in per cent.
     """
 
     model: Model
@@ -32,7 +33,7 @@ class Published:
     r2: tuple[float, float]
 
 
-def _model(terms: Mapping[str, float], dt: float) -> Model:
+def _make_published(terms: Mapping[str, float], dt: float) -> Model:
     return make_model(((parse(text), value) for text, value in terms.items()), ("u_V",), "y_um", dt)
 
 
@@ -72,19 +73,19 @@ _MODEL_14 = {
 PUBLISHED: Mapping[str, Published] = MappingProxyType(
     {
         "12": Published(
-            _model(_MODEL_12, 1e-3),
+            _make_published(_MODEL_12, 1e-3),
             "equation (12), after Martins and Aguirre: ERR, AIC and constraints",
             (0.32874, 0.33374),
             (0.99940, 0.99984),
         ),
         "13": Published(
-            _model(_MODEL_13, 1e-3),
+            _make_published(_MODEL_13, 1e-3),
             "equation (13), case 1: MGGP/FROE on the Bouc-Wen piezo",
             (0.31189, 0.25250),
             (0.99940, 0.99990),
         ),
         "14": Published(
-            _model(_MODEL_14, 5e-5),
+            _make_published(_MODEL_14, 5e-5),
             "equation (14), case 2: MGGP/FROE on the measured micromanipulator at 5 V and 300 Hz",
             (1.01111, 1.01039),
             (0.99888, 0.99887),
@@ -99,6 +100,6 @@ def published(number: str) -> Published:
     Raises
     ------
     SettingsError
-        There is none of that number.
+        No published model has that number.
     """
     return lookup(PUBLISHED, number, "published model")

@@ -1,4 +1,4 @@
-"""A second-order system, ``m x'' + c x' + k x = u``, and how one is estimated from a record."""
+"""Second-order system ``m x'' + c x' + k x = u`` and its estimation from a record."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,13 +11,19 @@ from islands.errors import RecordError, SettingsError
 
 Signal = NDArray[np.float64]
 
-#: Natural frequencies and dampings that a search begins from, and how many of the best are refined.
-FREQUENCIES, DAMPINGS, REFINED = 40, (0.003, 0.02, 0.1, 0.4, 1.0), 3
+#: Number of natural frequencies on the grid of starting points.
+FREQUENCY_COUNT = 40
+
+#: Damping ratios on the grid of starting points.
+DAMPING_RATIOS = (0.003, 0.02, 0.1, 0.4, 1.0)
+
+#: Number of the best starting points that are refined.
+REFINED_STARTS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class SecondOrder:
-    """Parameters, in the units of the record; ``position`` and ``rate`` are those of the first sample."""
+    """Parameters in the units of the record; ``position`` and ``rate`` are the state at the first sample."""
 
     mass: float
     damping: float
@@ -27,68 +33,72 @@ class SecondOrder:
 
 
 def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, float]) -> SecondOrder:
-    """Estimate what is not given of ``m``, ``c``, ``k`` by least squares of the simulated output.
+    """Estimate the unknown parameters among ``m``, ``c``, ``k`` by least squares of the simulated output.
 
-    The response is linear in 1/m and in the state at the first sample, which are solved for; frequency and
-    damping are searched for (variable projection, Golub and Pereyra 1973).
+    The response is linear in 1/m and in the initial state, which are solved for in closed form. Frequency and
+    damping are found by a nonlinear search (variable projection, Golub and Pereyra 1973).
 
     Parameters
     ----------
     u, y : ndarray, shape (samples,)
+        Input and output.
     dt : float
-        Seconds.
+        Sampling time in seconds.
     given : mapping
-        Values by name: m, c, k.
+        Known parameters by name: m, c, k.
 
     Raises
     ------
     SettingsError
-        The mass that is given is zero.
+        The given mass is zero.
     RecordError
-        Nothing is given, and nothing moves.
+        No parameter is given, and the input does not affect the output.
     """
     if given.get("m") == 0.0:
-        raise SettingsError("a mass of zero does not move as a second-order system: give another m")
-    # One value that is not zero says how large the response is: only the beginning is free then.
-    sized = any(given.values())
+        raise SettingsError("a mass of zero does not define a second-order system: give another m")
+    # A given nonzero value determines the scale of the response; then only the initial state is free.
+    scale_known = any(given.values())
 
-    def solved(point: Signal) -> tuple[Signal, Signal]:
-        system = _of(point, given)
-        columns = _columns(u, dt, *system)
-        if sized:
+    def solve_linear(point: Signal) -> tuple[Signal, Signal]:
+        system = _make_parameters(point, given)
+        columns = _make_responses(u, dt, *system)
+        if scale_known:
             fixed = columns[:, 0] / system[0]
             free = np.linalg.lstsq(columns[:, 1:], y - fixed, rcond=None)[0]
             return y - fixed - columns[:, 1:] @ free, np.concatenate([[1.0 / system[0]], free])
         weights: Signal = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0])
         return y - columns @ weights, weights
 
-    def missed(point: Signal) -> Signal:
-        # What explodes is as bad as can be, and its squares are numbers still.
+    def compute_residual(point: Signal) -> Signal:
+        # An unstable response gets the largest residual whose square is still finite.
         with np.errstate(all="ignore"):
-            return np.clip(np.nan_to_num(solved(point)[0], nan=1e100), -1e100, 1e100)
+            return np.clip(np.nan_to_num(solve_linear(point)[0], nan=1e100), -1e100, 1e100)
 
     slowest, fastest = 2 * np.pi / (y.size * dt), 0.8 * np.pi / dt
     starts = [
         np.log([frequency, damping])
-        for frequency in np.geomspace(slowest, fastest, FREQUENCIES)
-        for damping in DAMPINGS
+        for frequency in np.geomspace(slowest, fastest, FREQUENCY_COUNT)
+        for damping in DAMPING_RATIOS
     ]
-    starts.sort(key=lambda point: float(np.sum(missed(point) ** 2)))
+    starts.sort(key=lambda point: float(np.sum(compute_residual(point) ** 2)))
     found = [
-        scipy.optimize.least_squares(missed, start, method="lm", max_nfev=200) for start in starts[:REFINED]
+        scipy.optimize.least_squares(compute_residual, start, method="lm", max_nfev=200)
+        for start in starts[:REFINED_STARTS]
     ]
     best = min(found, key=lambda each: float(each.cost)).x
-    _, weights = solved(best)
-    mass, damping, stiffness = _of(best, given)
-    if not sized:
+    _, weights = solve_linear(best)
+    mass, damping, stiffness = _make_parameters(best, given)
+    if not scale_known:
         if weights[0] == 0.0:
-            raise RecordError("the input does not move the output: nothing tells m, c and k; give them")
+            raise RecordError(
+                "the input does not affect the output, so m, c and k cannot be estimated: give them"
+            )
         mass, damping, stiffness = (each / weights[0] for each in (1.0, damping / mass, stiffness / mass))
     return SecondOrder(mass, damping, stiffness, float(weights[1]), float(weights[2]))
 
 
-def _of(point: Signal, given: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return mass, damping and stiffness at a logarithm of frequency and of damping."""
+def _make_parameters(point: Signal, given: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return mass, damping and stiffness from the logarithms of natural frequency and damping ratio."""
     frequency, damping = np.exp(np.clip(point, -40.0, 40.0))
     if "m" in given:
         mass = given["m"]
@@ -105,18 +115,19 @@ def _of(point: Signal, given: Mapping[str, float]) -> tuple[float, float, float]
     )
 
 
-def _columns(u: Signal, dt: float, mass: float, damping: float, stiffness: float) -> Signal:
-    """Return the responses of a unit mass to the input, to a position and to a rate, shape (samples, 3)."""
+def _make_responses(u: Signal, dt: float, mass: float, damping: float, stiffness: float) -> Signal:
+    """Return the unit-mass responses to the input, initial position and initial rate, shape (samples, 3)."""
     c, k = damping / mass, stiffness / mass
     unit = ([1.0], [1.0, c, k])
-    # At rest at the first sample: a ramp up to it, as a filter's first step would be, is taken out.
+    # With first-order hold, the filter would add a ramp from zero to u[0] before the first sample. Splitting
+    # off the constant u[0] avoids it.
     forced = sum(
-        scipy.signal.lfilter(*map(np.ravel, scipy.signal.cont2discrete(unit, dt, method=hold)[:2]), pushed)
-        for hold, pushed in (("foh", u - u[0]), ("zoh", np.full(u.size, u[0])))
+        scipy.signal.lfilter(*map(np.ravel, scipy.signal.cont2discrete(unit, dt, method=hold)[:2]), part)
+        for hold, part in (("foh", u - u[0]), ("zoh", np.full(u.size, u[0])))
     )
     step = scipy.linalg.expm(dt * np.array([[0.0, 1.0], [-k, -c]]))
     trace, determinant = float(np.trace(step)), float(np.linalg.det(step))
-    # The free motion obeys x(j) = trace x(j-1) - determinant x(j-2), by Cayley and Hamilton.
+    # By the Cayley-Hamilton theorem the free motion is x(j) = trace x(j-1) - determinant x(j-2).
     pulse = np.zeros(u.size)
     pulse[0] = 1.0
     free = [

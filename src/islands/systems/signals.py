@@ -1,7 +1,7 @@
-"""Excitations: the inputs that drive a simulator or a test rig.
+"""Excitation signals for simulators and test rigs.
 
-Every function returns float64 samples of shape (samples,) on the grid ``k * dt`` and begins at time zero.
-Chance comes from an explicit seed alone: the same arguments give the same bits.
+Every function returns float64 samples of shape (samples,) on the grid ``k * dt`` from time zero. Random
+signals take an explicit seed. Equal arguments give bit-identical signals.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from islands.errors import SettingsError
 
 Signal = NDArray[np.float64]
-#: What seeds a NumPy generator; a sequence with a spawn key keeps two purposes of one seed apart.
+#: Seed of a NumPy generator. A sequence with a spawn key gives independent streams for the same seed.
 Seed = int | np.random.SeedSequence
 
 
@@ -28,42 +28,42 @@ def filtered_noise(
     zero_phase: bool = False,
     peak: float | None = None,
 ) -> Signal:
-    """White Gaussian noise of variance one through a Butterworth low-pass; section 6.1's excitation.
+    """Filter white Gaussian noise of variance one by a Butterworth low-pass (excitation of section 6.1).
 
     Parameters
     ----------
     dt, duration : float
         Sampling time and length in seconds.
     cutoff : float
-        The filter's -3 dB frequency in Hz, below half the sampling frequency.
+        Frequency of -3 dB in Hz, below half the sampling frequency.
     seed : int or SeedSequence
-        Seeds the noise.
+        Seed of the noise.
     order : int
         Order of the filter.
     zero_phase : bool
-        Filter forward and backward: no phase, twice the order, and no start from rest.
+        Whether to filter forward and backward, which gives zero phase, twice the order, and no start at rest.
     peak : float, optional
-        Scale the signal so that its largest absolute value is this; unscaled without it.
+        Largest absolute value of the scaled signal. By default the signal is not scaled.
 
     Raises
     ------
     SettingsError
-        The cutoff does not lie between zero and half the sampling frequency.
+        The cutoff is not between zero and half the sampling frequency.
     """
-    samples = _samples(dt, duration)
+    samples = _count_samples(dt, duration)
     if not 0.0 < cutoff < 0.5 / dt:
         raise SettingsError(
-            f"the cutoff lies between 0 and half the sampling frequency, {0.5 / dt} Hz, got {cutoff}"
+            f"the cutoff must be between 0 and half the sampling frequency, {0.5 / dt} Hz, got {cutoff}"
         )
     sections = scipy.signal.butter(order, cutoff, fs=1 / dt, output="sos")
     noise = np.random.default_rng(seed).standard_normal(samples)
-    run = scipy.signal.sosfiltfilt if zero_phase else scipy.signal.sosfilt
-    filtered: Signal = run(sections, noise)
-    return filtered if peak is None else _to_peak(filtered, peak)
+    apply_filter = scipy.signal.sosfiltfilt if zero_phase else scipy.signal.sosfilt
+    filtered: Signal = apply_filter(sections, noise)
+    return filtered if peak is None else _scale_to_peak(filtered, peak)
 
 
 def sine(dt: float, duration: float, amplitude: float, frequency: float, phase: float = 0.0) -> Signal:
-    """``amplitude * sin(2 pi frequency t + phase)``: frequency in Hz, phase in radians."""
+    """Return ``amplitude * sin(2 pi frequency t + phase)``; frequency in Hz, phase in radians."""
     return sines(dt, duration, (amplitude,), (frequency,), (phase,))
 
 
@@ -74,7 +74,7 @@ def sines(
     frequencies: Sequence[float],
     phases: Sequence[float] | None = None,
 ) -> Signal:
-    """Sum of sines: frequencies in Hz, phases in radians, zero where not given.
+    """Return a sum of sines; frequencies in Hz, phases in radians, zero by default.
 
     Raises
     ------
@@ -84,10 +84,10 @@ def sines(
     phases = (0.0,) * len(amplitudes) if phases is None else phases
     if not len(amplitudes) == len(frequencies) == len(phases):
         raise SettingsError(
-            "every sine has an amplitude, a frequency and a phase; "
+            "every sine needs an amplitude, a frequency and a phase; "
             f"got {len(amplitudes)}, {len(frequencies)} and {len(phases)}"
         )
-    time = _time(dt, duration)
+    time = _make_time(dt, duration)
     total = np.zeros_like(time)
     for amplitude, frequency, phase in zip(amplitudes, frequencies, phases, strict=True):
         total += amplitude * np.sin(2 * np.pi * frequency * time + phase)
@@ -103,47 +103,47 @@ def multisine(
     *,
     peak: float = 1.0,
 ) -> Signal:
-    """Periodic noise: equal harmonics of ``1 / period`` inside a band, with phases from a seed.
+    """Return a random-phase multisine: equal harmonics of ``1 / period`` inside a band.
 
     Parameters
     ----------
     dt, duration : float
-        Sampling time and length in seconds; the length need not be a whole number of periods.
+        Sampling time and length in seconds. The length need not be a whole number of periods.
     period : float
         Period in seconds, rounded to whole samples.
     band : (float, float)
-        Lowest and highest frequency in Hz, both included; the constant is never part of it.
+        Lowest and highest frequency in Hz, both included. The constant is never included.
     seed : int or SeedSequence
-        Seeds the phases.
+        Seed of the phases.
     peak : float
         Largest absolute value of a whole period.
 
     Raises
     ------
     SettingsError
-        No harmonic lies inside the band and below half the sampling frequency.
+        No harmonic is inside the band and below half the sampling frequency.
     """
-    samples, length = _samples(dt, duration), _samples(dt, period)
+    samples, length = _count_samples(dt, duration), _count_samples(dt, period)
     harmonics = np.arange(1, (length - 1) // 2 + 1)
-    # Half a part in 1e9: an edge that is a harmonic on paper stays inside after rounding.
+    # 5e-10 of the harmonic spacing, so that rounding does not exclude a harmonic at the edge of the band.
     slack = 5e-10 / (length * dt)
     frequencies = harmonics / (length * dt)
     harmonics = harmonics[(frequencies >= band[0] - slack) & (frequencies <= band[1] + slack)]
     if harmonics.size == 0:
         raise SettingsError(
-            f"no multiple of {1 / (length * dt)} Hz lies inside {band} Hz below half the sampling frequency: "
+            f"no multiple of {1 / (length * dt)} Hz is inside {band} Hz below half the sampling frequency: "
             "widen the band or lengthen the period"
         )
     spectrum = np.zeros(length // 2 + 1, dtype=np.complex128)
     phases = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, harmonics.size)
     spectrum[harmonics] = np.exp(1j * phases)
-    whole: Signal = np.fft.irfft(spectrum, n=length).astype(np.float64)
-    return np.resize(_to_peak(whole, peak), samples)
+    one_period: Signal = np.fft.irfft(spectrum, n=length).astype(np.float64)
+    return np.resize(_scale_to_peak(one_period, peak), samples)
 
 
 def sweep(dt: float, duration: float, amplitude: float, first: float, last: float) -> Signal:
-    """Sine whose frequency runs linearly from ``first`` to ``last`` Hz (a linear chirp), from zero."""
-    time = _time(dt, duration)
+    """Return a linear chirp from ``first`` to ``last`` Hz that starts at zero."""
+    time = _make_time(dt, duration)
     return amplitude * np.sin(2 * np.pi * (first + (last - first) / (2 * duration) * time) * time)
 
 
@@ -157,22 +157,22 @@ def hold_signal(
     loading: bool = True,
     periods: int = 2,
 ) -> Signal:
-    """Whole periods of a sine, then on to a level, then rest there; Figures 5 (c) and (d).
+    """Return periods of a sine followed by a constant level; Figures 5 (c) and (d).
 
     Parameters
     ----------
     dt : float
         Sampling time in seconds.
     duration : float
-        Seconds at rest; the sine before them comes on top.
+        Length of the constant part in seconds, not including the sine.
     amplitude, frequency : float
-        The sine that leads there; frequency in Hz.
+        Amplitude of the sine and its frequency in Hz.
     level : float
-        Where the input rests, within the amplitude.
+        Constant value, within the amplitude.
     loading : bool
-        Reach the level on the rising branch; False: on the falling one.
+        Whether to reach the level on the rising branch. If False, on the falling branch.
     periods : int
-        Whole periods before the last approach.
+        Number of whole periods before the final approach.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def hold_signal(
     """
     if amplitude <= 0 or abs(level) > amplitude:
         raise SettingsError(f"a sine of amplitude {amplitude} never reaches the level {level}")
-    rest = _samples(dt, duration)
+    rest = _count_samples(dt, duration)
     rising = np.arcsin(level / amplitude) % (2 * np.pi)
     angle = rising if loading else (np.pi - rising) % (2 * np.pi)
     before = int(np.ceil((periods + angle / (2 * np.pi)) / (frequency * dt) - 1e-9))
@@ -196,59 +196,59 @@ def minor_loops(
     frequency: float,
     reversals: Sequence[float] = (-0.5, 0.5, -0.25, 0.25),
 ) -> Signal:
-    """Major loop, then closed minor loops nested in each other.
+    """Return a major loop followed by nested, closed minor loops.
 
-    From rest at zero the input runs to ``+amplitude``, ``-amplitude``, ``+amplitude``, then through the
-    reversals inwards and through the same reversals outwards, back to ``+amplitude``: every loop that was
-    opened is closed where it began. Each leg is half a cosine whose steepest slope is at most that of a sine
-    of this amplitude and frequency, and every turning point is a sample.
+    The input starts at zero and goes to ``+amplitude``, ``-amplitude``, ``+amplitude``, then inwards through
+    the reversals and outwards through the same reversals, back to ``+amplitude``. Every loop closes at the
+    point where it opened. Each leg is half a cosine whose steepest slope is at most that of a sine of this
+    amplitude and frequency, and every turning point is a sample.
 
     Parameters
     ----------
     dt : float
         Sampling time in seconds.
     amplitude, frequency : float
-        The major loop; a full one lasts ``1 / frequency`` seconds.
+        Amplitude and frequency of the major loop, which takes ``1 / frequency`` seconds.
     reversals : sequence of float
-        Turning points inside the major loop as fractions of the amplitude, at least one, the first on the
-        way down; each lies strictly between the two before it.
+        Turning points inside the major loop as fractions of the amplitude, at least one. The first is reached
+        on the way down; each must be strictly between the two before it.
 
     Raises
     ------
     SettingsError
-        There is no reversal, or they are not nested.
+        There is no reversal, or the reversals are not nested.
     """
     chain = (-1.0, 1.0, *reversals)
     if len(chain) == 2:
-        raise SettingsError("a minor loop has a reversal: give at least one")
+        raise SettingsError("a minor loop needs a reversal: give at least one")
     for outer, previous, inner in zip(chain, chain[1:], chain[2:], strict=False):
         if not min(outer, previous) < inner < max(outer, previous):
-            raise SettingsError(f"each reversal lies between the two before it; {inner} in {chain} does not")
+            raise SettingsError(f"each reversal must be between the two before it; {inner} in {chain} is not")
     inwards = tuple(reversals)
     corners = amplitude * np.array([0.0, 1.0, -1.0, 1.0, *inwards, *inwards[-2::-1], 1.0])
-    half_period = _samples(dt, 0.5 / frequency)
+    half_period = _count_samples(dt, 0.5 / frequency)
     pieces = [corners[:1]]
     for start, stop in pairwise(corners):
         steps = max(2, int(np.ceil(half_period * abs(stop - start) / abs(2 * amplitude) - 1e-9)))
-        way = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, steps + 1) / steps)
-        leg = start + (stop - start) * way
+        fraction = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, steps + 1) / steps)
+        leg = start + (stop - start) * fraction
         leg[-1] = stop
         pieces.append(leg)
     return np.concatenate(pieces)
 
 
-def _samples(dt: float, duration: float) -> int:
+def _count_samples(dt: float, duration: float) -> int:
     if not (np.isfinite(dt) and dt > 0):
-        raise SettingsError(f"the sampling time is a positive number of seconds, got {dt}")
+        raise SettingsError(f"the sampling time must be a positive number of seconds, got {dt}")
     samples = round(duration / dt) if np.isfinite(duration) else 0
     if samples < 1:
-        raise SettingsError(f"a signal is at least one sample of {dt} s long, got {duration} s")
+        raise SettingsError(f"a signal must have at least one sample of {dt} s, got {duration} s")
     return samples
 
 
-def _time(dt: float, duration: float) -> Signal:
-    return np.arange(_samples(dt, duration), dtype=np.float64) * dt
+def _make_time(dt: float, duration: float) -> Signal:
+    return np.arange(_count_samples(dt, duration), dtype=np.float64) * dt
 
 
-def _to_peak(signal: Signal, peak: float) -> Signal:
+def _scale_to_peak(signal: Signal, peak: float) -> Signal:
     return signal * (peak / float(np.abs(signal).max()))

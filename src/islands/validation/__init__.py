@@ -1,1 +1,4 @@
-"""What a model is worth: error metrics, residual tests, physics checks."""
+"""Validation of models: error metrics, residual tests and physics checks.
+
+Read `assessment` first.
+"""

@@ -1,6 +1,6 @@
-"""How far a prediction lies from the measurement, and what each parameter has to earn.
+"""Error metrics of a prediction, and information criteria.
 
-Equations (7) and (8) are the paper's; the fit is that of the system identification toolboxes.
+Equations (7) and (8) refer to the paper. The fit is defined as in system identification toolboxes.
 """
 
 import math
@@ -14,15 +14,15 @@ from islands.errors import SettingsError
 
 @dataclass(frozen=True, slots=True)
 class Metrics:
-    """Distance of a prediction from the measurement.
+    """Error metrics of a prediction.
 
     Attributes
     ----------
     mape : float
-        Equation (7), in per cent. It is a mean absolute error in per cent of the measured range, not a mean
-        of relative errors; the paper's name is kept.
+        Equation (7), in per cent. Despite its name in the paper, it is the mean absolute error in per cent of
+        the measured range, not a mean of relative errors.
     r2 : float
-        Equation (8): 1 for a perfect prediction, 0 for one no better than the mean, negative for a worse one.
+        Equation (8): 1 for a perfect prediction, 0 if it is as good as the mean, negative if it is worse.
     rmse : float
         Root of the mean squared error, in the unit of the output.
     fit_percent : float
@@ -37,9 +37,9 @@ class Metrics:
 
 @dataclass(frozen=True, slots=True)
 class InformationCriteria:
-    """Prediction error weighed against the number of parameters; the lowest is the best.
+    """Prediction error penalised by the number of parameters; lower is better.
 
-    Only differences between models estimated from the same samples mean anything.
+    Values are only comparable between models estimated from the same samples.
 
     Attributes
     ----------
@@ -59,24 +59,25 @@ class InformationCriteria:
 def metrics(
     measured: NDArray[np.float64], predicted: NDArray[np.float64], output_range: float | None = None
 ) -> Metrics:
-    """Compare a prediction with the measurement, sample by sample.
+    """Compute the error metrics of a prediction.
 
-    Pairs with a NaN on either side (warm-up, missing output) are left out; if none is left, all is NaN. Where
-    the compared output is constant, ``r2``, ``fit_percent`` and (unless a range is given) ``mape`` are NaN.
-    A prediction that grows past what a float can square counts as infinitely wrong: no warning is given.
+    Samples with a NaN in either array (warm-up, missing output) are ignored. If no sample remains, all
+    metrics are NaN. If the compared output is constant, ``r2`` and ``fit_percent`` are NaN, and ``mape`` is
+    NaN unless a range is given. A prediction whose squared error overflows has an infinite error, without a
+    warning.
 
     Parameters
     ----------
     measured, predicted : ndarray, shape (samples,)
         Output ``y`` and prediction ``yhat``, in the same unit.
     output_range : float, optional
-        The scale of equation (7). By default ``max y - min y`` over the measured samples that are compared;
-        give the range of a whole record to put several of its parts on one scale. 0 makes ``mape`` NaN.
+        Scale of equation (7). The default is ``max y - min y`` over the compared measured samples. Give the
+        range of a whole record to use the same scale for its parts. With 0, ``mape`` is NaN.
 
     Raises
     ------
     SettingsError
-        The arrays are not one-dimensional and of one length, or the range is negative.
+        The arrays are not one-dimensional or differ in length, or the range is negative.
     """
     y = np.asarray(measured, dtype=np.float64)
     yhat = np.asarray(predicted, dtype=np.float64)
@@ -84,19 +85,21 @@ def metrics(
         raise SettingsError(f"compare two (samples,) arrays of one length, got {y.shape} and {yhat.shape}")
     if output_range is not None and output_range < 0.0:
         raise SettingsError(f"the output range is max - min and never negative, got {output_range}")
-    there = ~(np.isnan(y) | np.isnan(yhat))
-    y, yhat = y[there], yhat[there]
+    valid = ~(np.isnan(y) | np.isnan(yhat))
+    y, yhat = y[valid], yhat[valid]
     if not len(y):
         return Metrics(math.nan, math.nan, math.nan, math.nan)
     with np.errstate(over="ignore", invalid="ignore"):
-        return _compared(y, yhat, output_range)
+        return _compute_metrics(y, yhat, output_range)
 
 
-def _compared(y: NDArray[np.float64], yhat: NDArray[np.float64], output_range: float | None) -> Metrics:
+def _compute_metrics(
+    y: NDArray[np.float64], yhat: NDArray[np.float64], output_range: float | None
+) -> Metrics:
     spread = float(y.max() - y.min())
     scale = spread if output_range is None else output_range
-    # In units of the range, so that no unit of measurement underflows when squared. The range also tells what
-    # is constant: about their rounded mean, equal samples leave squares of 1e-34, not 0.
+    # Scale by the range so that squares do not underflow in any unit. The range also detects a constant
+    # output; the squared deviations of equal samples from their rounded mean are about 1e-34, not 0.
     unit = spread if spread > 0.0 else 1.0
     error, deviation = (y - yhat) / unit, (y - y.mean()) / unit
     squared = float(np.add.reduce(error * error))
@@ -112,7 +115,7 @@ def _compared(y: NDArray[np.float64], yhat: NDArray[np.float64], output_range: f
 def information_criteria(
     residual_sum_of_squares: float, samples: int, parameters: int
 ) -> InformationCriteria:
-    """Weigh a one-step-ahead residual against the number of parameters that made it.
+    """Compute the information criteria of a one-step-ahead residual.
 
     With ``N`` samples, ``p`` parameters and Gaussian noise of unknown variance, up to a common constant::
 
@@ -129,12 +132,12 @@ def information_criteria(
     samples : int
         Number of residuals in that sum.
     parameters : int
-        Number of estimated parameters; constraints that were imposed each take one away.
+        Number of estimated parameters, minus the number of imposed constraints.
 
     Raises
     ------
     SettingsError
-        There are not more samples than parameters, or a negative number was given.
+        There are not more samples than parameters, or an argument is negative.
     """
     if parameters < 0 or residual_sum_of_squares < 0.0:
         raise SettingsError(
@@ -143,7 +146,7 @@ def information_criteria(
         )
     if samples <= parameters:
         raise SettingsError(
-            f"{samples} samples cannot judge {parameters} parameters: take more samples or a smaller model"
+            f"{samples} samples are too few for {parameters} parameters: take more samples or a smaller model"
         )
     if residual_sum_of_squares == 0.0:
         return InformationCriteria(-math.inf, -math.inf, 0.0)

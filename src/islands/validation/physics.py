@@ -1,7 +1,7 @@
-"""What a model does where its record does not go: holds, minor loops, other amplitudes and other rates.
+"""Physics checks: behaviour of a model under excitations that the record does not contain.
 
-Accuracy on one more sine is cheap. What a hysteresis model owes its user is that it stays where it is when
-the input rests, wherever it was and from whichever side it came (Property 1 of the paper, section 3).
+The excitations are holds, minor loops, and other amplitudes and rates. A hysteresis model must keep a
+constant output at constant input, at every level and on both branches (Property 1 of the paper, section 3).
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,28 +18,32 @@ from islands.model.model import Model
 from islands.simulation.predictors import divergence_bound, free_run
 from islands.systems.signals import hold_signal, minor_loops, sine
 
-#: A cluster's sum meets its target within this.
+#: Tolerance of the sum of a cluster.
 SUM_TOLERANCE = 1e-9
 
-#: A hold is constant when the output moves less than this share of its range over the second half.
-CONSTANT = 1e-6
+#: Largest variation of the output over the second half of a constant hold, as a fraction of the record's
+#: output range.
+CONSTANT_TOLERANCE = 1e-6
 
-#: Levels of a hold as fractions of the input's amplitude about its middle.
+#: Levels of the holds relative to the midpoint of the input, as fractions of its amplitude.
 LEVELS = (-0.8, -0.4, 0.0, 0.4, 0.8)
 
-#: A hold lasts this many periods of the loop before it, an excursion is repeated this often.
-HOLD_PERIODS, PERIODS = 20, 4
+#: Length of a hold in periods of the preceding loop.
+HOLD_PERIODS = 20
 
-#: Other amplitudes and rates, as multiples of the record's own.
+#: Number of periods of an excursion.
+EXCURSION_PERIODS = 4
+
+#: Amplitudes and rates of the excursions, as multiples of those of the record.
 EXCURSIONS = (("amplitude", 0.5), ("rate", 0.25), ("rate", 5.0))
 
-#: No input rests longer than this many samples: a very slow record is checked at a faster rate.
-_LONGEST = 100_000
+#: Maximum length of a hold in samples. A very slow record is checked at a faster rate.
+_MAX_HOLD_SAMPLES = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class ClusterSum:
-    """The sum of a cluster's parameters, and what it is when there is a continuum of equilibria."""
+    """The sum of a cluster's parameters, and its target for a continuum of equilibria."""
 
     cluster: str
     sum: float
@@ -47,25 +51,25 @@ class ClusterSum:
 
     @property
     def met(self) -> bool:
-        """The sum meets its target to 1e-9."""
+        """Whether the sum meets its target to 1e-9."""
         return abs(self.sum - self.target) <= SUM_TOLERANCE
 
 
 @dataclass(frozen=True, slots=True)
 class HoldTest:
-    """The output while the input rests.
+    """The output at constant input.
 
     Attributes
     ----------
     level : float
-        The input's level as a fraction of its amplitude about its middle.
+        Level of the input relative to its midpoint, as a fraction of its amplitude.
     loading : bool
-        Reached while loading, or while unloading.
+        Whether the level was reached while loading.
     bounded, constant : bool
-        The output stayed within the bound; it was constant over the second half.
+        Whether the output stayed within the bound, and whether it was constant over the second half.
     drift_percent : float
-        How far the output moved from the first sample at rest to the last, in per cent of the record's
-        output range; infinite after a divergence, or where the record's output is constant and it moved.
+        Change of the output from the first to the last sample of the hold, in per cent of the record's output
+        range. Infinite after a divergence, or if the record's output is constant and the output changed.
     """
 
     level: float
@@ -77,19 +81,19 @@ class HoldTest:
 
 @dataclass(frozen=True, slots=True)
 class ExcursionTest:
-    """The output under an excitation that the record does not hold.
+    """The output under an excitation that the record does not contain.
 
     Attributes
     ----------
     name : str
         ``minor-loops``, ``amplitude x 0.5``, ``rate x 5``, ...
     bounded : bool
-        The output stayed within the bound.
+        Whether the output stayed within the bound.
     closure_percent : float
-        Distance of the output from one return of the input to the next, in per cent of the record's output
-        range: a loop that repeats closes.
+        Difference of the output between the last two maxima of the input, in per cent of the record's output
+        range. 0 for a closed loop.
     range_percent : float
-        The output's range, in per cent of the record's.
+        Range of the output, in per cent of the record's output range.
     """
 
     name: str
@@ -100,13 +104,13 @@ class ExcursionTest:
 
 @dataclass(frozen=True, slots=True)
 class PhysicsChecks:
-    """The physics check of a model.
+    """Results of the physics checks of a model.
 
     Attributes
     ----------
     clusters : tuple of ClusterSum
     holds : tuple of HoldTest
-        At five levels, each reached while loading and while unloading.
+        Holds at five levels, each reached while loading and while unloading.
     excursions : tuple of ExcursionTest
     """
 
@@ -116,9 +120,9 @@ class PhysicsChecks:
 
     @property
     def property_1(self) -> bool:
-        """Every cluster's sum meets its target, and every hold stays bounded and constant.
+        """Whether every cluster sum meets its target and every hold is bounded and constant.
 
-        The sums alone would pass y(k) = 2.5 y(k-1) - 1.5 y(k-2), which diverges.
+        The sums are not sufficient: y(k) = 2.5 y(k-1) - 1.5 y(k-2) meets them but diverges.
         """
         return all(entry.met for entry in self.clusters) and all(
             entry.bounded and entry.constant for entry in self.holds
@@ -126,41 +130,41 @@ class PhysicsChecks:
 
     @property
     def hold_drift_percent(self) -> float:
-        """The largest drift of all holds, in per cent of the output's range."""
+        """Largest drift of all holds, in per cent of the record's output range."""
         return max(entry.drift_percent for entry in self.holds)
 
 
 def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
-    """Check a model under excitations made from the record's own ranges and rate.
+    """Check a model under excitations derived from the ranges and the rate of the record.
 
-    The base loop is a sine over each input's whole range, its period such that its slope has the rms of the
-    record's. All inputs of a model move together.
+    The base loop is a sine over the range of each input. Its rms slope equals that of the record, within
+    limits of the period. All inputs of a model are excited simultaneously.
 
     Parameters
     ----------
     model : Model
-        With parameters.
+        Model with parameters.
     record : Dataset
-        Complete; it gives ranges, rate, bound, and an output to start from.
+        Complete record that defines the ranges, the rate, the bound and the initial output.
     """
-    period = _period(record, model.maximum_lag)
-    scenarios = [*_holds(period), *_excursions(period)]
-    simulated = list(_responses(model, record, [signal for _, signal in scenarios]))
+    period = _choose_period(record, model.maximum_lag)
+    scenarios = [*_make_holds(period), *_make_excursions(period)]
+    simulated = list(_simulate(model, record, [signal for _, signal in scenarios]))
     holds, excursions = [], []
     for (kind, signal), y in zip(scenarios, simulated, strict=True):
         if isinstance(kind, tuple):
             at_rest = y[len(y) - HOLD_PERIODS * period + model.maximum_lag :]
-            holds.append(_hold(kind, at_rest, record.output_range))
+            holds.append(_evaluate_hold(kind, at_rest, record.output_range))
         else:
-            excursions.append(_excursion(kind, signal, y, record.output_range))
+            excursions.append(_evaluate_excursion(kind, signal, y, record.output_range))
     return PhysicsChecks(cluster_sums(model), tuple(holds), tuple(excursions))
 
 
 def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
-    """Return the sums of the parameters over the clusters, beside their targets.
+    """Return the sums of the parameters over the clusters, with their targets.
 
-    The cluster of y comes first. Where no regressor is y at rest its sum is 0: an output that is not fed back
-    has one equilibrium, not a continuum.
+    The cluster of y comes first. Its sum is 0 if no regressor has the steady state y: without feedback of the
+    output there is one equilibrium, not a continuum.
     """
     sums = {group.steady_state: group.total(model.parameters) for group in clusters(model.regressors)}
     return tuple(
@@ -172,62 +176,66 @@ def cluster_sums(model: Model) -> tuple[ClusterSum, ...]:
 def hold_response(
     model: Model, record: Dataset, level: float = 0.4, loading: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return input (in fractions of its amplitude) and output of one hold, for a figure."""
-    signal = _hold_signal(_period(record, model.maximum_lag), level, loading)
-    return signal, next(_responses(model, record, [signal]))
+    """Return the input (in fractions of its amplitude) and the output of one hold, for a figure."""
+    signal = _make_hold(_choose_period(record, model.maximum_lag), level, loading)
+    return signal, next(_simulate(model, record, [signal]))
 
 
-def _period(record: Dataset, maximum_lag: int) -> int:
-    """Return the period in samples of a sine with range and rms slope of the first input that varies."""
+def _choose_period(record: Dataset, maximum_lag: int) -> int:
+    """Return the period in samples of a sine with the range and rms slope of the first varying input."""
     u = record.u[:, int(np.argmax(np.ptp(record.u, axis=0) > 0))]
     slope = np.concatenate([np.diff(u[begin:end]) for begin, end in record.bounds])
     amplitude = np.ptp(u) / 2
     period = 2 * np.pi * amplitude / np.sqrt(2 * np.mean(slope**2)) if slope.any() else 0
-    return int(np.clip(period, max(40, 4 * maximum_lag), _LONGEST // HOLD_PERIODS))
+    return int(np.clip(period, max(40, 4 * maximum_lag), _MAX_HOLD_SAMPLES // HOLD_PERIODS))
 
 
+#: Name of an excursion, or (level, loading) of a hold.
 _Kind = str | tuple[float, bool]
 
 
-def _holds(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
+def _make_holds(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
     return [
-        ((level, loading), _hold_signal(period, level, loading))
+        ((level, loading), _make_hold(period, level, loading))
         for level in LEVELS
         for loading in (True, False)
     ]
 
 
-def _hold_signal(period: int, level: float, loading: bool) -> NDArray[np.float64]:
+def _make_hold(period: int, level: float, loading: bool) -> NDArray[np.float64]:
     return hold_signal(
         1.0, HOLD_PERIODS * period, amplitude=1.0, frequency=1.0 / period, level=level, loading=loading
     )
 
 
-def _excursions(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
-    made: list[tuple[_Kind, NDArray[np.float64]]] = [
+def _make_excursions(period: int) -> list[tuple[_Kind, NDArray[np.float64]]]:
+    excursions: list[tuple[_Kind, NDArray[np.float64]]] = [
         ("minor-loops", minor_loops(1.0, amplitude=1.0, frequency=1.0 / period))
     ]
     for kind, factor in EXCURSIONS:
         amplitude, rate = (factor, 1.0) if kind == "amplitude" else (1.0, factor)
         samples = max(8, round(period / rate))
-        made.append((f"{kind} x {factor:g}", sine(1.0, PERIODS * samples + 1, amplitude, 1.0 / samples)))
-    return made
+        excursions.append(
+            (f"{kind} x {factor:g}", sine(1.0, EXCURSION_PERIODS * samples + 1, amplitude, 1.0 / samples))
+        )
+    return excursions
 
 
-def _responses(
+def _simulate(
     model: Model, record: Dataset, signals: Sequence[NDArray[np.float64]]
 ) -> Iterator[NDArray[np.float64]]:
-    """Yield the model's output for every signal, NaN from a divergence on.
+    """Yield the model's output for every signal, NaN after a divergence.
 
-    Each starts at rest in the middle of the inputs' range, from an output that was measured nearby.
+    Each simulation starts at the midpoint of the input ranges, with the measured output of the sample whose
+    inputs are nearest to it.
     """
-    middle = (record.u.max(axis=0) + record.u.min(axis=0)) / 2
+    midpoint = (record.u.max(axis=0) + record.u.min(axis=0)) / 2
     amplitude = np.ptp(record.u, axis=0) / 2
-    nearest = int(np.argmin(np.abs(record.u - middle).sum(axis=1)))
+    nearest = int(np.argmin(np.abs(record.u - midpoint).sum(axis=1)))
     rest = model.maximum_lag
     recordings = []
     for signal in signals:
-        u = middle + amplitude * np.concatenate([np.zeros(rest), signal])[:, None]
+        u = midpoint + amplitude * np.concatenate([np.zeros(rest), signal])[:, None]
         y = np.full(len(u), np.nan)
         y[:rest] = record.y[nearest]
         recordings.append(
@@ -239,24 +247,23 @@ def _responses(
         yield simulated[begin + rest : end]
 
 
-def _hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float) -> HoldTest:
-    """Judge the output from where every lag of the input has its level: before that it may still answer."""
+def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float) -> HoldTest:
+    """Evaluate the output ``y`` of a hold from the sample at which all lagged inputs are at the level."""
     level, loading = kind
-    # A divergence on the way to the level leaves NaN at rest as well.
+    # After a divergence before the hold, the output is also NaN during the hold.
     bounded = not np.isnan(y).any()
     drift = percent_of_range(y[-1] - y[0], output_range) if bounded else np.inf
     moves = np.ptp(y[len(y) // 2 :]) if bounded else np.inf
-    return HoldTest(level, loading, bounded, bool(moves <= CONSTANT * output_range), drift)
+    return HoldTest(level, loading, bounded, bool(moves <= CONSTANT_TOLERANCE * output_range), drift)
 
 
-def _excursion(
+def _evaluate_excursion(
     name: str, signal: NDArray[np.float64], y: NDArray[np.float64], output_range: float
 ) -> ExcursionTest:
     bounded = not np.isnan(y).any()
     if not bounded:
         return ExcursionTest(name, False, np.inf, np.inf)
-    # The last return of the input to its largest value, and the one before it: two samples side by side, as
-    # near to a crest from before as from behind, are one return.
+    # The last two maxima of the input. Two adjacent samples at equal distance from a crest count as one.
     largest = np.flatnonzero(signal >= signal.max() * (1 - 1e-9))
     before, last = largest[np.diff(largest, prepend=-2) > 1][-2:]
     return ExcursionTest(
@@ -268,6 +275,6 @@ def _excursion(
 
 
 def percent_of_range(distance: float, output_range: float) -> float:
-    """Return a distance in per cent of a range; of a range of 0 it is nothing, or infinitely much."""
-    share = abs(float(distance)) / output_range if output_range > 0 else np.inf
-    return 100 * share if distance else 0.0
+    """Return a distance in per cent of a range. If the range is 0, return 0 or infinity."""
+    fraction = abs(float(distance)) / output_range if output_range > 0 else np.inf
+    return 100 * fraction if distance else 0.0

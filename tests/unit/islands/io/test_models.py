@@ -78,7 +78,7 @@ def test_a_users_own_primitive_is_read_where_it_is_given():
     known = islands.PRIMITIVES | {"halved": islands.primitive("halved", halved, parity=-1)}
     model = islands.make_model([(islands.parse("halved(y(k-1))", known), 0.5)])
     assert model_from_json(model_json(model), primitives=known) == model
-    with pytest.raises(ModelError, match=r"terms\.0\.regressor: unknown function 'halved': known are mul"):
+    with pytest.raises(ModelError, match=r"terms\.0\.regressor: unknown function 'halved': take one of mul"):
         model_from_json(model_json(model))
 
 
@@ -195,7 +195,7 @@ BROKEN = {
     ),
     "the present": (
         document(terms=[term("u(k)")]),
-        "terms.0.regressor: a regressor reads the past alone: channel 1 has lag 0",
+        "terms.0.regressor: a regressor reads only past samples: channel 1 has lag 0",
     ),
     "zero": (
         document(terms=[term("u(k-1) - u(k-1)")]),
