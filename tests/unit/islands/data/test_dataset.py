@@ -1,4 +1,4 @@
-"""Laws of a record: its shapes hold, its values are finite and frozen, and segments stay apart."""
+"""Records: validation, read-only arrays, segments, slices and joins."""
 
 import warnings
 from dataclasses import FrozenInstanceError
@@ -19,13 +19,13 @@ def record(samples: int = 10, **changes: object) -> Dataset:
     return Dataset(**(fields | changes))
 
 
-def refusal(**changes: object) -> str:
+def error_message(**changes: object) -> str:
     with pytest.raises(RecordError) as caught:
         record(**changes)
     return str(caught.value)
 
 
-def test_a_single_input_may_come_as_a_vector():
+def test_single_input_may_be_a_vector():
     made = record()
     assert made.u.shape == (10, 1)
     assert (made.samples, made.inputs, len(made)) == (10, 1, 10)
@@ -49,7 +49,7 @@ def test_integers_and_single_precision_become_double_precision():
     assert made.u.dtype == made.y.dtype == np.float64
 
 
-def test_a_record_does_not_change_with_the_arrays_it_was_made_of():
+def test_record_copies_its_arrays():
     u, y = np.zeros(10), np.ones(10)
     made = record(u=u, y=y)
     u[3] = y[3] = 7.0
@@ -57,7 +57,7 @@ def test_a_record_does_not_change_with_the_arrays_it_was_made_of():
     assert made.y[3] == 1.0
 
 
-def test_a_record_cannot_be_written_to():
+def test_record_is_read_only():
     made = record()
     with pytest.raises(ValueError, match="read-only"):
         made.u[0, 0] = 1.0
@@ -76,80 +76,80 @@ def test_a_record_cannot_be_written_to():
         (np.ones(10), np.ones((10, 1))),
     ],
 )
-def test_arrays_that_do_not_fit_are_refused_with_their_shapes(u, y):
-    message = refusal(u=u, y=y)
+def test_error_for_inconsistent_arrays_shows_their_shapes(u, y):
+    message = error_message(u=u, y=y)
     assert f"got {u.shape} and {y.shape}" in message
     assert "(samples, inputs)" in message
 
 
-def test_a_record_without_samples_is_refused():
-    assert "0 samples" in refusal(samples=0)
+def test_record_without_samples_is_refused():
+    assert "0 samples" in error_message(samples=0)
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_sampling_time_that_is_not_a_positive_number_is_refused(dt):
-    message = refusal(dt=dt)
+def test_sampling_time_that_is_not_positive_and_finite_is_refused(dt):
+    message = error_message(dt=dt)
     assert "positive number of seconds" in message
     assert str(dt) in message
 
 
 @pytest.mark.parametrize("segments", [(4, 5), (11,), (10, 0), (12, -2)])
-def test_segments_are_positive_and_sum_to_the_samples(segments):
-    message = refusal(segments=segments)
+def test_segments_must_be_positive_and_sum_to_the_samples(segments):
+    message = error_message(segments=segments)
     assert str(segments) in message
     assert "10 samples" in message
 
 
 def test_names_or_units_that_do_not_match_the_inputs_are_refused():
     two = np.ones((10, 2))
-    assert "2 inputs need 2 names, got ('a', 'b', 'c')" in refusal(u=two, input_names=("a", "b", "c"))
-    assert "2 inputs need 2 units, got ('V',)" in refusal(u=two, input_units=("V",))
+    assert "2 inputs need 2 names, got ('a', 'b', 'c')" in error_message(u=two, input_names=("a", "b", "c"))
+    assert "2 inputs need 2 units, got ('V',)" in error_message(u=two, input_units=("V",))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_an_input_that_is_not_finite_is_refused_by_name_and_sample(value):
+def test_error_for_a_non_finite_input_names_input_and_sample(value):
     u = np.ones((10, 2))
     u[6, 1] = value
-    message = refusal(u=u, input_names=("a_V", "b_V"))
+    message = error_message(u=u, input_names=("a_V", "b_V"))
     assert "input b_V is not finite at sample 6" in message
     assert "repair or cut" in message
 
 
-def test_an_infinite_output_is_refused_by_name_and_sample():
+def test_error_for_an_infinite_output_names_output_and_sample():
     y = np.ones(10)
     y[4] = -np.inf
-    message = refusal(y=y, output_name="y_um")
+    message = error_message(y=y, output_name="y_um")
     assert "output y_um is infinite at sample 4" in message
 
 
-def test_a_missing_output_is_kept_as_nan():
+def test_missing_output_is_kept_as_nan():
     y = np.ones(10)
     y[7:] = np.nan
     assert np.isnan(record(y=y).y).tolist() == [False] * 7 + [True] * 3
 
 
-def test_time_starts_where_the_record_starts_and_steps_by_dt():
+def test_time_begins_at_the_start_of_the_record_and_steps_by_dt():
     made = record(samples=4, start=3.0)
     assert made.time.tolist() == [3.0, 3.5, 4.0, 4.5]
 
 
-def test_bounds_follow_one_another_without_a_hole():
+def test_bounds_of_segments_are_contiguous():
     assert record(segments=(3, 5, 2)).bounds == ((0, 3), (3, 8), (8, 10))
 
 
-def test_the_output_range_passes_over_missing_values():
+def test_output_range_ignores_missing_values():
     y = np.array([2.0, np.nan, -1.0, 5.0, np.nan])
     assert record(samples=5, y=y).output_range == 6.0
 
 
-def test_the_range_of_an_output_that_is_missing_throughout_is_nan_without_a_warning():
+def test_output_range_of_a_missing_output_is_nan_without_a_warning():
     made = record(samples=5, y=np.full(5, np.nan))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert np.isnan(made.output_range)
 
 
-def test_a_slice_is_a_record_of_its_own_that_starts_later():
+def test_slice_is_a_record_with_a_later_start():
     part = record()[4:7]
     assert part.u[:, 0].tolist() == [4.0, 5.0, 6.0]
     assert part.y.tolist() == [16.0, 25.0, 36.0]
@@ -157,24 +157,24 @@ def test_a_slice_is_a_record_of_its_own_that_starts_later():
     assert part.segments == (3,)
 
 
-def test_a_slice_cuts_segments_and_joins_none():
+def test_slice_cuts_segments_and_joins_none():
     made = record(segments=(3, 5, 2))
     assert made[1:9].segments == (2, 5, 1)
     assert made[3:8].segments == (5,)
     assert made[:4].segments == (3, 1)
 
 
-def test_a_slice_counts_negative_samples_from_the_end():
+def test_slice_counts_negative_samples_from_the_end():
     assert record()[-3:].u[:, 0].tolist() == [7.0, 8.0, 9.0]
 
 
 @pytest.mark.parametrize("rows", [slice(5, 5), slice(7, 3), slice(20, 30), slice(None, None, 2)])
-def test_a_slice_that_is_empty_or_skips_samples_is_refused(rows):
+def test_slice_that_is_empty_or_skips_samples_is_refused(rows):
     with pytest.raises(RecordError, match="non-empty slice of step 1 of the record's 10 samples"):
         record()[rows]
 
 
-def test_joined_recordings_stay_segments_of_their_own():
+def test_joined_recordings_remain_separate_segments():
     joined = join((record(samples=4, start=1.0), record(samples=6, segments=(2, 4))))
     assert joined.segments == (4, 2, 4)
     assert joined.y.tolist() == [0.0, 1.0, 4.0, 9.0, 0.0, 1.0, 4.0, 9.0, 16.0, 25.0]
@@ -189,21 +189,21 @@ def test_cutting_and_joining_at_a_boundary_returns_the_record():
     assert np.array_equal(again.y, made.y)
 
 
-def test_recordings_of_other_columns_or_units_are_not_joined():
+def test_recordings_with_different_columns_or_units_are_not_joined():
     for change in ({"output_name": "z"}, {"output_unit": "um"}, {"input_names": ("v",)}):
         with pytest.raises(RecordError, match="same columns and units: rename or convert"):
             join((record(), record(**change)))
 
 
-def test_recordings_of_another_sampling_time_are_not_joined():
+def test_recordings_with_different_sampling_times_are_not_joined():
     with pytest.raises(RecordError, match=r"sampled at 0\.5 s and 0\.501 s: resample"):
         join((record(), record(dt=0.501)))
 
 
-def test_sampling_times_that_differ_by_the_rounding_of_printed_time_are_joined():
+def test_recordings_whose_sampling_times_differ_by_rounding_are_joined():
     assert join((record(), record(dt=0.5 * (1 + 1e-5)))).dt == 0.5
 
 
-def test_joining_nothing_is_refused():
-    with pytest.raises(RecordError, match="no recording is given"):
+def test_join_without_recordings_is_refused():
+    with pytest.raises(RecordError, match="there is no recording to join"):
         join(())

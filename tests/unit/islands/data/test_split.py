@@ -1,4 +1,4 @@
-"""Laws of a split: nothing is lost, nothing is used twice, and both parts come from one system."""
+"""Split of records: the parts are disjoint, complete and from one system."""
 
 import numpy as np
 import pytest
@@ -12,44 +12,44 @@ def record(samples: int = 100, inputs: int = 1, **changes: object) -> Dataset:
     return Dataset(u=np.ones((samples, inputs)), y=np.arange(float(samples)), **({"dt": 0.1} | changes))
 
 
-def test_a_quarter_of_the_record_validates_unless_told_otherwise():
+def test_default_validation_part_is_a_quarter_of_the_record():
     parts = split(record())
     assert (parts.estimation.samples, parts.validation.samples) == (75, 25)
 
 
 @pytest.mark.parametrize(("samples", "fraction"), [(100, 0.1), (101, 0.5), (7, 0.3), (2, 0.5)])
-def test_the_parts_together_are_the_record_in_its_order(samples, fraction):
+def test_parts_of_a_split_together_are_the_record_in_order(samples, fraction):
     parts = split(record(samples), fraction)
     both = np.concatenate([parts.estimation.y, parts.validation.y])
     assert both.tolist() == list(range(samples))
 
 
-def test_the_validation_part_is_the_end_of_the_record_and_keeps_its_time():
+def test_validation_part_is_the_end_of_the_record_and_keeps_its_time():
     parts = split(record(start=2.0), 0.2)
     assert parts.validation.y[0] == 80.0
     assert parts.validation.start == pytest.approx(10.0)
     assert parts.estimation.start == 2.0
 
 
-def test_a_segment_across_the_boundary_is_cut_and_no_segment_is_joined():
+def test_segment_across_the_split_boundary_is_cut():
     parts = split(record(segments=(50, 40, 10)), 0.25)
     assert parts.estimation.segments == (50, 25)
     assert parts.validation.segments == (15, 10)
 
 
 @pytest.mark.parametrize("fraction", [0.0, 1.0, -0.1, 1.5, float("nan")])
-def test_a_fraction_outside_zero_and_one_is_refused(fraction):
+def test_fraction_outside_zero_and_one_is_refused(fraction):
     with pytest.raises(SettingsError, match=f"between 0 and 1, got {fraction}"):
         split(record(), fraction)
 
 
 @pytest.mark.parametrize("fraction", [0.001, 0.999])
-def test_a_fraction_that_leaves_a_part_empty_is_refused(fraction):
+def test_fraction_that_leaves_a_part_empty_is_refused(fraction):
     with pytest.raises(SettingsError, match=f"{fraction} of 100 samples leaves a part empty"):
         split(record(), fraction)
 
 
-def test_columns_of_the_two_parts_may_have_other_names():
+def test_columns_of_the_two_parts_may_have_different_names():
     parts = Split(record(output_name="y_est_V"), record(output_name="y_val_V"))
     assert parts.validation.output_name == "y_val_V"
 
@@ -64,5 +64,5 @@ def test_parts_with_different_sampling_times_are_refused():
         Split(record(), record(dt=0.1005))
 
 
-def test_sampling_times_that_differ_by_the_rounding_of_printed_time_are_one():
+def test_sampling_times_of_parts_may_differ_by_rounding():
     assert Split(record(), record(dt=0.100001)).estimation.dt == 0.1

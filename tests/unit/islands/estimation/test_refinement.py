@@ -1,4 +1,4 @@
-"""Refinement: Levenberg-Marquardt on the shooting error, where the constraints leave room."""
+"""Refinement: Levenberg-Marquardt on the multiple-shooting error under constraints."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ HYSTERESIS = {
     "y(k-1)*phi2(u(k-1), u(k-2))*phi1(u(k-1), u(k-2))": -0.3,
     "u(k-1)*phi1(u(k-1), u(k-2))": 0.1,
 }
-#: Two terms of y and two of y u: their sums are 1 and 0.
+#: Two terms with steady state y and two with y u; their sums are 1 and 0.
 CLUSTERED = {
     "y(k-1)": 0.7,
     "y(k-2)": 0.3,
@@ -35,8 +35,8 @@ def model(terms):
     return make_model((parse(text), theta) for text, theta in terms.items())
 
 
-def driven(terms, samples=600, seed=0, noise=0.0):
-    """The free run of a model from rest on a slow input that goes both ways, and noise on it."""
+def make_record(terms, samples=600, seed=0, noise=0.0):
+    """Return a noisy free run of a model from rest with a random-walk input."""
     rng = np.random.default_rng(seed)
     u = np.cumsum(rng.normal(size=samples)) / 10
     blank = Dataset(u, np.where(np.arange(samples) < 2, 0.0, np.nan), 0.1)
@@ -45,44 +45,44 @@ def driven(terms, samples=600, seed=0, noise=0.0):
     return Dataset(u, y + noise * rng.normal(size=samples), 0.1)
 
 
-def perturbed(terms, by=0.05):
-    """Parameters off by some per cent; the linear y stays, so that the model does not run away."""
+def perturb(terms, by=0.05):
+    """Return a model with perturbed parameters; y(k-1) is unchanged, so that the model does not diverge."""
     return model(
         {
-            text: theta * (1 + by * (-1) ** place * (text != "y(k-1)"))
-            for place, (text, theta) in enumerate(terms.items())
+            text: theta * (1 + by * (-1) ** position * (text != "y(k-1)"))
+            for position, (text, theta) in enumerate(terms.items())
         }
     )
 
 
-def refined(*arguments, **options):
+def refine_model(*arguments, **options):
     found = refine(*arguments, **options)
     assert isinstance(found, RefinedModel), found
     return found
 
 
 @pytest.mark.parametrize("interval", [1, 50, None])
-def test_it_finds_the_true_parameters_from_perturbed_ones_on_noise_free_data(interval):
-    record = driven(HYSTERESIS)
-    found = refined(perturbed(HYSTERESIS), record, interval)
+def test_refinement_recovers_true_parameters_from_noise_free_data(interval):
+    record = make_record(HYSTERESIS)
+    found = refine_model(perturb(HYSTERESIS), record, interval)
     assert found.before > 1e-8
     assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
     assert found.after < 1e-10 * found.before
     assert 2 <= found.steps <= 30
 
 
-def test_within_the_constraints_it_finds_them_too():
-    record = driven(CLUSTERED)
+def test_constrained_refinement_recovers_true_parameters():
+    record = make_record(CLUSTERED)
     start = model({**CLUSTERED, "y(k-1)": 0.65, "y(k-2)": 0.35, "u(k-1)*y(k-1)": 0.1, "u(k-2)*y(k-2)": -0.1})
-    found = refined(start, record, 60, "hysteresis")
+    found = refine_model(start, record, 60, "hysteresis")
     assert found.model.parameters == pytest.approx(model(CLUSTERED).parameters, rel=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("interval", [1, 40, None])
 @pytest.mark.parametrize("constraints", ["none", "hysteresis"])
-def test_the_shooting_error_never_grows_and_the_constraints_keep_holding(seed, interval, constraints):
-    record = driven(CLUSTERED, seed=seed, noise=0.02)
+def test_refinement_never_increases_the_error_and_keeps_constraints(seed, interval, constraints):
+    record = make_record(CLUSTERED, seed=seed, noise=0.02)
     start = estimate(model(CLUSTERED).regressors, record, constraints).model
     found = refine(start, record, interval, constraints)
     simulated = multiple_shooting(start, record, interval)
@@ -99,65 +99,65 @@ def test_the_shooting_error_never_grows_and_the_constraints_keep_holding(seed, i
         assert found.model.parameters[0] != start.parameters[0] or interval == 1
 
 
-def test_what_is_gained_is_the_error_that_counts():
-    """Least squares is the best one step ahead; over an interval its own parameters are not."""
-    record = driven(CLUSTERED, noise=0.05)
+def test_refinement_reduces_the_shooting_error_of_least_squares():
+    """The least-squares estimate is optimal one step ahead, but not over an interval."""
+    record = make_record(CLUSTERED, noise=0.05)
     start = estimate(model(CLUSTERED).regressors, record, "hysteresis").model
-    found = refined(start, record, 40, "hysteresis")
+    found = refine_model(start, record, 40, "hysteresis")
     assert found.after < 0.96 * found.before
-    ahead = refined(start, record, 1, "hysteresis")
+    ahead = refine_model(start, record, 1, "hysteresis")
     assert ahead.after == pytest.approx(ahead.before, rel=1e-6)
 
 
-def test_nothing_to_choose_leaves_the_model_as_it_is():
-    record = driven(HYSTERESIS)
+def test_model_without_free_directions_is_unchanged():
+    record = make_record(HYSTERESIS)
     only = model({"y(k-1)": 1.0})
-    found = refined(only, record, 50, "hysteresis")
+    found = refine_model(only, record, 50, "hysteresis")
     assert (found.model.parameters, found.steps) == ((1.0,), 0)
     assert found.model.standard_errors == (0.0,)
     assert found.before == found.after
 
 
-def test_steps_are_limited():
-    record = driven(HYSTERESIS)
-    start = perturbed(HYSTERESIS, 0.3)
-    one = refined(start, record, 50, max_steps=1)
+def test_number_of_steps_is_limited():
+    record = make_record(HYSTERESIS)
+    start = perturb(HYSTERESIS, 0.3)
+    one = refine_model(start, record, 50, max_steps=1)
     assert one.steps == 1
-    assert refined(start, record, 50, max_steps=0).model.parameters == start.parameters
-    assert refined(start, record, 50).after < one.after
+    assert refine_model(start, record, 50, max_steps=0).model.parameters == start.parameters
+    assert refine_model(start, record, 50).after < one.after
 
 
 def test_standard_errors_match_a_monte_carlo():
-    """Noise on the measurement alone is what a free run leaves over: 60 records tell the spread."""
-    clean = driven(HYSTERESIS, samples=400)
+    """With measurement noise only, compare the standard errors with the spread over 60 records."""
+    clean = make_record(HYSTERESIS, samples=400)
     rng = np.random.default_rng(12)
     found = []
     for _ in range(60):
-        # The first two samples, from which a run starts, are measured exactly.
+        # The first two samples, the initial values of a run, are free of noise.
         noise = np.where(np.arange(400) < 2, 0.0, 0.02 * rng.normal(size=400))
-        found.append(refined(model(HYSTERESIS), replace(clean, y=clean.y + noise), None).model)
+        found.append(refine_model(model(HYSTERESIS), replace(clean, y=clean.y + noise), None).model)
     spread = np.std([each.parameters for each in found], axis=0)
-    said = np.mean([each.standard_errors for each in found], axis=0)
-    # A standard deviation of 60 draws is known to 9 %: three of its own.
-    assert said == pytest.approx(spread, rel=0.28)
+    predicted = np.mean([each.standard_errors for each in found], axis=0)
+    # The standard deviation of 60 draws has a relative error of 9 %; allow three times that.
+    assert predicted == pytest.approx(spread, rel=0.28)
     mean = np.mean([each.parameters for each in found], axis=0)
-    assert np.all(np.abs(mean - model(HYSTERESIS).parameters) < 4 * said / np.sqrt(60))
+    assert np.all(np.abs(mean - model(HYSTERESIS).parameters) < 4 * predicted / np.sqrt(60))
 
 
 @pytest.mark.parametrize("constraints", ["none", "hysteresis"])
-def test_one_step_ahead_they_are_those_of_least_squares(constraints):
-    """Where the error is linear in the parameters, few rows or many."""
-    record = driven(CLUSTERED, samples=14, noise=0.05)
+def test_one_step_ahead_refinement_equals_least_squares(constraints):
+    """The one-step-ahead error is linear in the parameters; the record has only 14 samples."""
+    record = make_record(CLUSTERED, samples=14, noise=0.05)
     start = estimate(model(CLUSTERED).regressors, record, constraints).model
-    found = refined(start, record, 1, constraints)
+    found = refine_model(start, record, 1, constraints)
     assert found.model.parameters == pytest.approx(start.parameters, rel=1e-6)
     assert found.model.standard_errors == pytest.approx(start.standard_errors, rel=1e-6)
 
 
-def test_standard_errors_know_of_the_constraint():
-    """Of two parameters that sum to one, both are known as well as either; one alone is known exactly."""
-    record = driven(CLUSTERED, noise=0.02)
-    found = refined(
+def test_standard_errors_account_for_the_constraint():
+    """Two parameters with a fixed sum have equal standard errors."""
+    record = make_record(CLUSTERED, noise=0.02)
+    found = refine_model(
         estimate(model(CLUSTERED).regressors, record, "hysteresis").model, record, None, "hysteresis"
     )
     errors = dict(
@@ -169,9 +169,9 @@ def test_standard_errors_know_of_the_constraint():
 
 
 @pytest.mark.parametrize("interval", [30, None])
-def test_its_jacobian_matches_finite_differences_of_another_step(interval):
-    record = driven(HYSTERESIS, noise=0.02)
-    start = perturbed(HYSTERESIS)
+def test_jacobian_matches_higher_order_finite_differences(interval):
+    record = make_record(HYSTERESIS, noise=0.02)
+    start = perturb(HYSTERESIS)
     theta = np.array(start.parameters)
     residual = _Residual(start, record, interval, None)
     error = residual(theta)
@@ -179,7 +179,7 @@ def test_its_jacobian_matches_finite_differences_of_another_step(interval):
     normal, gradient = residual.normal_equations(theta, error, directions)
     columns = []
     for direction in directions.T:
-        # Of fourth order, with a step a hundred times as long.
+        # Fourth-order differences with a step 100 times larger.
         ahead = [residual(theta + factor * 1e-3 * direction) for factor in (-2, -1, 1, 2)]
         columns.append((ahead[0] - 8 * ahead[1] + 8 * ahead[2] - ahead[3]) / 12e-3)
     jacobian = np.array(columns)
@@ -188,44 +188,44 @@ def test_its_jacobian_matches_finite_differences_of_another_step(interval):
     assert np.all(np.abs(gradient - jacobian @ error) < 1e-5 * length * np.linalg.norm(error))
 
 
-def test_the_residual_is_prediction_minus_measurement_over_what_is_predicted():
-    record = driven(HYSTERESIS, noise=0.02)
-    start = perturbed(HYSTERESIS)
+def test_residual_is_prediction_minus_measurement():
+    record = make_record(HYSTERESIS, noise=0.02)
+    start = perturb(HYSTERESIS)
     expected = multiple_shooting(start, record, 30, 5)
     error = _Residual(start, record, 30, 5)(np.array(start.parameters))
     assert error == pytest.approx((expected.y - record.y)[5:], abs=1e-15)
 
 
-def test_segments_are_refined_together_and_none_reaches_into_another():
-    parts = driven(HYSTERESIS, 300, seed=1), driven(HYSTERESIS, 200, seed=2)
-    found = refined(perturbed(HYSTERESIS), join(parts), None)
+def test_segments_are_refined_together():
+    parts = make_record(HYSTERESIS, 300, seed=1), make_record(HYSTERESIS, 200, seed=2)
+    found = refine_model(perturb(HYSTERESIS), join(parts), None)
     assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
-def test_steps_that_diverge_are_failed_steps(monkeypatch):
-    """From far away the first steps overshoot: the damping grows until one does not."""
+def test_diverging_steps_are_rejected(monkeypatch):
+    """From a distant start the first steps overshoot; the damping increases until a step succeeds."""
     diverged = []
     original = _Residual.__call__
 
-    def watched(self, theta):
+    def record_divergence(self, theta):
         error = original(self, theta)
         diverged.append(error is None)
         return error
 
-    monkeypatch.setattr(_Residual, "__call__", watched)
+    monkeypatch.setattr(_Residual, "__call__", record_divergence)
     start = model(dict(zip(HYSTERESIS, (0.93, 0.46, -0.28, 0.39), strict=True)))
-    found = refined(start, driven(HYSTERESIS), None)
+    found = refine_model(start, make_record(HYSTERESIS), None)
     assert sum(diverged) >= 1
     assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
-def test_a_direction_in_which_the_model_diverges_stands_still(monkeypatch):
-    record = driven(HYSTERESIS)
-    start = perturbed(HYSTERESIS)
+def test_diverging_direction_contributes_zeros(monkeypatch):
+    record = make_record(HYSTERESIS)
+    start = perturb(HYSTERESIS)
     theta = np.array(start.parameters)
     residual = _Residual(start, record, 30, None)
     error = residual(theta)
-    whole, _ = residual.normal_equations(theta, error, np.eye(4))
+    complete, _ = residual.normal_equations(theta, error, np.eye(4))
     original = _Residual.__call__
     monkeypatch.setattr(
         _Residual, "__call__", lambda self, at: None if at[1] > theta[1] else original(self, at)
@@ -235,39 +235,39 @@ def test_a_direction_in_which_the_model_diverges_stands_still(monkeypatch):
     assert not normal[:, 1].any()
     assert gradient[1] == 0.0
     others = np.ix_([0, 2, 3], [0, 2, 3])
-    assert np.array_equal(normal[others], whole[others])
+    assert np.array_equal(normal[others], complete[others])
 
 
-def test_a_parameter_that_starts_at_zero_is_moved():
+def test_parameter_that_starts_at_zero_is_refined():
     start = model({**HYSTERESIS, "u(k-1)*phi1(u(k-1), u(k-2))": 0.0})
-    found = refined(start, driven(HYSTERESIS), 50)
+    found = refine_model(start, make_record(HYSTERESIS), 50)
     assert found.model.parameters == pytest.approx(model(HYSTERESIS).parameters, rel=1e-6)
 
 
-# Outcomes and mistakes.
+# Failures and invalid arguments.
 
 
-def test_a_model_that_diverges_as_it_is_is_an_outcome():
-    found = refine(model({**HYSTERESIS, "y(k-1)": 1.5}), driven(HYSTERESIS), 200)
+def test_initially_diverging_model_returns_an_outcome():
+    found = refine(model({**HYSTERESIS, "y(k-1)": 1.5}), make_record(HYSTERESIS), 200)
     assert isinstance(found, EvaluationOutcome)
     assert found.verdict is Status.DIVERGED
     assert "left" in found.reason
     assert "at sample" in found.reason
 
 
-def test_a_model_that_the_constraint_refuses_is_an_outcome():
-    record = driven(HYSTERESIS)
+def test_model_that_cannot_meet_the_constraint_returns_an_outcome():
+    record = make_record(HYSTERESIS)
     without_y = refine(model({"phi1(u(k-1), u(k-2))": 0.8}), record, 50, "hysteresis")
     assert isinstance(without_y, EvaluationOutcome)
     assert without_y.reason == "no regressor is y at rest: add y(k-1)"
     alone = refine(model({"y(k-1)": 1.0, "u(k-1)": 0.0}), record, 50, "hysteresis")
     assert isinstance(alone, EvaluationOutcome)
     assert alone.verdict is Status.INFEASIBLE
-    assert "leave its term out" in alone.reason
+    assert "remove its term" in alone.reason
 
 
-def test_what_the_kernel_would_not_check_is_refused():
-    record = driven(HYSTERESIS)
+def test_invalid_arguments_of_refine_are_refused():
+    record = make_record(HYSTERESIS)
     with pytest.raises(ModelError, match="no parameters yet"):
         refine(replace(model(HYSTERESIS), theta=None), record, 50)
     two_inputs = make_model([(parse("y(k-1)"), 1.0), (parse("u2(k-1)"), 0.1)], ("u1", "u2"))

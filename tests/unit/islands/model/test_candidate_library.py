@@ -1,4 +1,4 @@
-"""Libraries: their contents written out by hand where they are small, and counted where they are not."""
+"""Candidate libraries: contents of small libraries, counts of large ones."""
 
 from itertools import product
 from math import comb
@@ -17,7 +17,7 @@ def texts(name, degree, lags, inputs=1):
     return [plain(item.expression, inputs) for item in candidates(name, degree, lags, inputs)]
 
 
-def test_the_full_set_of_the_paper_has_80_729_terms_and_the_constant():
+def test_full_set_of_the_paper_has_80_729_terms_and_the_constant():
     assert full_set(5, 11, 11) == 80_729 + 1
 
 
@@ -25,7 +25,7 @@ def test_the_full_set_of_the_paper_has_80_729_terms_and_the_constant():
     ("degree", "output_lags", "input_lags", "inputs"),
     [(1, 1, 1, 1), (3, 2, 4, 1), (2, 3, 1, 3), (4, 0, 2, 2)],
 )
-def test_the_full_set_counts_every_monomial(degree, output_lags, input_lags, inputs):
+def test_full_set_counts_every_monomial(degree, output_lags, input_lags, inputs):
     signals = output_lags + inputs * input_lags
     powers = (exponents for exponents in product(range(degree + 1), repeat=signals))
     counted = sum(sum(exponents) <= degree for exponents in powers)
@@ -35,7 +35,7 @@ def test_the_full_set_counts_every_monomial(degree, output_lags, input_lags, inp
 # Contents.
 
 
-def test_the_polynomial_library_holds_every_monomial_and_the_constant():
+def test_polynomial_library_contains_every_monomial_and_the_constant():
     assert sorted(texts("polynomial", 1, 1)) == sorted(["1", "y(k-1)", "u(k-1)"])
     second = ["y(k-1)^2", "y(k-1)*u(k-1)", "u(k-1)^2"]
     assert sorted(texts("polynomial", 2, 1)) == sorted(["1", "y(k-1)", "u(k-1)", *second])
@@ -46,7 +46,7 @@ def test_the_polynomial_library_holds_every_monomial_and_the_constant():
     assert sorted(texts("polynomial", 2, 1, inputs=2)) == sorted([*two, *mixed])
 
 
-def test_the_phi_polynomial_library_holds_increments_times_directions_times_levels():
+def test_phi_polynomial_library_contains_products_with_increments():
     increment, direction = "(u(k-1) - u(k-2))", "sign(u(k-1) - u(k-2))"
     assert sorted(texts("phi-polynomial", 1, 2)) == sorted(
         ["y(k-1)", "u(k-1) - u(k-2)", f"{direction}*{increment}"]
@@ -61,13 +61,13 @@ def test_the_phi_polynomial_library_holds_increments_times_directions_times_leve
     )
 
 
-def test_the_phi_polynomial_library_pairs_every_increment_with_every_direction_of_its_input():
+def test_phi_polynomial_library_pairs_increments_with_directions():
     steps = ["u(k-1) - u(k-2)", "u(k-2) - u(k-3)"]
     pairs = [f"sign({direction})*({step})" for step in steps for direction in steps]
     assert sorted(texts("phi-polynomial", 1, 3)) == sorted(["y(k-1)", *steps, *pairs])
 
 
-def test_with_two_inputs_increment_and_direction_are_of_one_input_and_levels_of_all():
+def test_phi_polynomial_increment_and_direction_share_the_input():
     found = texts("phi-polynomial", 2, 2, inputs=2)
     assert len(found) == 1 + 2 * 2 * (1 + 3)
     assert "u2(k-1)*sign(u1(k-1) - u1(k-2))*(u1(k-1) - u1(k-2))" in found
@@ -77,7 +77,7 @@ def test_with_two_inputs_increment_and_direction_are_of_one_input_and_levels_of_
 
 
 @pytest.mark.parametrize(("degree", "lags", "inputs"), [(1, 2, 1), (5, 3, 1), (3, 4, 2), (2, 3, 3)])
-def test_beside_y_every_term_of_phi_polynomial_vanishes_at_rest(degree, lags, inputs):
+def test_phi_polynomial_terms_except_y_vanish_in_the_steady_state(degree, lags, inputs):
     first, *others = candidates("phi-polynomial", degree, lags, inputs)
     assert plain(first.expression) == "y(k-1)"
     assert {steady_state(item)[0] for item in others} == {0.0}
@@ -86,57 +86,57 @@ def test_beside_y_every_term_of_phi_polynomial_vanishes_at_rest(degree, lags, in
 
 @pytest.mark.parametrize("name", LIBRARIES)
 @pytest.mark.parametrize(("degree", "lags", "inputs"), [(1, 2, 1), (3, 3, 1), (2, 4, 2), (4, 2, 3)])
-def test_a_library_has_as_many_candidates_as_it_counts_before(name, degree, lags, inputs):
-    made = candidates(name, degree, lags, inputs)
-    assert len(made) == len(set(made)) == LIBRARIES[name].count(degree, lags, inputs)
-    assert list(made) == canonical_order(made)
+def test_library_count_equals_the_number_of_candidates(name, degree, lags, inputs):
+    found = candidates(name, degree, lags, inputs)
+    assert len(found) == len(set(found)) == LIBRARIES[name].count(degree, lags, inputs)
+    assert list(found) == canonical_order(found)
 
 
-def test_the_polynomial_library_is_the_full_set():
+def test_polynomial_library_is_the_full_set():
     assert len(candidates("polynomial", 3, 3, 1)) == full_set(3, 3, 3) == 84
 
 
-def test_the_defaults_are_those_of_the_documentation():
+def test_library_defaults_match_the_documentation():
     phi, polynomial = LIBRARIES["phi-polynomial"], LIBRARIES["polynomial"]
     assert (phi.degree, phi.lags, phi.constraints) == (5, 3, "hysteresis")
     assert (polynomial.degree, polynomial.lags, polynomial.constraints) == (3, 3, "none")
     assert len(candidates("phi-polynomial", phi.degree, phi.lags, 1)) == 1 + 6 * comb(4 + 2, 2)
 
 
-def test_every_candidate_is_a_product_of_the_paper_s_functions():
-    made = candidates("phi-polynomial", 3, 3, 1)
-    used = {node.primitive.name for item in made for node in _applied(item.expression)}
+def test_phi_polynomial_candidates_only_use_the_paper_s_functions():
+    found = candidates("phi-polynomial", 3, 3, 1)
+    used = {node.primitive.name for item in found for node in _find_calls(item.expression)}
     assert used == {"mul", "sub", "sign"}
 
 
-def _applied(expression):
+def _find_calls(expression):
     if isinstance(expression, Apply):
         yield expression
         for argument in expression.arguments:
-            yield from _applied(argument)
+            yield from _find_calls(argument)
 
 
-# What is refused.
+# Errors.
 
 
 @pytest.mark.parametrize(("degree", "lags"), [(0, 1), (1, 0), (-1, 3)])
-def test_degree_and_lags_are_at_least_one(degree, lags):
+def test_degree_or_lags_below_one_are_refused(degree, lags):
     with pytest.raises(SettingsError) as caught:
         candidates("polynomial", degree, lags, 1)
     assert str(caught.value) == f"degree and lags are at least 1, got {degree} and {lags}"
 
 
-def test_a_first_difference_takes_two_lags():
-    with pytest.raises(SettingsError, match="needs lags of at least 2: a first difference reads two samples"):
+def test_phi_polynomial_with_one_lag_is_refused():
+    with pytest.raises(SettingsError, match="needs lags of at least 2: a first difference uses two samples"):
         candidates("phi-polynomial", 2, 1, 1)
 
 
-def test_a_library_that_is_too_large_is_refused_before_it_is_made():
+def test_too_large_library_is_refused_before_it_is_built():
     with pytest.raises(SettingsError) as caught:
         candidates("polynomial", 5, 11, 1)
     assert str(caught.value) == (
         "80730 candidates are more than a library may have (4000): take a smaller degree or fewer lags, or "
-        "let evolution search"
+        "search by evolution"
     )
     with pytest.raises(SettingsError, match=r"^[0-9]{30,} candidates are more"):
         candidates("polynomial", 40, 40, 3)
@@ -144,14 +144,14 @@ def test_a_library_that_is_too_large_is_refused_before_it_is_made():
         candidates("phi-polynomial", 500, 1_000_000, 9)
 
 
-def test_what_counts_is_the_library_and_not_the_full_set():
-    # 435 897 monomials of degree 5 in 16 + 16 lags, of which phi-polynomial has a hundredth.
+def test_candidate_limit_applies_to_the_library_not_the_full_set():
+    # The full set has 435 897 monomials of degree 5 in 16 + 16 lags; phi-polynomial has a hundredth of them.
     assert full_set(5, 16, 16) == 435_897
     assert len(candidates("phi-polynomial", 5, 16, 1)) == 1 + 15 * 16 * 15 == 3601 <= MAX_CANDIDATES
 
 
-@pytest.mark.parametrize("ask", [library_named, lambda name: candidates(name, 2, 2, 1)])
-def test_an_unknown_library_is_refused_with_what_there_is(ask):
+@pytest.mark.parametrize("look_up", [library_named, lambda name: candidates(name, 2, 2, 1)])
+def test_unknown_library_error_lists_the_known_libraries(look_up):
     with pytest.raises(SettingsError) as caught:
-        ask("wavelets")
+        look_up("wavelets")
     assert str(caught.value) == "unknown library 'wavelets': take one of phi-polynomial, polynomial"

@@ -1,4 +1,4 @@
-"""Equations of models, in plain text, in LaTeX and in MathML."""
+"""Equations of models in plain text, LaTeX and MathML."""
 
 from itertools import pairwise
 from xml.etree import ElementTree
@@ -27,7 +27,7 @@ MODEL_12 = make_model(
 )
 
 
-def test_the_equation_of_the_papers_model_12():
+def test_equation_of_the_papers_model_12():
     assert equation(MODEL_12) == (
         "y(k) = 1*y(k-1) - 0.000246*y(k-1)*u(k-2)*(u(k-2) - u(k-3))"
         " - 0.0096*y(k-1)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3))"
@@ -36,14 +36,14 @@ def test_the_equation_of_the_papers_model_12():
     )
 
 
-def test_the_latex_of_the_papers_model_12_rounds_to_the_digits_asked_for():
+def test_latex_of_the_papers_model_12_has_the_requested_digits():
     assert latex_equation(MODEL_12, digits=1).startswith(
         r"y_{k} = 1 \, y_{k-1} - 0.0002 \, y_{k-1} u_{k-2} \left(u_{k-2} - u_{k-3}\right)"
         r" - 0.01 \, y_{k-1} \operatorname{sign}(u_{k-2} - u_{k-3}) \left(u_{k-2} - u_{k-3}\right)"
     )
 
 
-def test_an_equation_without_parameters_numbers_them():
+def test_equation_without_parameters_numbers_them():
     bare = make_model(
         [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("u1", "u2")
     )
@@ -54,28 +54,28 @@ def test_an_equation_without_parameters_numbers_them():
     )
 
 
-def test_an_equation_shows_very_small_and_negative_parameters():
+def test_equation_shows_very_small_and_negative_parameters():
     model = make_model([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
     assert equation(model) == "y(k) = -1.5e-07*y(k-1) - 2*u(k-1) - 0.25"
     assert latex_equation(model) == r"y_{k} = -1.5 \times 10^{-7} \, y_{k-1} - 2 \, u_{k-1} - 0.25"
 
 
-def test_a_quotient_keeps_its_brackets_behind_its_parameter():
-    # 0.5*u/y would be read as (0.5*u)/y, another regressor: division is protected.
+def test_quotient_keeps_its_brackets_after_its_parameter():
+    # 0.5*u/y would be parsed as (0.5*u)/y, which is a different regressor because division is protected.
     assert equation(make_model([(parse("u(k-1)/y(k-1)"), 0.5)])) == "y(k) = 0.5*(u(k-1)/y(k-1))"
 
 
 @given(models(inputs=2))
-def test_the_inputs_of_an_equation_are_numbered_where_there_are_several(model):
+def test_equation_numbers_the_inputs_if_there_are_several(model):
     assert "u(" not in equation(model)
-    written = latex_equation(model)
-    assert written.count("{") == written.count("}")
-    assert written.count(r"\left") == written.count(r"\right")
+    text = latex_equation(model)
+    assert text.count("{") == text.count("}")
+    assert text.count(r"\left") == text.count(r"\right")
 
 
-# MathML: a reader of the browser's page sees what stands in plain text.
+# MathML: the visible text equals the plain text.
 
-_SEEN = {
+_PLAIN = {
     "\u2212": " - ",
     "+": " + ",
     "=": " = ",
@@ -86,19 +86,19 @@ _SEEN = {
 }
 
 
-def seen(element):
-    """Plain text of what is visible: an ``mrow`` keeps nothing together, brackets alone do."""
-    parts = [seen(child) for child in element]
+def to_plain(element):
+    """Return the visible content as plain text; only brackets group it, an ``mrow`` does not."""
+    parts = [to_plain(child) for child in element]
     match element.tag, parts:
         case (("mi" | "mn" | "mo"), []):
-            return _SEEN.get(element.text, element.text)
+            return _PLAIN.get(element.text, element.text)
         case "msub", ["theta", index]:
             return f"theta{index}"
         case "msub", [name, index]:
             channel, _, time = index.rpartition(",")
             return f"{name}{channel}({time.replace(' ', '')})"
         case "msup", ["10", exponent]:
-            # Of a number: a power of the constant 10 has brackets.
+            # Exponent of a number; a power of the constant 10 has brackets.
             return exponent.replace(" ", "")
         case "msup", ["q", exponent]:
             return f"q{exponent.removeprefix(' - ')}"
@@ -117,12 +117,12 @@ def seen(element):
     raise AssertionError(ElementTree.tostring(element))
 
 
-def seen_in(text):
-    return seen(ElementTree.fromstring(text))
+def visible_text(mathml_text):
+    return to_plain(ElementTree.fromstring(mathml_text))
 
 
 @pytest.mark.parametrize(
-    ("text", "what_is_seen"),
+    ("text", "visible"),
     [
         ("y(k-12)", "y(k-12)"),
         ("u(k)", "u(k)"),
@@ -147,72 +147,72 @@ def seen_in(text):
         ("u(k-1)*q1(y(k-1))", "u(k-1)*(q1*y(k-1))"),
     ],
 )
-def test_what_is_seen_of_an_expression_in_mathml(text, what_is_seen):
-    assert seen_in(mathml(parse(text))) == what_is_seen
+def test_mathml_of_an_expression_shows_its_plain_text(text, visible):
+    assert visible_text(mathml(parse(text))) == visible
 
 
-def test_a_leaf_in_mathml():
+def test_mathml_of_a_leaf():
     assert mathml(Lagged(2, 3), 2) == (
         "<msub><mi>u</mi><mrow><mn>2</mn><mo>,</mo><mi>k</mi><mo>&#x2212;</mo><mn>3</mn></mrow></msub>"
     )
 
 
-def test_a_fraction_and_a_root_in_mathml():
+def test_mathml_of_a_fraction_and_of_a_root():
     past = "<mrow><mi>k</mi><mo>&#x2212;</mo><mn>1</mn></mrow>"
     u, y = (f"<msub><mi>{name}</mi>{past}</msub>" for name in "uy")
     assert mathml(parse("u(k-1)/y(k-1)")) == f"<mfrac>{u}{y}</mfrac>"
     assert mathml(parse("sqrt(u(k-1))")) == f"<msqrt><mrow><mo>|</mo>{u}<mo>|</mo></mrow></msqrt>"
 
 
-def test_the_name_of_a_function_cannot_break_mathml():
+def test_mathml_escapes_function_names():
     for name, written in (("a<b&c>", "a&lt;b&amp;c&gt;"), ("\u03c3", "&#963;"), ("{0}", "{0}")):
         text = mathml(Apply(Primitive(name, 1, abs, "{0}"), (U,)))
         assert f"<mi>{written}</mi>" in text
-        assert seen_in(text) == f"{name}(u(k-1))"
+        assert visible_text(text) == f"{name}(u(k-1))"
 
 
 @given(models(inputs=2))
 def test_mathml_of_every_model_shows_its_plain_equation(model):
     written = mathml_equation(model)
-    left, _, shown = seen_in(written).partition(" = ")
+    left, _, shown = visible_text(written).partition(" = ")
     assert left == "y(k)"
-    # Text is parsed, because a number and a product are written in more than one way.
+    # Compare parsed expressions, because numbers and products have several notations.
     assert parse(shown) == parse(equation(model).removeprefix("y(k) = "))
 
 
 @given(models(inputs=1, most=12))
-def test_mathml_of_every_model_is_a_block_of_ascii_with_a_sign_between_two_terms(model):
+def test_mathml_of_every_model_is_ascii_with_signs_between_terms(model):
     written = mathml_equation(model)
     assert written.isascii()
     assert written.startswith('<math display="block">')
     assert written.count('form="infix"') == model.size - 1
-    assert "u1" not in seen_in(written)
+    assert "u1" not in visible_text(written)
 
 
 @given(models(inputs=2, most=12))
-def test_a_row_of_mathml_is_short_or_a_single_term(model):
+def test_mathml_row_is_short_or_a_single_term(model):
     rows = ElementTree.fromstring(mathml_equation(model)).findall(".//mtr")
     for row in rows:
         text = "".join(row[1].itertext())
         signs = [mark for mark in row[1].iter("mo") if mark.get("form") == "infix"]
         assert len(text) <= 80 or len(signs) <= 1
-    # Another row begins only where the term did not fit.
+    # A new row only starts if the next term did not fit.
     for row, following in pairwise(rows):
         assert "form" in following[1][0].attrib
         assert len("".join((*row[1].itertext(), *following[1].itertext()))) > 80
 
 
-def test_a_short_equation_is_no_table():
+def test_mathml_of_a_short_equation_is_not_a_table():
     written = mathml_equation(
         make_model([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
     )
     assert "mtable" not in written
-    assert seen_in(written) == "y(k) =  - 1.5e-7*y(k-1) - 2*u(k-1) - 0.25"
+    assert visible_text(written) == "y(k) =  - 1.5e-7*y(k-1) - 2*u(k-1) - 0.25"
 
 
-def test_the_mathml_of_the_papers_model_12_has_two_rows_and_the_digits_asked_for():
+def test_mathml_of_the_papers_model_12_has_two_rows():
     root = ElementTree.fromstring(mathml_equation(MODEL_12, digits=1))
-    first, second = (seen(row) for row in root.findall(".//mtr"))
+    first, second = (to_plain(row) for row in root.findall(".//mtr"))
     assert first == (
         "y(k) = 1*y(k-1) - 0.0002*y(k-1)*u(k-2)*(u(k-2) - u(k-3))"
         " - 0.01*y(k-1)*sign(u(k-2) - u(k-3))*(u(k-2) - u(k-3))"
@@ -228,7 +228,7 @@ def test_mathml_without_parameters_numbers_them():
         [(parse("y(k-1)"), 1.0), (parse("u1(k-1) + u2(k-1)"), 1.0), (parse("1"), 1.0)], ("a", "b")
     )
     bare = type(named)(named.regressors, input_names=named.input_names)
-    assert seen_in(mathml_equation(bare)) == "y(k) = theta1*y(k-1) + theta2*(u1(k-1) + u2(k-1)) + theta3"
+    assert visible_text(mathml_equation(bare)) == "y(k) = theta1*y(k-1) + theta2*(u1(k-1) + u2(k-1)) + theta3"
 
 
 @given(regressors(inputs=2))

@@ -1,4 +1,4 @@
-"""Expressions: their value, their height, their lags and their order."""
+"""Expressions: value, height, lags and canonical order."""
 
 import pytest
 
@@ -50,7 +50,7 @@ def test_model_13_fits_a_height_of_five_exactly():
     assert heights == [0, 5, 4, 5, 4, 3, 4, 4, 5]
 
 
-def test_phi2_as_a_sign_of_a_difference_would_be_one_higher():
+def test_phi2_has_a_smaller_height_than_the_sign_of_a_difference():
     assert height(parse("phi2(q5(u(k-1)), u(k-1))")) == 2
     assert height(parse("sign(q5(u(k-1)) - u(k-1))")) == 3
 
@@ -63,13 +63,13 @@ def test_height_counts_edges_from_the_root_to_the_deepest_leaf(text, edges):
     assert height(parse(text)) == edges
 
 
-def test_back_shifts_add_to_the_lags_of_everything_under_them():
+def test_back_shifts_add_to_the_lags_of_all_leaves_below():
     expression = Shift(2, Apply(MUL, (Lagged(0, 1), Shift(3, Lagged(2, 4)), Constant(7.0))))
     assert unshifted(expression) == Apply(MUL, (Lagged(0, 3), Lagged(2, 9), Constant(7.0)))
     assert lags(expression) == {(0, 3), (2, 9)}
 
 
-def test_a_walk_goes_from_the_root_to_the_leaves_from_left_to_right():
+def test_walk_yields_nodes_in_pre_order():
     left, right = Apply(SUB, (Lagged(1), Lagged(2))), Shift(1, Constant(3.0))
     expression = Apply(ADD, (left, right))
     assert children(expression) == (left, right)
@@ -83,7 +83,7 @@ def test_a_walk_goes_from_the_root_to_the_leaves_from_left_to_right():
     ]
 
 
-def test_the_value_of_an_expression_worked_by_hand():
+def test_value_of_an_expression_matches_a_hand_calculation():
     def signal(channel, lag):
         return 10.0 * channel + lag
 
@@ -92,12 +92,12 @@ def test_the_value_of_an_expression_worked_by_hand():
     assert value(Apply(MUL, (Constant(2.0),) * 10), signal) == 1024.0
 
 
-def test_what_is_no_expression_has_no_value():
-    with pytest.raises(ModelError, match="'u' is no expression: use Lagged, Constant, Shift or Apply"):
+def test_value_of_an_unknown_node_is_refused():
+    with pytest.raises(ModelError, match="'u' is not an expression: use Lagged, Constant, Shift or Apply"):
         value("u", lambda *_: 0.0)
 
 
-def test_content_puts_signals_before_functions_before_back_shifts_before_numbers():
+def test_content_orders_signals_functions_back_shifts_numbers():
     rising = [
         Lagged(0, 1),
         Lagged(0, 10),

@@ -1,4 +1,4 @@
-"""A model is canonical regressors in order, with one parameter each."""
+"""Models: validation, properties and construction from terms."""
 
 import pytest
 from hypothesis import given
@@ -20,14 +20,14 @@ def terms(**parameters):
     return [(parse(text), parameter) for text, parameter in parameters.items()]
 
 
-def test_a_model_has_a_regressor():
+def test_model_without_regressor_is_refused():
     with pytest.raises(ModelError, match="a model has at least one regressor"):
         Model(())
 
 
 @pytest.mark.parametrize("texts", [("u(k-1)", "y(k-1)"), ("y(k-1)", "y(k-1)"), ("1", "y(k-1)")])
 def test_regressors_out_of_order_or_repeated_are_refused(texts):
-    with pytest.raises(ModelError, match="stand in the order of their content, each once"):
+    with pytest.raises(ModelError, match="must be in canonical order without repetition"):
         Model(items(*texts))
 
 
@@ -38,32 +38,32 @@ def test_canonical_order_sorts_and_drops_repetitions():
 
 
 @pytest.mark.parametrize("name", ["theta", "standard_errors"])
-def test_another_number_of_parameters_than_regressors_is_refused(name):
+def test_wrong_number_of_parameters_is_refused(name):
     with pytest.raises(ModelError, match=f"3 {name} for 2 regressors"):
         Model(items("y(k-1)", "u(k-1)"), **{name: (1.0, 2.0, 3.0)})
 
 
-def test_an_input_that_the_model_does_not_have_is_refused():
+def test_regressor_of_an_undeclared_input_is_refused():
     with pytest.raises(ModelError, match=r"reads input 3 and has 2: \('volts', 'load'\)"):
         Model(items("y(k-1)", "u3(k-1)"), input_names=("volts", "load"))
     assert Model(items("y(k-1)", "u2(k-1)"), input_names=("volts", "load")).inputs == 2
 
 
-def test_a_model_of_a_constant_alone_needs_no_history():
+def test_constant_model_has_maximum_lag_zero():
     model = Model(items("1"), (2.5,))
     assert (model.size, model.maximum_lag, model.parameters) == (1, 0, (2.5,))
 
 
-def test_the_deepest_lag_of_all_regressors_is_the_models():
+def test_maximum_lag_of_a_model_is_the_largest_of_its_regressors():
     assert Model(items("y(k-2)", "u(k-11)", "y(k-3)*u(k-4)")).maximum_lag == 11
 
 
-def test_a_model_without_parameters_says_so():
+def test_parameters_of_an_unestimated_model_raise_an_error():
     with pytest.raises(ModelError, match="the model has no parameters yet: estimate them first"):
         _ = Model(items("y(k-1)")).parameters
 
 
-def test_with_parameters_gives_a_model_of_its_own():
+def test_with_parameters_returns_a_new_model():
     bare = Model(items("y(k-1)", "u(k-1)"), dt=0.5, output_name="x")
     made = bare.with_parameters([1, 2], [0.1, 0.2])
     assert (made.theta, made.standard_errors) == ((1.0, 2.0), (0.1, 0.2))
@@ -74,7 +74,7 @@ def test_with_parameters_gives_a_model_of_its_own():
         bare.with_parameters([1.0])
 
 
-def test_model_of_moves_factors_into_the_parameters_and_merges_equal_terms():
+def test_make_model_moves_factors_into_parameters_and_merges_terms():
     made = make_model(
         [
             (parse("2*u(k-1)*y(k-1)"), 0.5),
@@ -90,23 +90,23 @@ def test_model_of_moves_factors_into_the_parameters_and_merges_equal_terms():
     assert (made.dt, made.input_names, made.output_name) == (0.01, ("u",), "y")
 
 
-def test_model_of_terms_that_cancel_keeps_a_parameter_of_zero():
+def test_make_model_keeps_a_zero_parameter_for_cancelling_terms():
     made = make_model([(parse("u(k-1) - u(k-2)"), 1.0), (parse("u(k-2) - u(k-1)"), 1.0)])
     assert made.theta == (0.0,)
 
 
-def test_model_of_nothing_but_zero_terms_is_refused():
+def test_make_model_of_zero_terms_is_refused():
     with pytest.raises(ModelError, match="a model has at least one regressor"):
         make_model([(parse("phi2(u(k-1), u(k-1))"), 1.0), (Constant(0.0), 2.0)])
 
 
-def test_model_of_a_term_that_looks_ahead_is_refused():
-    with pytest.raises(ModelError, match="reads the past alone: channel 1 has lag 0"):
+def test_make_model_of_a_non_causal_term_is_refused():
+    with pytest.raises(ModelError, match="reads only past samples: channel 1 has lag 0"):
         make_model([(parse("y(k-1)"), 1.0), (parse("u(k)"), 1.0)])
 
 
 @given(models(inputs=2))
-def test_a_model_made_of_its_own_terms_is_the_same_model(model):
+def test_make_model_of_the_terms_of_a_model_returns_an_equal_model(model):
     again = make_model(
         [(item.expression, theta) for item, theta in zip(model.regressors, model.parameters, strict=True)][
             ::-1

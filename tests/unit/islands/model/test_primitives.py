@@ -1,4 +1,4 @@
-"""The table of primitives keeps what it declares, and a user's own joins only if it does."""
+"""Primitives: values and declared properties of the table, and checks of user-defined primitives."""
 
 import math
 import pickle
@@ -15,13 +15,13 @@ from islands.model.rendering import latex, plain
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
-def test_every_entry_of_the_table_is_finite_and_as_it_declares(entry):
+def test_built_in_primitive_is_finite_and_has_its_declared_properties(entry):
     check(entry)
     assert PRIMITIVES[entry.name] is entry
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
-def test_every_entry_survives_a_journey_to_another_process(entry):
+def test_built_in_primitive_can_be_pickled(entry):
     assert pickle.loads(pickle.dumps(entry)).scalar is entry.scalar
 
 
@@ -54,16 +54,16 @@ def test_every_entry_survives_a_journey_to_another_process(entry):
         ("min", (2.0, -7.0), -7.0),
     ],
 )
-def test_what_a_primitive_computes(name, arguments, result):
+def test_built_in_primitive_returns_the_expected_value(name, arguments, result):
     assert PRIMITIVES[name].scalar(*arguments) == pytest.approx(result, rel=1e-15)
 
 
-def test_the_table_cannot_be_changed():
+def test_primitive_table_is_read_only():
     with pytest.raises(TypeError):
         PRIMITIVES["mine"] = PRIMITIVES["mul"]
 
 
-def test_two_primitives_of_one_name_are_equal():
+def test_primitives_of_the_same_name_are_equal():
     assert PRIMITIVES["tanh"] == replace(PRIMITIVES["tanh"], parity=0, scalar=math.sinh)
     assert PRIMITIVES["tanh"] != replace(PRIMITIVES["tanh"], name="sinh")
 
@@ -76,7 +76,7 @@ def hypotenuse(a, b):
     return (a * a + b * b) ** 0.5
 
 
-def test_a_users_primitive_is_written_read_and_brought_into_canonical_form():
+def test_user_primitive_is_rendered_parsed_and_canonicalised():
     table = {**PRIMITIVES, "soft_clip": primitive("soft_clip", saturation, parity=-1)}
     expression = parse("soft_clip(-2*u(k-1))*y(k-1)", table)
     assert plain(expression) == "soft_clip((-2)*u(k-1))*y(k-1)"
@@ -86,7 +86,7 @@ def test_a_users_primitive_is_written_read_and_brought_into_canonical_form():
     assert (factor, plain(core)) == (-1.0, "y(k-1)*soft_clip(2*u(k-1))")
 
 
-def test_a_users_commutative_primitive_forgets_the_order_of_its_arguments():
+def test_commutative_user_primitive_sorts_its_arguments():
     entry = primitive("hyp", hypotenuse, commutative=True)
     assert (entry.arity, entry.latex.format("a", "b")) == (2, r"\operatorname{hyp}(a, b)")
     table = {**PRIMITIVES, "hyp": entry}
@@ -113,13 +113,13 @@ def test_a_users_commutative_primitive_forgets_the_order_of_its_arguments():
         "None",
     ],
 )
-def test_a_name_that_is_taken_or_cannot_be_read_is_refused(name):
-    with pytest.raises(ModelError, match="can't name a primitive: take an identifier that is not in use"):
+def test_primitive_name_that_is_taken_or_invalid_is_refused(name):
+    with pytest.raises(ModelError, match="cannot name a primitive: use an identifier that is not in use"):
         primitive(name, saturation)
 
 
 @pytest.mark.parametrize("name", ["quad", "ramp", "unit_step", "yield_point", "y1"])
-def test_a_name_may_begin_like_a_signal(name):
+def test_primitive_name_may_begin_like_a_signal(name):
     made = primitive(name, saturation)
     assert plain(parse(f"{name}(y(k-1))", {name: made})) == f"{name}(y(k-1))"
 
@@ -127,12 +127,12 @@ def test_a_name_may_begin_like_a_signal(name):
 @pytest.mark.parametrize(
     ("scalar", "message"),
     [
-        (lambda: 1.0, "takes 0 arguments: a primitive takes one or two"),
-        (lambda a, b, c: a + b + c, "takes 3 arguments: a primitive takes one or two"),
-        (max, "does not tell its arguments: wrap it in a function of one or two"),
+        (lambda: 1.0, "takes 0 arguments: a primitive must take one or two"),
+        (lambda a, b, c: a + b + c, "takes 3 arguments: a primitive must take one or two"),
+        (max, "has no signature: wrap it in a function of one or two arguments"),
     ],
 )
-def test_a_function_of_other_than_one_or_two_arguments_is_refused(scalar, message):
+def test_primitive_with_wrong_number_of_arguments_is_refused(scalar, message):
     with pytest.raises(ModelError, match=message):
         primitive("mine", scalar)
 
@@ -150,7 +150,7 @@ def test_a_function_of_other_than_one_or_two_arguments_is_refused(scalar, messag
         (lambda a, b: a / b, r"'mine' fails at \(0\.0, 0\.0\) \(float division by zero\): protect it there"),
     ],
 )
-def test_a_function_that_is_not_finite_everywhere_is_refused_and_the_argument_named(scalar, message):
+def test_primitive_error_names_the_argument_with_a_non_finite_value(scalar, message):
     with pytest.raises(ModelError, match=message):
         primitive("mine", scalar)
 
@@ -158,35 +158,35 @@ def test_a_function_that_is_not_finite_everywhere_is_refused_and_the_argument_na
 @pytest.mark.parametrize(
     ("scalar", "parity"), [(math.cos, -1), (math.tanh, 1), (lambda a: a + 1.0, -1), (lambda a: a * a + a, 1)]
 )
-def test_a_false_parity_is_refused(scalar, parity):
-    with pytest.raises(ModelError, match=rf"declares parity {parity}, not so at"):
+def test_false_parity_is_refused(scalar, parity):
+    with pytest.raises(ModelError, match=rf"declares parity {parity}, which is false at"):
         primitive("mine", scalar, parity=parity)
 
 
 @pytest.mark.parametrize("scalar", [lambda a, b: a - b, lambda a, b: a + 2.0 * b])
-def test_a_false_commutativity_is_refused(scalar):
-    with pytest.raises(ModelError, match="declares that it commutes, not so at"):
+def test_false_commutativity_is_refused(scalar):
+    with pytest.raises(ModelError, match="declares that it commutes, which is false at"):
         primitive("mine", scalar, commutative=True)
 
 
-def test_a_false_degree_is_refused():
-    with pytest.raises(ModelError, match=r"declares degree 2\.0, not so at"):
+def test_false_degree_is_refused():
+    with pytest.raises(ModelError, match=r"declares degree 2\.0, which is false at"):
         check(Primitive("mine", 1, abs, "{0}", degree=2.0))
 
 
-def test_parity_and_degree_are_for_one_argument():
-    # Canonical form takes the sign of the first argument out and would forget the second.
+def test_parity_and_degree_of_a_binary_primitive_are_refused():
+    # Canonicalisation extracts the sign of the first argument and would ignore the second.
     for wrong in ({"parity": -1}, {"degree": 1.0}):
-        with pytest.raises(ModelError, match="has two arguments: parity and degree are for one"):
+        with pytest.raises(ModelError, match="has two arguments: parity and degree require one argument"):
             check(Primitive("mine", 2, lambda a, b: a + b, "{0} + {1}", **wrong))
 
 
 @pytest.mark.parametrize("wrong", [r"\frac{1}{2}{0}", r"\foo{x}{0}", "{", r"{0}^{"])
-def test_latex_that_is_no_format_is_refused_when_the_primitive_is_made(wrong):
-    with pytest.raises(ModelError, match=r"the LaTeX of primitive 'mine' is no format of \{0\}"):
+def test_primitive_with_invalid_latex_format_is_refused(wrong):
+    with pytest.raises(ModelError, match=r"the LaTeX of primitive 'mine' is not a format string of \{0\}"):
         primitive("mine", saturation, latex=wrong)
 
 
-def test_latex_of_the_users_own_is_kept():
+def test_latex_of_a_user_primitive_is_kept():
     made = primitive("mine", saturation, latex=r"\sigma({0})")
     assert made.latex.format(latex(Lagged(1))) == r"\sigma(u_{k-1})"

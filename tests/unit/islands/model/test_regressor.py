@@ -1,4 +1,4 @@
-"""Canonical form, case by case."""
+"""Regressors and their canonical form."""
 
 import pytest
 
@@ -11,7 +11,7 @@ from islands.model.regressor import canonical, regressor
 from islands.model.rendering import plain
 
 
-def written(text):
+def canonical_text(text):
     factor, item = regressor(parse(text))
     return factor, item and plain(item.expression)
 
@@ -48,8 +48,8 @@ def written(text):
         ("log(-u(k-1))", 1.0, "log(u(k-1))"),
     ],
 )
-def test_the_canonical_form_of(text, factor, core):
-    assert written(text) == (pytest.approx(factor, rel=1e-15), core)
+def test_canonical_form_of_an_expression(text, factor, core):
+    assert canonical_text(text) == (pytest.approx(factor, rel=1e-15), core)
 
 
 @pytest.mark.parametrize(
@@ -67,31 +67,31 @@ def test_the_canonical_form_of(text, factor, core):
         "2*u(k-1)*y(k-1) - y(k-1)*u(k-1)*2",
     ],
 )
-def test_what_is_identically_zero_is_no_regressor(text):
+def test_expression_that_is_identically_zero_has_no_regressor(text):
     assert regressor(parse(text)) == (0.0, None)
 
 
-def test_the_square_of_a_sign_is_not_one_because_it_rests_at_zero():
+def test_square_of_a_sign_is_not_simplified_to_one():
     _, square = regressor(parse("sign(u(k-1) - u(k-2))^2"))
     assert square.expression != Constant(1.0)
     assert square.lags == {(1, 1), (1, 2)}
 
 
-def test_a_quotient_keeps_a_factor_of_its_numerator_because_it_is_protected():
-    # 2*u/y is 1, not 2, where y is zero.
-    assert written("(2*u(k-1))/y(k-1)") == (1.0, "(2*u(k-1))/y(k-1)")
+def test_protected_quotient_keeps_the_factor_of_its_numerator():
+    # If y is zero, 2*u/y is 1, not 2.
+    assert canonical_text("(2*u(k-1))/y(k-1)") == (1.0, "(2*u(k-1))/y(k-1)")
 
 
 @pytest.mark.parametrize(
     ("text", "channel", "lag"), [("u(k)", 1, 0), ("y(k-1)*u2(k)", 2, 0), ("exp(y(k))", 0, 0)]
 )
-def test_a_regressor_that_looks_ahead_is_refused(text, channel, lag):
-    message = f"reads the past alone: channel {channel} has lag {lag}, take 1 or more"
+def test_non_causal_regressor_is_refused(text, channel, lag):
+    message = f"reads only past samples: channel {channel} has lag {lag}, take 1 or more"
     with pytest.raises(ModelError, match=message):
         regressor(parse(text))
 
 
-def test_a_look_ahead_is_refused_by_its_lag_after_all_back_shifts():
+def test_causality_is_checked_after_back_shifts():
     with pytest.raises(ModelError, match="channel 1 has lag -1"):
         regressor(Lagged(1, -1))
     assert regressor(parse("q2(u(k))"))[1].expression == Lagged(1, 2)
@@ -104,7 +104,7 @@ def test_lags_of_a_regressor():
     assert regressor(parse("3"))[1].maximum_lag == 0
 
 
-def test_the_regressors_content_is_its_expressions():
+def test_content_of_a_regressor_is_that_of_its_expression():
     _, item = regressor(parse("y(k-2)*u(k-1)"))
     assert item.content == (1, "mul", 2, (0, 0, 2), (0, 1, 1))
 
@@ -113,27 +113,27 @@ def test_the_regressors_content_is_its_expressions():
     "text",
     ["1e200*1e200", "exp(1e200*1e200*u(k-1))", "1e-310*y(k-1) + u(k-1)", "1e308*u(k-1) + 1e308*u(k-1)"],
 )
-def test_numbers_that_overflow_are_refused(text):
-    with pytest.raises(ModelError, match="the numbers in an expression overflow: write smaller ones"):
+def test_overflowing_numbers_are_refused(text):
+    with pytest.raises(ModelError, match="the numbers in an expression overflow: take smaller ones"):
         regressor(parse(text))
 
 
-def test_a_users_function_that_fails_on_a_number_in_the_expression_is_named():
+def test_error_in_constant_folding_names_the_user_primitive():
     pole = primitive("pole", lambda a: 1.0 / (a - 0.125))
     with pytest.raises(ModelError, match=r"'pole' fails at \[0\.125\] \(float division by zero\)"):
         regressor(parse("u(k-1) + pole(0.125)", {**PRIMITIVES, "pole": pole}))
 
 
-def test_a_weight_that_vanishes_against_the_leading_one_leaves_the_sum():
+def test_term_with_a_vanishing_relative_weight_is_dropped():
     assert canonical(parse("1e300*y(k-1) + 1e-300*u(k-1)")) == (1e300, Lagged(0, 1))
 
 
-def test_a_product_of_one_factor_is_the_factor():
+def test_product_of_one_factor_is_the_factor():
     assert canonical(Apply(MUL, (Lagged(1, 1),))) == (1.0, Lagged(1, 1))
 
 
-def test_weights_that_cancel_but_for_rounding_are_zero():
-    """0.1 + 0.2 - 0.3 is 5.6e-17 in floats; at rest this regressor is zero."""
+def test_weights_that_cancel_up_to_rounding_are_zero():
+    """In floating point 0.1 + 0.2 - 0.3 is 5.6e-17; the steady state of this regressor is zero."""
     made = regressor(parse("0.1*y(k-1) + 0.2*y(k-2) + (-0.3)*y(k-3)"))[1]
     assert made is not None
     assert steady_state(made)[0] == 0.0

@@ -1,4 +1,4 @@
-"""A layout holds every sample after a warm-up in one lane, and its past where the kernel looks for it."""
+"""Layout of shooting intervals: every predicted sample is in one lane, after its warm-up."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ WARM_UP = 5
 
 @pytest.fixture
 def record():
-    # Every sample tells where it stands: y is its number, the inputs are that plus a thousand and two.
+    # Every value identifies its sample: y is the index, the inputs are the index plus 1000 and plus 2000.
     y = np.arange(float(sum(SEGMENTS)))
     return Dataset(np.column_stack([y + 1000, y + 2000]), y, 0.1, segments=SEGMENTS)
 
 
 def blocks(cut):
-    """Yield offset of the block, its lanes, and the starts and lengths of its intervals."""
+    """Yield the offset, the number of lanes, the starts and the lengths of the intervals of each block."""
     base = 0
     for offset, lanes in zip(cut.block_offset, cut.block_lanes, strict=True):
         yield offset, lanes, cut.start[base : base + lanes], cut.length[base : base + lanes]
@@ -40,7 +40,7 @@ def test_every_sample_after_a_warm_up_belongs_to_one_interval(record, interval):
 
 
 @pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
-def test_the_kernel_finds_every_sample_of_a_lane_with_its_warm_up(record, interval):
+def test_lane_contains_its_samples_and_their_warm_up(record, interval):
     cut = layout(record, WARM_UP, interval)
     for offset, lanes, starts, lengths in blocks(cut):
         for lane in range(lanes):
@@ -51,7 +51,7 @@ def test_the_kernel_finds_every_sample_of_a_lane_with_its_warm_up(record, interv
 
 
 @pytest.mark.parametrize("interval", [1, 2, 7, 100, None])
-def test_blocks_are_no_wider_than_the_width_and_their_intervals_do_not_lengthen(record, interval):
+def test_blocks_fit_the_width_and_intervals_are_sorted_by_length(record, interval):
     cut = layout(record, WARM_UP, interval)
     assert cut.width in WIDTHS
     assert 1 <= cut.block_lanes.min() <= cut.block_lanes.max() <= cut.width
@@ -59,7 +59,7 @@ def test_blocks_are_no_wider_than_the_width_and_their_intervals_do_not_lengthen(
         assert (np.diff(lengths) <= 0).all()
 
 
-def test_the_last_shorter_interval_of_a_segment_counts(record):
+def test_last_interval_of_a_segment_may_be_shorter(record):
     cut = layout(record, WARM_UP, 100)
     assert sorted(zip(cut.start.tolist(), cut.length.tolist(), strict=True)) == [
         (5, 100),
@@ -71,19 +71,19 @@ def test_the_last_shorter_interval_of_a_segment_counts(record):
     ]
 
 
-def test_one_step_ahead_gathers_nothing(record):
+def test_one_step_ahead_layout_does_not_gather_samples(record):
     cut = layout(record, WARM_UP, 1)
     assert cut.row_stride == 1
     assert np.array_equal(cut.signals[:, : record.samples], np.vstack([record.y, record.u.T]))
-    # The row of the last sample may be read whole.
+    # The kernel may read the complete row of the last sample.
     assert cut.signals.shape[1] == record.samples + cut.width
-    # A block never reaches across a boundary: its lanes are neighbouring samples.
+    # A block does not cross a segment boundary: its lanes are adjacent samples.
     for _, _, starts, _ in blocks(cut):
         assert (np.diff(starts) == 1).all()
 
 
 @pytest.mark.parametrize(("intervals", "width"), [(1, 8), (8, 8), (20, 24), (24, 24), (60, 104), (1000, 104)])
-def test_a_row_is_as_wide_as_pays(intervals, width):
+def test_width_of_a_row_depends_on_the_number_of_intervals(intervals, width):
     record = Dataset(np.zeros(3 * intervals + 1), np.zeros(3 * intervals + 1), 1.0)
     cut = layout(record, 1, 3)
     assert (len(cut.start), cut.width) == (intervals, width)
@@ -91,20 +91,20 @@ def test_a_row_is_as_wide_as_pays(intervals, width):
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("interval", [2, 7, 100, None])
-def test_a_gathered_row_is_full_of_numbers_of_the_record(monkeypatch, record, interval, width):
+def test_gathered_row_only_contains_samples_of_the_record(monkeypatch, record, interval, width):
     monkeypatch.setattr("islands.simulation.layout.WIDTHS", (width,))
     cut = layout(record, WARM_UP, interval)
     assert cut.row_stride == cut.width == width
     assert np.isin(cut.signals[0], record.y).all()
     for channel, base in enumerate((0, 1000, 2000)):
         assert np.array_equal(cut.signals[channel], cut.signals[0] + base)
-    # Lanes that nobody has asked for repeat the first: they do not run away where it does not.
+    # Unused lanes repeat the first, so they only diverge if it does.
     for offset, lanes, _, lengths in blocks(cut):
         block = cut.signals[0, offset : offset + (WARM_UP + lengths[0]) * width].reshape(-1, width)
         assert np.array_equal(block[:, lanes:], np.repeat(block[:, :1], width - lanes, axis=1))
 
 
-def test_the_largest_measured_output_is_known(record):
+def test_layout_stores_the_largest_measured_output(record):
     assert layout(record, WARM_UP, None).largest == sum(SEGMENTS) - 1
     y = np.full(9, np.nan)
     assert layout(Dataset(np.zeros(9), y, 1.0), 0, None).largest == 0.0
@@ -112,12 +112,12 @@ def test_the_largest_measured_output_is_known(record):
     assert layout(Dataset(np.zeros(9), y, 1.0), 0, None).largest == 7.0
 
 
-def test_no_warm_up_is_needed_where_nothing_is_read_back(record):
+def test_layout_without_warm_up_covers_the_whole_record(record):
     assert layout(record, 0, None).length.sum() == record.samples
 
 
 @pytest.mark.parametrize("interval", [0, -3])
-def test_an_interval_without_a_sample_is_refused(record, interval):
+def test_interval_without_a_sample_is_refused(record, interval):
     with pytest.raises(SettingsError, match=f"^a shooting interval has at least 1 sample, got {interval}$"):
         layout(record, WARM_UP, interval)
 
@@ -133,7 +133,7 @@ def test_recordings_that_are_all_too_short_are_refused(record):
 @pytest.mark.parametrize(
     ("sample", "interval"), [(239, None), (241, None), (243, None), (239, 1), (300, 1), (357, 1), (343, 100)]
 )
-def test_a_missing_output_is_refused_where_an_interval_starts_from_it(record, sample, interval):
+def test_missing_output_in_the_warm_up_of_an_interval_is_refused(record, sample, interval):
     y = record.y.copy()
     y[sample] = np.nan
     gap = Dataset(record.u, y, 0.1, segments=SEGMENTS)
@@ -141,7 +141,7 @@ def test_a_missing_output_is_refused_where_an_interval_starts_from_it(record, sa
         layout(gap, WARM_UP, interval)
 
 
-def test_a_missing_output_outside_the_warm_ups_is_none_of_the_layouts_business(record):
+def test_missing_output_outside_the_warm_ups_is_accepted(record):
     y = record.y.copy()
     y[WARM_UP:230] = np.nan
     gap = Dataset(record.u, y, 0.1, segments=SEGMENTS)

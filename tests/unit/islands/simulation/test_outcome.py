@@ -1,4 +1,4 @@
-"""An outcome says what happened and what to do."""
+"""Outcomes of evaluations: status, reason and advice."""
 
 import pytest
 
@@ -10,17 +10,17 @@ def test_only_ok_is_true():
     assert [verdict for verdict in Status if EvaluationOutcome(verdict)] == [Status.OK]
 
 
-def test_ok_reads_ok():
+def test_text_of_ok_is_ok():
     assert str(OK) == "ok"
 
 
 @pytest.mark.parametrize("verdict", [verdict for verdict in Status if verdict is not Status.OK])
-def test_a_failure_reads_kind_reason_and_advice(verdict):
+def test_text_of_a_failure_contains_kind_reason_and_advice(verdict):
     text = str(EvaluationOutcome(verdict, "this happened"))
     assert text == f"{verdict.name.lower()}: this happened; {verdict.value}"
 
 
-def test_every_verdict_has_an_advice_of_its_own():
+def test_every_status_has_a_distinct_advice():
     advices = [verdict.value for verdict in Status]
     assert len(set(advices)) == len(Status)
     assert all(len(advice) > 10 for advice in advices)

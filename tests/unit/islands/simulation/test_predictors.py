@@ -1,4 +1,4 @@
-"""A simulation that leaves its bound is an outcome with a place; a caller's mistake is a message."""
+"""Predictors: divergence is an outcome with its sample, invalid arguments raise errors."""
 
 import math
 import re
@@ -30,15 +30,18 @@ def record(u=None, segments=()):
 
 
 def spikes(**at):
-    """Return an input of small numbers with some large ones: ``s100=1e9`` stands at sample 100."""
+    """Return an input of small numbers with spikes; ``s100=1e9`` is a spike at sample 100."""
     u = np.random.default_rng(12).normal(size=SAMPLES)
     for name, size in at.items():
         u[int(name[1:])] = size
     return u
 
 
-def judged(chosen, data, interval=None, bound=None):
-    """Simulate in plain floats; return predictions up to each divergence and the first sample of any."""
+def simulate_scalar(chosen, data, interval=None, bound=None):
+    """Simulate with Python floats.
+
+    Return the predictions up to each divergence, and the first diverged sample.
+    """
     bound = divergence_bound(data) if bound is None else bound
     u, y, found = data.u[:, 0].tolist(), data.y.tolist(), np.full(data.samples, np.nan)
     first = None
@@ -58,8 +61,8 @@ def judged(chosen, data, interval=None, bound=None):
     return found, first
 
 
-#: Models and inputs that leave the bound in every way there is, and the first sample where a free run does
-#: (None: the oracle alone knows).
+#: Models and inputs that leave the bound in different ways, and the first sample at which a free run does
+#: (None if only the scalar simulation gives it).
 DIVERGENCES = {
     "growing slowly": (model((1.2, "y(k-1)"), (1.0, "u(k-1)")), {}, None),
     "growing at once": (model((0.5, "y(k-1)^4*y(k-2)^2"), (9.0, "u(k-1)")), {}, None),
@@ -80,12 +83,12 @@ every_divergence = pytest.mark.parametrize("name", DIVERGENCES)
 
 @every_divergence
 @pytest.mark.parametrize("interval", [1, 10, 70, None])
-def test_divergence_is_an_outcome_with_its_first_sample(name, interval):
+def test_divergence_outcome_names_the_first_sample(name, interval):
     chosen, at, _ = DIVERGENCES[name]
     data = record(spikes(**at))
-    expected, first = judged(chosen, data, interval)
+    expected, first = simulate_scalar(chosen, data, interval)
     found = multiple_shooting(chosen, data, interval)
-    # Predictions are kept up to the sample where they left the bound, NaN to the end of the interval.
+    # Predictions are NaN from the sample at which they leave the bound to the end of the interval.
     assert np.array_equal(found.y, expected, equal_nan=True)
     if first is None:
         assert found.outcome == OK
@@ -97,17 +100,17 @@ def test_divergence_is_an_outcome_with_its_first_sample(name, interval):
 
 
 @every_divergence
-def test_a_diverging_free_run_has_its_place(name):
-    chosen, at, place = DIVERGENCES[name]
+def test_diverging_free_run_is_nan_from_the_diverged_sample(name):
+    chosen, at, known_sample = DIVERGENCES[name]
     data = record(spikes(**at))
     found = free_run(chosen, data)
     sample = int(re.fullmatch(r"\|y\| left \S+ at sample (\d+)", found.outcome.reason)[1])
-    assert place in (None, sample)
+    assert known_sample in (None, sample)
     assert np.isfinite(found.y[chosen.maximum_lag : sample]).all()
     assert np.isnan(found.y[sample:]).all()
 
 
-def test_a_divergence_ends_its_own_interval_alone():
+def test_divergence_only_ends_its_own_interval():
     data = record(spikes(s100=1e9), segments=(90, 60, 150))
     found = multiple_shooting(model((1.0, "u(k-1)")), data, 20).y
     # Intervals of the second segment begin at 91 and 111.
@@ -116,39 +119,39 @@ def test_a_divergence_ends_its_own_interval_alone():
     assert np.array_equal(found[predicted], data.u[predicted - 1, 0])
 
 
-def test_the_earliest_of_several_diverging_intervals_is_named():
-    # Lanes are ordered by length: the short last interval of the first segment stands behind longer ones.
+def test_divergence_outcome_names_the_earliest_interval():
+    # Lanes are sorted by length: the short last interval of the first segment follows longer ones.
     data = record(spikes(s87=1e9, s200=1e9), segments=(90, 210))
     found = multiple_shooting(model((1.0, "u(k-1)")), data, 40)
     assert found.outcome.reason.endswith("at sample 88")
 
 
-def test_what_a_block_left_behind_is_not_read_as_the_next_ones(monkeypatch):
-    # Blocks of eight lanes: the first block leaves the bound at its 41st step, and the arena still holds that
-    # when a lane of the second block ends after 30 while its neighbour leaves the bound.
+def test_divergence_of_a_block_does_not_affect_the_next_block(monkeypatch):
+    # Blocks of eight lanes: the first block leaves the bound at its 41st step. The work memory still contains
+    # that value when a lane of the second block ends after 30 steps while its neighbour leaves the bound.
     monkeypatch.setattr("islands.simulation.layout.WIDTHS", (8,))
     chosen, segments = model((1.0, "u(k-1)")), (31, *(101,) * 8, 61, 6)
     u, y = np.random.default_rng(12).normal(size=(2, sum(segments)))
     u[[31 + 40, sum(segments) - 4]] = 1e9
     data = Dataset(u, y, 0.1, segments=segments)
     assert layout(data, 1).length.tolist() == [100] * 8 + [60, 30, 5]
-    expected, first = judged(chosen, data)
+    expected, first = simulate_scalar(chosen, data)
     found = free_run(chosen, data)
     assert first == 31 + 41
     assert found.outcome.reason.endswith("at sample 72")
     assert np.array_equal(found.y, expected, equal_nan=True)
 
 
-def test_an_unstable_model_that_is_shot_often_enough_does_not_diverge():
+def test_short_intervals_prevent_divergence_of_an_unstable_model():
     chosen = model((1.2, "y(k-1)"), (1.0, "u(k-1)"))
     assert free_run(chosen, record()).outcome.verdict is Status.DIVERGED
     assert multiple_shooting(chosen, record(), 20).outcome
     assert one_step_ahead(chosen, record()).outcome
 
 
-def test_a_bound_of_ones_own_replaces_that_of_the_record():
+def test_given_bound_replaces_that_of_the_record():
     chosen, data = model((1.2, "y(k-1)"), (1.0, "u(k-1)")), record()
-    expected, first = judged(chosen, data, bound=50.0)
+    expected, first = simulate_scalar(chosen, data, bound=50.0)
     found = free_run(chosen, data, bound=50.0)
     assert found.outcome.reason == f"|y| left 50 at sample {first}"
     assert np.array_equal(found.y, expected, equal_nan=True)
@@ -170,13 +173,13 @@ def test_a_bound_of_ones_own_replaces_that_of_the_record():
         ([math.nan, math.nan, math.nan], 1.0),
     ],
 )
-def test_the_bound_is_a_million_times_what_is_known_of_the_outputs_scale(y, scale):
+def test_bound_is_a_million_times_the_known_scale_of_the_output(y, scale):
     assert divergence_bound(Dataset(np.zeros(3), np.array(y), 1.0)) == pytest.approx(BOUND * scale)
     assert BOUND == 1e6
 
 
-def test_a_model_at_rest_may_start_to_move():
-    # Nothing but the initial zero is known of the output: its scale must not be taken for zero.
+def test_output_known_only_as_zero_does_not_give_a_zero_bound():
+    # Only the initial zero of the output is known, which must not give a scale of zero.
     y = np.full(SAMPLES, np.nan)
     y[0] = 0.0
     found = free_run(model((0.5, "y(k-1)"), (1.0, "u(k-1)")), Dataset(np.ones(SAMPLES), y, 0.1))
@@ -184,7 +187,7 @@ def test_a_model_at_rest_may_start_to_move():
     assert found.y[-1] == pytest.approx(2.0)
 
 
-def test_an_error_where_the_output_is_missing_is_nan_and_no_divergence():
+def test_missing_output_makes_the_error_nan_without_divergence():
     data = record()
     y = data.y.copy()
     y[150] = math.nan
@@ -194,17 +197,17 @@ def test_an_error_where_the_output_is_missing_is_nan_and_no_divergence():
     assert np.array_equal(found.y[1:], data.u[:-1, 0])
 
 
-# A caller's mistakes.
+# Invalid arguments.
 
 
-def test_too_short_a_record_is_refused():
+def test_too_short_record_is_refused():
     with pytest.raises(RecordError) as caught:
         free_run(model((1.0, "u(k-300)")), record())
     assert "the longest recording has 300 samples" in str(caught.value)
     assert "the warm-up takes 300: take a longer recording" in str(caught.value)
 
 
-def test_too_long_a_warm_up_is_not_called_a_deep_lag():
+def test_error_for_a_too_long_warm_up_does_not_mention_lags():
     with pytest.raises(RecordError) as caught:
         free_run(model((1.0, "u(k-1)")), record(), warm_up=400)
     assert "the warm-up takes 400" in str(caught.value)
@@ -212,7 +215,7 @@ def test_too_long_a_warm_up_is_not_called_a_deep_lag():
 
 
 @pytest.mark.parametrize("simulate", [one_step_ahead, free_run])
-def test_a_missing_output_in_a_warm_up_is_refused(simulate):
+def test_missing_output_in_a_warm_up_is_refused(simulate):
     data = record()
     y = data.y.copy()
     y[1] = math.nan
@@ -222,26 +225,26 @@ def test_a_missing_output_in_a_warm_up_is_refused(simulate):
     assert "fill the gap" in str(caught.value)
 
 
-def test_another_number_of_inputs_is_refused():
+def test_record_with_a_different_number_of_inputs_is_refused():
     data = Dataset(np.zeros((9, 2)), np.zeros(9), 0.1)
     with pytest.raises(RecordError, match=re.escape("the model has 1 inputs ('u',), the record 2")):
         free_run(model((1.0, "u(k-1)")), data)
 
 
-def test_a_model_without_parameters_is_refused():
+def test_model_without_parameters_is_refused():
     structure = replace(model((1.0, "u(k-1)")), theta=None)
     with pytest.raises(ModelError, match=r"^the model has no parameters yet: estimate them first$"):
         free_run(structure, record())
 
 
 @pytest.mark.parametrize("interval", [0, -1])
-def test_an_empty_interval_is_refused(interval):
+def test_empty_interval_is_refused(interval):
     with pytest.raises(SettingsError, match=f"at least 1 sample, got {interval}$"):
         multiple_shooting(model((1.0, "u(k-1)")), record(), interval)
 
 
 @pytest.mark.parametrize("warm_up", [0, 3, -1])
-def test_a_warm_up_shorter_than_the_deepest_lag_is_refused(warm_up):
+def test_warm_up_shorter_than_the_largest_lag_is_refused(warm_up):
     chosen = model((1.0, "u(k-1)"), (0.1, "y(k-4)"))
     with pytest.raises(SettingsError) as caught:
         one_step_ahead(chosen, record(), warm_up)

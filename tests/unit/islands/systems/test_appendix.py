@@ -1,4 +1,4 @@
-"""The test systems of appendix A: their recursions, their inputs, their noise."""
+"""Test systems of appendix A: recursions, inputs and noise."""
 
 import numpy as np
 import pytest
@@ -10,18 +10,18 @@ from islands.systems.appendix import S1, S2
 BOTH = pytest.mark.parametrize("system", [S1, S2], ids=lambda system: system.name)
 
 
-def ratio(signal, noise):
-    """The paper's signal-to-noise ratio: 20 log10 of a ratio of variances."""
+def snr_of_variances(signal, noise):
+    """Return the paper's signal-to-noise ratio: 20 log10 of a ratio of variances."""
     return 20 * np.log10(signal.var() / noise.var())
 
 
 def test_s1_is_the_recursion_of_the_paper():
     u = np.array([1.0, -2.0, 0.5, 3.0, 0.0, 0.0])
-    second = 0.25 * -2.0  # y[0] = 0, so only the input speaks
+    second = 0.25 * -2.0  # y[0] = 0, so only the input contributes
     third = 0.75 * 0.25 + 0.25 * 0.5 - 0.2 * 0.25 * 0.5
     fourth = 0.75 * second + 0.25 * 3.0 - 0.2 * second * 3.0
     fifth = 0.75 * third
-    np.testing.assert_allclose(appendix.respond_s1(u), [0.0, 0.25, second, third, fourth, fifth], rtol=1e-14)
+    np.testing.assert_allclose(appendix.simulate_s1(u), [0.0, 0.25, second, third, fourth, fifth], rtol=1e-14)
 
 
 def test_s2_is_the_recursion_of_the_paper():
@@ -29,72 +29,72 @@ def test_s2_is_the_recursion_of_the_paper():
     u[0], u[1] = 1.0, 2.0
     third = 1.0 * 2.0 * (2.5 + 2.0) / (1 + 1.0 + 4.0)
     fourth = third * 2.0 * (2.5 + third) / (1 + third**2 + 4.0)
-    np.testing.assert_allclose(appendix.respond_s2(u), [0.0] * 11 + [1.0, 2.0, third, fourth], rtol=1e-14)
+    np.testing.assert_allclose(appendix.simulate_s2(u), [0.0] * 11 + [1.0, 2.0, third, fourth], rtol=1e-14)
 
 
 @BOTH
-def test_the_noise_never_enters_the_recursion(system):
+def test_noise_does_not_enter_the_recursion(system):
     record = appendix.soft_record(system, seed=3)
-    clean = system.respond(record.u[:, 0])
+    clean = system.simulate(record.u[:, 0])
     error = record.y - clean
-    assert error.std() == pytest.approx(system.noise(clean), rel=0.15)
-    # White: no correlation of neighbours beyond three standard deviations.
+    assert error.std() == pytest.approx(system.noise_std(clean), rel=0.15)
+    # White noise: the correlation of adjacent samples is within three standard deviations.
     assert abs(np.corrcoef(error[1:], error[:-1])[0, 1]) < 3 / np.sqrt(len(error))
 
 
-def test_the_noise_of_s1_has_a_fixed_size_and_that_of_s2_a_fifth_of_its_output():
+def test_noise_std_is_fixed_for_s1_and_a_fifth_of_the_output_for_s2():
     output = np.array([-3.0, 3.0])
-    assert S1.noise(output) == 0.02
-    assert S2.noise(output) == pytest.approx(0.2 * 3.0)
+    assert S1.noise_std(output) == 0.02
+    assert S2.noise_std(output) == pytest.approx(0.2 * 3.0)
 
 
-def test_the_quoted_snr_of_s1_is_that_of_the_white_input():
+def test_quoted_snr_of_s1_is_that_of_the_white_input():
     quoted = 51.47
     snr = [
-        20 * np.log10(appendix.respond_s1(appendix.white_input(seed)).var() / 0.02**2) for seed in range(200)
+        20 * np.log10(appendix.simulate_s1(appendix.white_input(seed)).var() / 0.02**2) for seed in range(200)
     ]
     assert np.mean(snr) == pytest.approx(quoted, abs=0.5)
 
 
-def test_the_quoted_snr_of_s2_follows_from_its_noise_variance():
+def test_quoted_snr_of_s2_follows_from_its_noise_variance():
     quoted = 28.05
     records = [appendix.white_record(S2, seed) for seed in range(50)]
-    clean = [S2.respond(record.u[:, 0]) for record in records]
-    snr = [ratio(y, record.y - y) for y, record in zip(clean, records, strict=True)]
+    clean = [S2.simulate(record.u[:, 0]) for record in records]
+    snr = [snr_of_variances(y, record.y - y) for y, record in zip(clean, records, strict=True)]
     assert np.mean(snr) == pytest.approx(quoted, abs=0.3)
 
 
-def test_the_rescaled_input_fits_the_quoted_snr_of_s1_and_unit_gain_does_not():
+def test_rescaled_input_is_closer_to_the_quoted_snr_than_unit_gain():
     def median_snr(scaling):
-        outputs = [appendix.respond_s1(appendix.soft_input(seed, scaling)) for seed in range(50)]
+        outputs = [appendix.simulate_s1(appendix.soft_input(seed, scaling)) for seed in range(50)]
         return np.median([20 * np.log10(y.var() / 0.02**2) for y in outputs])
 
     assert abs(median_snr("rescaled") - 51.47) < 8.0
     assert abs(median_snr("unit-gain") - 51.47) > 30.0
 
 
-def test_the_rescaled_input_has_variance_one_fifth():
+def test_rescaled_input_has_variance_one_fifth():
     assert appendix.soft_input(0).var() == pytest.approx(0.20, rel=1e-12)
 
 
-def test_the_unit_gain_input_is_what_a_plain_loop_through_the_two_poles_gives():
+def test_inverse_filter_of_the_unit_gain_input_returns_white_noise():
     u = appendix.soft_input(4, "unit-gain", samples=300)
-    once = u.copy()
-    once[1:] -= 0.95 * u[:-1]
-    white = once.copy()
-    white[1:] -= 0.9 * once[:-1]
+    one_pole = u.copy()
+    one_pole[1:] -= 0.95 * u[:-1]
+    white = one_pole.copy()
+    white[1:] -= 0.9 * one_pole[:-1]
     white /= (1 - 0.95) * (1 - 0.9)
     assert white.var() == pytest.approx(0.20, rel=0.25)
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 3 / np.sqrt(300)
 
 
-def test_the_scalings_differ_by_a_factor_alone():
+def test_scalings_differ_only_by_a_factor():
     rescaled, unit = appendix.soft_input(5, "rescaled"), appendix.soft_input(5, "unit-gain")
     np.testing.assert_allclose(rescaled / rescaled[0], unit / unit[0], rtol=1e-9)
     assert 4.0 < rescaled[0] / unit[0] < 30.0
 
 
-def test_an_unknown_scaling_is_refused_with_those_there_are():
+def test_unknown_scaling_error_lists_the_known_scalings():
     with pytest.raises(SettingsError, match=r"'raw'.*rescaled, unit-gain"):
         appendix.soft_input(0, "raw")
 
@@ -103,26 +103,26 @@ def test_an_unknown_scaling_is_refused_with_those_there_are():
 @pytest.mark.parametrize("scaling", appendix.SCALINGS)
 def test_both_systems_stay_bounded_for_fifty_seeds(system, scaling):
     for seed in range(50):
-        assert np.abs(system.respond(appendix.soft_input(seed, scaling))).max() < 25.0
-        assert np.abs(system.respond(appendix.white_input(seed))).max() < 25.0
+        assert np.abs(system.simulate(appendix.soft_input(seed, scaling))).max() < 25.0
+        assert np.abs(system.simulate(appendix.white_input(seed))).max() < 25.0
 
 
-def test_a_system_that_diverges_says_so():
-    diverging = appendix.OutputErrorSystem("s1", lambda u: appendix.respond_s1(u - 1e3), S1.noise)
+def test_diverging_system_raises_an_error():
+    diverging = appendix.OutputErrorSystem("s1", lambda u: appendix.simulate_s1(u - 1e3), S1.noise_std)
     with pytest.raises(RecordError, match=r"s1 diverged at sample \d+"):
         appendix.soft_record(diverging)
 
 
-def test_records_of_different_seeds_and_purposes_share_no_draw():
+def test_records_of_different_seeds_and_purposes_are_independent():
     soft, white = appendix.soft_record(S1, 0), appendix.white_record(S1, 0)
     other = appendix.white_record(S1, 1)
     draws = [
         appendix.soft_input(0),
-        soft.y - S1.respond(soft.u[:, 0]),
+        soft.y - S1.simulate(soft.u[:, 0]),
         white.u[:, 0],
-        white.y - S1.respond(white.u[:, 0]),
+        white.y - S1.simulate(white.u[:, 0]),
         other.u[:, 0],
     ]
     correlation = np.abs(np.corrcoef(draws) - np.eye(len(draws)))
-    # The soft input has few independent samples, hence the wide band.
+    # The tolerance is large because the soft input has few independent samples.
     assert correlation.max() < 0.3

@@ -1,4 +1,4 @@
-"""Laws of the Bouc-Wen piezoelectric actuator, equation (11)."""
+"""Bouc-Wen piezoelectric actuator, equation (11)."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ PIEZO = BoucWenPiezo()
 
 
 def integrate_exactly(piezo, u, dt):
-    """Equation (11) by an adaptive method of high order, restarted at every kink of the voltage."""
+    """Integrate equation (11) by an adaptive high-order method, restarted at every kink of the voltage."""
     h = [0.0]
     for step in np.diff(u):
         v = step / dt
@@ -31,7 +31,7 @@ def test_runge_kutta_agrees_with_an_adaptive_integrator():
     kink = np.flatnonzero(PIEZO.dp * u - exact < 0)[0] - 1
     assert kink > 80
     np.testing.assert_allclose(y[:kink], exact[:kink], atol=1e-9)
-    # Where the state crosses zero inside a step, |h| has a kink and the order of the method is lost.
+    # If the state crosses zero inside a step, |h| has a kink and the method loses its order.
     np.testing.assert_allclose(y, exact, atol=1e-3)
     assert np.ptp(exact) > 60.0
 
@@ -45,34 +45,34 @@ def test_halving_the_step_divides_the_error_by_sixteen():
     assert error(10) / error(20) == pytest.approx(16.0, rel=0.15)
 
 
-def test_the_parameters_are_those_of_the_paper():
+def test_default_parameters_are_those_of_the_paper():
     assert (PIEZO.A, PIEZO.beta, PIEZO.gamma, PIEZO.dp) == (0.9, 0.008, 0.008, 1.6)
 
 
-def test_after_a_reversal_the_hysteretic_state_moves_on_a_straight_line():
-    # With beta = gamma the loss vanishes where slope and state have opposite signs, so h' = A u'.
+def test_hysteretic_state_is_linear_in_the_voltage_after_a_reversal():
+    # With beta = gamma the loss vanishes while slope and state have opposite signs, so h' = A u'.
     u = np.linspace(0.0, 20.0, 2001)
     y = simulate(PIEZO, -u, DT, h0=30.0)
     np.testing.assert_allclose(y, -PIEZO.dp * u - (30.0 - PIEZO.A * u), atol=1e-10)
 
 
-def test_under_a_growing_voltage_the_state_saturates_at_its_known_level():
+def test_hysteretic_state_saturates_at_its_theoretical_level():
     u = np.linspace(0.0, 600.0, 60001)
     h = PIEZO.dp * u - simulate(PIEZO, u, DT)
-    # h' = u' (A - (beta + gamma) h) has the closed solution below; its limit is A / (beta + gamma).
+    # h' = u' (A - (beta + gamma) h) has the closed-form solution below with the limit A / (beta + gamma).
     limit = PIEZO.A / (PIEZO.beta + PIEZO.gamma)
     np.testing.assert_allclose(h, limit * (1 - np.exp(-u * (PIEZO.beta + PIEZO.gamma))), atol=1e-8)
     assert h[-1] == pytest.approx(56.25, abs=0.01)
 
 
 @pytest.mark.parametrize("loading", [True, False])
-def test_at_a_constant_voltage_the_output_stays_where_it_is(loading):
+def test_output_is_constant_at_constant_voltage(loading):
     u = signals.hold_signal(DT, 20.0, amplitude=40.0, frequency=1.0, level=20.0, loading=loading)
-    rest = simulate(PIEZO, u, DT)[-20000:]
-    assert (rest == rest[0]).all()
+    held = simulate(PIEZO, u, DT)[-20000:]
+    assert (held == held[0]).all()
 
 
-def test_loading_and_unloading_to_one_voltage_end_apart():
+def test_loading_and_unloading_to_one_voltage_end_at_different_outputs():
     ends = [
         simulate(
             PIEZO, signals.hold_signal(DT, 1.0, amplitude=40.0, frequency=1.0, level=20.0, loading=side), DT
@@ -82,7 +82,7 @@ def test_loading_and_unloading_to_one_voltage_end_apart():
     assert ends[1] - ends[0] > 5.0
 
 
-def test_the_loop_does_not_depend_on_the_rate():
+def test_loop_does_not_depend_on_the_rate():
     fine = 1e-4
     slow = simulate(PIEZO, signals.sine(fine, 8.0, 40.0, 0.25), fine)[::20]
     fast = simulate(PIEZO, signals.sine(fine, 0.4, 40.0, 5.0), fine)
@@ -90,22 +90,22 @@ def test_the_loop_does_not_depend_on_the_rate():
     np.testing.assert_allclose(slow, fast, atol=2e-3)
 
 
-def test_a_state_at_the_start_is_where_the_output_begins():
+def test_initial_state_determines_the_initial_output():
     y = simulate(PIEZO, np.array([10.0, 10.0]), DT, h0=4.0)
     assert y.tolist() == [12.0, 12.0]
 
 
-def test_a_slope_given_is_the_slope_that_drives_the_state():
+def test_given_slope_drives_the_state():
     u = signals.sine(DT, 1.0, 40.0, 1.0)
-    own = simulate(PIEZO, u, DT)
-    np.testing.assert_array_equal(simulate(PIEZO, u, DT, slope=np.diff(u) / DT), own)
-    at_rest = simulate(PIEZO, u, DT, slope=np.zeros(len(u) - 1), h0=2.0)
-    np.testing.assert_allclose(at_rest, 1.6 * u - 2.0, rtol=1e-15)
+    default = simulate(PIEZO, u, DT)
+    np.testing.assert_array_equal(simulate(PIEZO, u, DT, slope=np.diff(u) / DT), default)
+    constant_state = simulate(PIEZO, u, DT, slope=np.zeros(len(u) - 1), h0=2.0)
+    np.testing.assert_allclose(constant_state, 1.6 * u - 2.0, rtol=1e-15)
 
 
-def test_shapes_that_do_not_fit_are_refused():
+def test_inconsistent_shapes_are_refused():
     u = np.zeros(5)
-    with pytest.raises(RecordError, match=r"5 samples have 4 slopes, got \(5,\)"):
+    with pytest.raises(RecordError, match=r"5 samples require 4 slopes, got \(5,\)"):
         simulate(PIEZO, u, DT, slope=u)
     with pytest.raises(RecordError, match=r"got \(5, 1\)"):
         simulate(PIEZO, u[:, None], DT)
@@ -115,18 +115,18 @@ def test_shapes_that_do_not_fit_are_refused():
         simulate(PIEZO, u, 0.0)
 
 
-def test_a_single_sample_is_a_record():
+def test_single_sample_can_be_simulated():
     assert simulate(PIEZO, np.array([2.0]), DT, h0=0.2).tolist() == [3.0]
 
 
-def test_a_record_names_its_columns_and_units():
+def test_piezo_record_names_its_columns_and_units():
     record = bouc_wen.consistent_validation(duration=1.0)
     assert (record.input_names, record.input_units) == (("u_V",), ("V",))
     assert (record.output_name, record.output_unit) == ("y_um", "um")
     assert (record.dt, record.start, record.samples) == (1e-3, 0.0, 1000)
 
 
-def test_the_consistent_record_obeys_one_equation_in_both_parts():
+def test_consistent_record_obeys_one_equation_in_both_parts():
     for record in (
         bouc_wen.consistent_estimation(seed=2, duration=5.0, peak=30.0),
         bouc_wen.consistent_validation(duration=2.0),
@@ -136,7 +136,7 @@ def test_the_consistent_record_obeys_one_equation_in_both_parts():
         np.testing.assert_array_equal(record.y, simulate(PIEZO, u, record.dt))
 
 
-def test_the_consistent_noise_reaches_the_peak_asked_for():
+def test_consistent_noise_reaches_the_requested_peak():
     record = bouc_wen.consistent_estimation(seed=2, duration=5.0, peak=30.0)
     assert np.abs(record.u).max() == pytest.approx(30.0, abs=1e-12)
     assert record.samples == 5000

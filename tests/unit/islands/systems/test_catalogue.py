@@ -1,4 +1,4 @@
-"""The table of systems drives its own tests: every entry, variant and part is made and looked at."""
+"""Table of simulated systems: every variant and part of every entry."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from islands.errors import SettingsError
 from islands.systems.catalogue import SYSTEMS, make_record
 
-EVERY = [
+RECORDS = [
     (system.name, variant, part)
     for system in SYSTEMS.values()
     for variant in system.variants
@@ -15,8 +15,8 @@ EVERY = [
 SAMPLING = {"bouc-wen-piezo": 1e-3, "s1": 1.0, "s2": 1.0}
 
 
-@pytest.mark.parametrize(("name", "variant", "part"), EVERY)
-def test_every_record_is_finite_and_the_same_to_the_bit_when_made_again(name, variant, part):
+@pytest.mark.parametrize(("name", "variant", "part"), RECORDS)
+def test_every_record_is_finite_and_reproducible(name, variant, part):
     record, again = (make_record(name, variant, part, seed=5) for _ in range(2))
     assert record.dt == SAMPLING[name]
     assert record.samples >= 500
@@ -28,9 +28,9 @@ def test_every_record_is_finite_and_the_same_to_the_bit_when_made_again(name, va
 
 @pytest.mark.parametrize(
     ("name", "variant", "part"),
-    [entry for entry in EVERY if entry[:2] != ("bouc-wen-piezo", "authors") or entry[2] == "noise-2"],
+    [entry for entry in RECORDS if entry[:2] != ("bouc-wen-piezo", "authors") or entry[2] == "noise-2"],
 )
-def test_only_parts_with_noise_listen_to_the_seed(name, variant, part):
+def test_seed_only_affects_parts_with_noise(name, variant, part):
     first, second = (make_record(name, variant, part, seed) for seed in (0, 1))
     noisy = name != "bouc-wen-piezo" or part in ("estimation", "noise-2")
     assert (first.y.tobytes() != second.y.tobytes()) == noisy
@@ -38,13 +38,13 @@ def test_only_parts_with_noise_listen_to_the_seed(name, variant, part):
 
 @pytest.mark.parametrize("part", SYSTEMS["bouc-wen-piezo"].parts)
 @pytest.mark.parametrize("variant", SYSTEMS["bouc-wen-piezo"].variants)
-def test_the_piezo_starts_at_rest_except_in_the_authors_noise(variant, part):
+def test_piezo_starts_at_rest_except_in_the_authors_noise(variant, part):
     record = make_record("bouc-wen-piezo", variant, part)
-    rest = abs(record.u[0, 0]) < 1e-6 and abs(record.y[0]) < 1e-6
-    assert rest == ((variant, part) not in {("authors", "estimation"), ("authors", "noise-2")})
+    at_rest = abs(record.u[0, 0]) < 1e-6 and abs(record.y[0]) < 1e-6
+    assert at_rest == ((variant, part) not in {("authors", "estimation"), ("authors", "noise-2")})
 
 
-def test_the_second_noise_is_not_the_first_one():
+def test_second_noise_record_differs_from_the_first():
     for variant in ("authors", "consistent"):
         first = make_record("bouc-wen-piezo", variant, "estimation")
         second = make_record("bouc-wen-piezo", variant, "noise-2")
@@ -53,13 +53,13 @@ def test_the_second_noise_is_not_the_first_one():
 
 
 @pytest.mark.parametrize("part", ["hold-loading", "hold-unloading"])
-def test_the_holds_rest_for_twenty_seconds_at_twenty_volts(part):
+def test_hold_parts_are_constant_for_twenty_seconds_at_twenty_volts(part):
     record = make_record("bouc-wen-piezo", "consistent", part)
     assert (record.u[-20000:, 0] == 20.0).all()
     assert (record.y[-20000:] == record.y[-1]).all()
 
 
-def test_every_entry_stands_under_its_name_and_describes_itself_in_a_line():
+def test_every_system_has_its_key_as_name_and_a_one_line_description():
     for name, system in SYSTEMS.items():
         assert system.name == name
         assert "\n" not in system.description
@@ -73,9 +73,9 @@ def test_every_entry_stands_under_its_name_and_describes_itself_in_a_line():
         (("piezo", "authors", "estimation"), r"no system is called 'piezo': there is bouc-wen-piezo, s1, s2"),
         (("s1", "raw", "estimation"), r"no variant of s1 is called 'raw': there is rescaled, unit-gain"),
         (("s2", "rescaled", "test"), r"no part of s2 is called 'test': there is estimation, validation"),
-        (("s1", "rescaled", "estimation", -1), r"a seed is a whole number from 0 on, got -1"),
+        (("s1", "rescaled", "estimation", -1), r"a seed must not be negative, got -1"),
     ],
 )
-def test_what_there_is_not_is_refused_with_what_there_is(arguments, message):
+def test_unknown_name_error_lists_the_known_names(arguments, message):
     with pytest.raises(SettingsError, match=message):
         make_record(*arguments)

@@ -1,4 +1,4 @@
-"""Elements along a motion and in a balance of forces, beside formulas and another integrator."""
+"""Force elements along a motion and in a balance of forces, compared with formulas and a reference solver."""
 
 from collections.abc import Callable
 
@@ -14,8 +14,14 @@ from islands.systems.mechanics import WIDTH, Elements, compiled, integrate_along
 
 Array = NDArray[np.float64]
 
-#: Of the oscillator.
-MASS, DAMPING, STIFFNESS = 0.5, 1.2, 80.0
+#: Mass of the oscillator.
+MASS = 0.5
+
+#: Damping of the oscillator.
+DAMPING = 1.2
+
+#: Stiffness of the oscillator.
+STIFFNESS = 80.0
 
 
 def cubic(x, _rate, _z, numbers):
@@ -26,20 +32,20 @@ def drag(_x, rate, _z, numbers):
     return numbers[0] * rate
 
 
-def stored(_x, _rate, z, numbers):
+def state_force(_x, _rate, z, numbers):
     return numbers[0] * z
 
 
-def travelled(_x, rate, _z, _numbers):
+def rate_integral(_x, rate, _z, _numbers):
     return rate
 
 
-def leaking(x, rate, z, numbers):
+def leaky_integral(x, rate, z, numbers):
     return rate - numbers[1] * z - numbers[2] * x * z
 
 
 def elements(*parts) -> Elements:
-    """Return elements of (force, memory or None, sign, state at the beginning, numbers)."""
+    """Pack elements (force, state derivative or None, sign, initial state, numbers)."""
     numbers = np.zeros((len(parts), WIDTH))
     for row, part in zip(numbers, parts, strict=True):
         row[: len(part[4])] = part[4]
@@ -52,39 +58,39 @@ def elements(*parts) -> Elements:
     )
 
 
-def push(t: Array | float) -> Array:
+def input_force(t: Array | float) -> Array:
     return 3.0 * np.sin(7.0 * t) + 2.0 * np.cos(3.1 * t)
 
 
-def moved(
+def simulate(
     parts: Elements,
     dt: float,
     seconds: float = 4.0,
-    u: Callable[[Array], Array] = push,
+    u: Callable[[Array], Array] = input_force,
     starts: dict[int, tuple[float, float]] | None = None,
 ) -> Array:
-    """Integrate from rest, or from states at some samples."""
+    """Integrate the motion from rest, with restarts from the given states at some samples."""
     t = dt * np.arange(round(seconds / dt) + 1)
-    begins, x0, v0, x = np.zeros(t.size, dtype=bool), np.zeros(t.size), np.zeros(t.size), np.empty(t.size)
-    begins[0] = True
+    restarts, x0, v0, x = np.zeros(t.size, dtype=bool), np.zeros(t.size), np.zeros(t.size), np.empty(t.size)
+    restarts[0] = True
     for k, (position, rate) in (starts or {}).items():
-        begins[k], x0[k], v0[k] = True, position, rate
-    midway = np.stack([u(t + dt / 2), u(t + dt)])
-    integrate_motion(u(t), midway, dt, MASS, DAMPING, STIFFNESS, parts, begins, x0, v0, x)
+        restarts[k], x0[k], v0[k] = True, position, rate
+    intersample = np.stack([u(t + dt / 2), u(t + dt)])
+    integrate_motion(u(t), intersample, dt, MASS, DAMPING, STIFFNESS, parts, restarts, x0, v0, x)
     return x
 
 
 def reference(
-    force: Callable[..., float], memory: Callable[..., float] | None, z0: float, dt: float
+    force: Callable[..., float], derivative: Callable[..., float] | None, z0: float, dt: float
 ) -> Array:
-    """Integrate by somebody else's method of high order; the force resists."""
+    """Integrate by a SciPy method of high order; the force opposes the motion."""
 
     def slope(t, state):
         x, v, z = state
         return [
             v,
-            (push(t) - DAMPING * v - STIFFNESS * x - force(x, v, z)) / MASS,
-            memory(x, v, z) if memory else 0.0,
+            (input_force(t) - DAMPING * v - STIFFNESS * x - force(x, v, z)) / MASS,
+            derivative(x, v, z) if derivative else 0.0,
         ]
 
     t = dt * np.arange(round(4.0 / dt) + 1)
@@ -94,18 +100,18 @@ def reference(
     return found.y[0]
 
 
-def test_a_linear_oscillator_moves_as_it_has_to() -> None:
-    assert moved(elements(), 2e-3) == pytest.approx(reference(lambda *_: 0.0, None, 0.0, 2e-3), abs=1e-8)
+def test_linear_oscillator_matches_reference_solution() -> None:
+    assert simulate(elements(), 2e-3) == pytest.approx(reference(lambda *_: 0.0, None, 0.0, 2e-3), abs=1e-8)
 
 
-def test_so_does_one_with_a_cubic_spring() -> None:
+def test_cubic_spring_matches_reference_solution() -> None:
     parts = elements((cubic, None, -1.0, 0.0, (4e4,)))
     known = reference(lambda x, _v, _z: 4e4 * x**3, None, 0.0, 2e-3)
-    assert moved(parts, 2e-3) == pytest.approx(known, abs=1e-7)
-    assert np.max(np.abs(known - moved(elements(), 2e-3))) > 0.01
+    assert simulate(parts, 2e-3) == pytest.approx(known, abs=1e-7)
+    assert np.max(np.abs(known - simulate(elements(), 2e-3))) > 0.01
 
 
-def test_so_does_one_with_a_hysteresis() -> None:
+def test_hysteresis_element_matches_reference_solution() -> None:
     form, numbers = hysteresis.SECOND_HYSTERESIS.form, (60.0, 40.0, -15.0, 0.01)
     parts = elements((form.force, form.state_derivative, -1.0, 0.01, numbers))
     known = reference(
@@ -114,23 +120,25 @@ def test_so_does_one_with_a_hysteresis() -> None:
         0.01,
         2e-3,
     )
-    # Where the rate turns the element's law has a kink: the order is lost for a step.
-    assert moved(parts, 2e-3) == pytest.approx(known, abs=2e-6)
-    assert np.max(np.abs(known - moved(elements(), 2e-3))) > 0.005
+    # The element's equation has a kink when the rate changes sign, so one step loses its order.
+    assert simulate(parts, 2e-3) == pytest.approx(known, abs=2e-6)
+    assert np.max(np.abs(known - simulate(elements(), 2e-3))) > 0.005
 
 
-def test_half_the_step_has_a_sixteenth_of_the_error() -> None:
+def test_halving_the_step_divides_the_motion_error_by_sixteen() -> None:
     parts = elements((cubic, None, -1.0, 0.0, (4e4,)), (drag, None, -1.0, 0.0, (0.4,)))
-    fine = moved(parts, 1.25e-3)
-    errors = [float(np.max(np.abs(moved(parts, dt) - fine[:: round(dt / 1.25e-3)]))) for dt in (0.02, 0.01)]
+    fine = simulate(parts, 1.25e-3)
+    errors = [
+        float(np.max(np.abs(simulate(parts, dt) - fine[:: round(dt / 1.25e-3)]))) for dt in (0.02, 0.01)
+    ]
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.3)
 
 
-def test_a_sign_turns_a_force_round() -> None:
-    """A spring that resists is one more spring."""
+def test_sign_of_an_element_reverses_its_force() -> None:
+    """A negative sign with a positive stiffness equals a positive sign with a negative stiffness."""
     stiffer = elements((spring, None, -1.0, 0.0, (STIFFNESS,)))
     softer = elements((spring, None, 1.0, 0.0, (-STIFFNESS,)))
-    assert np.array_equal(moved(stiffer, 0.01), moved(softer, 0.01))
+    assert np.array_equal(simulate(stiffer, 0.01), simulate(softer, 0.01))
 
 
 def spring(x, _rate, _z, numbers):
@@ -138,43 +146,43 @@ def spring(x, _rate, _z, numbers):
 
 
 @given(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.1, 9.0))
-def test_without_elements_it_is_linear(one: float, other: float, pitch: float) -> None:
+def test_motion_without_elements_is_linear_in_the_input(one: float, other: float, pitch: float) -> None:
     def second(t):
         return np.cos(pitch * t)
 
     parts = elements()
-    together = moved(parts, 0.01, u=lambda t: one * push(t) + other * second(t))
-    apart = one * moved(parts, 0.01) + other * moved(parts, 0.01, u=second)
-    assert together == pytest.approx(apart, abs=1e-12)
+    combined = simulate(parts, 0.01, u=lambda t: one * input_force(t) + other * second(t))
+    superposition = one * simulate(parts, 0.01) + other * simulate(parts, 0.01, u=second)
+    assert combined == pytest.approx(superposition, abs=1e-12)
 
 
-def test_it_begins_anew_where_it_is_told() -> None:
+def test_motion_restarts_from_the_given_state() -> None:
     parts = elements((cubic, None, -1.0, 0.0, (4e4,)))
-    whole = moved(parts, 0.01, starts={150: (0.03, -0.4)})
+    whole = simulate(parts, 0.01, starts={150: (0.03, -0.4)})
     assert whole[150] == 0.03
-    assert np.array_equal(whole[:150], moved(parts, 0.01)[:150])
-    later = moved(parts, 0.01, seconds=2.5, u=lambda t: push(t + 1.5), starts={0: (0.03, -0.4)})
+    assert np.array_equal(whole[:150], simulate(parts, 0.01)[:150])
+    later = simulate(parts, 0.01, seconds=2.5, u=lambda t: input_force(t + 1.5), starts={0: (0.03, -0.4)})
     assert whole[150:] == pytest.approx(later, abs=1e-12)
 
 
-def test_what_an_element_remembers_goes_on_through_a_beginning() -> None:
-    """The stored travel is that of the whole motion: only so does the force behind the restart fit."""
-    parts = elements((stored, travelled, -1.0, 0.0, (30.0,)))
-    plain = moved(parts, 0.005)
-    # It begins anew where it is and as fast as it moves: all but the rounding of the rate stays the same.
+def test_element_state_is_kept_at_a_restart() -> None:
+    """The state integrates the rate of the whole motion, so the force is continuous at a restart."""
+    parts = elements((state_force, rate_integral, -1.0, 0.0, (30.0,)))
+    plain = simulate(parts, 0.005)
+    # Restart from the current position and rate: only the error of the rate differs.
     t = 0.005 * np.arange(plain.size)
     rate = float(np.interp(1.0, t, np.gradient(plain, t)))
-    again = moved(parts, 0.005, starts={200: (float(plain[200]), rate)})
+    again = simulate(parts, 0.005, starts={200: (float(plain[200]), rate)})
     assert again == pytest.approx(plain, abs=1e-4)
-    elsewhere = moved(parts, 0.005, starts={200: (float(plain[200]) + 0.02, rate)})
-    # The travel does not know of the leap: the spring of it pulls to a place of its own from then on.
+    displaced = simulate(parts, 0.005, starts={200: (float(plain[200]) + 0.02, rate)})
+    # The state ignores the jump in position, so its spring has a different equilibrium afterwards.
     known = 30.0 * 0.02 / (STIFFNESS + 30.0)
-    assert (elsewhere - plain)[-100:].mean() == pytest.approx(known, rel=0.1)
+    assert (displaced - plain)[-100:].mean() == pytest.approx(known, rel=0.1)
 
 
-def test_what_explodes_is_no_number_from_there_on() -> None:
+def test_motion_is_nan_after_an_overflow() -> None:
     with np.errstate(all="ignore"):
-        x = moved(elements((cubic, None, 1.0, 0.0, (1e9,))), 0.01)
+        x = simulate(elements((cubic, None, 1.0, 0.0, (1e9,))), 0.01)
     first = int(np.flatnonzero(~np.isfinite(x))[0])
     assert 0 < first < x.size
     assert np.isnan(x[first:]).all()
@@ -186,7 +194,7 @@ def motion() -> tuple[Array, Array, float]:
     return x, np.gradient(x, 0.01), 0.01
 
 
-def test_along_a_motion_forces_are_their_formulas() -> None:
+def test_forces_along_a_motion_match_their_formulas() -> None:
     x, rate, dt = motion()
     total = np.full(x.size, 7.0)
     parts = elements((cubic, None, 1.0, 0.0, (2.0,)), (drag, None, -1.0, 0.0, (0.7,)))
@@ -194,24 +202,24 @@ def test_along_a_motion_forces_are_their_formulas() -> None:
     assert total == pytest.approx(2.0 * x**3 - 0.7 * rate, abs=1e-13)
 
 
-def test_along_a_motion_nothing_is_nothing() -> None:
+def test_force_along_a_motion_without_elements_is_zero() -> None:
     x, rate, dt = motion()
     total = np.full(x.size, 7.0)
     integrate_along(x, rate, dt, elements(), total)
     assert not total.any()
 
 
-def test_along_a_motion_what_is_remembered_is_integrated_from_its_beginning() -> None:
+def test_element_state_along_a_motion_starts_at_its_initial_value() -> None:
     x, rate, dt = motion()
     total = np.empty(x.size)
-    integrate_along(x, rate, dt, elements((stored, travelled, 1.0, 0.4, (3.0,))), total)
+    integrate_along(x, rate, dt, elements((state_force, rate_integral, 1.0, 0.4, (3.0,))), total)
     assert total == pytest.approx(3.0 * (0.4 + x - x[0]), abs=1e-12)
 
 
-def test_along_a_motion_a_memory_is_the_solution_of_its_equation() -> None:
+def test_element_state_along_a_motion_matches_reference_solution() -> None:
     x, rate, dt = motion()
     total = np.empty(x.size)
-    integrate_along(x, rate, dt, elements((stored, leaking, 1.0, 0.4, (1.0, 2.0, 0.5))), total)
+    integrate_along(x, rate, dt, elements((state_force, leaky_integral, 1.0, 0.4, (1.0, 2.0, 0.5))), total)
     z, known = 0.4, []
     for k in range(x.size):
         known.append(z)

@@ -1,4 +1,4 @@
-"""Laws of the excitations."""
+"""Excitation signals."""
 
 import numpy as np
 import pytest
@@ -9,30 +9,30 @@ from islands.systems import signals
 DT = 1e-3
 
 
-def power(u):
-    """Frequencies in Hz and squared magnitudes of the spectrum of a record at DT."""
+def compute_power(u):
+    """Return frequencies in Hz and squared magnitudes of the spectrum of a signal sampled at DT."""
     return np.fft.rfftfreq(len(u), DT), np.abs(np.fft.rfft(u)) ** 2
 
 
-def turning_points(u):
-    """Values where the input stops, turns round or ends, in order."""
+def find_turning_points(u):
+    """Return the values at which the signal starts, stops, turns or ends, in order."""
     direction = np.sign(np.diff(u))
     turns = np.flatnonzero(direction[1:] != direction[:-1]) + 1
     return np.concatenate([u[:1], u[turns], u[-1:]])
 
 
 @pytest.mark.parametrize("zero_phase", [False, True])
-def test_filtered_noise_keeps_nothing_above_its_cutoff(zero_phase):
+def test_filtered_noise_has_no_power_above_its_cutoff(zero_phase):
     u = signals.filtered_noise(DT, 50.0, 2.0, seed=1, zero_phase=zero_phase)
-    frequency, energy = power(u * np.hanning(len(u)))
+    frequency, energy = compute_power(u * np.hanning(len(u)))
     assert energy[frequency > 8.0].sum() < 1e-5 * energy.sum()
     assert energy[frequency < 2.0].sum() > 0.9 * energy.sum()
 
 
-def test_unscaled_noise_has_the_variance_its_bandwidth_leaves():
+def test_variance_of_unscaled_noise_follows_from_its_bandwidth():
     u = signals.filtered_noise(DT, 400.0, 20.0, seed=3)
-    # White noise of variance one spreads over 500 Hz; a fifth-order Butterworth has a noise bandwidth of
-    # (pi / 10) / sin(pi / 10) = 1.0166 times its cutoff.
+    # White noise of variance one has a bandwidth of 500 Hz; a fifth-order Butterworth filter has a noise
+    # bandwidth of (pi / 10) / sin(pi / 10) = 1.0166 times its cutoff.
     assert u.var() == pytest.approx(1.0166 * 20.0 / 500.0, rel=0.05)
 
 
@@ -43,13 +43,13 @@ def test_causal_noise_starts_from_rest_and_zero_phase_noise_does_not():
     assert abs(symmetric[0]) > 1e-3
 
 
-def test_the_later_noise_cannot_change_the_causal_signal_before_it():
+def test_causal_noise_does_not_depend_on_later_samples():
     long = signals.filtered_noise(DT, 10.0, 1.0, seed=5)
     short = signals.filtered_noise(DT, 4.0, 1.0, seed=5)
     np.testing.assert_array_equal(long[:4000], short)
 
 
-def test_noise_reaches_its_peak_and_depends_on_its_seed_alone():
+def test_noise_reaches_its_peak_and_only_depends_on_its_seed():
     first = signals.filtered_noise(DT, 5.0, 1.0, seed=6, peak=50.0)
     again = signals.filtered_noise(DT, 5.0, 1.0, seed=6, peak=50.0)
     other = signals.filtered_noise(DT, 5.0, 1.0, seed=7, peak=50.0)
@@ -58,7 +58,7 @@ def test_noise_reaches_its_peak_and_depends_on_its_seed_alone():
     assert np.abs(first - other).max() > 1.0
 
 
-def test_a_sine_has_its_amplitude_frequency_and_phase():
+def test_sine_has_its_amplitude_frequency_and_phase():
     u = signals.sine(DT, 1.0, amplitude=3.0, frequency=2.0, phase=np.pi / 2)
     assert u.shape == (1000,)
     assert u[0] == pytest.approx(3.0)
@@ -66,7 +66,7 @@ def test_a_sine_has_its_amplitude_frequency_and_phase():
     assert u[250] == pytest.approx(-3.0)
 
 
-def test_several_sines_stand_in_the_spectrum_with_their_amplitudes():
+def test_spectrum_of_several_sines_shows_their_amplitudes():
     u = signals.sines(DT, 1.0, amplitudes=(2.0, 0.5), frequencies=(3.0, 40.0))
     amplitude = 2 * np.abs(np.fft.rfft(u)) / len(u)
     assert amplitude[3] == pytest.approx(2.0)
@@ -74,12 +74,12 @@ def test_several_sines_stand_in_the_spectrum_with_their_amplitudes():
     assert np.delete(amplitude, [3, 40]).max() < 1e-12
 
 
-def test_sines_without_a_partner_are_refused():
+def test_sines_with_sequences_of_different_length_are_refused():
     with pytest.raises(SettingsError, match="got 2, 1 and 2"):
         signals.sines(DT, 1.0, (1.0, 2.0), (3.0,))
 
 
-def test_a_multisine_repeats_itself():
+def test_multisine_is_periodic():
     u = signals.multisine(DT, 5.0, period=2.0, band=(0.5, 10.0), seed=8, peak=4.0)
     assert u.shape == (5000,)
     np.testing.assert_array_equal(u[:2000], u[2000:4000])
@@ -87,9 +87,9 @@ def test_a_multisine_repeats_itself():
     assert np.abs(u[:1000] - u[1000:2000]).max() > 0.1
 
 
-def test_a_multisine_has_power_in_its_band_only_and_equally_there():
+def test_multisine_has_equal_power_in_its_band_and_none_outside():
     u = signals.multisine(DT, 2.0, period=2.0, band=(0.5, 10.0), seed=8, peak=4.0)
-    frequency, energy = power(u)
+    frequency, energy = compute_power(u)
     inside = (frequency >= 0.5) & (frequency <= 10.0)
     assert inside.sum() == 20
     np.testing.assert_allclose(energy[inside], energy[inside][0], rtol=1e-9)
@@ -97,17 +97,17 @@ def test_a_multisine_has_power_in_its_band_only_and_equally_there():
     assert np.abs(u).max() == pytest.approx(4.0)
 
 
-def test_the_seed_moves_a_multisines_phases():
+def test_seed_changes_the_phases_of_a_multisine():
     first, second = (signals.multisine(DT, 1.0, 1.0, (1.0, 20.0), seed=seed) for seed in (0, 1))
     assert np.abs(first - second).max() > 0.1
 
 
-def test_a_multisine_without_a_harmonic_in_its_band_is_refused():
+def test_multisine_without_a_harmonic_in_its_band_is_refused():
     with pytest.raises(SettingsError, match=r"no multiple of 1\.0 Hz"):
         signals.multisine(DT, 1.0, period=1.0, band=(1.2, 1.8), seed=0)
 
 
-def test_a_sweep_passes_from_its_first_to_its_last_frequency():
+def test_sweep_goes_from_its_first_to_its_last_frequency():
     u = signals.sweep(DT, 10.0, amplitude=2.0, first=1.0, last=9.0)
     upward = np.flatnonzero((u[:-1] < 0) & (u[1:] >= 0)) * DT
     instant = 1 / np.diff(upward)
@@ -119,11 +119,11 @@ def test_a_sweep_passes_from_its_first_to_its_last_frequency():
 
 @pytest.mark.parametrize("level", [20.0, 0.0, -15.0])
 @pytest.mark.parametrize("loading", [True, False])
-def test_a_hold_comes_from_its_side_and_then_rests(level, loading):
+def test_hold_signal_approaches_from_its_side_and_is_then_constant(level, loading):
     u = signals.hold_signal(DT, 3.0, amplitude=40.0, frequency=1.0, level=level, loading=loading)
-    rest = u[-3000:]
+    held = u[-3000:]
     approach = u[:-3000]
-    assert (rest == level).all()
+    assert (held == level).all()
     assert u[0] == 0.0
     assert approach.max() == pytest.approx(40.0)
     assert approach.min() == pytest.approx(-40.0)
@@ -133,16 +133,16 @@ def test_a_hold_comes_from_its_side_and_then_rests(level, loading):
     assert 2000 <= len(approach) <= 3000
 
 
-def test_a_level_out_of_the_sines_reach_is_refused():
+def test_hold_level_beyond_the_amplitude_is_refused():
     with pytest.raises(SettingsError, match=r"never reaches the level 41\.0"):
         signals.hold_signal(DT, 1.0, amplitude=40.0, frequency=1.0, level=41.0)
 
 
-def test_minor_loops_turn_where_they_are_told_and_close():
+def test_minor_loops_turn_at_their_reversals_and_close():
     u = signals.minor_loops(DT, amplitude=40.0, frequency=1.0, reversals=(-0.5, 0.5, -0.25))
     expected = [0.0, 40.0, -40.0, 40.0, -20.0, 20.0, -10.0, 20.0, -20.0, 40.0]
-    # Exactly: a loop is closed when the input returns to the value it opened at, to the bit.
-    assert turning_points(u).tolist() == expected
+    # Exact comparison: a loop is closed if the input returns bit-identically to the value at which it opened.
+    assert find_turning_points(u).tolist() == expected
 
 
 def test_minor_loops_are_never_steeper_than_the_major_sine():
@@ -164,18 +164,18 @@ def test_minor_loops_without_a_reversal_are_refused():
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, np.nan])
-def test_a_sampling_time_that_is_no_time_is_refused(dt):
+def test_invalid_sampling_time_is_refused(dt):
     with pytest.raises(SettingsError, match="sampling time"):
         signals.sine(dt, 1.0, 1.0, 1.0)
 
 
 @pytest.mark.parametrize("duration", [0.0, -2.0, np.inf, np.nan])
-def test_a_signal_without_a_sample_is_refused(duration):
+def test_signal_without_a_sample_is_refused(duration):
     with pytest.raises(SettingsError, match="at least one sample"):
         signals.sweep(DT, duration, 1.0, 1.0, 2.0)
 
 
 @pytest.mark.parametrize("cutoff", [0.0, 500.0, np.nan])
-def test_a_cutoff_beyond_the_sampling_frequencys_half_is_refused(cutoff):
+def test_cutoff_above_half_the_sampling_frequency_is_refused(cutoff):
     with pytest.raises(SettingsError, match=r"half the sampling frequency, 500\.0 Hz"):
         signals.filtered_noise(DT, 1.0, cutoff, seed=0)

@@ -1,4 +1,4 @@
-"""An assessment holds what the simulations of a model give, part by part and mode by mode."""
+"""Assessment of a model: metrics, outcomes and tests of every part and mode."""
 
 import math
 from dataclasses import astuple
@@ -24,7 +24,7 @@ def model(terms, names=("u",)):
 
 
 LINEAR = model({"y(k-1)": 0.7, "u(k-1)": 0.5, "u(k-2)": 0.2})
-#: Stable for small outputs; beyond 1.0 it runs away, and far beyond in a single step.
+#: Stable for small outputs. It diverges for outputs above 1.0, and in a single step for very large outputs.
 EXPLOSIVE = model({"y(k-1)": 0.5, "y(k-1)^3": 0.5, "u(k-1)": 0.3})
 
 
@@ -54,7 +54,7 @@ def runs(data, warm_up=None):
 
 
 @pytest.mark.parametrize("warm_up", [None, 10])
-def test_every_part_and_mode_has_the_metrics_of_its_simulation(warm_up):
+def test_metrics_of_every_part_and_mode_are_those_of_its_simulation(warm_up):
     found = assess(LINEAR, PARTS_OF_DATA, SHOOTING, warm_up)
     assert list(found.metrics) == list(found.outcomes) == list(PARTS) == ["estimation", "validation"]
     for part, data in zip(PARTS, (PARTS_OF_DATA.estimation, PARTS_OF_DATA.validation), strict=True):
@@ -67,14 +67,14 @@ def test_every_part_and_mode_has_the_metrics_of_its_simulation(warm_up):
     assert len(set(errors)) == 3
 
 
-def test_the_physics_is_that_of_the_estimation_data():
+def test_physics_checks_use_the_estimation_data():
     split = Split(record(200), record(90, seed=1, size=5.0))
     found = assess(LINEAR, split, SHOOTING)
     assert found.physics == check_physics(LINEAR, split.estimation)
     assert found.physics != check_physics(LINEAR, split.validation)
 
 
-def test_the_information_criteria_weigh_the_one_step_ahead_residual_of_the_estimation_data():
+def test_information_criteria_use_the_one_step_ahead_estimation_residual():
     data = PARTS_OF_DATA.estimation
     residual = data.y[5:] - 0.7 * data.y[4:-1] - 0.5 * data.u[4:-1, 0] - 0.2 * data.u[3:-2, 0]
     squares = float(np.sum(residual**2))
@@ -84,7 +84,7 @@ def test_the_information_criteria_weigh_the_one_step_ahead_residual_of_the_estim
     assert found.fpe == pytest.approx(squares / 195 * 198 / 192, rel=1e-12)
 
 
-def test_the_residual_tests_are_those_of_the_one_step_ahead_residual_on_the_validation_data():
+def test_residual_tests_use_the_one_step_ahead_validation_residual():
     data = PARTS_OF_DATA.validation
     found = assess(LINEAR, PARTS_OF_DATA, SHOOTING).residual_tests
     expected = residual_tests(data.y - one_step_ahead(LINEAR, data).y, data.u, max_lag=25)
@@ -96,7 +96,7 @@ def test_the_residual_tests_are_those_of_the_one_step_ahead_residual_on_the_vali
 # Divergence.
 
 
-def test_a_diverged_simulation_has_no_metrics_and_says_where():
+def test_diverged_simulation_has_no_metrics_and_names_the_sample():
     found = assess(EXPLOSIVE, Split(record(200), record(90, seed=1, size=3.0)), 200)
     for mode in ("multiple_shooting", "free_run"):
         assert all(math.isnan(value) for value in astuple(found.metrics["validation"][mode]))
@@ -109,16 +109,16 @@ def test_a_diverged_simulation_has_no_metrics_and_says_where():
     assert found.residual_tests.ljung_box > 0.0
 
 
-def spiked(samples, seed=1):
-    """A record in which the output is small but for one sample, far outside all others."""
+def record_with_spike(samples, seed=1):
+    """Return a record whose output has one very large sample."""
     data = record(samples, seed)
     y = data.y.copy()
     y[40] = 1e6
     return Dataset(data.u, y, 0.1)
 
 
-def test_a_prediction_that_diverges_even_one_step_ahead_fails_every_residual_test_and_says_why():
-    found = assess(EXPLOSIVE, Split(record(200), spiked(90)), SHOOTING)
+def test_one_step_ahead_divergence_fails_every_residual_test():
+    found = assess(EXPLOSIVE, Split(record(200), record_with_spike(90)), SHOOTING)
     assert found.outcomes["validation"]["one_step_ahead"].reason.endswith("at sample 41")
     assert math.isnan(found.metrics["validation"]["one_step_ahead"].rmse)
     tests = found.residual_tests
@@ -133,18 +133,18 @@ def test_a_prediction_that_diverges_even_one_step_ahead_fails_every_residual_tes
     assert math.isfinite(found.information.aic)
 
 
-def test_a_divergence_on_the_estimation_data_leaves_no_information_criterion():
-    found = assess(EXPLOSIVE, Split(spiked(200), record(90)), SHOOTING)
+def test_estimation_divergence_makes_information_criteria_nan():
+    found = assess(EXPLOSIVE, Split(record_with_spike(200), record(90)), SHOOTING)
     assert not found.outcomes["estimation"]["one_step_ahead"]
     assert all(math.isnan(value) for value in astuple(found.information))
     assert math.isfinite(found.metrics["validation"]["one_step_ahead"].rmse)
     assert found.residual_tests.ljung_box > 0.0
 
 
-# Recordings, and short ones.
+# Several recordings and short recordings.
 
 
-def test_the_residual_of_the_longest_recording_is_tested():
+def test_residual_tests_use_the_longest_recording():
     recordings = tuple(record(samples, seed) for seed, samples in enumerate((30, 80, 50)))
     found = assess(LINEAR, Split(record(200), join(recordings)), SHOOTING).residual_tests
     expected = assess(LINEAR, Split(record(200), recordings[1]), SHOOTING).residual_tests
@@ -152,7 +152,7 @@ def test_the_residual_of_the_longest_recording_is_tested():
     assert found.tests[0].values.tolist() == expected.tests[0].values.tolist()
 
 
-def test_the_metrics_of_several_recordings_are_over_all_their_samples():
+def test_metrics_of_several_recordings_cover_all_their_samples():
     recordings = tuple(record(samples, seed) for seed, samples in enumerate((30, 80, 50)))
     found = assess(LINEAR, Split(join(recordings), record(90)), SHOOTING).metrics["estimation"]["free_run"]
     errors = np.concatenate([(part.y - free_run(LINEAR, part).y)[2:] for part in recordings])
@@ -160,22 +160,22 @@ def test_the_metrics_of_several_recordings_are_over_all_their_samples():
     assert found.rmse == pytest.approx(math.sqrt(np.mean(errors**2)), rel=1e-12)
 
 
-def test_a_recording_shorter_than_the_warm_up_takes_no_part():
+def test_recording_shorter_than_the_warm_up_is_ignored():
     long = record(80, 1)
     both = assess(LINEAR, Split(record(200), join((record(2, 7), long))), SHOOTING)
-    alone = assess(LINEAR, Split(record(200), long), SHOOTING)
-    assert both.metrics["validation"]["free_run"].rmse == alone.metrics["validation"]["free_run"].rmse
-    assert both.residual_tests.ljung_box == alone.residual_tests.ljung_box
+    single = assess(LINEAR, Split(record(200), long), SHOOTING)
+    assert both.metrics["validation"]["free_run"].rmse == single.metrics["validation"]["free_run"].rmse
+    assert both.residual_tests.ljung_box == single.residual_tests.ljung_box
 
 
 @pytest.mark.parametrize(("residuals", "lag"), [(3, 1), (4, 1), (7, 2), (20, 9), (52, 25), (80, 25)])
-def test_a_short_validation_part_is_tested_for_fewer_lags(residuals, lag):
+def test_short_validation_part_is_tested_at_fewer_lags(residuals, lag):
     found = assess(LINEAR, Split(record(200), record(residuals + 2)), SHOOTING)
     assert found.residual_tests.tests[0].lags.tolist() == list(range(lag + 1))
 
 
 @pytest.mark.parametrize(("samples", "warm_up"), [(3, 2), (4, 2), (12, 10)])
-def test_a_validation_part_with_too_few_residuals_is_refused(samples, warm_up):
+def test_validation_part_with_too_few_residuals_is_refused(samples, warm_up):
     with pytest.raises(RecordError) as caught:
         assess(LINEAR, Split(record(200), record(samples)), SHOOTING, warm_up)
     assert str(caught.value) == (
@@ -184,14 +184,14 @@ def test_a_validation_part_with_too_few_residuals_is_refused(samples, warm_up):
     )
 
 
-def test_a_validation_part_without_a_prediction_is_refused():
+def test_validation_part_without_a_prediction_is_refused():
     with pytest.raises(RecordError, match="the longest recording has 2 samples and the warm-up takes 2"):
         assess(LINEAR, Split(record(200), record(2)), SHOOTING)
 
 
-def test_a_constant_validation_output_has_an_error_and_no_share_of_a_range():
-    still = Dataset(record(90).u, np.full(90, 0.25), 0.1)
-    found = assess(LINEAR, Split(record(200), still), SHOOTING).metrics["validation"]["free_run"]
+def test_constant_validation_output_has_an_rmse_but_no_mape_or_r2():
+    constant = Dataset(record(90).u, np.full(90, 0.25), 0.1)
+    found = assess(LINEAR, Split(record(200), constant), SHOOTING).metrics["validation"]["free_run"]
     assert found.rmse > 0.0
     assert math.isnan(found.mape)
     assert math.isnan(found.r2)

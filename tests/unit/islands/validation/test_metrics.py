@@ -1,4 +1,4 @@
-"""The metrics are those of the paper's equations and of the toolboxes, and they never warn."""
+"""Error metrics and information criteria: hand calculations, edge cases and errors."""
 
 import dataclasses
 import math
@@ -13,7 +13,7 @@ Y = np.array([0.0, 1.0, 4.0, 3.0])
 YHAT = np.array([0.0, 2.0, 4.0, 1.0])
 
 
-def test_metrics_worked_by_hand():
+def test_metrics_match_a_hand_calculation():
     # Errors 0, -1, 0, 2 on a range of 4; the mean is 2, the squared deviations 4 + 1 + 4 + 1.
     found = metrics(Y, YHAT)
     assert found.mape == pytest.approx(100 * 3 / (4 * 4))
@@ -22,48 +22,48 @@ def test_metrics_worked_by_hand():
     assert found.fit_percent == pytest.approx(100 * (1 - math.sqrt(5 / 10)))
 
 
-def test_a_perfect_prediction_has_no_error():
+def test_perfect_prediction_has_no_error():
     assert metrics(Y, Y) == Metrics(mape=0.0, r2=1.0, rmse=0.0, fit_percent=100.0)
 
 
-def test_predicting_the_mean_explains_nothing():
+def test_prediction_of_the_mean_has_zero_r2_and_fit():
     found = metrics(Y, np.full(4, Y.mean()))
     assert found.r2 == pytest.approx(0.0, abs=1e-15)
     assert found.fit_percent == pytest.approx(0.0, abs=1e-13)
 
 
-def test_a_prediction_worse_than_the_mean_has_negative_r2_and_fit():
+def test_prediction_worse_than_the_mean_has_negative_r2_and_fit():
     found = metrics(Y, -Y)
     assert found.r2 == pytest.approx(1 - 4 * 26 / 10)
     assert found.fit_percent < 0
 
 
-def test_all_but_rmse_are_free_of_the_unit_and_the_offset():
+def test_metrics_except_rmse_do_not_depend_on_unit_and_offset():
     here, there = metrics(Y, YHAT), metrics(1e-6 * Y + 3e-6, 1e-6 * YHAT + 3e-6)
     assert (there.mape, there.r2, there.fit_percent) == pytest.approx((here.mape, here.r2, here.fit_percent))
     assert there.rmse == pytest.approx(1e-6 * here.rmse)
 
 
-def test_no_unit_is_too_small_to_be_squared():
+def test_metrics_do_not_underflow_in_small_units():
     here, there = metrics(Y, YHAT), metrics(1e-200 * Y, 1e-200 * YHAT)
     assert there.r2 == pytest.approx(here.r2)
     assert there.rmse == pytest.approx(1e-200 * here.rmse, rel=1e-12)
 
 
-def test_pairs_with_a_nan_on_either_side_are_left_out():
+def test_samples_with_a_nan_on_either_side_are_ignored():
     measured = np.concatenate(([100.0, 5.0], Y, [math.nan]))
     predicted = np.concatenate(([math.nan, math.nan], YHAT, [7.0]))
     assert metrics(measured, predicted) == metrics(Y, YHAT)
 
 
 @pytest.mark.parametrize("samples", [0, 3])
-def test_nothing_to_compare_gives_nan(samples):
+def test_metrics_without_a_common_sample_are_nan(samples):
     found = metrics(np.ones(samples), np.full(samples, math.nan))
     assert all(math.isnan(value) for value in dataclasses.astuple(found))
 
 
-def test_a_constant_output_has_an_rmse_alone():
-    # 0.1 is no binary fraction: a rounded mean must not pass for a spread.
+def test_constant_output_only_has_an_rmse():
+    # 0.1 is not a binary fraction: the rounding of the mean must not count as variation.
     found = metrics(np.full(7, 0.1), np.full(7, 0.4))
     assert found.rmse == pytest.approx(0.3)
     assert math.isnan(found.mape)
@@ -71,24 +71,24 @@ def test_a_constant_output_has_an_rmse_alone():
     assert math.isnan(found.fit_percent)
 
 
-def test_a_given_range_scales_mape_and_nothing_else():
+def test_given_range_only_scales_mape():
     found = metrics(Y, YHAT, output_range=8.0)
     assert found.mape == pytest.approx(metrics(Y, YHAT).mape / 2)
     assert dataclasses.replace(found, mape=0.0) == dataclasses.replace(metrics(Y, YHAT), mape=0.0)
 
 
-def test_a_given_range_makes_mape_of_a_constant_output():
+def test_given_range_defines_mape_of_a_constant_output():
     assert metrics(np.full(3, 2.0), np.full(3, 2.5), output_range=10.0).mape == pytest.approx(5.0)
 
 
-def test_a_given_range_of_zero_leaves_mape_undefined():
+def test_given_range_of_zero_makes_mape_nan():
     found = metrics(Y, YHAT, output_range=0.0)
     assert math.isnan(found.mape)
     assert found.r2 == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("far", [1e200, math.inf])
-def test_a_run_that_blew_up_is_infinitely_wrong_without_a_warning(far):
+def test_overflowing_prediction_has_an_infinite_error_without_a_warning(far):
     found = metrics(Y, np.array([0.0, 2.0, far, -far]))
     assert found.r2 == -math.inf
     assert found.fit_percent == -math.inf
@@ -98,17 +98,17 @@ def test_a_run_that_blew_up_is_infinitely_wrong_without_a_warning(far):
 @pytest.mark.parametrize(
     ("measured", "predicted"), [(np.ones(3), np.ones(4)), (np.ones((3, 1)), np.ones((3, 1)))]
 )
-def test_arrays_that_do_not_pair_are_refused(measured, predicted):
+def test_arrays_of_different_shape_are_refused(measured, predicted):
     with pytest.raises(SettingsError, match=r"two \(samples,\) arrays of one length, got \(3,"):
         metrics(measured, predicted)
 
 
-def test_a_negative_range_is_refused():
+def test_negative_range_is_refused():
     with pytest.raises(SettingsError, match=r"never negative, got -1\.0"):
         metrics(Y, YHAT, output_range=-1.0)
 
 
-def test_information_criteria_worked_by_hand():
+def test_information_criteria_match_a_hand_calculation():
     # rss / N = 0.5, N = 100, p = 4.
     found = information_criteria(50.0, 100, 4)
     assert found.aic == pytest.approx(100 * math.log(0.5) + 8)
@@ -121,31 +121,31 @@ def test_aic_is_nearly_the_log_of_fpe_in_a_long_record():
     assert found.aic == pytest.approx(100_000 * math.log(found.fpe), abs=1e-3)
 
 
-def test_bic_asks_more_of_a_parameter_than_aic():
-    # A parameter that lowers rss by a factor exp(-5 / N) gains 5: more than 2, less than log 1000.
+def test_bic_penalises_a_parameter_more_than_aic():
+    # A parameter that reduces rss by a factor exp(-5 / N) gains 5: more than 2 and less than log 1000.
     small, large = information_criteria(10.0, 1000, 3), information_criteria(10.0 * math.exp(-5e-3), 1000, 4)
     assert large.aic < small.aic
     assert large.bic > small.bic
 
 
-def test_a_residual_of_zero_is_as_good_as_it_gets():
+def test_zero_residual_has_the_lowest_information_criteria():
     assert information_criteria(0.0, 10, 2) == InformationCriteria(-math.inf, -math.inf, 0.0)
 
 
-def test_the_smallest_residual_is_not_mistaken_for_zero():
+def test_smallest_positive_residual_is_not_treated_as_zero():
     assert information_criteria(5e-324, 10, 2).aic == pytest.approx(
         10 * (math.log(5e-324) - math.log(10)) + 4
     )
 
 
-def test_a_nan_residual_stays_nan():
+def test_nan_residual_gives_nan_information_criteria():
     found = information_criteria(math.nan, 10, 2)
     assert all(math.isnan(value) for value in dataclasses.astuple(found))
 
 
 @pytest.mark.parametrize("samples", [0, 4, 5])
 def test_more_parameters_than_samples_are_refused(samples):
-    with pytest.raises(IslandsError, match=f"{samples} samples cannot judge 5 parameters"):
+    with pytest.raises(IslandsError, match=f"{samples} samples are too few for 5 parameters"):
         information_criteria(1.0, samples, 5)
 
 

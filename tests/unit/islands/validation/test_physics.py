@@ -1,4 +1,4 @@
-"""The physics check: holds, excursions and cluster sums of models whose behaviour is known on paper."""
+"""Physics checks: holds, excursions and cluster sums of models with known behaviour."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def model(terms, names=("u",)):
 
 
 def record(period=PERIOD, periods=5, **changes):
-    """A sine about a middle that is not zero, and an output of range 8 whose first sample is 3."""
+    """Return a record with a sine input of nonzero mean, and an output of range 8 whose first sample is 3."""
     angle = 2 * np.pi * np.arange(periods * period) / period
     return Dataset(MIDDLE + AMPLITUDE * np.sin(angle), 3.0 + 4.0 * np.sin(angle), 0.01, **changes)
 
@@ -27,7 +27,7 @@ def excursions(checked):
     return {entry.name: entry for entry in checked.excursions}
 
 
-#: An output that follows the input and forgets on the way: rate-independent, and y stays where it rests.
+#: A rate-independent model with fading memory whose output is constant at constant input.
 HYSTERESIS = {
     "y(k-1)": 1.0,
     "u(k-1) - u(k-2)": 0.5,
@@ -36,7 +36,7 @@ HYSTERESIS = {
 }
 
 
-def test_a_model_of_hysteresis_has_property_1_and_does_not_drift():
+def test_hysteresis_model_has_property_1_and_does_not_drift():
     checked = check_physics(model(HYSTERESIS), record())
     assert checked.property_1 is True
     assert checked.hold_drift_percent < 1e-9
@@ -44,7 +44,7 @@ def test_a_model_of_hysteresis_has_property_1_and_does_not_drift():
     assert all(entry.bounded for entry in checked.excursions)
 
 
-def test_what_constrained_least_squares_estimates_has_property_1():
+def test_constrained_least_squares_estimate_meets_the_cluster_sums():
     regressors = model(HYSTERESIS | {"y(k-3)": 1.0, "u(k-1)": 1.0, "u(k-4)": 1.0}).regressors
     rng = np.random.default_rng(3)
     data = Dataset(np.cumsum(rng.normal(size=400)), np.cumsum(rng.normal(size=400)), 0.1)
@@ -54,16 +54,16 @@ def test_what_constrained_least_squares_estimates_has_property_1():
     assert not any(entry.met for entry in cluster_sums(free))
 
 
-def test_the_sums_alone_do_not_give_property_1():
-    # Both meet the sum of 1; this one's modes are 1 and 1.5, so whatever moves it sends it away.
+def test_cluster_sums_are_not_sufficient_for_property_1():
+    # The sum is 1, but the modes are 1 and 1.5, so every disturbance diverges.
     checked = check_physics(model({"y(k-1)": 2.5, "y(k-2)": -1.5, "u(k-1) - u(k-2)": 0.1}), record())
     assert [(entry.cluster, entry.met) for entry in checked.clusters] == [("y", True)]
     assert not any(entry.bounded for entry in checked.holds)
     assert checked.property_1 is False
 
 
-def test_holds_that_stay_do_not_give_property_1_either():
-    # It settles wherever the input rests, but in one place only.
+def test_constant_holds_are_not_sufficient_for_property_1():
+    # The output settles at constant input, but at a single equilibrium.
     checked = check_physics(model({"y(k-1)": 0.5, "u(k-1)": 0.4}), record())
     assert all(entry.bounded and entry.constant for entry in checked.holds)
     sums = {entry.cluster: (entry.sum, entry.target, entry.met) for entry in checked.clusters}
@@ -72,14 +72,14 @@ def test_holds_that_stay_do_not_give_property_1_either():
 
 
 @pytest.mark.parametrize("terms", [{"u(k-1) - u(k-2)": 0.5}, {"1": 2.0}, {"y(k-1)*u(k-1)": 0.01}])
-def test_an_output_that_is_not_fed_back_has_no_continuum_of_equilibria(terms):
-    # The first has no cluster at all, and its output is zero and constant in every hold.
+def test_model_without_feedback_has_no_continuum_of_equilibria(terms):
+    # The first model has no cluster; its output is zero and constant in every hold.
     checked = check_physics(model(terms), record())
     assert checked.clusters[0] == ClusterSum("y", 0.0, 1.0)
     assert checked.property_1 is False
 
 
-def test_an_output_that_hops_between_two_values_is_not_constant():
+def test_output_alternating_between_two_values_is_not_constant():
     checked = check_physics(model({"y(k-2)": 1.0, "u(k-1) - u(k-2)": 0.1}), record())
     assert checked.clusters == (ClusterSum("y", 1.0, 1.0),)
     assert all(entry.bounded for entry in checked.holds)
@@ -87,20 +87,20 @@ def test_an_output_that_hops_between_two_values_is_not_constant():
     assert checked.property_1 is False
 
 
-def test_a_transient_that_dies_out_is_no_want_of_constancy():
-    # Modes 1 and -0.4: it still answers when the hold begins, and stands still in its second half.
+def test_decaying_transient_does_not_violate_property_1():
+    # Modes 1 and -0.4: a transient remains when the hold starts, but has decayed in its second half.
     settling = model({"y(k-1)": 0.6, "y(k-2)": 0.4, "u(k-1) - u(k-2)": 0.1})
     checked = check_physics(settling, record())
     assert checked.hold_drift_percent > 1e-3
     assert checked.property_1 is True
-    # It swings about its end, and what counts is how far that is from where it began.
+    # The output oscillates about its final value; the drift is the difference of last and first sample.
     for entry in checked.holds:
         y = hold_response(settling, record(), entry.level, entry.loading)[1][-20 * PERIOD + 2 :]
         assert entry.drift_percent == pytest.approx(100 * abs(y[-1] - y[0]) / 8, rel=1e-9)
         assert entry.drift_percent < 0.9 * 100 * np.ptp(y) / 8
 
 
-def test_there_are_ten_holds_at_five_levels():
+def test_physics_check_has_ten_holds_at_five_levels():
     holds = check_physics(model(HYSTERESIS), record()).holds
     assert len(LEVELS) == 5
     assert sorted((entry.level, entry.loading) for entry in holds) == sorted(
@@ -110,29 +110,29 @@ def test_there_are_ten_holds_at_five_levels():
 
 @pytest.mark.parametrize("loading", [True, False])
 @pytest.mark.parametrize("level", LEVELS)
-def test_a_hold_ends_at_its_level_from_the_side_that_it_names(level, loading):
+def test_hold_reaches_its_level_from_the_stated_side(level, loading):
     signal, y = hold_response(model(HYSTERESIS), record(), level, loading)
-    rest = signal[-20 * PERIOD :]
-    assert np.all(rest == level)
+    held = signal[-20 * PERIOD :]
+    assert np.all(held == level)
     assert len(signal) == len(y)
     before = signal[-20 * PERIOD - 1]
     assert (before < level) if loading else (before > level)
     assert np.abs(signal).max() == pytest.approx(1.0, abs=1e-9)
 
 
-def test_the_drift_is_that_of_a_hand_computation():
-    forgetful = model({"y(k-1)": 0.9999, "u(k-1) - u(k-2)": 0.8})
+def test_drift_matches_a_hand_calculation():
+    decaying = model({"y(k-1)": 0.9999, "u(k-1) - u(k-2)": 0.8})
     data = record()
-    checked = check_physics(forgetful, data)
+    checked = check_physics(decaying, data)
     drifts = {(entry.level, entry.loading): entry.drift_percent for entry in checked.holds}
     for (level, loading), drift in drifts.items():
-        signal, simulated = hold_response(forgetful, data, level, loading)
+        signal, simulated = hold_response(decaying, data, level, loading)
         u = MIDDLE + AMPLITUDE * np.concatenate([[0.0, 0.0], signal])
         y = [3.0, 3.0]
         for k in range(2, len(u)):
             y.append(0.9999 * y[-1] + 0.8 * (u[k - 1] - u[k - 2]))
         np.testing.assert_allclose(simulated, y[2:], rtol=1e-12)
-        # From two samples into the rest on it decays alone, 20 periods less 2 and 1 samples long.
+        # From the third sample of the hold on the output only decays, over 20 periods less 3 samples.
         begin = y[-20 * PERIOD + 2]
         expected = 100 * abs(begin) * (1 - 0.9999 ** (20 * PERIOD - 3)) / 8.0
         assert drift == pytest.approx(expected, rel=1e-9)
@@ -141,7 +141,7 @@ def test_the_drift_is_that_of_a_hand_computation():
     assert all(entry.bounded for entry in checked.holds)
 
 
-def test_a_divergence_is_infinite_and_gives_no_warning():
+def test_divergence_gives_infinite_values_without_a_warning():
     checked = check_physics(model({"y(k-1)": 1.0, "y(k-1)^3*u(k-1)^2": 1.0}), record())
     assert not any(entry.bounded or entry.constant for entry in checked.holds)
     assert {entry.drift_percent for entry in checked.holds} == {np.inf}
@@ -154,25 +154,25 @@ def test_a_divergence_is_infinite_and_gives_no_warning():
 # Excursions.
 
 
-def test_the_excursions_are_minor_loops_half_the_amplitude_and_other_rates():
+def test_excursions_are_minor_loops_half_amplitude_and_other_rates():
     names = list(excursions(check_physics(model(HYSTERESIS), record())))
     assert names == ["minor-loops", "amplitude x 0.5", "rate x 0.25", "rate x 5"]
 
 
-# Five times the rate, these have 32 to 38 samples a period. Those of 34 and 38 have no sample at a crest but
-# one on either side, equally high.
+# At five times the rate, these have 32 to 38 samples per period. Those with 34 and 38 samples have no sample
+# at a crest, but two adjacent samples of equal height.
 @pytest.mark.parametrize("period", [160, 165, 170, 175, 180, 190])
-def test_a_rate_independent_model_closes_its_loops(period):
+def test_rate_independent_model_closes_its_loops(period):
     found = excursions(check_physics(model(HYSTERESIS), record(period)))
-    # At half the amplitude its memory fades more slowly: by exp(-0.3 * 20) in a turn.
+    # At half the amplitude the memory fades more slowly: by exp(-0.3 * 20) per period.
     assert found["amplitude x 0.5"].closure_percent < 1e-4
     assert found["rate x 0.25"].closure_percent < 1e-9
     assert found["rate x 5"].closure_percent < 1e-9
-    # One sample of lag, on legs of different steepness: all that a nested loop leaves open is that.
+    # A nested loop only stays open by one sample of lag on legs of different steepness.
     assert found["minor-loops"].closure_percent < 0.1
 
 
-def test_a_copy_of_the_input_closes_at_every_crest():
+def test_model_proportional_to_the_input_closes_its_loops():
     found = excursions(check_physics(model({"y(k-1)": 1.0, "u(k-1) - u(k-2)": 0.5}), record(170)))
     for name in ("amplitude x 0.5", "rate x 0.25", "rate x 5"):
         assert found[name].closure_percent < 1e-9
@@ -181,53 +181,53 @@ def test_a_copy_of_the_input_closes_at_every_crest():
     assert found["minor-loops"].range_percent == pytest.approx(100 * AMPLITUDE / 8, rel=1e-3)
 
 
-def test_a_ratchet_opens_by_the_way_of_a_turn():
-    # It climbs by a hundredth of the way that the input goes: four amplitudes a turn.
+def test_closure_of_a_ratchet_is_its_gain_per_period():
+    # The output rises by a hundredth of the path of the input: four amplitudes per period.
     ratchet = model({"y(k-1)": 1.0, "abs(u(k-1) - u(k-2))": 0.01})
     found = excursions(check_physics(ratchet, record(160)))
-    turn = 100 * 0.01 * 4 * AMPLITUDE / 8
-    assert found["amplitude x 0.5"].closure_percent == pytest.approx(turn / 2, rel=1e-9)
-    assert found["rate x 0.25"].closure_percent == pytest.approx(turn, rel=1e-9)
-    assert found["rate x 5"].closure_percent == pytest.approx(turn, rel=1e-9)
+    per_period = 100 * 0.01 * 4 * AMPLITUDE / 8
+    assert found["amplitude x 0.5"].closure_percent == pytest.approx(per_period / 2, rel=1e-9)
+    assert found["rate x 0.25"].closure_percent == pytest.approx(per_period, rel=1e-9)
+    assert found["rate x 5"].closure_percent == pytest.approx(per_period, rel=1e-9)
 
 
 # What the record gives: the period, the range, a place to start from.
 
 
-def rest_of(data, terms=HYSTERESIS, names=("u",)):
-    """Return the length of the rest of a hold, which is twenty periods."""
+def hold_length(data, terms=HYSTERESIS, names=("u",)):
+    """Return the length of a hold in samples, which is twenty periods."""
     signal, _ = hold_response(model(terms, names), data)
     return len(signal) - 1 - int(np.flatnonzero(signal != signal[-1])[-1])
 
 
-def test_the_period_is_that_of_the_records_sine():
-    assert rest_of(record(200)) == 20 * 200
-    assert rest_of(record(1000)) == 20 * 1000
+def test_period_is_that_of_the_sine_of_the_record():
+    assert hold_length(record(200)) == 20 * 200
+    assert hold_length(record(1000)) == 20 * 1000
 
 
-def test_the_period_of_noise_comes_from_its_range_and_slope():
+def test_period_for_noise_follows_from_its_range_and_slope():
     rng = np.random.default_rng(5)
     u = np.cumsum(rng.normal(size=5000))
     expected = int(np.pi * np.ptp(u) / np.sqrt(2 * np.mean(np.diff(u) ** 2)))
     assert 40 < expected < 5000
-    assert rest_of(Dataset(u, u, 0.1)) == 20 * expected
+    assert hold_length(Dataset(u, u, 0.1)) == 20 * expected
 
 
-def test_the_period_of_a_very_slow_record_is_cut():
-    assert rest_of(record(40_000, 1)) == 100_000
+def test_period_for_a_very_slow_record_is_limited():
+    assert hold_length(record(40_000, 1)) == 100_000
 
 
 @pytest.mark.parametrize(("lag", "period"), [(2, 40), (10, 40), (30, 120)])
-def test_the_period_of_a_very_fast_record_is_stretched_for_the_models_memory(lag, period):
+def test_period_for_a_very_fast_record_depends_on_the_largest_lag(lag, period):
     u = np.tile([1.0, -1.0], 100)
-    assert rest_of(Dataset(u, u, 0.1), {"y(k-1)": 1.0, f"u(k-1) - u(k-{lag})": 0.5}) == 20 * period
+    assert hold_length(Dataset(u, u, 0.1), {"y(k-1)": 1.0, f"u(k-1) - u(k-{lag})": 0.5}) == 20 * period
 
 
-def test_a_step_between_two_recordings_is_no_slope():
+def test_step_between_recordings_does_not_count_as_slope():
     angle = 2 * np.pi * np.arange(400) / 200
     u = np.concatenate([np.sin(angle), 1000 + np.sin(angle)])
-    alone = rest_of(Dataset(u, u, 0.1, segments=(400, 400)))
-    across = rest_of(Dataset(u, u, 0.1))
+    alone = hold_length(Dataset(u, u, 0.1, segments=(400, 400)))
+    across = hold_length(Dataset(u, u, 0.1))
     assert alone == 100_000
     assert across < alone
 
@@ -235,18 +235,18 @@ def test_a_step_between_two_recordings_is_no_slope():
 TWO = {"y(k-1)": 1.0, "u1(k-1) - u1(k-2)": 0.5, "u2(k-1) - u2(k-2)": -0.25}
 
 
-def test_all_inputs_of_a_model_move_together_over_their_own_ranges():
+def test_inputs_are_excited_simultaneously_over_their_ranges():
     angle = 2 * np.pi * np.arange(800) / 200
     u = np.column_stack([2 * np.sin(angle), 40 + 10 * np.cos(angle)])
     data = Dataset(u, 4.0 * np.sin(angle), 0.1)
     checked = check_physics(model(TWO, ("a", "b")), data)
     assert checked.property_1 is True
     assert checked.hold_drift_percent < 1e-9
-    # 0.5 * 2 and -0.25 * 10 together, up and down, of a range of 8.
+    # Contributions 0.5 * 2 and -0.25 * 10, peak to peak, relative to a range of 8.
     assert excursions(checked)["rate x 0.25"].range_percent == pytest.approx(100 * 2 * 1.5 / 8, rel=1e-3)
 
 
-def test_a_hold_is_at_a_level_of_every_input_about_its_own_middle():
+def test_hold_level_is_relative_to_the_midpoint_of_every_input():
     angle = 2 * np.pi * np.arange(800) / 200
     data = Dataset(np.column_stack([2 * np.sin(angle), 40 + 10 * np.cos(angle)]), np.sin(angle), 0.1)
     total = model({"u1(k-1)": 1.0, "u2(k-1)": 1.0}, ("a", "b"))
@@ -254,19 +254,19 @@ def test_a_hold_is_at_a_level_of_every_input_about_its_own_middle():
     assert hold_response(total, data, -0.8)[1][-1] == pytest.approx(-0.8 * 2 + 40 - 0.8 * 10)
 
 
-def test_the_period_comes_from_the_first_input_that_varies():
+def test_period_follows_from_the_first_varying_input():
     angle = 2 * np.pi * np.arange(800) / 200
     data = Dataset(np.column_stack([np.ones(800), np.sin(angle)]), np.sin(angle), 0.1)
-    assert rest_of(data, TWO, ("a", "b")) == 20 * 200
+    assert hold_length(data, TWO, ("a", "b")) == 20 * 200
     assert check_physics(model(TWO, ("a", "b")), data).property_1 is True
 
 
-def test_of_a_constant_output_what_stays_has_not_drifted_and_what_moves_has_infinitely():
+def test_drift_relative_to_a_constant_output_is_zero_or_infinite():
     data = Dataset(record().u, np.full(record().samples, 2.0), 0.01)
-    still = check_physics(model({"y(k-1)": 1.0}), data)
-    assert still.property_1 is True
-    assert still.hold_drift_percent == 0.0
-    assert {(entry.bounded, entry.closure_percent, entry.range_percent) for entry in still.excursions} == {
+    constant = check_physics(model({"y(k-1)": 1.0}), data)
+    assert constant.property_1 is True
+    assert constant.hold_drift_percent == 0.0
+    assert {(entry.bounded, entry.closure_percent, entry.range_percent) for entry in constant.excursions} == {
         (True, 0.0, 0.0)
     }
     moved = check_physics(model({"y(k-1)": 0.9999, "u(k-1) - u(k-2)": 0.5}), data)
@@ -276,21 +276,21 @@ def test_of_a_constant_output_what_stays_has_not_drifted_and_what_moves_has_infi
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])
-def test_a_record_of_a_few_samples_is_enough_for_the_check(samples):
+def test_record_of_a_few_samples_is_sufficient_for_the_check(samples):
     u, y = np.array([1.0, 2.0, 4.0])[:samples], np.array([0.0, 0.5, 0.2])[:samples]
     checked = check_physics(model(HYSTERESIS), Dataset(u, y, 0.1))
     assert len(checked.holds) == 10
     assert checked.property_1 is True
 
 
-def test_a_constant_model_reads_no_past_and_is_checked_all_the_same():
+def test_constant_model_can_be_checked():
     checked = check_physics(model({"1": 2.0}), record())
     assert len(checked.holds) == 10
     assert checked.hold_drift_percent == 0.0
     assert [(entry.cluster, entry.sum) for entry in checked.clusters] == [("y", 0.0), ("1", 2.0)]
 
 
-def test_without_an_output_to_start_from_there_is_no_check():
+def test_record_without_a_measured_output_is_refused():
     data = Dataset(record().u, np.full(record().samples, np.nan), 0.01)
     with pytest.raises(RecordError, match="the output is missing at sample 0, where a simulation starts"):
         check_physics(model(HYSTERESIS), data)

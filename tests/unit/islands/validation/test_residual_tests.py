@@ -1,4 +1,4 @@
-"""Each correlation test finds the fault it is for, and a true model is seldom turned down."""
+"""Residual tests: every test detects its fault, and a true model is rejected at the nominal rate."""
 
 import math
 
@@ -18,13 +18,13 @@ def noise_and_input(seed, samples=SAMPLES, inputs=1):
     return rng.standard_normal(samples), rng.standard_normal((samples, inputs))
 
 
-def named(result, name, index=0):
+def get_test(result, name, index=0):
     wanted = None if name == "xi_xi" else index
     (found,) = [test for test in result.tests if (test.name, test.input) == (name, wanted)]
     return found
 
 
-def failed(result):
+def failed_names(result):
     return {test.name for test in result.tests if not test.passed}
 
 
@@ -32,18 +32,18 @@ def largest_lag(test):
     return test.lags[np.argmax(np.abs(test.values))]
 
 
-def delayed(signal, delay):
+def delay_by(signal, delay):
     return np.concatenate((np.zeros(delay), signal[:-delay]))
 
 
-def oracle(past, present, lag):
-    """The definition, pair by pair: both means removed, scaled by the zero-lag products."""
+def correlate_pairs(past, present, lag):
+    """Compute the definition pair by pair: means removed, normalised by the zero-lag products."""
     past, present = past - past.mean(), present - present.mean()
     pairs = [past[k - lag] * present[k] for k in range(len(past)) if 0 <= k - lag < len(past)]
     return math.fsum(pairs) / math.sqrt(math.fsum(past**2) * math.fsum(present**2))
 
 
-def test_values_are_those_of_the_definitions():
+def test_correlations_match_their_definitions():
     xi, u = noise_and_input(1, samples=60)
     xi, u = xi + 0.3, u + 5.0
     result = residual_tests(xi, u, max_lag=4)
@@ -56,8 +56,8 @@ def test_values_are_those_of_the_definitions():
         "u2_xi2": (source**2, noise**2, 0),
     }
     for name, (past, present, late) in signals.items():
-        test = named(result, name)
-        expected = [oracle(past, present, lag + late) for lag in test.lags]
+        test = get_test(result, name)
+        expected = [correlate_pairs(past, present, lag + late) for lag in test.lags]
         np.testing.assert_allclose(test.values, expected, rtol=0, atol=1e-12, err_msg=name)
 
 
@@ -70,23 +70,23 @@ def test_lags_band_and_labels():
         assert test.lags.tolist() == list(range(-3 if two_sided else 0, 4))
         assert test.band == pytest.approx(1.96 / 20)
         assert test.limit > test.band
-    assert named(result, "xi_xi").label == r"$\phi_{\xi\xi}(\tau)$"
-    assert named(result, "u2_xi2").label == r"$\phi_{(u^2)'\xi^2}(\tau)$"
+    assert get_test(result, "xi_xi").label == r"$\phi_{\xi\xi}(\tau)$"
+    assert get_test(result, "u2_xi2").label == r"$\phi_{(u^2)'\xi^2}(\tau)$"
 
 
-def test_the_residual_correlates_fully_with_itself_at_lag_0_and_that_lag_does_not_count():
+def test_autocorrelation_at_lag_zero_does_not_count():
     xi, u = noise_and_input(3)
-    test = named(residual_tests(xi, u, max_lag=20), "xi_xi")
+    test = get_test(residual_tests(xi, u, max_lag=20), "xi_xi")
     assert test.values[0] == pytest.approx(1.0)
     outside = np.count_nonzero(np.abs(test.values[1:]) > test.band)
     assert test.inside_percent == pytest.approx(100 * (20 - outside) / 20)
     assert test.passed
 
 
-def test_the_limit_holds_all_lags_of_all_tests_at_the_stated_level():
+def test_limit_has_the_nominal_level_for_all_lags_of_all_tests():
     xi, u = noise_and_input(4)
-    # One input: five correlation tests and the whiteness share the level; u_xi has 11 lags.
-    test = named(residual_tests(xi, u, max_lag=5), "u_xi")
+    # With one input, five correlation tests and the whiteness test share the level; u_xi has 11 lags.
+    test = get_test(residual_tests(xi, u, max_lag=5), "u_xi")
     one_value = scipy.special.chdtr(1, SAMPLES * test.limit**2)
     assert one_value ** (6 * 11) == pytest.approx(1 - FALSE_ALARM)
 
@@ -94,14 +94,14 @@ def test_the_limit_holds_all_lags_of_all_tests_at_the_stated_level():
 def test_ljung_box_is_the_weighted_sum_of_squared_autocorrelations():
     xi, u = noise_and_input(5, samples=50)
     result = residual_tests(xi, u, max_lag=6)
-    statistic = 50 * 52 * sum(oracle(xi, xi, lag) ** 2 / (50 - lag) for lag in range(1, 7))
+    statistic = 50 * 52 * sum(correlate_pairs(xi, xi, lag) ** 2 / (50 - lag) for lag in range(1, 7))
     assert result.ljung_box == pytest.approx(statistic)
     assert result.whiteness_p == pytest.approx(scipy.special.chdtrc(6, statistic))
 
 
 @pytest.mark.parametrize("kind", ["white", "slow", "sine"])
-def test_a_true_model_is_turned_down_about_as_often_as_stated(kind):
-    turned_down, inside = 0, []
+def test_true_model_is_rejected_at_about_the_nominal_rate(kind):
+    rejected, inside = 0, []
     for seed in range(200):
         xi, u = noise_and_input(seed, samples=1000)
         if kind == "slow":
@@ -109,93 +109,93 @@ def test_a_true_model_is_turned_down_about_as_often_as_stated(kind):
         elif kind == "sine":
             u = np.sin(np.arange(1000) / 16)[:, None]
         result = residual_tests(xi, u)
-        turned_down += not result.passed
+        rejected += not result.passed
         inside.append(np.mean([test.inside_percent for test in result.tests]))
-    # 200 draws at 5 % give 10 with a deviation of 3; dependent lags make the tests turn down fewer.
-    assert turned_down <= 19
-    assert turned_down >= (4 if kind == "white" else 1)
+    # 200 draws at 5 % give 10 rejections with a standard deviation of 3; dependent lags reduce the number.
+    assert rejected <= 19
+    assert rejected >= (4 if kind == "white" else 1)
     assert np.mean(inside) == pytest.approx(95.0, abs=1.0)
 
 
-def test_a_true_model_with_two_inputs_is_turned_down_about_as_often_as_stated():
-    turned_down = sum(
+def test_true_model_with_two_inputs_is_rejected_at_the_nominal_rate():
+    rejected = sum(
         not residual_tests(*noise_and_input(seed, samples=1000, inputs=2)).passed for seed in range(200)
     )
-    assert 4 <= turned_down <= 19
+    assert 4 <= rejected <= 19
 
 
-def test_a_forgotten_linear_term_stands_in_u_xi_at_its_delay():
+def test_missing_linear_term_appears_in_u_xi_at_its_delay():
     e, u = noise_and_input(6)
-    result = residual_tests(e + 0.2 * delayed(u[:, 0], 3), u)
-    assert failed(result) == {"u_xi"}
-    assert largest_lag(named(result, "u_xi")) == 3
-    assert named(result, "u_xi").values[25 + 3] == pytest.approx(0.2 / math.sqrt(1.04), abs=0.05)
+    result = residual_tests(e + 0.2 * delay_by(u[:, 0], 3), u)
+    assert failed_names(result) == {"u_xi"}
+    assert largest_lag(get_test(result, "u_xi")) == 3
+    assert get_test(result, "u_xi").values[25 + 3] == pytest.approx(0.2 / math.sqrt(1.04), abs=0.05)
     assert not result.passed
 
 
-def test_a_single_lag_far_outside_fails_though_the_count_of_lags_looks_innocent():
+def test_single_lag_outside_the_limit_fails_the_test():
     e, u = noise_and_input(6)
-    test = named(residual_tests(e + 0.2 * delayed(u[:, 0], 3), u), "u_xi")
+    test = get_test(residual_tests(e + 0.2 * delay_by(u[:, 0], 3), u), "u_xi")
     assert test.inside_percent > 90
     assert not test.passed
 
 
-def test_coloured_noise_stands_in_xi_xi_and_in_the_whiteness():
+def test_coloured_noise_appears_in_xi_xi_and_whiteness():
     e, u = noise_and_input(7)
     result = residual_tests(scipy.signal.lfilter([1.0], [1.0, -0.3], e), u)
-    assert failed(result) == {"xi_xi"}
-    assert named(result, "xi_xi").values[1] == pytest.approx(0.3, abs=0.05)
+    assert failed_names(result) == {"xi_xi"}
+    assert get_test(result, "xi_xi").values[1] == pytest.approx(0.3, abs=0.05)
     assert result.whiteness_p < 1e-6
 
 
-def test_faint_colour_at_many_lags_is_found_by_the_whiteness_alone():
+def test_weak_colour_at_many_lags_is_only_detected_by_whiteness():
     e, u = noise_and_input(8)
     result = residual_tests(scipy.signal.lfilter([1.0, *[0.03] * 15], [1.0], e), u)
     assert result.whiteness_p < 1e-3
-    assert failed(result) == set()
+    assert failed_names(result) == set()
     assert not result.passed
 
 
-def test_a_forgotten_even_term_stands_in_u2_xi_and_not_in_u_xi():
+def test_missing_even_term_appears_in_u2_xi_and_not_in_u_xi():
     e, u = noise_and_input(9)
-    result = residual_tests(e + 0.15 * delayed(u[:, 0] ** 2, 2), u)
-    assert failed(result) == {"u2_xi"}
-    assert largest_lag(named(result, "u2_xi")) == 2
+    result = residual_tests(e + 0.15 * delay_by(u[:, 0] ** 2, 2), u)
+    assert failed_names(result) == {"u2_xi"}
+    assert largest_lag(get_test(result, "u2_xi")) == 2
 
 
-def test_a_forgotten_product_of_noise_and_input_stands_in_xi_xiu():
+def test_missing_product_of_noise_and_input_appears_in_xi_xiu():
     e, u = noise_and_input(10)
     xi = e.copy()
     for k in range(1, SAMPLES):
         xi[k] += 0.2 * xi[k - 1] * u[k - 1, 0]
     result = residual_tests(xi, u)
-    assert failed(result) == {"xi_xiu"}
-    assert largest_lag(named(result, "xi_xiu")) == 0
+    assert failed_names(result) == {"xi_xiu"}
+    assert largest_lag(get_test(result, "xi_xiu")) == 0
 
 
-def test_noise_that_grows_with_the_input_stands_in_u2_xi2_alone():
+def test_noise_that_grows_with_the_input_only_appears_in_u2_xi2():
     e, u = noise_and_input(11)
-    result = residual_tests(e * (1 + 0.5 * delayed(u[:, 0], 1)), u)
-    assert failed(result) == {"u2_xi2"}
-    assert largest_lag(named(result, "u2_xi2")) == 1
+    result = residual_tests(e * (1 + 0.5 * delay_by(u[:, 0], 1)), u)
+    assert failed_names(result) == {"u2_xi2"}
+    assert largest_lag(get_test(result, "u2_xi2")) == 1
 
 
-def test_a_fault_is_reported_at_the_input_it_comes_from():
+def test_missing_term_is_reported_at_its_input():
     e, u = noise_and_input(12, inputs=2)
-    result = residual_tests(e + 0.2 * delayed(u[:, 1], 1), u)
+    result = residual_tests(e + 0.2 * delay_by(u[:, 1], 1), u)
     assert [(test.name, test.input) for test in result.tests if not test.passed] == [("u_xi", 1)]
     assert [test.input for test in result.tests] == [None, 0, 0, 0, 0, 1, 1, 1, 1]
-    assert named(result, "u_xi", 1).label == r"$\phi_{u_{2}\xi}(\tau)$"
+    assert get_test(result, "u_xi", 1).label == r"$\phi_{u_{2}\xi}(\tau)$"
 
 
-def test_without_inputs_the_whiteness_is_tested():
+def test_residual_without_inputs_is_tested_for_whiteness():
     e, u = noise_and_input(13, inputs=0)
     result = residual_tests(e, u)
     assert [test.name for test in result.tests] == ["xi_xi"]
     assert result.passed
 
 
-def test_units_and_offsets_change_nothing():
+def test_units_and_offsets_do_not_change_the_tests():
     e, u = noise_and_input(14, samples=300)
     here, there = residual_tests(e, u), residual_tests(1e-200 * (e + 2.0), 1e160 * (u - 7.0))
     for one, other in zip(here.tests, there.tests, strict=True):
@@ -203,7 +203,7 @@ def test_units_and_offsets_change_nothing():
     assert there.whiteness_p == pytest.approx(here.whiteness_p)
 
 
-def test_the_warm_up_is_dropped_with_its_inputs():
+def test_warm_up_is_dropped_with_its_inputs():
     e, u = noise_and_input(15, samples=300)
     e[:7], u[:7] = math.nan, 1e6
     here, there = residual_tests(e, u), residual_tests(e[7:], u[7:])
@@ -213,7 +213,7 @@ def test_the_warm_up_is_dropped_with_its_inputs():
 
 
 @pytest.mark.parametrize("constant", [0.0, 0.1])
-def test_a_constant_residual_has_nothing_to_correlate(constant):
+def test_constant_residual_has_nothing_to_correlate(constant):
     _, u = noise_and_input(16, samples=300)
     result = residual_tests(np.full(300, constant), u)
     assert result.passed
@@ -221,34 +221,34 @@ def test_a_constant_residual_has_nothing_to_correlate(constant):
     for test in result.tests:
         assert not test.values.any()
         assert "constant: there is nothing to correlate" in test.note
-    assert named(result, "xi_xi").note.startswith("the residual is constant")
+    assert get_test(result, "xi_xi").note.startswith("the residual is constant")
 
 
-def test_a_constant_input_has_nothing_to_correlate():
+def test_constant_input_has_nothing_to_correlate():
     e, u = noise_and_input(17, inputs=2)
     u[:, 1] = 0.1
     result = residual_tests(e, u)
     assert result.passed
     for name in INPUT_TESTS:
-        assert not named(result, name, 1).values.any()
-        assert "constant" in named(result, name, 1).note
-        assert named(result, name, 0).note == ""
-    assert named(result, "u_xi", 1).note.startswith("input 1 is constant")
-    assert named(result, "xi_xi").note == ""
+        assert not get_test(result, name, 1).values.any()
+        assert "constant" in get_test(result, name, 1).note
+        assert get_test(result, name, 0).note == ""
+    assert get_test(result, "u_xi", 1).note.startswith("input 1 is constant")
+    assert get_test(result, "xi_xi").note == ""
 
 
-def test_a_two_level_input_has_no_even_part_to_correlate():
+def test_two_level_input_has_no_even_part_to_correlate():
     e, _ = noise_and_input(18)
-    # Levels about 0.2: their squares about the mean are equal but for rounding.
+    # Levels symmetric about 0.2: the squared deviations from the mean are equal up to rounding.
     levels = np.tile([[1.3], [-0.9], [-0.9], [1.3]], (SAMPLES // 4, 1))
     result = residual_tests(e, levels)
-    assert named(result, "u2_xi").note.startswith("the square of input 0 is constant")
-    assert not named(result, "u2_xi").values.any()
-    assert named(result, "u_xi").note == ""
-    assert named(result, "u_xi").values.any()
+    assert get_test(result, "u2_xi").note.startswith("the square of input 0 is constant")
+    assert not get_test(result, "u2_xi").values.any()
+    assert get_test(result, "u_xi").note == ""
+    assert get_test(result, "u_xi").values.any()
 
 
-def test_results_cannot_be_changed():
+def test_residual_test_results_are_read_only():
     test = residual_tests(*noise_and_input(19, samples=100)).tests[0]
     with pytest.raises(ValueError, match="read-only"):
         test.values[0] = 2.0
@@ -257,14 +257,14 @@ def test_results_cannot_be_changed():
 
 
 @pytest.mark.parametrize(("sample", "value"), [(40, math.nan), (0, math.inf), (99, math.nan)])
-def test_a_residual_that_is_missing_after_the_warm_up_is_refused(sample, value):
+def test_residual_that_is_missing_after_the_warm_up_is_refused(sample, value):
     e, u = noise_and_input(20, samples=100)
     e[sample] = value
     with pytest.raises(SettingsError, match=f"{value} at sample {sample}: only NaN before its first value"):
         residual_tests(e, u)
 
 
-def test_an_input_that_is_not_finite_is_refused_by_sample_and_channel():
+def test_error_for_a_non_finite_input_names_sample_and_channel():
     e, u = noise_and_input(21, samples=100, inputs=2)
     e[:5], u[30, 1] = math.nan, math.inf
     with pytest.raises(SettingsError, match="input 1 is not finite at sample 30"):
@@ -280,12 +280,12 @@ def test_too_few_residuals_for_the_lags_are_refused(warm_up):
 
 
 @pytest.mark.parametrize("samples", [27, 30])
-def test_short_records_are_tested_as_long_as_every_lag_has_a_pair(samples):
+def test_short_record_is_tested_if_every_lag_has_a_pair(samples):
     e, u = noise_and_input(23, samples=samples)
     assert np.isfinite(residual_tests(e, u, max_lag=25).whiteness_p)
 
 
-def test_shapes_that_do_not_fit_are_refused():
+def test_inconsistent_shapes_are_refused():
     e, u = noise_and_input(24, samples=100)
     with pytest.raises(SettingsError, match=r"got \(100,\) and \(100,\)"):
         residual_tests(e, u[:, 0])
@@ -293,6 +293,6 @@ def test_shapes_that_do_not_fit_are_refused():
         residual_tests(e, u[1:])
 
 
-def test_a_largest_lag_under_1_is_refused():
+def test_largest_lag_below_1_is_refused():
     with pytest.raises(SettingsError, match="at least 1 sample, got 0"):
         residual_tests(*noise_and_input(25, samples=100), max_lag=0)
