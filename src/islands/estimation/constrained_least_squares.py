@@ -52,7 +52,7 @@ def null_space(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | EvaluationOutcome:
     """Return a particular solution of ``S theta = c`` and an orthonormal basis of the null space of S.
 
-    Return INFEASIBLE with the first offending constraint if a row is zero, redundant or contradictory.
+    Return INFEASIBLE with the number of a constraint that is zero, redundant or contradictory.
     """
     constraints, terms = S.shape
     if not constraints:

@@ -22,7 +22,8 @@ from islands.simulation.layout import layout
 from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound, multiple_shooting
 
-#: Relative step of a central difference, a compromise between truncation and rounding errors.
+#: Step of a central difference in units of the parameters' magnitudes, a compromise between truncation and
+#: rounding errors.
 _DIFFERENCE_STEP = 1e-5
 
 #: Initial damping.

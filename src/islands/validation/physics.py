@@ -68,8 +68,9 @@ class HoldTest:
     bounded, constant : bool
         Whether the output stayed within the bound, and whether it was constant over the second half.
     drift_percent : float
-        Change of the output from the first to the last sample of the hold, in per cent of the record's output
-        range. Infinite after a divergence, or if the record's output is constant and the output changed.
+        Change of the output from the sample at which all lagged inputs are at the level to the end of the
+        hold, in per cent of the record's output range. Infinite after a divergence, or if the record's output
+        is constant and the output changed.
     """
 
     level: float
