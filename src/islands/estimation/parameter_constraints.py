@@ -103,12 +103,12 @@ class Constraint:
         The only regressor of a group with sum zero has a zero parameter and is removed.
         """
         groups = clusters(regressors, self.group)
-        alone = {
+        singletons = {
             group.members[0]
             for group in groups
             if len(group.members) == 1 and group.steady_state not in self.sums
         }
-        kept = tuple(item for position, item in enumerate(regressors) if position not in alone)
+        kept = tuple(item for position, item in enumerate(regressors) if position not in singletons)
         groups = clusters(kept, self.group)
         if not self.sums.keys() <= {group.steady_state for group in groups}:
             return EvaluationOutcome(Status.INFEASIBLE, self.lacking)

@@ -53,7 +53,7 @@ def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout
     offset = width * (np.cumsum(rows) - rows)
     gathered = padded_size(len(signals) * int(rows.sum()) * width).reshape(len(signals), -1)
     for cut, count, at, steps in zip(cuts, lanes, offset, rows, strict=True):
-        # A short lane is filled up to the end of the record; unused lanes repeat the first.
+        # A short lane is filled with the following samples of the record; unused lanes repeat the first.
         samples = start[cut : cut + count] - warm_up + np.arange(steps)[:, None]
         block = gathered[:, at : at + steps * width].reshape(len(signals), steps, width)
         block[:, :, :count] = signals[:, np.minimum(samples, record.samples - 1)]

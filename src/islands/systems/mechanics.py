@@ -105,8 +105,8 @@ def integrate_motion(u, intersample, dt, mass, damping, stiffness, elements, res
 
     ``intersample`` (2, samples) is the input half a step after each sample, and at the end of the step just
     before the next sample, where the input may jump. At samples with ``restarts`` set, the motion restarts
-    from ``x0`` and ``v0``; the elements keep their states. ``x`` is NaN from the sample
-    at which the motion is not finite.
+    from ``x0`` and ``v0``; the elements keep their states. ``x`` is NaN from the sample at which the motion
+    is not finite.
     """
     size = 2 + elements.forces.size
     state, at = np.zeros(size), np.empty(size)

@@ -33,7 +33,7 @@ class Published:
     r2: tuple[float, float]
 
 
-def _make_published(terms: Mapping[str, float], dt: float) -> Model:
+def _make_published_model(terms: Mapping[str, float], dt: float) -> Model:
     return make_model(((parse(text), value) for text, value in terms.items()), ("u_V",), "y_um", dt)
 
 
@@ -73,19 +73,19 @@ _MODEL_14 = {
 PUBLISHED: Mapping[str, Published] = MappingProxyType(
     {
         "12": Published(
-            _make_published(_MODEL_12, 1e-3),
+            _make_published_model(_MODEL_12, 1e-3),
             "equation (12), after Martins and Aguirre: ERR, AIC and constraints",
             (0.32874, 0.33374),
             (0.99940, 0.99984),
         ),
         "13": Published(
-            _make_published(_MODEL_13, 1e-3),
+            _make_published_model(_MODEL_13, 1e-3),
             "equation (13), case 1: MGGP/FROE on the Bouc-Wen piezo",
             (0.31189, 0.25250),
             (0.99940, 0.99990),
         ),
         "14": Published(
-            _make_published(_MODEL_14, 5e-5),
+            _make_published_model(_MODEL_14, 5e-5),
             "equation (14), case 2: MGGP/FROE on the measured micromanipulator at 5 V and 300 Hz",
             (1.01111, 1.01039),
             (0.99888, 0.99887),

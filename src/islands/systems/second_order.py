@@ -52,7 +52,7 @@ def estimate_second_order(u: Signal, y: Signal, dt: float, given: Mapping[str, f
     SettingsError
         The given mass is zero.
     RecordError
-        No parameter is given, and the input does not affect the output.
+        No nonzero parameter is given, and the input does not affect the output.
     """
     if given.get("m") == 0.0:
         raise SettingsError("a mass of zero does not define a second-order system: give another m")

@@ -181,12 +181,12 @@ def hold_signal(
     """
     if amplitude <= 0 or abs(level) > amplitude:
         raise SettingsError(f"a sine of amplitude {amplitude} never reaches the level {level}")
-    rest = _count_samples(dt, duration)
+    held = _count_samples(dt, duration)
     rising = np.arcsin(level / amplitude) % (2 * np.pi)
     angle = rising if loading else (np.pi - rising) % (2 * np.pi)
     before = int(np.ceil((periods + angle / (2 * np.pi)) / (frequency * dt) - 1e-9))
     approach = amplitude * np.sin(2 * np.pi * frequency * dt * np.arange(before))
-    return np.concatenate([approach, np.full(rest, level, dtype=np.float64)])
+    return np.concatenate([approach, np.full(held, level, dtype=np.float64)])
 
 
 def minor_loops(

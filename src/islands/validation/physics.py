@@ -233,19 +233,19 @@ def _simulate(
     midpoint = (record.u.max(axis=0) + record.u.min(axis=0)) / 2
     amplitude = np.ptp(record.u, axis=0) / 2
     nearest = int(np.argmin(np.abs(record.u - midpoint).sum(axis=1)))
-    rest = model.maximum_lag
+    warm_up = model.maximum_lag
     recordings = []
     for signal in signals:
-        u = midpoint + amplitude * np.concatenate([np.zeros(rest), signal])[:, None]
+        u = midpoint + amplitude * np.concatenate([np.zeros(warm_up), signal])[:, None]
         y = np.full(len(u), np.nan)
-        y[:rest] = record.y[nearest]
+        y[:warm_up] = record.y[nearest]
         recordings.append(
             Dataset(u, y, record.dt, record.input_names, record.output_name, record.input_units)
         )
     joined = join(tuple(recordings))
     simulated = free_run(model, joined, bound=divergence_bound(record)).y
     for begin, end in joined.bounds:
-        yield simulated[begin + rest : end]
+        yield simulated[begin + warm_up : end]
 
 
 def _evaluate_hold(kind: tuple[float, bool], y: NDArray[np.float64], output_range: float) -> HoldTest:

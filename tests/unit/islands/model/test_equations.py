@@ -13,7 +13,7 @@ from islands.model.parsing import parse
 from islands.model.rendering import mathml
 from support.strategies import models, regressors
 
-U, Y = Lagged(1, 1), Lagged(0, 1)
+U = Lagged(1, 1)
 
 MODEL_12 = make_model(
     [

@@ -8,7 +8,8 @@ from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SUB
 from islands.model.rendering import LARGEST_POWER, at_rest, latex, plain
 
-U, Y = Lagged(1, 1), Lagged(0, 1)
+U = Lagged(1, 1)
+Y = Lagged(0, 1)
 
 
 def mul(*factors):

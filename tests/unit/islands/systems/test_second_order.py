@@ -15,7 +15,11 @@ from support.strategies import part_of_the_examples
 
 Array = NDArray[np.float64]
 
-SAMPLES, DT = 400, 0.01
+#: Length of the records in samples.
+SAMPLES = 400
+
+#: Sampling time in seconds.
+DT = 0.01
 
 #: Natural frequency in Hz, damping ratio, mass, and the initial state relative to the response to the input.
 systems = st.tuples(

@@ -10,7 +10,8 @@ from islands.estimation.estimate import estimate
 from islands.validation.physics import LEVELS, ClusterSum, check_physics, cluster_sums, hold_response
 
 PERIOD = 200
-AMPLITUDE, MIDDLE = 10.0, 5.0
+AMPLITUDE = 10.0
+MIDPOINT = 5.0
 
 
 def model(terms, names=("u",)):
@@ -20,7 +21,7 @@ def model(terms, names=("u",)):
 def record(period=PERIOD, periods=5, **changes):
     """Return a record with a sine input of nonzero mean, and an output of range 8 whose first sample is 3."""
     angle = 2 * np.pi * np.arange(periods * period) / period
-    return Dataset(MIDDLE + AMPLITUDE * np.sin(angle), 3.0 + 4.0 * np.sin(angle), 0.01, **changes)
+    return Dataset(MIDPOINT + AMPLITUDE * np.sin(angle), 3.0 + 4.0 * np.sin(angle), 0.01, **changes)
 
 
 def excursions(checked):
@@ -127,7 +128,7 @@ def test_drift_matches_a_hand_calculation():
     drifts = {(entry.level, entry.loading): entry.drift_percent for entry in checked.holds}
     for (level, loading), drift in drifts.items():
         signal, simulated = hold_response(decaying, data, level, loading)
-        u = MIDDLE + AMPLITUDE * np.concatenate([[0.0, 0.0], signal])
+        u = MIDPOINT + AMPLITUDE * np.concatenate([[0.0, 0.0], signal])
         y = [3.0, 3.0]
         for k in range(2, len(u)):
             y.append(0.9999 * y[-1] + 0.8 * (u[k - 1] - u[k - 2]))
@@ -226,10 +227,10 @@ def test_period_for_a_very_fast_record_depends_on_the_largest_lag(lag, period):
 def test_step_between_recordings_does_not_count_as_slope():
     angle = 2 * np.pi * np.arange(400) / 200
     u = np.concatenate([np.sin(angle), 1000 + np.sin(angle)])
-    alone = hold_length(Dataset(u, u, 0.1, segments=(400, 400)))
-    across = hold_length(Dataset(u, u, 0.1))
-    assert alone == 100_000
-    assert across < alone
+    separate = hold_length(Dataset(u, u, 0.1, segments=(400, 400)))
+    joined = hold_length(Dataset(u, u, 0.1))
+    assert separate == 100_000
+    assert joined < separate
 
 
 TWO = {"y(k-1)": 1.0, "u1(k-1) - u1(k-2)": 0.5, "u2(k-1) - u2(k-2)": -0.25}
