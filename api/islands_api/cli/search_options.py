@@ -1,55 +1,93 @@
-"""Options that are settings of a search: shared by ``islands identify`` and ``islands jobs submit``."""
+"""Options of a search, for ``islands identify`` and ``islands jobs submit``, generated from `Settings`."""
 
-from typing import Annotated
+from collections.abc import Callable, Mapping
+from dataclasses import Field, dataclass, field, fields
+from functools import wraps
+from inspect import Parameter, signature
+from types import MappingProxyType
+from typing import Annotated, Any, get_args
 
 import typer
 
-from islands.estimation.parameter_constraints import CONSTRAINTS
-from islands.evolution.gp.island_profiles import ISLAND_PROFILES
-from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.topology import TOPOLOGIES
 from islands.evolution.presets import PRESETS
-from islands.model.primitives import PRIMITIVES
-
-#: Options that are settings, and have their names.
-SETTINGS = (
-    *("population", "generations", "max_terms", "max_height", "shooting", "primitives", "constraints"),
-    *("islands", "topology", "migrate_every", "migrants", "emigrants", "replaced", "characters"),
-    *("max_evaluations", "target_error"),
-)
+from islands.evolution.settings import Settings
 
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESETS))]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
-Population = Annotated[int | None, typer.Option("--population")]
-Generations = Annotated[int | None, typer.Option("--generations")]
-MaxTerms = Annotated[int | None, typer.Option("--max-terms")]
-MaxHeight = Annotated[int | None, typer.Option("--max-height")]
-Shooting = Annotated[int | None, typer.Option("--shooting", help="Samples of an interval.")]
-Primitives = Annotated[
-    list[str] | None, typer.Option("--primitive", help=f"Repeat it: {', '.join(PRIMITIVES)}.")
-]
-Constraints = Annotated[str | None, typer.Option("--constraints", help=" or ".join(CONSTRAINTS))]
-Islands = Annotated[int | None, typer.Option("--islands", help="Islands that evolve side by side.")]
-Topology = Annotated[
-    str | None, typer.Option("--topology", help=f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
-]
-MigrateEvery = Annotated[
-    str | None, typer.Option("--migrate-every", help="Generations; 5,100:20 is 20 from generation 100 on.")
-]
-Migrants = Annotated[str | None, typer.Option("--migrants", help="For each neighbour; may change likewise.")]
-Emigrants = Annotated[
-    str | None, typer.Option("--emigrants", help=f"Who leaves: {', '.join(SELECTION_POLICIES)}.")
-]
-Replaced = Annotated[
-    str | None, typer.Option("--replaced", help=f"Whose place they take: {', '.join(REPLACEMENT_POLICIES)}.")
-]
-Characters = Annotated[
-    list[str] | None,
-    typer.Option("--character", help=f"Repeat it, islands take turns: {', '.join(ISLAND_PROFILES)}."),
-]
-MaxEvaluations = Annotated[
-    int | None, typer.Option("--max-evaluations", help="End with the epoch that reaches it.")
-]
-TargetError = Annotated[
-    float | None, typer.Option("--target-error", help="RMSE; end with the epoch that reaches it.")
-]
+
+
+@dataclass(frozen=True, slots=True)
+class SearchOptions:
+    """Options of a search, as they were given.
+
+    Attributes
+    ----------
+    changes : mapping
+        The given settings, by name; every other setting has the value of the preset.
+    """
+
+    preset: str = "hysteresis"
+    seed: int = 0
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+#: Default of the parameter that `with_search_options` replaces.
+DEFAULTS = SearchOptions()
+
+
+def _option_fields() -> Mapping[str, Field[Any]]:
+    """Return the fields of `Settings` that are options, in the order of the help."""
+    names: list[str] = []
+    found = {each.name: each for each in fields(Settings) if "command_line" in each.metadata}
+    for name, each in found.items():
+        after = each.metadata["command_line"]["after"]
+        names.insert(names.index(after) + 1 if after else len(names), name)
+    return MappingProxyType({name: found[name] for name in names})
+
+
+_FIELDS = _option_fields()
+
+#: Settings that are options, in the order of the help.
+SETTINGS = tuple(_FIELDS)
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
+    return Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=annotation)
+
+
+def _setting_parameter(setting: Field[Any]) -> Parameter:
+    """Return the parameter of a setting: repeatable for a tuple, text for a union of types."""
+    declared = setting.metadata["command_line"]
+    members = get_args(setting.type)
+    kind: Any = setting.type
+    if members:
+        kind = list[members[0]] if Ellipsis in members else str  # type: ignore[valid-type]
+    option = typer.Option(declared["option"] or f"--{setting.name.replace('_', '-')}", help=declared["help"])
+    return _parameter(setting.name, Annotated[kind | None, option], None)
+
+
+def with_search_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Replace the parameter ``search`` of a command by the options of a search.
+
+    The command receives their values as one `SearchOptions`.
+    """
+    options = [
+        _parameter("preset", Preset, DEFAULTS.preset),
+        *map(_setting_parameter, _FIELDS.values()),
+        _parameter("seed", Seed, DEFAULTS.seed),
+    ]
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        changes = {name: given.pop(name) for name in SETTINGS}
+        changes = {name: value for name, value in changes.items() if value is not None}
+        command(search=SearchOptions(given.pop("preset"), given.pop("seed"), changes), **given)
+
+    declared = signature(command)
+    parameters = [
+        parameter
+        for each in declared.parameters.values()
+        for parameter in (options if each.name == "search" else [each])
+    ]
+    run.__signature__ = declared.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return run

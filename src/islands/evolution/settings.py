@@ -1,7 +1,8 @@
 """Everything that determines a run of evolution, besides the record and the seed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
+from typing import TypeVar
 
 from islands.errors import SettingsError, lookup
 from islands.estimation.parameter_constraints import CONSTRAINTS
@@ -10,12 +11,31 @@ from islands.evolution.gp.gene_structure import STRUCTURES
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from islands.evolution.migration.schedule import Schedule, schedule
-from islands.evolution.migration.topology import topology
+from islands.evolution.migration.topology import TOPOLOGIES, topology
 from islands.model.candidate_library import library_named
 from islands.model.primitives import PRIMITIVES
 
 #: More islands than this would not fit into any coordinator.
 MOST_ISLANDS = 10_000
+
+T = TypeVar("T")
+
+
+def _option(default: T, help_text: str | None = None, name: str | None = None, after: str = "") -> T:
+    """Declare a setting that is also an option of the command line.
+
+    Parameters
+    ----------
+    default
+        Default of the setting. The option's own default is None: the value of the preset.
+    name : str, optional
+        Name of the option; ``--max-terms`` for the setting ``max_terms`` by default.
+    after : str, optional
+        Setting whose option precedes this one in the help; the order of the fields by default.
+    """
+    metadata = {"option": name, "help": help_text, "after": after}
+    made: T = field(default=default, metadata={"command_line": metadata})
+    return made
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,21 +114,23 @@ class Settings:
         unit, is not above this; 0: none.
     """
 
-    population: int = 500
-    generations: int = 500
+    population: int = _option(500)
+    generations: int = _option(500)
     elite: float = 0.1
     crossover: float = 0.8
     mutation: float = 0.2
     prune: float = 0.5
     tolerance: float = 1e-5
-    max_terms: int = 10
-    max_height: int = 5
+    max_terms: int = _option(10)
+    max_height: int = _option(5)
     shifts: tuple[int, ...] = (1, 2, 3, 4, 5)
-    primitives: tuple[str, ...] = ("mul", "phi1", "phi2")
+    primitives: tuple[str, ...] = _option(
+        ("mul", "phi1", "phi2"), f"Repeat it: {', '.join(PRIMITIVES)}.", "--primitive"
+    )
     structure: str = "phi"
-    constraints: str = "hysteresis"
+    constraints: str = _option("hysteresis", " or ".join(CONSTRAINTS))
     fitness: str = "shooting"
-    shooting: int = 500
+    shooting: int = _option(500, "Samples of an interval.", after="max_height")
     tournament: int = 3
     high_level: float = 0.5
     outer: float = 0.5
@@ -120,15 +142,17 @@ class Settings:
     from_library: float = 0.0
     distinct: bool = False
     refine: bool = False
-    islands: int = 1
-    topology: str = "isolated"
-    migrate_every: int | str = 10
-    migrants: int | str = 1
-    emigrants: str = "best"
-    replaced: str = "worst"
-    characters: tuple[str, ...] = ()
-    max_evaluations: int = 0
-    target_error: float = 0.0
+    islands: int = _option(1, "Islands that evolve side by side.")
+    topology: str = _option("isolated", f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
+    migrate_every: int | str = _option(10, "Generations; 5,100:20 is 20 from generation 100 on.")
+    migrants: int | str = _option(1, "For each neighbour; may change likewise.")
+    emigrants: str = _option("best", f"Who leaves: {', '.join(SELECTION_POLICIES)}.")
+    replaced: str = _option("worst", f"Whose place they take: {', '.join(REPLACEMENT_POLICIES)}.")
+    characters: tuple[str, ...] = _option(
+        (), f"Repeat it, islands take turns: {', '.join(ISLAND_PROFILES)}.", "--character"
+    )
+    max_evaluations: int = _option(0, "End with the epoch that reaches it.")
+    target_error: float = _option(0.0, "RMSE; end with the epoch that reaches it.")
 
     def __post_init__(self) -> None:
         _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)

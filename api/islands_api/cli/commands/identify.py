@@ -8,15 +8,16 @@ import typer
 from islands.errors import SettingsError, lookup
 from islands.io.records import fingerprint
 from islands_api.cli import options
-from islands_api.cli import search_options as search
 from islands_api.cli.identify_run import RunOptions, run, stored
 from islands_api.cli.output_folder import check_folder
+from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
 from islands_service.engines import ENGINES
 
 #: Options that say how to run, not what: they may differ from one resumption to the next.
 RUNNING = ("resume", "engine", "ray_address", "wall_time", "verbose")
 
 
+@with_search_options
 def identify(
     context: typer.Context,
     record: Annotated[
@@ -35,24 +36,7 @@ def identify(
         str | None,
         typer.Option("--test", help="FILE, FRACTION of the end, or START:STOP: nothing touches it."),
     ] = None,
-    preset: search.Preset = "hysteresis",
-    population: search.Population = None,
-    generations: search.Generations = None,
-    max_terms: search.MaxTerms = None,
-    max_height: search.MaxHeight = None,
-    shooting: search.Shooting = None,
-    primitives: search.Primitives = None,
-    constraints: search.Constraints = None,
-    islands: search.Islands = None,
-    topology: search.Topology = None,
-    migrate_every: search.MigrateEvery = None,
-    migrants: search.Migrants = None,
-    emigrants: search.Emigrants = None,
-    replaced: search.Replaced = None,
-    characters: search.Characters = None,
-    max_evaluations: search.MaxEvaluations = None,
-    target_error: search.TargetError = None,
-    seed: search.Seed = 0,
+    search: SearchOptions = DEFAULTS,
     engine: Annotated[
         str | None,
         typer.Option("--engine", help=f"{' or '.join(ENGINES)}; ray by default where there are islands."),
@@ -69,7 +53,6 @@ def identify(
     verbose: Annotated[bool, typer.Option("--verbose", help="Tell what the caches take, too.")] = False,
 ) -> None:
     """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR goes on."""
-    given = locals()
     if engine is not None:
         lookup(ENGINES, engine, "engine")
     if wall_time is not None and not wall_time > 0.0:
@@ -84,7 +67,6 @@ def identify(
         if record is None or not inputs or output_column is None or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
         check_folder(out, force)
-        changes = {name: given[name] for name in search.SETTINGS if given[name] is not None}
         sources = {"record": str(record), "validation": validation, "test": test}
         files = {
             kind: str(Path(name).resolve())
@@ -99,9 +81,9 @@ def identify(
             "output": output_column,
             "dt": dt,
             "rows": rows,
-            "preset": preset,
-            "seed": seed,
-            "changes": changes,
+            "preset": search.preset,
+            "seed": search.seed,
+            "changes": dict(search.changes),
         }
         run(manner, out, job)
 

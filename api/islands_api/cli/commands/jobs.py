@@ -8,9 +8,9 @@ import typer
 from islands.errors import SettingsError
 from islands_api.cli import job_views as views
 from islands_api.cli import options
-from islands_api.cli import search_options as search
 from islands_api.cli.console import errors, output
 from islands_api.cli.output_folder import check_folder
+from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands_api.client import Client, JobFailedError
 from islands_api.client.diagnosis_calls import simulation_of
 from islands_api.schemas import JobView
@@ -46,6 +46,7 @@ _NAME = 200
 
 
 @jobs.command()
+@with_search_options
 def submit(
     record: Annotated[Path, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet.")],
     inputs: options.Inputs,
@@ -56,24 +57,7 @@ def submit(
         str | None,
         typer.Option("--validation", help="FILE, FRACTION of the end (default 0.25), or START:STOP."),
     ] = None,
-    preset: search.Preset = "hysteresis",
-    population: search.Population = None,
-    generations: search.Generations = None,
-    max_terms: search.MaxTerms = None,
-    max_height: search.MaxHeight = None,
-    shooting: search.Shooting = None,
-    primitives: search.Primitives = None,
-    constraints: search.Constraints = None,
-    islands: search.Islands = None,
-    topology: search.Topology = None,
-    migrate_every: search.MigrateEvery = None,
-    migrants: search.Migrants = None,
-    emigrants: search.Emigrants = None,
-    replaced: search.Replaced = None,
-    characters: search.Characters = None,
-    max_evaluations: search.MaxEvaluations = None,
-    target_error: search.TargetError = None,
-    seed: search.Seed = 0,
+    search: SearchOptions = DEFAULTS,
     name: Name = "",
     priority: Priority = 0,
     idempotency_key: IdempotencyKey = None,
@@ -83,7 +67,6 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Upload a record and submit a job that identifies it."""
-    given = locals()
     names = options.columns(inputs)
     held_out = _held_out(validation)
     with _client(url, key) as client:
@@ -100,15 +83,15 @@ def submit(
             dataset,
             names,
             output_column,
-            preset=preset,
-            seed=seed,
+            preset=search.preset,
+            seed=search.seed,
             dt=dt,
             rows=rows,
             validation=validating,
             name=_called(name, record),
             priority=priority,
             idempotency_key=idempotency_key,
-            **{each: given[each] for each in search.SETTINGS if given[each] is not None},
+            **search.changes,
         )
     if watch:
         _follow(url, key, job, as_json)
@@ -126,7 +109,7 @@ def diagnose(
     tolerance: options.Tolerances = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    seed: search.Seed = 0,
+    seed: Seed = 0,
     name: Name = "",
     priority: Priority = 0,
     idempotency_key: IdempotencyKey = None,
