@@ -191,7 +191,7 @@ def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:
     )
 
 
-def exported(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[str]:
+def export(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[str]:
     """Take a model as text of a kind."""
     path = f"/v1/jobs/{_part(which)}/models/{rank}/export"
     return RequestSpec("GET", path, lambda response: response.text, params={"format": form})

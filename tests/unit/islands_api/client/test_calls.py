@@ -34,20 +34,44 @@ def record(tmp_path: Path) -> Path:
 # The two clients.
 
 
-def test_both_clients_have_the_same_calls() -> None:
-    def of(kind: type) -> dict[str, list[str]]:
-        return {
-            name: list(inspect.signature(method).parameters)
-            for name, method in vars(kind).items()
-            if inspect.isfunction(method) and not name.startswith("_")
-        }
+def public_methods(kind: type) -> dict[str, Any]:
+    """Return the public methods of a class, inherited ones too."""
+    members = {name: getattr(kind, name) for name in dir(kind) if not name.startswith("_")}
+    return {name: member for name, member in members.items() if inspect.isfunction(member)}
 
-    assert of(Client) == of(AsyncClient)
-    assert inspect.signature(Client.__init__).parameters == inspect.signature(AsyncClient.__init__).parameters
+
+def test_both_clients_have_the_same_signatures() -> None:
+    blocking, awaited = public_methods(Client), public_methods(AsyncClient)
+    assert {"upload", "submit", "diagnose", "job", "export", "wait"} <= blocking.keys() == awaited.keys()
+    for name, method in blocking.items():
+        mine, other = inspect.signature(method), inspect.signature(awaited[name])
+        assert mine.parameters == other.parameters, name
+        if not inspect.isgeneratorfunction(method):
+            assert mine.return_annotation == other.return_annotation, name
+        assert method.__name__ == awaited[name].__name__ == name
+        assert method.__doc__
+    assert inspect.signature(Client) == inspect.signature(AsyncClient)
     assert all(
         inspect.iscoroutinefunction(method) or inspect.isasyncgenfunction(method)
-        for name, method in vars(AsyncClient).items()
-        if inspect.isfunction(method) and not name.startswith("_")
+        for method in awaited.values()
+    )
+
+
+@pytest.mark.parametrize("kind", [Client, AsyncClient])
+def test_signatures_name_their_parameters(kind: type) -> None:
+    variable = {
+        (name, parameter.name)
+        for name, method in public_methods(kind).items()
+        for parameter in inspect.signature(method).parameters.values()
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+    }
+    assert variable == {("submit", "settings")}
+    assert inspect.signature(kind.upload) == inspect.Signature(  # type: ignore[attr-defined]
+        [
+            inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD),
+            *inspect.signature(calls.upload).parameters.values(),
+        ],
+        return_annotation=DatasetView,
     )
 
 

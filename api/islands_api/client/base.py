@@ -1,0 +1,132 @@
+"""Base class of both clients: construction, request arguments, and one method for each call."""
+
+from collections.abc import Callable, Coroutine
+from contextlib import ExitStack
+from functools import update_wrapper
+from inspect import Parameter, iscoroutinefunction, signature
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, get_args, overload
+
+import httpx
+
+from islands_api.client import calls, diagnosis_calls
+from islands_api.client.calls import RequestSpec, T
+from islands_api.client.errors import JobFailedError
+from islands_api.client.transport import PATIENCE, make_headers, parse_address, parse_timeout, ssl_context
+from islands_api.schemas import JobView
+from islands_service.domain.job import JobState
+
+H = TypeVar("H", httpx.Client, httpx.AsyncClient)
+P = ParamSpec("P")
+
+
+class Endpoint(Generic[P, T]):
+    """Method of both clients that sends one call; `AsyncClient` returns a coroutine.
+
+    Parameters
+    ----------
+    make_request : callable
+        A function of `islands_api.client.calls`. The method has its parameters and its docstring.
+    """
+
+    def __init__(self, make_request: Callable[P, RequestSpec[T]]) -> None:
+        def send(client: Any, /, *args: P.args, **kwargs: P.kwargs) -> Any:
+            return client.call(make_request(*args, **kwargs))
+
+        async def send_async(client: Any, /, *args: P.args, **kwargs: P.kwargs) -> Any:
+            return await client.call(make_request(*args, **kwargs))
+
+        declared = signature(make_request)
+        own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
+        (answer,) = get_args(declared.return_annotation)
+        method: Any
+        for method in (send, send_async):
+            update_wrapper(method, make_request)
+            method.__signature__ = declared.replace(
+                parameters=[own, *declared.parameters.values()], return_annotation=answer
+            )
+        self._send, self._send_async = send, send_async
+
+    @overload
+    def __get__(self, client: None, owner: type) -> Callable[Concatenate[Any, P], Any]: ...
+    @overload
+    def __get__(self, client: "BaseClient[httpx.Client]", owner: type) -> Callable[P, T]: ...
+    @overload
+    def __get__(
+        self, client: "BaseClient[httpx.AsyncClient]", owner: type
+    ) -> Callable[P, Coroutine[Any, Any, T]]: ...
+    def __get__(self, client: Any, owner: Any) -> Any:
+        method = self._send_async if iscoroutinefunction(getattr(owner, "call", None)) else self._send
+        return method if client is None else method.__get__(client, owner)
+
+
+class BaseClient(Generic[H]):
+    """What both clients share: add a call to `islands_api.client.calls` and one line here.
+
+    The parameters are described in `islands_api.client.synchronous.Client`.
+    """
+
+    upload = Endpoint(calls.upload)
+    submit = Endpoint(calls.submit)
+    diagnose = Endpoint(diagnosis_calls.diagnose)
+    job = Endpoint(calls.job)
+    jobs = Endpoint(calls.jobs)
+    datasets = Endpoint(calls.datasets)
+    resume = Endpoint(calls.resume)
+    delete = Endpoint(calls.delete)
+    delete_dataset = Endpoint(calls.delete_dataset)
+    models = Endpoint(calls.models)
+    result = Endpoint(calls.result)
+    report = Endpoint(calls.report)
+    extended = Endpoint(calls.extended)
+    history = Endpoint(calls.history)
+    export = Endpoint(calls.export)
+    figure = Endpoint(calls.figure)
+
+    _http_class: type[H]
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8000",
+        key: str | None = None,
+        *,
+        timeout: float = PATIENCE,
+        retry: float = 30.0,
+        verify: Any = True,
+    ) -> None:
+        self._http: H = self._http_class(
+            base_url=parse_address(url),
+            headers=make_headers(key),
+            timeout=parse_timeout(timeout),
+            verify=ssl_context(verify),
+        )
+        self._url, self._timeout, self._retry = url, timeout, retry
+
+    def _request_arguments(self, call: RequestSpec[Any], until: float, stack: ExitStack) -> dict[str, Any]:
+        """Return the arguments of `httpx.Client.request`; the stack closes the file that is uploaded."""
+        files = None
+        if call.file is not None:
+            files = {"file": (call.file.name, stack.enter_context(call.file.open("rb")))}
+        return {
+            "method": call.method,
+            "url": call.path,
+            "params": dict(call.params),
+            "headers": dict(call.headers),
+            "json": call.json,
+            "data": call.data,
+            "files": files,
+            "timeout": parse_timeout(self._timeout, until),
+        }
+
+
+def check_succeeded(job: JobView) -> JobView:
+    """Return an ended job if it has succeeded.
+
+    Raises
+    ------
+    JobFailedError
+        The job has failed or was cancelled.
+    """
+    if job.state != JobState.SUCCEEDED:
+        detail = (job.problem or {}).get("detail", "it was cancelled")
+        raise JobFailedError(f"job {job.id} {job.state}: {detail}")
+    return job
