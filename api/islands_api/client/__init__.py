@@ -1,4 +1,4 @@
-"""The Python client, for programs that wait and for those that do not. It speaks REST alone."""
+"""Python clients of the REST API, blocking and for asyncio. Read `islands_api.client.calls` first."""
 
 from islands_api.client.asynchronous import AsyncClient
 from islands_api.client.calls import JobRef

@@ -14,8 +14,8 @@ from islands_api.client import calls
 from islands_api.client.base import BaseClient, check_succeeded
 from islands_api.client.calls import JobRef, RequestSpec, T
 from islands_api.client.errors import ServiceError
-from islands_api.client.response_parsing import Event, EventLines, refuse_problem
-from islands_api.client.transport import RetryPolicy, in_time, retry_after
+from islands_api.client.response_parsing import Event, EventParser, raise_for_problem
+from islands_api.client.transport import RetryPolicy, long_poll_seconds, translate_timeout
 from islands_api.schemas import JobView
 from islands_service.domain.job import TERMINAL, JobState
 
@@ -58,19 +58,19 @@ class AsyncClient(BaseClient[httpx.AsyncClient]):
         ServiceUnreachableError
             The service did not answer.
         """
-        tries = RetryPolicy(self._url, self._retry, until)
+        policy = RetryPolicy(self._url, self._retry, until)
         while True:
             try:
                 with ExitStack() as stack:
                     response = await self._http.request(**self._request_arguments(call, until, stack))
             except httpx.TransportError as error:
-                pause = tries.failed(error, call.repeatable)
+                pause = policy.delay_after_error(error, call.repeatable)
             else:
-                again = tries.answered(response, call.repeatable)
-                if again is None:
-                    refuse_problem(response)
+                delay = policy.delay_after_response(response, call.repeatable)
+                if delay is None:
+                    raise_for_problem(response)
                     return call.read(response)
-                pause = again
+                pause = delay
             await sleep(pause)
 
     async def cancel(self, which: JobRef) -> JobView:
@@ -103,12 +103,14 @@ class AsyncClient(BaseClient[httpx.AsyncClient]):
             The job has not ended within this number of seconds.
         """
         until = monotonic() + seconds
-        with in_time(calls.id_of(which), seconds, until):
+        with translate_timeout(calls.get_id(which), seconds, until):
             job = await self.call(calls.job(which), until)
         yield job
         while job.state not in TERMINAL:
-            with in_time(job.id, seconds, until):
-                after = await self.call(calls.changed(job, retry_after(self._timeout, until)), until)
+            with translate_timeout(job.id, seconds, until):
+                after = await self.call(
+                    calls.await_change(job, long_poll_seconds(self._timeout, until)), until
+                )
             if after.version != job.version:
                 yield after
             elif monotonic() > until:
@@ -131,9 +133,9 @@ class AsyncClient(BaseClient[httpx.AsyncClient]):
 
     async def events(self, which: JobRef, after: int = 0) -> AsyncIterator[Event]:
         """Yield the events of a job after a number until it has ended; reconnect if the connection breaks."""
-        tries = RetryPolicy(self._url, self._retry)
+        policy = RetryPolicy(self._url, self._retry)
         while True:
-            lines = EventLines()
+            parser = EventParser()
             try:
                 headers = {"Last-Event-ID": str(after)}
                 async with self._http.stream("GET", calls.events_path(which), headers=headers) as response:
@@ -141,16 +143,16 @@ class AsyncClient(BaseClient[httpx.AsyncClient]):
                         return
                     if not response.is_success:
                         await response.aread()
-                    pause = tries.answered(response)
+                    pause = policy.delay_after_response(response)
                     if pause is None:
-                        refuse_problem(response)
-                        tries.succeeded()
+                        raise_for_problem(response)
+                        policy.reset()
                         async for piece in response.aiter_bytes():
-                            for event in lines.feed(piece):
+                            for event in parser.feed(piece):
                                 after = event.number
                                 yield event
                         # A stream also ends when the service stops. The end of the job is answered by 204.
-                        pause = tries.ended()
+                        pause = policy.delay_after_stream()
             except httpx.TransportError as error:
-                pause = tries.failed(error)
+                pause = policy.delay_after_error(error)
             await sleep(pause)

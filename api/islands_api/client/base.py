@@ -11,7 +11,13 @@ import httpx
 from islands_api.client import calls, diagnosis_calls
 from islands_api.client.calls import RequestSpec, T
 from islands_api.client.errors import JobFailedError
-from islands_api.client.transport import PATIENCE, make_headers, parse_address, parse_timeout, ssl_context
+from islands_api.client.transport import (
+    ANSWER_TIMEOUT,
+    check_url,
+    make_headers,
+    make_ssl_context,
+    make_timeout,
+)
 from islands_api.schemas import JobView
 from islands_service.domain.job import JobState
 
@@ -89,15 +95,15 @@ class BaseClient(Generic[H]):
         url: str = "http://127.0.0.1:8000",
         key: str | None = None,
         *,
-        timeout: float = PATIENCE,
+        timeout: float = ANSWER_TIMEOUT,
         retry: float = 30.0,
         verify: Any = True,
     ) -> None:
         self._http: H = self._http_class(
-            base_url=parse_address(url),
+            base_url=check_url(url),
             headers=make_headers(key),
-            timeout=parse_timeout(timeout),
-            verify=ssl_context(verify),
+            timeout=make_timeout(timeout),
+            verify=make_ssl_context(verify),
         )
         self._url, self._timeout, self._retry = url, timeout, retry
 
@@ -114,7 +120,7 @@ class BaseClient(Generic[H]):
             "json": call.json,
             "data": call.data,
             "files": files,
-            "timeout": parse_timeout(self._timeout, until),
+            "timeout": make_timeout(self._timeout, until),
         }
 
 

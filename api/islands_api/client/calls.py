@@ -1,4 +1,4 @@
-"""Calls: what is sent for each thing that a client can do. No transport."""
+"""Requests of the REST API: one function for each call, without transport."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +12,7 @@ from uuid import uuid4
 import httpx
 
 from islands.errors import SettingsError
-from islands_api.client.response_parsing import document_of, read_as
+from islands_api.client.response_parsing import read_as, read_mapping
 from islands_api.schemas import (
     DatasetPage,
     DatasetView,
@@ -26,21 +26,25 @@ from islands_api.schemas import (
 
 T = TypeVar("T")
 
-#: A job, or its id.
+#: Job or its id.
 JobRef = JobView | str
 
-#: A data set, or its id.
+#: Data set or its id.
 DatasetRef = DatasetView | str
 
 
 @dataclass(frozen=True, slots=True)
 class RequestSpec(Generic[T]):
-    """One request, and what its answer means.
+    """Request, and the function that reads its answer.
 
     Attributes
     ----------
+    read : callable
+        Reads the answer.
+    data, file : mapping and Path, optional
+        Fields and file of a multipart form.
     repeatable : bool
-        To send it twice does what sending it once does: it is sent again when no answer came.
+        Whether the request is idempotent: it is sent again if no answer arrives.
     """
 
     method: str
@@ -60,8 +64,20 @@ def upload(
     output: str | None = None,
     dt: float | None = None,
 ) -> RequestSpec[DatasetView]:
-    """Upload a record; with columns it is checked as a job would."""
-    given: dict[str, Any] = {"inputs": names_of(inputs) or None, "output": output, "dt": dt}
+    """Upload a record.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV, NPZ, MAT or Parquet file.
+    inputs : str or sequence of str
+        Input columns. If columns are given, the service checks the record as it does for a job.
+    output : str, optional
+        Output column.
+    dt : float, optional
+        Sampling time in seconds, if the record has no time column.
+    """
+    given: dict[str, Any] = {"inputs": as_list(inputs) or None, "output": output, "dt": dt}
     form = {name: value for name, value in given.items() if value is not None}
     return RequestSpec("POST", "/v1/datasets", read_as(DatasetView), data=form, file=Path(path))
 
@@ -81,27 +97,35 @@ def submit(
     idempotency_key: str | None = None,
     **settings: Any,
 ) -> RequestSpec[JobView]:
-    """Submit a job; it has an idempotency key in any case, so that a lost answer makes no second job.
+    """Submit a job that identifies a record.
+
+    A random idempotency key is used if none is given, so that a lost answer does not create a second job.
 
     Parameters
     ----------
+    inputs : str or sequence of str
+        Input columns.
+    output : str
+        Output column.
+    dt : float, optional
+        Sampling time in seconds, if the record has no time column.
     rows : str, optional
-        ``START:STOP``, the samples that estimate.
+        ``START:STOP``, the samples used for estimation.
     validation : float or data set or mapping, optional
-        The share of the record's end, a data set, or ``{"dataset": ID, "rows": "START:STOP"}``.
+        Fraction of the record's end, a data set, or ``{"dataset": ID, "rows": "START:STOP"}``.
     settings
-        Those that differ from the preset's: `islands.evolution.settings.Settings`.
+        Settings that differ from those of the preset: `islands.evolution.settings.Settings`.
 
     Raises
     ------
     SettingsError
-        A number is NaN or infinite, or the idempotency key has letters that no header may have.
+        A number is NaN or infinite, or the idempotency key is not printable ASCII.
     """
     if isinstance(validation, str | DatasetView):
-        validation = {"dataset": id_of(validation)}
+        validation = {"dataset": get_id(validation)}
     given: dict[str, Any] = {
-        "dataset": id_of(dataset),
-        "inputs": names_of(inputs),
+        "dataset": get_id(dataset),
+        "inputs": as_list(inputs),
         "output": output,
         "preset": preset,
         "seed": seed,
@@ -112,146 +136,150 @@ def submit(
         "priority": priority or None,
         "settings": settings or None,
     }
-    return submission("/v1/jobs", given, idempotency_key)
+    return make_submission("/v1/jobs", given, idempotency_key)
 
 
 def job(which: JobRef) -> RequestSpec[JobView]:
-    """Look at a job."""
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}", read_as(JobView))
+    """Return a job."""
+    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}", read_as(JobView))
 
 
-def changed(which: JobView, seconds: float) -> RequestSpec[JobView]:
-    """Wait until a job is not as it was."""
+def await_change(which: JobView, seconds: float) -> RequestSpec[JobView]:
+    """Return a job when it has changed, or unchanged after some seconds (long polling)."""
 
     def read(response: httpx.Response) -> JobView:
         return which if response.status_code == HTTPStatus.NOT_MODIFIED else read_as(JobView)(response)
 
     headers = {"If-None-Match": f'"{which.version}"'}
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}", read, params={"wait": seconds}, headers=headers)
+    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}", read, params={"wait": seconds}, headers=headers)
 
 
 def jobs(state: str | None = None, cursor: str | None = None, limit: int = 50) -> RequestSpec[JobPage]:
-    """List jobs."""
+    """Return a page of jobs, newest first."""
     given = {"state": state, "cursor": cursor, "limit": limit}
     params = {key: value for key, value in given.items() if value is not None}
     return RequestSpec("GET", "/v1/jobs", read_as(JobPage), params=params)
 
 
 def datasets(cursor: str | None = None, limit: int = 50) -> RequestSpec[DatasetPage]:
-    """List data sets."""
+    """Return a page of data sets, newest first."""
     params = {"limit": limit, **({} if cursor is None else {"cursor": cursor})}
     return RequestSpec("GET", "/v1/datasets", read_as(DatasetPage), params=params)
 
 
 def cancel(which: JobRef) -> RequestSpec[JobView]:
     """Cancel a job."""
-    return RequestSpec("POST", f"/v1/jobs/{_part(which)}/cancel", read_as(JobView))
+    return RequestSpec("POST", f"/v1/jobs/{_quote_id(which)}/cancel", read_as(JobView))
 
 
 def resume(which: JobRef) -> RequestSpec[JobView]:
-    """Have a job go on that failed or was cancelled."""
-    return RequestSpec("POST", f"/v1/jobs/{_part(which)}/resume", read_as(JobView), repeatable=False)
+    """Resume a job that has failed or was cancelled."""
+    return RequestSpec("POST", f"/v1/jobs/{_quote_id(which)}/resume", read_as(JobView), repeatable=False)
 
 
 def delete(which: JobRef) -> RequestSpec[None]:
     """Delete a finished job."""
-    return RequestSpec("DELETE", f"/v1/jobs/{_part(which)}", lambda _: None, repeatable=False)
+    return RequestSpec("DELETE", f"/v1/jobs/{_quote_id(which)}", lambda _: None, repeatable=False)
 
 
 def delete_dataset(which: DatasetRef) -> RequestSpec[None]:
-    """Delete a data set."""
-    return RequestSpec("DELETE", f"/v1/datasets/{_part(which)}", lambda _: None, repeatable=False)
+    """Delete a data set that no unfinished job needs."""
+    return RequestSpec("DELETE", f"/v1/datasets/{_quote_id(which)}", lambda _: None, repeatable=False)
 
 
 def models(which: JobRef) -> RequestSpec[tuple[ModelView, ...]]:
-    """Take the models of a job."""
+    """Return the models of a job, best first."""
     page = read_as(ModelPage)
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/models", lambda response: page(response).items)
+    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/models", lambda response: page(response).items)
 
 
 def result(which: JobRef) -> RequestSpec[dict[str, Any]]:
-    """Take the whole result."""
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/result", document_of)
+    """Return the whole result: ``result.json``, or ``discrepancy.json`` of a discrepancy job."""
+    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/result", read_mapping)
 
 
 def report(which: JobRef) -> RequestSpec[bytes]:
-    """Take the report of a job."""
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/report", lambda response: response.content)
+    """Return the report of a job as one HTML file."""
+    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/report", lambda response: response.content)
 
 
 def extended(which: JobRef) -> RequestSpec[bytes]:
-    """Take the simulation with what it lacked."""
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}/extended", lambda response: response.content)
+    """Return the extended simulation of a discrepancy job: ``extended.json``."""
+    return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/extended", lambda response: response.content)
 
 
 def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:
-    """Take the course of the search."""
+    """Return a page of the search history after a generation; an empty page is the end."""
     return RequestSpec(
-        "GET", f"/v1/jobs/{_part(which)}/history", read_as(HistoryPage), params={"after": after}
+        "GET", f"/v1/jobs/{_quote_id(which)}/history", read_as(HistoryPage), params={"after": after}
     )
 
 
 def export(which: JobRef, rank: int = 1, form: str = "python") -> RequestSpec[str]:
-    """Take a model as text of a kind."""
-    path = f"/v1/jobs/{_part(which)}/models/{rank}/export"
+    """Return a model as text: python, c, matlab, latex, json and so on."""
+    path = f"/v1/jobs/{_quote_id(which)}/models/{rank}/export"
     return RequestSpec("GET", path, lambda response: response.text, params={"format": form})
 
 
 def figure(which: JobRef, name: str, rank: int | None = 1) -> RequestSpec[bytes]:
-    """Take a figure of a model, or without a rank of the search, as SVG."""
+    """Return a figure of a model as SVG, or of the search if the rank is None."""
     of = "" if rank is None else f"/models/{rank}"
     return RequestSpec(
-        "GET", f"/v1/jobs/{_part(which)}{of}/figures/{_part(name)}.svg", lambda response: response.content
+        "GET",
+        f"/v1/jobs/{_quote_id(which)}{of}/figures/{_quote_id(name)}.svg",
+        lambda response: response.content,
     )
 
 
 def figure_names(which: JobRef, rank: int | None) -> RequestSpec[tuple[str, ...]]:
-    """Ask which figures there are, of a model or of the search."""
+    """Return the names of the figures of a model, or of the search if the rank is None."""
     of = "" if rank is None else f"/models/{rank}"
     names = read_as(Names)
-    return RequestSpec("GET", f"/v1/jobs/{_part(which)}{of}/figures", lambda response: names(response).items)
+    return RequestSpec(
+        "GET", f"/v1/jobs/{_quote_id(which)}{of}/figures", lambda response: names(response).items
+    )
 
 
 def events_path(which: JobRef) -> str:
-    """Return where a job's events come from."""
-    return f"/v1/jobs/{_part(which)}/events"
+    """Return the path of the event stream of a job."""
+    return f"/v1/jobs/{_quote_id(which)}/events"
 
 
-def id_of(which: JobView | DatasetView | str) -> str:
-    """Return the id of what is given as a value or by its id."""
+def get_id(which: JobView | DatasetView | str) -> str:
+    """Return the id of a job or data set that is given as a value or as an id."""
     return which if isinstance(which, str) else which.id
 
 
-def _part(which: JobView | DatasetView | str) -> str:
-    """Return a part of a path, whatever somebody takes for an id."""
-    return quote(id_of(which), safe="")
+def _quote_id(which: JobView | DatasetView | str) -> str:
+    """Return an id as one percent-encoded path segment."""
+    return quote(get_id(which), safe="")
 
 
-def submission(path: str, given: Mapping[str, Any], idempotency_key: str | None) -> RequestSpec[JobView]:
-    """Submit a job of any kind, once; what is None is left to the service.
+def make_submission(path: str, given: Mapping[str, Any], idempotency_key: str | None) -> RequestSpec[JobView]:
+    """Return the request that submits a job of any kind. Values that are None get the service's default.
 
     Raises
     ------
     SettingsError
-        As of `submit`.
+        A number is NaN or infinite, or the idempotency key is not printable ASCII.
     """
     body = {key: value for key, value in given.items() if value is not None}
-    _refuse_no_numbers(body)
+    _check_finite(body)
     key = uuid4().hex if idempotency_key is None else idempotency_key
     if not (key.isascii() and key.isprintable()):
-        raise SettingsError(f"an idempotency key is a line of ASCII, got {key!r}")
+        raise SettingsError(f"an idempotency key consists of printable ASCII characters, got {key!r}")
     return RequestSpec("POST", path, read_as(JobView), headers={"Idempotency-Key": key}, json=body)
 
 
-def _refuse_no_numbers(body: Mapping[str, Any]) -> None:
+def _check_finite(body: Mapping[str, Any]) -> None:
     try:
         json.dumps(body, allow_nan=False)
     except ValueError as error:
         raise SettingsError(
-            "a number of the job is NaN or infinite: leave it out, or give another"
+            "a number of the job is NaN or infinite: omit it or give a finite number"
         ) from error
 
 
-def names_of(given: str | Sequence[str]) -> list[str]:
-    """Return the names that are given as a list, or as one name."""
+def as_list(given: str | Sequence[str]) -> list[str]:
+    """Return a list of names, given as one name or as a sequence."""
     return [given] if isinstance(given, str) else list(given)

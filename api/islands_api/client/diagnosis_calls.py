@@ -1,17 +1,17 @@
-"""Calls of discrepancy jobs: what is sent to have a simulation held against a record."""
+"""Requests of discrepancy jobs, which diagnose a simulation."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from islands.errors import SettingsError
 from islands.io.simulator_spec.specification import parse_spec
-from islands_api.client.calls import DatasetRef, RequestSpec, id_of, names_of, submission
+from islands_api.client.calls import DatasetRef, RequestSpec, as_list, get_id, make_submission
 from islands_api.schemas import JobView
 
 
 def diagnose(
     dataset: DatasetRef,
-    input: str,  # noqa: A002 - as the body has it
+    input: str,  # noqa: A002 - the name in the request body
     output: str,
     simulation: str | Mapping[str, Any],
     *,
@@ -24,31 +24,38 @@ def diagnose(
     priority: int = 0,
     idempotency_key: str | None = None,
 ) -> RequestSpec[JobView]:
-    """Submit a job that finds out what a simulation gets wrong about a record.
+    """Submit a job that diagnoses the errors of a simulation on a record.
 
     Parameters
     ----------
-    input, channels : str and sequence of str
-        The column that drives the simulation, and those that may couple in.
+    input : str
+        Column that drives the simulation.
     simulation : str or mapping
         As on the command line (``"bouc-wen-piezo"``, ``"model:FILE.json"``, ``"column:NAME"`` ...), or as in
-        the body.
+        the request body.
+    channels : str or sequence of str
+        Columns that may couple in, for example a temperature.
     tolerance : mapping, optional
-        Relative standard deviations of the simulation's parameters.
+        Relative standard deviations of the simulation's parameters, by name.
+    dt : float, optional
+        Sampling time in seconds, if the record has no time column.
+    rows : str, optional
+        ``START:STOP``, the samples to use.
 
     Raises
     ------
     SettingsError
-        As of `islands_api.client.calls.submit`, or as of `simulation_of`.
+        The simulation is unknown or is Python code, a number is NaN or infinite, or the idempotency key is
+        not printable ASCII.
     ModelError
-        As of `simulation_of`.
+        A model file cannot be read.
     """
     given = {
-        "dataset": id_of(dataset),
+        "dataset": get_id(dataset),
         "input": input,
         "output": output,
-        "channels": names_of(channels) or None,
-        "simulation": simulation_of(simulation) if isinstance(simulation, str) else simulation,
+        "channels": as_list(channels) or None,
+        "simulation": parse_simulation(simulation) if isinstance(simulation, str) else simulation,
         "tolerance": dict(tolerance or {}) or None,
         "seed": seed,
         "dt": dt,
@@ -56,23 +63,23 @@ def diagnose(
         "name": name or None,
         "priority": priority or None,
     }
-    return submission("/v1/discrepancies", given, idempotency_key)
+    return make_submission("/v1/discrepancies", given, idempotency_key)
 
 
-def simulation_of(text: str) -> dict[str, Any]:
-    """Return the simulation that a text asks for, as it is sent; a model file is read here.
+def parse_simulation(text: str) -> dict[str, Any]:
+    """Read the text of a simulation; return its form in the request body. A model file is read here.
 
     Raises
     ------
     SettingsError
-        It asks for nothing that there is, or for code: a service runs none of others.
+        The simulation is unknown, or is Python code, which a service does not run.
     ModelError
-        It names a model file that cannot be read.
+        A model file cannot be read.
     """
-    asked = parse_spec(text).model_dump(mode="json", exclude_unset=True)
-    if asked["kind"] == "python":
+    document = parse_spec(text).model_dump(mode="json", exclude_unset=True)
+    if document["kind"] == "python":
         raise SettingsError(
-            f"{text}: a service runs no code of others: run 'islands diagnose' where it is, or send what it "
-            "simulates as a column of the record"
+            f"{text}: a service does not run code of its clients: run 'islands diagnose' locally, or send "
+            "the simulated output as a column of the record"
         )
-    return dict(asked)
+    return dict(document)

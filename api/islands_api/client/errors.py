@@ -1,4 +1,4 @@
-"""What a client raises: the service's problems, and that it cannot be reached."""
+"""Errors of the clients: problems that the service reports, and failures to reach it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,18 +7,18 @@ from islands.errors import IslandsError
 
 
 class ServiceError(IslandsError):
-    """The service answered with a problem; the message is its detail.
+    """The service answered with a problem. The message is its detail.
 
     Attributes
     ----------
     status : int
-        Of HTTP.
+        HTTP status.
     type : str
-        ``/problems/invalid-record`` and so on: see docs/how-to/use-the-rest-api.md.
+        Type of the problem, ``/problems/invalid-record`` and so on: see docs/how-to/use-the-rest-api.md.
     detail : str
         What is wrong, and what to do.
     document : mapping
-        The whole problem.
+        The whole problem document.
     """
 
     def __init__(self, status: int, document: Mapping[str, Any]) -> None:
@@ -33,4 +33,4 @@ class ServiceUnreachableError(IslandsError):
 
 
 class JobFailedError(IslandsError):
-    """A job that was waited for has failed, or was cancelled."""
+    """A job has failed or was cancelled while the caller waited for its success."""

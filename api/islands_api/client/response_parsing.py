@@ -1,4 +1,4 @@
-"""Answers: what is made of what the service sends back. No transport."""
+"""Parsing of responses: documents, problems and event streams, without transport."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -16,14 +16,14 @@ M = TypeVar("M", bound=BaseModel)
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a job.
+    """Event of a job.
 
     Attributes
     ----------
     number : int
-        The job's version after it.
+        Version of the job after the event.
     kind : str
-        queued, running, progress, cancelling, succeeded, failed, cancelled.
+        queued, running, progress, cancelling, succeeded, failed or cancelled.
     """
 
     number: int
@@ -31,28 +31,29 @@ class Event:
     data: Mapping[str, Any]
 
 
-class EventLines:
-    """Gathers what comes over the wire until an event is complete."""
+class EventParser:
+    """Incremental parser of a stream of server-sent events."""
 
     def __init__(self) -> None:
         self._rest = b""
 
     def feed(self, piece: bytes) -> Iterator[Event]:
-        """Take what has come; yield the events that it completes."""
-        # A line ends where a byte says so: the text of an event may hold what Unicode takes for a line's end.
+        """Take the next bytes of the stream; yield the events that they complete."""
+        # Split at the byte LF only: the text of an event may contain Unicode line separators.
         *blocks, self._rest = (self._rest + piece).split(b"\n\n")
         for block in blocks:
             fields = dict(line.split(": ", 1) for line in block.decode().split("\n") if ": " in line)
-            if "event" in fields:  # what else there is are comments
+            if "event" in fields:  # other blocks are comments
                 yield Event(int(fields["id"]), fields["event"], json.loads(fields["data"]))
 
 
-def refuse_problem(response: httpx.Response) -> None:
-    """Raise what the service says is wrong.
+def raise_for_problem(response: httpx.Response) -> None:
+    """Raise the problem that a response reports.
 
     Raises
     ------
     ServiceError
+        The status is neither a success nor 304.
     """
     if response.is_success or response.status_code == HTTPStatus.NOT_MODIFIED:
         return
@@ -61,44 +62,41 @@ def refuse_problem(response: httpx.Response) -> None:
     except ValueError:
         document = None
     if not isinstance(document, dict):
-        elsewhere = response.headers.get("location")
-        said = f"look at {elsewhere}" if elsewhere else response.text[:200]
-        document = {"detail": f"HTTP {response.status_code} {response.reason_phrase}: {said}"}
+        location = response.headers.get("location")
+        text = f"look at {location}" if location else response.text[:200]
+        document = {"detail": f"HTTP {response.status_code} {response.reason_phrase}: {text}"}
     raise ServiceError(response.status_code, document)
 
 
-def read_as(form: type[M]) -> Callable[[httpx.Response], M]:
-    """Return what reads an answer of a form.
+def read_as(model: type[M]) -> Callable[[httpx.Response], M]:
+    """Return a function that reads a response as a Pydantic model.
 
-    Raises
-    ------
-    ServiceError
-        An answer has another one.
+    The function raises `ServiceError` if the response does not match the model.
     """
 
     def read(response: httpx.Response) -> M:
         try:
-            return form.model_validate_json(response.content)
+            return model.model_validate_json(response.content)
         except ValidationError as error:
-            raise _foreign(response) from error
+            raise _incompatible_service(response) from error
 
     return read
 
 
-def document_of(response: httpx.Response) -> dict[str, Any]:
-    """Read an answer as a mapping.
+def read_mapping(response: httpx.Response) -> dict[str, Any]:
+    """Read a response as a JSON object.
 
     Raises
     ------
     ServiceError
-        It is none.
+        The response is not a JSON object.
     """
     try:
         return dict(response.json())
     except (ValueError, TypeError) as error:
-        raise _foreign(response) from error
+        raise _incompatible_service(response) from error
 
 
-def _foreign(response: httpx.Response) -> ServiceError:
-    detail = f"what answers at {response.url} is no islands service, or one of another version"
+def _incompatible_service(response: httpx.Response) -> ServiceError:
+    detail = f"{response.url} is not an islands service, or is one of another version"
     return ServiceError(response.status_code, {"detail": detail})

@@ -13,8 +13,8 @@ from islands_api.client import calls
 from islands_api.client.base import BaseClient, check_succeeded
 from islands_api.client.calls import JobRef, RequestSpec, T
 from islands_api.client.errors import ServiceError
-from islands_api.client.response_parsing import Event, EventLines, refuse_problem
-from islands_api.client.transport import RetryPolicy, in_time, retry_after
+from islands_api.client.response_parsing import Event, EventParser, raise_for_problem
+from islands_api.client.transport import RetryPolicy, long_poll_seconds, translate_timeout
 from islands_api.schemas import JobView
 from islands_service.domain.job import TERMINAL, JobState
 
@@ -22,8 +22,8 @@ from islands_service.domain.job import TERMINAL, JobState
 class Client(BaseClient[httpx.Client]):
     """Blocking client of a service.
 
-    A call without an answer is repeated for ``retry`` seconds if that is safe. A submission is safe because it
-    has an idempotency key: repeating it does not create a second job.
+    A call without an answer is repeated for ``retry`` seconds if that is safe. A submission is safe: its
+    idempotency key prevents a second job.
 
     Parameters
     ----------
@@ -76,19 +76,19 @@ class Client(BaseClient[httpx.Client]):
         ServiceUnreachableError
             The service did not answer.
         """
-        tries = RetryPolicy(self._url, self._retry, until)
+        policy = RetryPolicy(self._url, self._retry, until)
         while True:
             try:
                 with ExitStack() as stack:
                     response = self._http.request(**self._request_arguments(call, until, stack))
             except httpx.TransportError as error:
-                pause = tries.failed(error, call.repeatable)
+                pause = policy.delay_after_error(error, call.repeatable)
             else:
-                again = tries.answered(response, call.repeatable)
-                if again is None:
-                    refuse_problem(response)
+                delay = policy.delay_after_response(response, call.repeatable)
+                if delay is None:
+                    raise_for_problem(response)
                     return call.read(response)
-                pause = again
+                pause = delay
             sleep(pause)
 
     def cancel(self, which: JobRef) -> JobView:
@@ -121,12 +121,12 @@ class Client(BaseClient[httpx.Client]):
             The job has not ended within this number of seconds.
         """
         until = monotonic() + seconds
-        with in_time(calls.id_of(which), seconds, until):
+        with translate_timeout(calls.get_id(which), seconds, until):
             job = self.call(calls.job(which), until)
         yield job
         while job.state not in TERMINAL:
-            with in_time(job.id, seconds, until):
-                after = self.call(calls.changed(job, retry_after(self._timeout, until)), until)
+            with translate_timeout(job.id, seconds, until):
+                after = self.call(calls.await_change(job, long_poll_seconds(self._timeout, until)), until)
             if after.version != job.version:
                 yield after
             elif monotonic() > until:
@@ -149,9 +149,9 @@ class Client(BaseClient[httpx.Client]):
 
     def events(self, which: JobRef, after: int = 0) -> Iterator[Event]:
         """Yield the events of a job after a number until it has ended; reconnect if the connection breaks."""
-        tries = RetryPolicy(self._url, self._retry)
+        policy = RetryPolicy(self._url, self._retry)
         while True:
-            lines = EventLines()
+            parser = EventParser()
             try:
                 headers = {"Last-Event-ID": str(after)}
                 with self._http.stream("GET", calls.events_path(which), headers=headers) as response:
@@ -159,16 +159,16 @@ class Client(BaseClient[httpx.Client]):
                         return
                     if not response.is_success:
                         response.read()
-                    pause = tries.answered(response)
+                    pause = policy.delay_after_response(response)
                     if pause is None:
-                        refuse_problem(response)
-                        tries.succeeded()
+                        raise_for_problem(response)
+                        policy.reset()
                         for piece in response.iter_bytes():
-                            for event in lines.feed(piece):
+                            for event in parser.feed(piece):
                                 after = event.number
                                 yield event
                         # A stream also ends when the service stops. The end of the job is answered by 204.
-                        pause = tries.ended()
+                        pause = policy.delay_after_stream()
             except httpx.TransportError as error:
-                pause = tries.failed(error)
+                pause = policy.delay_after_error(error)
             sleep(pause)

@@ -1,4 +1,4 @@
-"""What both clients know of the way to the service: how long to wait, when to try again, when to give up."""
+"""Connection settings and retry policy of both clients."""
 
 import os
 import ssl
@@ -17,33 +17,43 @@ import httpx
 from islands.errors import SettingsError
 from islands_api.client.errors import ServiceUnreachableError
 
-#: Seconds for an answer: the service itself takes up to two minutes to read an upload.
-PATIENCE = 150.0
+#: Seconds to wait for an answer. The service takes up to two minutes to read an upload.
+ANSWER_TIMEOUT = 150.0
 
-#: Seconds for a connection, for which an answer of a job that has not changed is held back, and by which an
-#: answer may come later than that.
-CONNECT, WAIT, GRACE = 10.0, 30.0, 5.0
+#: Seconds to wait for a connection.
+CONNECT_TIMEOUT = 10.0
 
-#: Seconds between tries: a service that was started again is back in a second or two.
-DELAYS, LAST_DELAY = (0.1, 0.2, 0.4, 0.8), 1.0
+#: Longest time, in seconds, for which the service holds back the answer about an unchanged job.
+LONG_POLL_SECONDS = 30.0
 
-#: Answers after which the same call may succeed, and those that leave open whether it was carried out.
-PASSING = (HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE)
-DOUBTFUL = (HTTPStatus.BAD_GATEWAY, HTTPStatus.GATEWAY_TIMEOUT)
+#: Seconds by which an answer may arrive after its deadline.
+GRACE_SECONDS = 5.0
+
+#: Seconds between the first attempts. A restarted service is back in one or two seconds.
+RETRY_DELAYS = (0.1, 0.2, 0.4, 0.8)
+
+#: Seconds between later attempts.
+LAST_RETRY_DELAY = 1.0
+
+#: Status codes after which the same call may succeed. The call was not carried out.
+TRANSIENT_STATUS = (HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE)
+
+#: Status codes of a gateway. The call may have been carried out.
+AMBIGUOUS_STATUS = (HTTPStatus.BAD_GATEWAY, HTTPStatus.GATEWAY_TIMEOUT)
 
 
 def make_headers(key: str | None) -> dict[str, str]:
-    """Return what every request says.
+    """Return the headers of every request.
 
     Raises
     ------
     SettingsError
-        The key cannot be one; it is not shown.
+        The key is malformed. The message does not contain the key.
     """
     headers = {"User-Agent": f"islands/{version('islands')}"}
     if key is None:
         return headers
-    # One that was read from a file ends with the line. What else HTTP refuses, it would refuse by showing it.
+    # A key read from a file ends with a line break. httpx would show other invalid characters in its error.
     key = key.strip()
     if not key or not all("!" <= letter <= "~" for letter in key):
         raise SettingsError(
@@ -52,13 +62,13 @@ def make_headers(key: str | None) -> dict[str, str]:
     return {**headers, "Authorization": f"Bearer {key}"}
 
 
-def parse_address(url: str) -> str:
-    """Return a service's address as it is.
+def check_url(url: str) -> str:
+    """Return the address of a service unchanged.
 
     Raises
     ------
     SettingsError
-        It is none.
+        The address is not an HTTP or HTTPS URL with a host.
     """
     try:
         parsed = httpx.URL(url)
@@ -69,102 +79,103 @@ def parse_address(url: str) -> str:
     return url
 
 
-def ssl_context(verify: Any) -> Any:
-    """Return whom to trust, as httpx takes it: a file of certificates is read."""
+def make_ssl_context(verify: Any) -> Any:
+    """Return ``verify`` for httpx; read a file of certificates."""
     return ssl.create_default_context(cafile=verify) if isinstance(verify, str | os.PathLike) else verify
 
 
-def parse_timeout(patience: float, until: float = inf) -> httpx.Timeout:
-    """Return how long a request may take that is of no use any more a little after a time of the clock."""
-    patience = min(patience, max(0.0, until - monotonic()) + GRACE)
-    return httpx.Timeout(patience, connect=min(patience, CONNECT))
+def make_timeout(seconds: float, until: float = inf) -> httpx.Timeout:
+    """Return the timeout of a request, limited to a short time after a deadline on the monotonic clock."""
+    seconds = min(seconds, max(0.0, until - monotonic()) + GRACE_SECONDS)
+    return httpx.Timeout(seconds, connect=min(seconds, CONNECT_TIMEOUT))
 
 
-def retry_after(patience: float, until: float) -> float:
-    """Return for how many seconds the service may hold an answer back, so that it still comes in time."""
-    return max(0.0, min(WAIT, patience / 2, until - monotonic()))
+def long_poll_seconds(timeout: float, until: float) -> float:
+    """Return the seconds for which the service may hold back an answer so that it arrives in time."""
+    return max(0.0, min(LONG_POLL_SECONDS, timeout / 2, until - monotonic()))
 
 
 class RetryPolicy:
-    """Decides after each try of a call whether there is another one, and when.
+    """Decides after each attempt of a call whether and when to repeat it.
 
     Parameters
     ----------
     url : str
-        Of the service, for messages.
+        Address of the service, for messages.
     retry : float
-        Seconds from the first failure on for which a call is sent again.
+        Seconds, from the first failure on, during which a call is repeated.
     until : float
-        No try begins after this time of the clock.
+        Deadline on the monotonic clock: no attempt begins after it.
     """
 
     def __init__(self, url: str, retry: float, until: float = inf) -> None:
         self._url, self._retry, self._latest = url, retry, until
-        self.succeeded()
+        self.reset()
 
-    def succeeded(self) -> None:
-        """Forget the failures: something has come through."""
+    def reset(self) -> None:
+        """Forget earlier failures, after data has arrived."""
         self._until: float | None = None
-        self._delays = chain(DELAYS, repeat(LAST_DELAY))
+        self._delays = chain(RETRY_DELAYS, repeat(LAST_RETRY_DELAY))
 
-    def ended(self) -> float:
-        """Return the seconds until a stream is taken up again that has ended in good order."""
-        return DELAYS[0]
+    def delay_after_stream(self) -> float:
+        """Return the seconds until a stream that ended without an error is opened again."""
+        return RETRY_DELAYS[0]
 
-    def failed(self, error: httpx.TransportError, repeatable: bool = True) -> float:
-        """Return the seconds until the next try, after one to which there was no answer.
+    def delay_after_error(self, error: httpx.TransportError, repeatable: bool = True) -> float:
+        """Return the seconds until the next attempt after an attempt without an answer.
 
         Raises
         ------
         ServiceUnreachableError
-            There is no next try.
+            The certificate is not trusted, repeating the call could do harm, or the time for it is over.
         """
-        if untrusted(error):
+        if is_untrusted(error):
             raise ServiceUnreachableError(
                 f"the certificate of the service at {self._url} is not trusted ({error}): give the file of "
                 "its authority as `verify`, to the command line in SSL_CERT_FILE"
             ) from error
-        reason = reason_of(error)
-        # A connection that never came about has carried nothing.
+        reason = describe_error(error)
+        # Without a connection nothing was sent: the call can be repeated.
         if not (repeatable or isinstance(error, httpx.ConnectError | httpx.ConnectTimeout)):
             raise ServiceUnreachableError(
-                f"the service at {self._url} broke off before it answered ({reason}): it may have done what "
-                "was asked, look whether it has"
+                f"the service at {self._url} closed the connection before it answered ({reason}): the call "
+                "may have been carried out, check before you repeat it"
             ) from error
-        pause = self._pause(0.0)
+        pause = self._next_delay(0.0)
         if pause is None:
             raise ServiceUnreachableError(
-                f"the service at {self._url} does not answer ({reason}): is it running, and is this its "
-                "address?"
+                f"the service at {self._url} does not answer ({reason}): check that it runs and that the "
+                "address is right"
             ) from error
         return pause
 
-    def answered(self, response: httpx.Response, repeatable: bool = True) -> float | None:
-        """Return the seconds until the next try, after one with an answer; None if that is the answer."""
-        passing = (*PASSING, *DOUBTFUL) if repeatable else PASSING
-        return self._pause(asked_to_wait(response)) if response.status_code in passing else None
+    def delay_after_response(self, response: httpx.Response, repeatable: bool = True) -> float | None:
+        """Return the seconds until the next attempt, or None if the response is the answer."""
+        transient = (*TRANSIENT_STATUS, *AMBIGUOUS_STATUS) if repeatable else TRANSIENT_STATUS
+        return self._next_delay(parse_retry_after(response)) if response.status_code in transient else None
 
-    def _pause(self, least: float) -> float | None:
+    def _next_delay(self, least: float) -> float | None:
         if self._until is None:
             self._until = min(monotonic() + self._retry, self._latest)
         pause = max(next(self._delays), least)
         return pause if monotonic() + pause <= self._until else None
 
 
-def untrusted(error: BaseException) -> bool:
-    """Tell whether an error comes from a certificate: it will not get better."""
-    return any(isinstance(each, ssl.SSLCertVerificationError) for each in _causes(error))
+def is_untrusted(error: BaseException) -> bool:
+    """Return whether a certificate caused an error. Such an error is permanent."""
+    return any(isinstance(each, ssl.SSLCertVerificationError) for each in _get_causes(error))
 
 
-def reason_of(error: BaseException) -> str:
-    """Say what the matter is, as the system says it: the libraries between have words of their own."""
-    for each in reversed(_causes(error)):
+def describe_error(error: BaseException) -> str:
+    """Return the operating system's message of an error if it has one, else that of the library."""
+    for each in reversed(_get_causes(error)):
         if isinstance(each, OSError) and each.errno is not None:
             return os.strerror(each.errno) if each.errno > 0 else str(each.strerror)
     return str(error) or type(error).__name__
 
 
-def _causes(error: BaseException) -> list[BaseException]:
+def _get_causes(error: BaseException) -> list[BaseException]:
+    """Return an error and its chain of causes."""
     found, cause = [error], error.__cause__ or error.__context__
     while cause is not None:
         found.append(cause)
@@ -172,30 +183,31 @@ def _causes(error: BaseException) -> list[BaseException]:
     return found
 
 
-def asked_to_wait(response: httpx.Response) -> float:
-    """Return the seconds of an answer's Retry-After, a number or a date; 0 where there is none."""
+def parse_retry_after(response: httpx.Response) -> float:
+    """Return the seconds of the Retry-After header, a number or a date; 0 if it is missing or malformed."""
     text = response.headers.get("retry-after", "").strip()
     if text.isascii() and text.isdecimal():
         return float(text)
     try:
-        # The service's own clock is what its date means.
-        told, now = (parsedate_to_datetime(each) for each in (text, response.headers.get("date", "")))
-        return max(0.0, (told - now).total_seconds())
+        # The date refers to the clock of the service.
+        target, now = (parsedate_to_datetime(each) for each in (text, response.headers.get("date", "")))
+        return max(0.0, (target - now).total_seconds())
     except (TypeError, ValueError):
         return 0.0
 
 
 @contextmanager
-def in_time(job: str, seconds: float, until: float) -> Iterator[None]:
-    """Turn a service that is away when the time is over into the end of the time.
+def translate_timeout(job: str, seconds: float, until: float) -> Iterator[None]:
+    """Turn an unreachable service into a timeout if the deadline has come.
 
     Raises
     ------
     TimeoutError
+        The service is unreachable at the deadline.
     """
     try:
         yield
     except ServiceUnreachableError as error:
-        if monotonic() + LAST_DELAY < until:
+        if monotonic() + LAST_RETRY_DELAY < until:
             raise
         raise TimeoutError(f"job {job} is not known to have ended after {seconds:g} s: {error}") from error

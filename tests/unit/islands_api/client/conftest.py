@@ -1,6 +1,6 @@
-"""What the laws of the client need: a service, both clients in one manner, and lines that can be cut.
+"""Fixtures of the client tests: a service, both clients behind one interface, and breakable connections.
 
-The coordinator's part is played by the tests: they claim a job in the store, tell of it and finish it.
+The tests act as the coordinator: they claim a job in the store, report its progress and finish it.
 """
 
 import asyncio
@@ -25,14 +25,14 @@ from support.stores import LONG
 
 LOOPBACK = "127.0.0.1"
 
-#: To read the authorities that a system trusts takes longer than most tests.
+#: Shared, because reading the authorities that the system trusts takes longer than most tests.
 TRUST = ssl.create_default_context()
 
 Answer = tuple[int, dict[str, str], bytes]
 
 
 class Awaited:
-    """An `AsyncClient` whose every call is awaited at once, so that one law holds for both clients."""
+    """`AsyncClient` whose calls are awaited immediately, so that one test covers both clients."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         self.client = AsyncClient(*arguments, **named)
@@ -42,12 +42,12 @@ class Awaited:
         method = getattr(self.client, name)
 
         def call(*arguments: Any, **named: Any) -> Any:
-            begun = method(*arguments, **named)
-            return self._each(begun) if inspect.isasyncgen(begun) else self._runner.run(begun)
+            pending = method(*arguments, **named)
+            return self._iterate(pending) if inspect.isasyncgen(pending) else self._runner.run(pending)
 
         return call
 
-    def _each(self, items: Any) -> Iterator[Any]:
+    def _iterate(self, items: Any) -> Iterator[Any]:
         try:
             while True:
                 try:
@@ -64,14 +64,14 @@ class Awaited:
 
 @pytest.fixture(scope="module")
 def service(serve: Any) -> Iterator[Service]:
-    """A service that limits no rate. Each test has an owner of its own in it."""
+    """A service without a rate limit. Each test has a separate owner."""
     with serve(rate=0) as running:
         yield running
 
 
 @dataclass(frozen=True, slots=True)
 class Me:
-    """Whose test it is."""
+    """Owner of a test."""
 
     owner: str
     secret: str
@@ -87,7 +87,7 @@ def me(service: Service) -> Me:
 
 @pytest.fixture(params=[Client, Awaited], ids=["sync", "async"])
 def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    """What makes a client, of either kind; it tries again for two seconds unless told otherwise."""
+    """Return a factory of clients of either kind, with two seconds of retries by default."""
     with ExitStack() as stack:
 
         def make(url: str, key: str | None = None, **options: Any) -> Any:
@@ -99,14 +99,14 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the client try again sooner than it does: for tests of what it does, not when."""
-    monkeypatch.setattr(transport, "DELAYS", (0.03, 0.06))
-    monkeypatch.setattr(transport, "LAST_DELAY", 0.1)
+    """Shorten the delays between attempts, for tests that do not measure them."""
+    monkeypatch.setattr(transport, "RETRY_DELAYS", (0.03, 0.06))
+    monkeypatch.setattr(transport, "LAST_RETRY_DELAY", 0.1)
 
 
 @pytest.fixture
 def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The seconds for which the client waits before it asks again; it does not wait here."""
+    """Seconds that the client would sleep before each repetition; it does not sleep here."""
     made: list[float] = []
 
     async def pause(seconds: float) -> None:
@@ -119,17 +119,17 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 @pytest.fixture
 def client(connect: Callable[..., Any], service: Service, me: Me) -> Any:
-    """A client of the service."""
+    """Client of the service."""
     return connect(service.url, me.secret)
 
 
 @pytest.fixture
 def claimed(service: Service) -> Callable[[Any], Lease]:
-    """What claims a job, as its coordinator."""
+    """Return a function that claims a job like its coordinator."""
 
     def claim(job: Any) -> Lease:
         while True:
-            # Those of earlier tests come first.
+            # Jobs of earlier tests are claimed first.
             lease = service.store.leases.claim(uuid4().hex, LONG)
             assert lease is not None
             if lease.job.id == job.id:
@@ -140,46 +140,46 @@ def claimed(service: Service) -> Callable[[Any], Lease]:
 
 @pytest.fixture
 def later() -> Iterator[Callable[..., None]]:
-    """What does something in a while, beside the test; when that ends it is done, and has not failed."""
+    """Return a function that runs an action in a thread after a delay; at teardown it must have succeeded."""
     with ExitStack() as stack:
 
         def start(seconds: float, action: Callable[..., Any], *arguments: Any) -> None:
             failed: list[BaseException] = []
 
-            def act() -> None:
+            def run() -> None:
                 time.sleep(seconds)
                 try:
                     action(*arguments)
-                except BaseException as error:  # told where the test can see it
+                except BaseException as error:  # raised in the test's thread at teardown
                     failed.append(error)
 
-            def end() -> None:
+            def check() -> None:
                 thread.join()
                 assert not failed, failed
 
-            thread = threading.Thread(target=act)
+            thread = threading.Thread(target=run)
             thread.start()
-            stack.callback(end)
+            stack.callback(check)
 
         yield start
 
 
 class Wire:
-    """A line to a service. Its next connections pass so many bytes of answers each, and are cut then.
+    """TCP proxy of a service that breaks its next connections after a number of answer bytes.
 
     Attributes
     ----------
     cuts : list of int
-        For the next connections, one after the other; one beyond them is not cut. With 0 a connection is cut
-        when the service answers: it has carried out what was asked by then.
-    asked : int
-        Connections so far.
+        Bytes that the next connections pass, in order; later connections are not broken. With 0 a connection
+        breaks at the first byte of the answer: the service has carried out the request by then.
+    connections : int
+        Number of connections so far.
     """
 
     def __init__(self, port: int) -> None:
         self._target, self._port = port, 0
         self.cuts: list[int] = []
-        self.asked = 0
+        self.connections = 0
         self._lock, self._open = threading.Lock(), set[socket.socket]()
         self._threads: list[threading.Thread] = []
         self.mend()
@@ -195,7 +195,7 @@ class Wire:
         self._start(self._accept, self._listener)
 
     def tear(self) -> None:
-        """Refuse connections, and end those that there are."""
+        """Refuse connections, and close the open ones."""
         self._end(self._listener)
         self.interrupt()
         for thread in self._threads:
@@ -203,13 +203,13 @@ class Wire:
         self._threads.clear()
 
     def outage(self, seconds: float) -> None:
-        """Refuse connections for a while: one after the other, however late the thread that does it is."""
+        """Refuse connections for some seconds, in one thread so that the order is certain."""
         self.tear()
         time.sleep(seconds)
         self.mend()
 
     def interrupt(self) -> None:
-        """End the connections that there are."""
+        """Close the open connections."""
         with self._lock:
             for each in self._open:
                 with suppress(OSError):
@@ -221,11 +221,11 @@ class Wire:
         self._threads.append(thread)
 
     def _accept(self, listener: socket.socket) -> None:
-        with suppress(OSError):  # it was closed
+        with suppress(OSError):  # the listener was closed
             while True:
                 near, _ = listener.accept()
                 far = socket.create_connection((LOOPBACK, self._target))
-                self.asked += 1
+                self.connections += 1
                 with self._lock:
                     self._open |= {near, far}
                 self._start(self._pass, near, far, self.cuts.pop(0) if self.cuts else None)
@@ -262,29 +262,29 @@ class Wire:
 
 @pytest.fixture
 def wire(service: Service) -> Iterator[Wire]:
-    """A line to the service."""
-    line = Wire(service.port)
+    """A breakable connection to the service."""
+    proxy = Wire(service.port)
     try:
-        yield line
+        yield proxy
     finally:
-        line.tear()
+        proxy.tear()
 
 
 @dataclass(slots=True)
 class Script:
-    """A server that answers what it is told to, and keeps what it was asked, and when.
+    """Server with prepared answers that records its requests and their times.
 
-    It stands for what cannot be had from the service at will: one that has no time, and what is none at all.
+    It replaces a busy service and servers of other kinds.
     """
 
     url: str
     answers: list[Answer]
-    asked: list[tuple[float, str, dict[str, str]]] = field(default_factory=list)
+    requests: list[tuple[float, str, dict[str, str]]] = field(default_factory=list)
 
 
 @pytest.fixture
 def scripted() -> Iterator[Callable[..., Script]]:
-    """What makes a server that gives some answers in turn; the last one stays."""
+    """Return a factory of servers that give some answers in turn and repeat the last one."""
     over = threading.Event()
     with ExitStack() as stack:
 
@@ -298,7 +298,7 @@ def scripted() -> Iterator[Callable[..., Script]]:
 
                 def do_GET(self) -> None:
                     self.rfile.read(int(self.headers.get("content-length", 0)))
-                    script.asked.append((time.monotonic(), self.path, dict(self.headers)))
+                    script.requests.append((time.monotonic(), self.path, dict(self.headers)))
                     status, headers, body = script.answers[0]
                     if len(script.answers) > 1:
                         script.answers.pop(0)
@@ -309,7 +309,7 @@ def scripted() -> Iterator[Callable[..., Script]]:
                     self.end_headers()
                     self.wfile.write(body)
 
-                do_POST = do_DELETE = do_GET  # noqa: N815 - the names are the library's
+                do_POST = do_DELETE = do_GET  # noqa: N815 - names defined by the library
 
                 def log_message(self, *_: Any) -> None:
                     pass

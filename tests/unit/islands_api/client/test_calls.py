@@ -1,4 +1,4 @@
-"""Calls of the client against the real application: what is sent, what comes back, what a refusal becomes."""
+"""Calls of both clients against the real application: requests, answers and problems."""
 
 import asyncio
 import inspect
@@ -31,51 +31,7 @@ def record(tmp_path: Path) -> Path:
     return path
 
 
-# The two clients.
-
-
-def public_methods(kind: type) -> dict[str, Any]:
-    """Return the public methods of a class, inherited ones too."""
-    members = {name: getattr(kind, name) for name in dir(kind) if not name.startswith("_")}
-    return {name: member for name, member in members.items() if inspect.isfunction(member)}
-
-
-def test_both_clients_have_the_same_signatures() -> None:
-    blocking, awaited = public_methods(Client), public_methods(AsyncClient)
-    assert {"upload", "submit", "diagnose", "job", "export", "wait"} <= blocking.keys() == awaited.keys()
-    for name, method in blocking.items():
-        mine, other = inspect.signature(method), inspect.signature(awaited[name])
-        assert mine.parameters == other.parameters, name
-        if not inspect.isgeneratorfunction(method):
-            assert mine.return_annotation == other.return_annotation, name
-        assert method.__name__ == awaited[name].__name__ == name
-        assert method.__doc__
-    assert inspect.signature(Client) == inspect.signature(AsyncClient)
-    assert all(
-        inspect.iscoroutinefunction(method) or inspect.isasyncgenfunction(method)
-        for method in awaited.values()
-    )
-
-
-@pytest.mark.parametrize("kind", [Client, AsyncClient])
-def test_signatures_name_their_parameters(kind: type) -> None:
-    variable = {
-        (name, parameter.name)
-        for name, method in public_methods(kind).items()
-        for parameter in inspect.signature(method).parameters.values()
-        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-    }
-    assert variable == {("submit", "settings")}
-    assert inspect.signature(kind.upload) == inspect.Signature(  # type: ignore[attr-defined]
-        [
-            inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD),
-            *inspect.signature(calls.upload).parameters.values(),
-        ],
-        return_annotation=DatasetView,
-    )
-
-
-def test_the_package_names_what_a_program_needs() -> None:
+def test_package_exports_the_public_names() -> None:
     assert islands_api.Client is Client
     assert islands_api.AsyncClient is AsyncClient
     assert islands_api.ServiceError is ServiceError
@@ -86,7 +42,7 @@ def test_the_package_names_what_a_program_needs() -> None:
 # Data sets.
 
 
-def test_an_uploaded_record_comes_back_with_what_is_in_it(client: Any, record: Path) -> None:
+def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> None:
     dataset = client.upload(record, ["u_V"], "y_um")
     assert isinstance(dataset, DatasetView)
     assert dataset.name == record.name
@@ -99,7 +55,7 @@ def test_an_uploaded_record_comes_back_with_what_is_in_it(client: Any, record: P
     assert client.datasets().items[0] == dataset
 
 
-def test_an_upload_is_checked_as_the_job_that_it_is_for(client: Any, me: Any, tmp_path: Path) -> None:
+def test_upload_with_columns_is_checked_like_a_job(client: Any, me: Any, tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_bytes(csv(y_um={8: "nan"}))
     with pytest.raises(ServiceError) as caught:
@@ -109,8 +65,8 @@ def test_an_upload_is_checked_as_the_job_that_it_is_for(client: Any, me: Any, tm
     assert [dataset.id for dataset in client.datasets().items] == [me.dataset]
 
 
-def test_an_upload_sends_all_that_is_given() -> None:
-    for inputs in ("u_V", ["u_V"], ("u_V",)):  # a name alone is one input, not an input a letter
+def test_upload_sends_all_given_values() -> None:
+    for inputs in ("u_V", ["u_V"], ("u_V",)):  # a single name is one input, not one input per letter
         assert calls.upload("r.csv", inputs, "y_um", 0.0).data == {
             "inputs": ["u_V"],
             "output": "y_um",
@@ -120,12 +76,12 @@ def test_an_upload_sends_all_that_is_given() -> None:
 
 
 @pytest.mark.parametrize("path", ["nowhere.csv", "."])
-def test_a_record_that_cannot_be_read_is_an_error_of_its_file(client: Any, path: str) -> None:
+def test_unreadable_record_raises_the_error_of_its_file(client: Any, path: str) -> None:
     with pytest.raises(OSError, match=r"nowhere\.csv|Is a directory"):
         client.upload(path)
 
 
-def test_pages_of_data_sets_and_jobs_follow_each_other(client: Any, service: Service, me: Any) -> None:
+def test_pages_of_data_sets_and_jobs_do_not_overlap(client: Any, service: Service, me: Any) -> None:
     kept(service.store, me.owner, b"another")
     for pages in (client.datasets, lambda **given: client.jobs(state="queued", **given)):
         for _ in range(2):
@@ -137,7 +93,7 @@ def test_pages_of_data_sets_and_jobs_follow_each_other(client: Any, service: Ser
         assert first.items[0].id != second.items[0].id
 
 
-def test_a_data_set_goes_when_no_job_needs_it(client: Any, me: Any) -> None:
+def test_data_set_can_be_deleted_when_no_job_needs_it(client: Any, me: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     with pytest.raises(ServiceError) as caught:
         client.delete_dataset(me.dataset)
@@ -150,7 +106,7 @@ def test_a_data_set_goes_when_no_job_needs_it(client: Any, me: Any) -> None:
 # Jobs.
 
 
-def test_a_job_says_what_was_submitted(client: Any, me: Any) -> None:
+def test_job_contains_all_submitted_values(client: Any, me: Any) -> None:
     given = {"preset": "narx", "seed": 7, "dt": 0.5, "rows": None, "name": "tank, 2 islands", "priority": 3}
     job = client.submit(
         me.dataset, "u_V", "y_um", **{**given, "dt": None}, validation=0.4, islands=2, shifts=(1, 2)
@@ -181,13 +137,13 @@ def test_a_job_says_what_was_submitted(client: Any, me: Any) -> None:
         ({"dataset": "0-csv", "rows": "5:"}, {"dataset": "0-csv", "rows": "5:"}),
     ],
 )
-def test_validation_is_a_share_a_data_set_or_rows_of_one(given: Any, stored: Any) -> None:
+def test_validation_is_a_fraction_a_data_set_or_its_rows(given: Any, stored: Any) -> None:
     body = calls.submit("1-csv", ["u_V"], "y_um", validation=given).json
     assert body.get("validation") == stored
     JobRequest.model_validate(body)
 
 
-def test_a_call_takes_ids_and_values_alike(client: Any, service: Service, me: Any) -> None:
+def test_calls_accept_ids_and_values(client: Any, service: Service, me: Any) -> None:
     other = kept(service.store, me.owner, b"another")
     record, validation = client.datasets().items[1], client.datasets().items[0]
     assert (record.id, validation.id) == (me.dataset, other)
@@ -197,12 +153,12 @@ def test_a_call_takes_ids_and_values_alike(client: Any, service: Service, me: An
     assert client.cancel(job).id == client.job(job.id).id
 
 
-def test_no_setting_of_a_search_is_hidden_by_an_argument() -> None:
+def test_arguments_of_submit_hide_no_setting() -> None:
     taken = set(inspect.signature(calls.submit).parameters) - {"settings"}
     assert not taken & {each.name for each in fields(Settings)}
 
 
-def test_every_submission_has_a_key_of_its_own_unless_one_is_given(client: Any, me: Any) -> None:
+def test_submissions_have_distinct_idempotency_keys_by_default(client: Any, me: Any) -> None:
     one, other = (client.submit(me.dataset, **SPEC) for _ in range(2))
     assert one.id != other.id
     assert client.submit(me.dataset, **SPEC, idempotency_key="mine").id not in (one.id, other.id)
@@ -218,12 +174,12 @@ def test_every_submission_has_a_key_of_its_own_unless_one_is_given(client: Any, 
 @pytest.mark.parametrize(
     "wrong", [{"target_error": float("nan")}, {"validation": float("inf")}, {"idempotency_key": "schlüssel"}]
 )
-def test_what_cannot_be_sent_is_refused_before_it_is(wrong: dict[str, Any]) -> None:
-    with pytest.raises(SettingsError, match=r"NaN or infinite|a line of ASCII"):
+def test_invalid_submission_is_rejected_before_sending(wrong: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match=r"NaN or infinite|printable ASCII"):
         calls.submit("0-csv", ["u_V"], "y_um", **wrong)
 
 
-def test_a_discrepancy_job_says_what_was_submitted(client: Any, me: Any) -> None:
+def test_discrepancy_job_contains_all_submitted_values(client: Any, me: Any) -> None:
     simulation = {"kind": "bouc-wen-piezo", "parameters": {"dp": 1.5}}
     job = client.diagnose(
         me.dataset,
@@ -255,15 +211,15 @@ def test_a_discrepancy_job_says_what_was_submitted(client: Any, me: Any) -> None
     [
         ("pendulum", "unknown simulation 'pendulum'"),
         ("model:none.json", "none.json cannot be read"),
-        ("python:model.py:run", "a service runs no code of others"),
+        ("python:model.py:run", "a service does not run code of its clients"),
     ],
 )
-def test_a_simulation_that_cannot_be_sent_is_refused_before_it_is(text: str, why: str) -> None:
+def test_invalid_simulation_is_rejected_before_sending(text: str, why: str) -> None:
     with pytest.raises(IslandsError, match=why):
         diagnosis_calls.diagnose("0-csv", "u_V", "y_um", text)
 
 
-def test_a_model_file_goes_along(tmp_path: Path) -> None:
+def test_model_file_is_sent_with_the_submission(tmp_path: Path) -> None:
     path = tmp_path / "model.json"
     path.write_text('{"terms": []}')
     body = diagnosis_calls.diagnose("0-csv", "u_V", "y_um", f"model:{path}", channels="T_K").json
@@ -271,7 +227,7 @@ def test_a_model_file_goes_along(tmp_path: Path) -> None:
     assert body["simulation"] == {"kind": "model", "model": {"terms": []}, "name": "model model.json"}
 
 
-def test_a_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> None:
+def test_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     assert client.cancel(job).state == JobState.CANCELLED
     assert client.resume(job).state == JobState.QUEUED
@@ -282,13 +238,13 @@ def test_a_queued_job_is_cancelled_resumed_and_deleted(client: Any, me: Any) -> 
     assert (caught.value.status, caught.value.type) == (404, "/problems/no-such-job")
 
 
-def test_cancelling_what_is_cancelled_changes_nothing(client: Any, me: Any) -> None:
+def test_cancelling_a_cancelled_job_changes_nothing(client: Any, me: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     cancelled = client.cancel(job)
     assert client.cancel(job) == cancelled
 
 
-def test_a_finished_job_is_not_cancelled_and_a_waiting_one_not_resumed(
+def test_finished_job_cannot_be_cancelled_nor_queued_job_resumed(
     client: Any, service: Service, me: Any, claimed: Any
 ) -> None:
     job = client.submit(me.dataset, **SPEC)
@@ -301,7 +257,7 @@ def test_a_finished_job_is_not_cancelled_and_a_waiting_one_not_resumed(
         client.cancel(job)
 
 
-def test_a_failed_job_says_why(client: Any, service: Service, me: Any, claimed: Any) -> None:
+def test_failed_job_contains_its_problem(client: Any, service: Service, me: Any, claimed: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     service.store.leases.finish(claimed(job), FAILED)
     assert client.job(job).problem == {"type": "broken", "detail": "it broke"}
@@ -312,7 +268,7 @@ def test_a_failed_job_says_why(client: Any, service: Service, me: Any, claimed: 
 
 
 @pytest.mark.parametrize(
-    ("wrong", "status", "kind", "told"),
+    ("wrong", "status", "kind", "message"),
     [
         ({"islands": 0}, 422, "invalid-settings", "islands is at least 1, got 0"),
         ({"preset": "magic"}, 422, "invalid-settings", "unknown preset 'magic'"),
@@ -322,21 +278,21 @@ def test_a_failed_job_says_why(client: Any, service: Service, me: Any, claimed: 
         ({"dataset": "0-csv"}, 404, "no-such-dataset", "0-csv"),
     ],
 )
-def test_a_problem_is_raised_as_what_it_is(
-    client: Any, me: Any, wrong: dict[str, Any], status: int, kind: str, told: str
+def test_problem_is_raised_with_status_type_and_detail(
+    client: Any, me: Any, wrong: dict[str, Any], status: int, kind: str, message: str
 ) -> None:
     with pytest.raises(ServiceError) as caught:
         client.submit(**{"dataset": me.dataset, **SPEC, **wrong})
     error = caught.value
     assert (error.status, error.type) == (status, f"/problems/{kind}")
-    assert told in error.detail
+    assert message in error.detail
     assert str(error) == error.detail == error.document["detail"]
     assert error.document["request_id"]
     assert client.jobs().items == ()
 
 
 @pytest.mark.parametrize("identity", ["..", "../datasets", "a/b", "a?wait=30", "ä", "", "x" * 65, "%2e%2e"])
-def test_whatever_is_taken_for_an_id_is_part_of_a_path_and_no_more(client: Any, identity: str) -> None:
+def test_malformed_id_is_one_segment_of_the_path(client: Any, identity: str) -> None:
     for call in (client.job, client.models, client.delete, client.cancel):
         with pytest.raises(ServiceError) as caught:
             call(identity)
@@ -344,47 +300,45 @@ def test_whatever_is_taken_for_an_id_is_part_of_a_path_and_no_more(client: Any, 
 
 
 @pytest.mark.parametrize(
-    ("status", "headers", "body", "told"),
+    ("status", "headers", "body", "message"),
     [
         (500, {}, b"<html>oh</html>", "HTTP 500 Internal Server Error: <html>oh</html>"),
         (400, {}, b'["a", "list"]', 'HTTP 400 Bad Request: ["a", "list"]'),
         (404, {}, b"{}", "HTTP 404"),
         (301, {"Location": "https://elsewhere/"}, b"", "301 Moved Permanently: look at https://elsewhere/"),
-        (200, {}, b"<html>hello</html>", "is no islands service, or one of another version"),
-        (200, {}, b'{"items": 5}', "is no islands service, or one of another version"),
+        (200, {}, b"<html>hello</html>", "is not an islands service, or is one of another version"),
+        (200, {}, b'{"items": 5}', "is not an islands service, or is one of another version"),
     ],
 )
-def test_an_answer_of_something_else_is_no_answer(
-    connect: Any, scripted: Any, status: int, headers: dict[str, str], body: bytes, told: str
+def test_answer_of_another_server_raises_an_error(
+    connect: Any, scripted: Any, status: int, headers: dict[str, str], body: bytes, message: str
 ) -> None:
     server = scripted((status, headers, body))
     client = connect(server.url, retry=0.0)
     for call in (client.jobs, lambda: client.result("0")) if status != 200 else (client.jobs,):
         with pytest.raises(ServiceError) as caught:
             call()
-        assert told in str(caught.value)
+        assert message in str(caught.value)
         assert (caught.value.status, caught.value.type) == (status, "about:blank")
 
 
 @pytest.mark.parametrize("body", [b"<html>", b"[[1]]", b"5"])
-def test_a_result_is_a_document(connect: Any, scripted: Any, body: bytes) -> None:
-    with pytest.raises(ServiceError, match="is no islands service"):
+def test_result_that_is_not_an_object_raises_an_error(connect: Any, scripted: Any, body: bytes) -> None:
+    with pytest.raises(ServiceError, match="is not an islands service"):
         connect(scripted((200, {}, body)).url).result("0")
 
 
-def test_what_a_newer_service_adds_comes_along(
-    connect: Any, scripted: Any, service: Service, me: Any
-) -> None:
+def test_fields_of_a_newer_service_are_kept(connect: Any, scripted: Any, service: Service, me: Any) -> None:
     document = {**job_document(queued(service.store, me.owner)), "mood": "good"}
     job = connect(scripted((200, {}, json.dumps(document).encode())).url).job("0")
     assert job.mood == "good"
     assert set(JobView.model_fields) == set(document) - {"mood"}
 
 
-# At once.
+# Concurrency and repetition.
 
 
-def test_many_calls_go_on_at_once(service: Service, me: Any) -> None:
+def test_concurrent_calls_share_one_client(service: Service, me: Any) -> None:
     async def submit_all() -> list[JobView]:
         async with AsyncClient(service.url, me.secret) as client:
             one = calls.submit(me.dataset, ["u_V"], "y_um", idempotency_key="one")
@@ -393,14 +347,14 @@ def test_many_calls_go_on_at_once(service: Service, me: Any) -> None:
     assert len({job.id for job in asyncio.run(submit_all())}) == 1
 
 
-def test_a_closed_client_is_closed(service: Service, me: Any) -> None:
+def test_closed_client_raises_an_error(service: Service, me: Any) -> None:
     with Client(service.url, me.secret) as client:
         client.jobs()
     with pytest.raises(RuntimeError, match="closed"):
         client.jobs()
 
 
-def test_a_call_that_may_not_be_repeated_says_so() -> None:
+def test_calls_declare_whether_they_are_repeatable() -> None:
     made: list[RequestSpec[Any]] = [
         calls.cancel("0"),
         calls.resume("0"),

@@ -1,4 +1,4 @@
-"""A job is followed: by asking until it has ended, and by its events, over lines that are cut."""
+"""Following a job by long polling and by events, over reliable and broken connections."""
 
 import asyncio
 import time
@@ -15,7 +15,7 @@ from islands_api.client import (
     ServiceUnreachableError,
     transport,
 )
-from islands_api.client.response_parsing import EventLines
+from islands_api.client.response_parsing import EventParser
 from islands_service.domain.job import JobOutcome, JobState
 from support.service import Service
 from support.stores import CANCELLED, FAILED, FOUND, brought_on
@@ -24,15 +24,15 @@ SPEC = {"inputs": ["u_V"], "output": "y_um"}
 
 pytestmark = pytest.mark.usefixtures("quick")
 
-#: What a job goes through: a claim, reports of progress, an end.
+#: Generations that a job reports between its claim and its end.
 GENERATIONS = range(1, 7)
 
 
 @pytest.fixture
-def carried_out(service: Service, claimed: Any) -> Callable[..., None]:
-    """What carries a job out, with a pause between the steps."""
+def run_job(service: Service, claimed: Any) -> Callable[..., None]:
+    """Return a function that runs a job with a pause between the steps."""
 
-    def carry_out(job: Any, pause: float = 0.0, outcome: JobOutcome = FOUND) -> None:
+    def run(job: Any, pause: float = 0.0, outcome: JobOutcome = FOUND) -> None:
         lease = claimed(job)
         for generation in GENERATIONS:
             time.sleep(pause)
@@ -40,7 +40,7 @@ def carried_out(service: Service, claimed: Any) -> Callable[..., None]:
         time.sleep(pause)
         service.store.leases.finish(lease, outcome)
 
-    return carry_out
+    return run
 
 
 @pytest.fixture
@@ -48,71 +48,69 @@ def job(client: Any, me: Any) -> Any:
     return client.submit(me.dataset, **SPEC)
 
 
-def happened(outcome: str = "succeeded") -> list[tuple[int, str]]:
+def expected_events(outcome: str = "succeeded") -> list[tuple[int, str]]:
     kinds = ["queued", "running", *("progress" for _ in GENERATIONS), outcome]
     return list(enumerate(kinds, start=1))
 
 
-def seen(events: Any) -> list[tuple[int, str]]:
+def numbers_and_kinds(events: Any) -> list[tuple[int, str]]:
     return [(event.number, event.kind) for event in events]
 
 
-# By asking.
+# By long polling.
 
 
-def test_progress_shows_every_state_it_meets_and_ends_with_the_job(
-    client: Any, job: Any, carried_out: Any, later: Any
+def test_progress_yields_increasing_versions_until_the_job_ends(
+    client: Any, job: Any, run_job: Any, later: Any
 ) -> None:
-    later(0.05, carried_out, job, 0.06)
-    met = list(client.progress(job))
-    assert [met[0].state, met[-1].state] == [JobState.QUEUED, JobState.SUCCEEDED]
-    versions = [each.version for each in met]
+    later(0.05, run_job, job, 0.06)
+    states = list(client.progress(job))
+    assert [states[0].state, states[-1].state] == [JobState.QUEUED, JobState.SUCCEEDED]
+    versions = [each.version for each in states]
     assert versions == sorted(set(versions))
-    told = [each.progress["generation"] for each in met if each.progress]
-    assert told == sorted(told)
-    assert len(set(told)) >= 2  # it was asked while the job went on
+    generations = [each.progress["generation"] for each in states if each.progress]
+    assert generations == sorted(generations)
+    assert len(set(generations)) >= 2  # states of the running job were seen
 
 
-def test_a_change_is_told_when_it_happens(
+def test_progress_yields_a_change_immediately(
     client: Any, service: Service, job: Any, later: Any, me: Any
 ) -> None:
     began = time.monotonic()
     later(0.2, service.store.jobs.cancel, me.owner, job.id)
     assert [each.state for each in client.progress(job)] == ["queued", "cancelled"]
     assert 0.2 <= time.monotonic() - began < 25.0
-    asked = [entry for entry in service.logs if entry.get("path") == f"/v1/jobs/{job.id}"]
-    assert len(asked) == 2  # as it is, and when it has changed: nobody asks again and again
+    requests = [entry for entry in service.logs if entry.get("path") == f"/v1/jobs/{job.id}"]
+    assert len(requests) == 2  # the present state and the change: no busy polling
 
 
-def test_waiting_returns_the_job_that_has_succeeded(
-    client: Any, job: Any, carried_out: Any, later: Any
-) -> None:
-    later(0.1, carried_out, job)
+def test_wait_returns_the_succeeded_job(client: Any, job: Any, run_job: Any, later: Any) -> None:
+    later(0.1, run_job, job)
     done = client.wait(job.id)
     assert (done.state, done.summary) == (JobState.SUCCEEDED, FOUND.summary)
-    assert client.wait(done, 0.0) == done  # of one that has ended nobody waits
+    assert client.wait(done, 0.0) == done  # an ended job is returned immediately
 
 
 @pytest.mark.parametrize(
-    ("outcome", "told"), [(FAILED, "failed: it broke"), (CANCELLED, "cancelled: it was cancelled")]
+    ("outcome", "message"), [(FAILED, "failed: it broke"), (CANCELLED, "cancelled: it was cancelled")]
 )
-def test_waiting_for_a_job_that_does_not_succeed_says_why(
-    client: Any, job: Any, carried_out: Any, later: Any, outcome: JobOutcome, told: str
+def test_wait_raises_the_reason_of_an_unsuccessful_job(
+    client: Any, job: Any, run_job: Any, later: Any, outcome: JobOutcome, message: str
 ) -> None:
-    later(0.1, carried_out, job, 0.0, outcome)
+    later(0.1, run_job, job, 0.0, outcome)
     with pytest.raises(JobFailedError) as caught:
         client.wait(job)
-    assert str(caught.value) == f"job {job.id} {told}"
+    assert str(caught.value) == f"job {job.id} {message}"
 
 
-def test_waiting_ends_in_time(client: Any, job: Any) -> None:
+def test_wait_times_out(client: Any, job: Any) -> None:
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=f"job {job.id} is still queued after 0.3 s"):
         client.wait(job, 0.3)
     assert 0.3 <= time.monotonic() - began < 25.0
 
 
-def test_waiting_ends_in_time_though_the_job_goes_on(
+def test_wait_times_out_while_the_job_progresses(
     client: Any, job: Any, service: Service, claimed: Any, later: Any
 ) -> None:
     lease = claimed(job)
@@ -124,7 +122,7 @@ def test_waiting_ends_in_time_though_the_job_goes_on(
     assert 0.3 <= time.monotonic() - began < 25.0
 
 
-def test_waiting_ends_in_time_though_the_service_is_away(connect: Any, me: Any, wire: Any) -> None:
+def test_wait_times_out_while_the_service_is_unreachable(connect: Any, me: Any, wire: Any) -> None:
     client = connect(wire.url, me.secret, retry=60.0)
     job = client.submit(me.dataset, **SPEC)
     wire.tear()
@@ -134,10 +132,10 @@ def test_waiting_ends_in_time_though_the_service_is_away(connect: Any, me: Any, 
     assert time.monotonic() - began < 25.0
 
 
-def test_waiting_ends_in_time_though_the_service_hangs(
+def test_wait_times_out_while_the_service_hangs(
     connect: Any, scripted: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(transport, "GRACE", 0.1)
+    monkeypatch.setattr(transport, "GRACE_SECONDS", 0.1)
     server = scripted((200, {}, b"{}"), delay=60.0)
     began = time.monotonic()
     with pytest.raises(TimeoutError, match=r"job 0 is not known to have ended after 0.2 s"):
@@ -145,7 +143,7 @@ def test_waiting_ends_in_time_though_the_service_hangs(
     assert time.monotonic() - began < 25.0
 
 
-def test_a_service_that_is_away_for_too_long_ends_the_waiting(connect: Any, me: Any, wire: Any) -> None:
+def test_wait_fails_after_a_long_outage(connect: Any, me: Any, wire: Any) -> None:
     client = connect(wire.url, me.secret, retry=0.3)
     job = client.submit(me.dataset, **SPEC)
     wire.tear()
@@ -153,21 +151,19 @@ def test_a_service_that_is_away_for_too_long_ends_the_waiting(connect: Any, me: 
         client.wait(job, 60.0)
 
 
-def test_waiting_survives_a_service_that_is_started_again(
-    connect: Any, me: Any, wire: Any, carried_out: Any, later: Any
+def test_wait_survives_a_restart_of_the_service(
+    connect: Any, me: Any, wire: Any, run_job: Any, later: Any
 ) -> None:
     client = connect(wire.url, me.secret)
     job = client.submit(me.dataset, **SPEC)
     later(0.1, wire.outage, 0.3)
-    later(0.2, carried_out, job)
+    later(0.2, run_job, job)
     assert client.wait(job).state == JobState.SUCCEEDED
 
 
 @pytest.mark.ci
-def test_an_impatient_client_can_wait_for_a_job_that_does_nothing(
-    connect: Any, service: Service, me: Any
-) -> None:
-    # The service must not hold an answer back for longer than the client waits for one.
+def test_wait_works_with_a_short_timeout_and_an_idle_job(connect: Any, service: Service, me: Any) -> None:
+    # The service must not hold back an answer for longer than the client's timeout.
     client = connect(service.url, me.secret, timeout=1.5, retry=0.0)
     job = client.submit(me.dataset, **SPEC)
     with pytest.raises(TimeoutError, match="is still queued"):
@@ -177,86 +173,89 @@ def test_an_impatient_client_can_wait_for_a_job_that_does_nothing(
 # By events.
 
 
-def test_events_come_in_order_until_the_job_has_ended(
-    client: Any, job: Any, carried_out: Any, later: Any
+def test_events_arrive_in_order_until_the_job_has_ended(
+    client: Any, job: Any, run_job: Any, later: Any
 ) -> None:
-    later(0.05, carried_out, job, 0.02)
+    later(0.05, run_job, job, 0.02)
     events = list(client.events(job))
-    assert seen(events) == happened()
+    assert numbers_and_kinds(events) == expected_events()
     assert all(isinstance(event, Event) for event in events)
     assert events[1].data["attempt"] == 1
     assert [event.data["generation"] for event in events[2:-1]] == list(GENERATIONS)
 
 
-def test_events_go_on_behind_a_number(client: Any, job: Any, carried_out: Any) -> None:
-    carried_out(job)
+def test_events_start_after_a_number(client: Any, job: Any, run_job: Any) -> None:
+    run_job(job)
     for after in (0, 4, 8, 9):
-        assert seen(client.events(job, after)) == happened()[after:]
+        assert numbers_and_kinds(client.events(job, after)) == expected_events()[after:]
 
 
 @pytest.mark.parametrize("passed", [999, 1300])
-def test_events_neither_lack_nor_repeat_over_cut_lines(
-    connect: Any, me: Any, wire: Any, client: Any, job: Any, carried_out: Any, passed: int
+def test_events_are_complete_over_broken_connections(
+    connect: Any, me: Any, wire: Any, client: Any, job: Any, run_job: Any, passed: int
 ) -> None:
-    carried_out(job)
-    # The head of an answer takes some 800 bytes: some are cut in it, others in the middle of an event.
+    run_job(job)
+    # The header of an answer has some 800 bytes: some cuts are in it, others in the middle of an event.
     wire.cuts = [passed, 40, 900]
-    assert seen(connect(wire.url, me.secret).events(job)) == happened()
-    assert wire.asked > 2
+    assert numbers_and_kinds(connect(wire.url, me.secret).events(job)) == expected_events()
+    assert wire.connections > 2
 
 
-def test_events_go_on_when_a_service_comes_back(
-    connect: Any, me: Any, wire: Any, job: Any, carried_out: Any, later: Any
+def test_events_continue_after_an_outage(
+    connect: Any, me: Any, wire: Any, job: Any, run_job: Any, later: Any
 ) -> None:
-    later(0.05, carried_out, job, 0.05)
+    later(0.05, run_job, job, 0.05)
     later(0.2, wire.outage, 0.2)
-    assert seen(connect(wire.url, me.secret).events(job)) == happened()
+    assert numbers_and_kinds(connect(wire.url, me.secret).events(job)) == expected_events()
 
 
-def test_the_end_of_a_job_is_told_though_the_stream_ended_before(
-    connect: Any, service: Service, me: Any, job: Any, carried_out: Any, later: Any
+def test_events_include_the_end_of_a_job_after_a_closed_stream(
+    connect: Any, service: Service, me: Any, job: Any, run_job: Any, later: Any
 ) -> None:
     def end_streams() -> None:
-        # As a service does that is ending; the job ends before anybody has come back.
-        carried_out(job)
+        # Like a stopping service; the job ends before the client reconnects.
+        run_job(job)
         service.app.state.islands.hub.close()
         time.sleep(0.05)
         service.app.state.islands.hub.closed = False
 
     service.app.state.islands.hub.closed = False
     later(0.15, end_streams)
-    assert seen(connect(service.url, me.secret).events(job)) == happened()
+    assert numbers_and_kinds(connect(service.url, me.secret).events(job)) == expected_events()
 
 
-def test_a_line_that_is_quiet_for_long_is_taken_up_again(
-    connect: Any, me: Any, wire: Any, job: Any, carried_out: Any, later: Any
+def test_idle_connections_may_break_repeatedly(
+    connect: Any, me: Any, wire: Any, job: Any, run_job: Any, later: Any
 ) -> None:
-    # Nothing comes for longer than the client tries again, before and after it is cut off.
+    # No event arrives for longer than the retry time, before and after the connection breaks.
     client = connect(wire.url, me.secret, retry=0.15)
     for seconds in (0.25, 0.5):
         later(seconds, wire.interrupt)
-    later(0.55, carried_out, job)
-    assert seen(client.events(job)) == happened()
+    later(0.55, run_job, job)
+    assert numbers_and_kinds(client.events(job)) == expected_events()
 
 
-def test_a_line_that_has_gone_silent_is_taken_up_again(
-    connect: Any, service: Service, me: Any, job: Any, carried_out: Any, later: Any
+def test_silent_connection_is_reopened_after_the_timeout(
+    connect: Any, service: Service, me: Any, job: Any, run_job: Any, later: Any
 ) -> None:
-    later(0.4, carried_out, job)
-    assert seen(connect(service.url, me.secret, timeout=0.2, retry=0.3).events(job)) == happened()
+    later(0.4, run_job, job)
+    assert (
+        numbers_and_kinds(connect(service.url, me.secret, timeout=0.2, retry=0.3).events(job))
+        == expected_events()
+    )
 
 
-def test_who_reads_slowly_loses_nothing(connect: Any, me: Any, wire: Any, job: Any, carried_out: Any) -> None:
-    carried_out(job)
+def test_slow_reader_receives_all_events(connect: Any, me: Any, wire: Any, job: Any, run_job: Any) -> None:
+    run_job(job)
     wire.cuts = [1300]
     events = []
     for event in connect(wire.url, me.secret, retry=0.2).events(job):
         events.append(event)
         time.sleep(0.3 if event.number == 2 else 0.0)
-    assert seen(events) == happened()
+    assert numbers_and_kinds(events) == expected_events()
 
 
-def test_events_of_a_service_that_stays_away_end_in_time(connect: Any, me: Any, wire: Any, job: Any) -> None:
+def test_events_fail_after_a_long_outage(connect: Any, me: Any, wire: Any, job: Any) -> None:
     client = connect(wire.url, me.secret, retry=0.3)
     events = client.events(job)
     assert next(iter(events)).kind == "queued"
@@ -265,34 +264,32 @@ def test_events_of_a_service_that_stays_away_end_in_time(connect: Any, me: Any, 
         list(events)
 
 
-def test_events_are_asked_for_again_when_the_service_has_time(connect: Any, scripted: Any) -> None:
+def test_events_are_requested_again_after_a_busy_answer(connect: Any, scripted: Any) -> None:
     text = b"id: 1\nevent: succeeded\ndata: {}\n\n"
     server = scripted((503, {}, b"{}"), (429, {"Retry-After": "0"}, b"{}"), (200, {}, text), (204, {}, b""))
-    assert seen(connect(server.url).events("0")) == [(1, "succeeded")]
-    assert [headers["Last-Event-ID"] for *_, headers in server.asked] == ["0", "0", "0", "1"]
+    assert numbers_and_kinds(connect(server.url).events("0")) == [(1, "succeeded")]
+    assert [headers["Last-Event-ID"] for *_, headers in server.requests] == ["0", "0", "0", "1"]
     with pytest.raises(ServiceError):
         list(connect(scripted((503, {"Retry-After": "9"}, b"{}")).url).events("0"))
 
 
-def test_a_job_that_is_not_there_has_no_events(client: Any) -> None:
+def test_unknown_job_has_no_events(client: Any) -> None:
     with pytest.raises(ServiceError) as caught:
-        list(client.events("nobody"))
+        list(client.events("unknown"))
     assert caught.value.type == "/problems/no-such-job"
 
 
-def test_a_job_that_goes_away_ends_its_events(
-    client: Any, job: Any, me: Any, service: Service, later: Any
-) -> None:
-    def forget() -> None:
+def test_deleted_job_ends_its_events(client: Any, job: Any, me: Any, service: Service, later: Any) -> None:
+    def delete() -> None:
         service.store.jobs.cancel(me.owner, job.id)
         service.store.jobs.delete(me.owner, job.id)
 
-    later(0.15, forget)
+    later(0.15, delete)
     with pytest.raises(ServiceError, match="there is no job"):
         list(client.events(job))
 
 
-def test_what_looks_like_a_line_s_end_ends_no_event(
+def test_unicode_line_separators_do_not_split_an_event(
     client: Any, job: Any, service: Service, claimed: Any
 ) -> None:
     text = "a\u2028b\x85c\r\nd\x0be\x1cf\n\ng\U0001f600"
@@ -302,37 +299,37 @@ def test_what_looks_like_a_line_s_end_ends_no_event(
     assert last.data["detail"] == text
 
 
-def test_a_line_that_is_cut_within_a_letter_loses_nothing(
+def test_connection_broken_within_a_character_loses_nothing(
     connect: Any, me: Any, wire: Any, job: Any, service: Service, claimed: Any
 ) -> None:
     detail = "ü" * 500
     problem = {"type": "broken", "detail": detail}
     service.store.leases.finish(claimed(job), JobOutcome(JobState.FAILED, problem=problem))
-    wire.cuts = [1500, 1501]  # one of them is the middle of a letter
+    wire.cuts = [1500, 1501]  # one of the cuts is within a character
     *_, last = connect(wire.url, me.secret).events(job)
     assert last.data["detail"] == detail
-    assert wire.asked > 2
+    assert wire.connections > 2
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 7, 1000])
-def test_events_do_not_depend_on_how_they_arrive(size: int) -> None:
+def test_parsed_events_do_not_depend_on_the_chunk_size(size: int) -> None:
     text = (
         ": alive\n\n" + 'id: 1\nevent: running\ndata: {"note": "ü: x"}\n\n' * 2 + "id: 9\nevent: prog"
     ).encode()
-    lines = EventLines()
-    found = [event for at in range(0, len(text), size) for event in lines.feed(text[at : at + size])]
+    parser = EventParser()
+    found = [event for at in range(0, len(text), size) for event in parser.feed(text[at : at + size])]
     assert found == [Event(1, "running", {"note": "ü: x"})] * 2
 
 
-def test_many_jobs_are_followed_at_once(service: Service, me: Any, carried_out: Any, later: Any) -> None:
+def test_concurrent_streams_share_one_client(service: Service, me: Any, run_job: Any, later: Any) -> None:
     async def follow_all() -> list[list[tuple[int, str]]]:
         async with AsyncClient(service.url, me.secret) as client:
             jobs = [await client.submit(me.dataset, ["u_V"], "y_um") for _ in range(8)]
-            later(0.1, lambda: [carried_out(each) for each in jobs])
+            later(0.1, lambda: [run_job(each) for each in jobs])
 
             async def follow(one: Any) -> list[tuple[int, str]]:
-                return seen([event async for event in client.events(one)])
+                return numbers_and_kinds([event async for event in client.events(one)])
 
             return await asyncio.gather(*map(follow, jobs))
 
-    assert asyncio.run(follow_all()) == [happened()] * 8
+    assert asyncio.run(follow_all()) == [expected_events()] * 8

@@ -1,4 +1,4 @@
-"""What the client does when a line is cut, a service is away for a while, or has no time."""
+"""Behaviour of the clients with broken connections, outages and busy services."""
 
 import json
 import time
@@ -19,8 +19,8 @@ SPEC = {"inputs": ["u_V"], "output": "y_um"}
 EMPTY = (200, {}, b'{"items": [], "next": null}')
 
 
-def refused(status: int, after: object = None, kind: str = "too-many-requests") -> Any:
-    """A problem, as the service tells it, and when to come back."""
+def problem_answer(status: int, after: object = None, kind: str = "too-many-requests") -> Any:
+    """Return an answer with a problem and a Retry-After header."""
     body = json.dumps({"type": f"/problems/{kind}", "detail": "not now"}).encode()
     return status, {} if after is None else {"Retry-After": str(after)}, body
 
@@ -33,16 +33,16 @@ def from_now(seconds: float) -> str:
 
 
 @pytest.mark.parametrize("passed", [0, 12, 200], ids=["no answer", "half a status", "half a body"])
-def test_a_lost_answer_makes_no_second_job(
+def test_lost_answer_to_a_submission_creates_no_second_job(
     connect: Any, service: Service, me: Any, wire: Any, passed: int
 ) -> None:
     wire.cuts = [passed, passed]
     job = connect(wire.url, me.secret).submit(me.dataset, **SPEC)
-    assert wire.asked == 3  # the first two were carried out, or would have been
+    assert wire.connections == 3  # the first two requests reached the service
     assert [found.id for found in service.store.jobs.page(me.owner).jobs] == [job.id]
 
 
-def test_a_lost_answer_to_an_upload_makes_no_second_data_set(
+def test_lost_answer_to_an_upload_creates_no_second_data_set(
     connect: Any, me: Any, wire: Any, tmp_path: Any
 ) -> None:
     path = tmp_path / "record.csv"
@@ -50,26 +50,27 @@ def test_a_lost_answer_to_an_upload_makes_no_second_data_set(
     wire.cuts = [0]
     client = connect(wire.url, me.secret)
     dataset = client.upload(path)
-    assert wire.asked == 2
+    assert wire.connections == 2
     assert [found.id for found in client.datasets().items] == [dataset.id, me.dataset]
 
 
-def test_a_lost_answer_to_a_cancellation_is_no_failure(client: Any, connect: Any, me: Any, wire: Any) -> None:
+def test_lost_answer_to_a_cancellation_is_not_an_error(client: Any, connect: Any, me: Any, wire: Any) -> None:
     job = client.submit(me.dataset, **SPEC)
     wire.cuts = [0]
     assert connect(wire.url, me.secret).cancel(job).state == JobState.CANCELLED
-    assert client.job(job).version == 2  # once
+    assert client.job(job).version == 2  # cancelled once
 
 
-def test_what_would_do_harm_is_not_sent_twice(client: Any, connect: Any, me: Any, wire: Any) -> None:
+def test_non_idempotent_call_is_not_repeated(client: Any, connect: Any, me: Any, wire: Any) -> None:
     job = client.cancel(client.submit(me.dataset, **SPEC))
     for call in ("resume", "delete"):
-        wire.cuts, before = [0], wire.asked
+        wire.cuts, before = [0], wire.connections
         with pytest.raises(
-            ServiceUnreachableError, match=r"broke off before it answered .*: it may have done what was asked"
+            ServiceUnreachableError,
+            match=r"closed the connection before it answered .*: the call may have been carried out",
         ):
             getattr(connect(wire.url, me.secret), call)(job)
-        assert wire.asked == before + 1
+        assert wire.connections == before + 1
         if call == "resume":
             assert client.job(job).state == JobState.QUEUED
             client.cancel(job)
@@ -77,35 +78,35 @@ def test_what_would_do_harm_is_not_sent_twice(client: Any, connect: Any, me: Any
         client.job(job)
 
 
-def test_what_may_have_been_done_is_not_sent_twice(
+def test_call_with_unknown_outcome_is_not_repeated(
     client: Any, connect: Any, me: Any, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    job, asked = client.cancel(client.submit(me.dataset, **SPEC)), []
+    job, attempts = client.cancel(client.submit(me.dataset, **SPEC)), []
 
     def resume(*_: Any) -> None:
-        asked.append(1)
+        attempts.append(1)
         raise CommitUnknownError("the database went away")
 
     monkeypatch.setattr(service.store.jobs, "resume", resume)
-    with pytest.raises(ServiceError, match="nobody knows whether it was written") as caught:
+    with pytest.raises(ServiceError, match="whether") as caught:
         client.resume(job)
     assert (caught.value.status, caught.value.type) == (504, "/problems/store-in-doubt")
-    assert len(asked) == 1
+    assert len(attempts) == 1
 
 
-def test_what_never_left_may_be_sent_again(client: Any, connect: Any, me: Any, wire: Any, later: Any) -> None:
+def test_call_without_a_connection_is_repeated(
+    client: Any, connect: Any, me: Any, wire: Any, later: Any
+) -> None:
     job = client.cancel(client.submit(me.dataset, **SPEC))
     wire.tear()
     later(0.2, wire.mend)
     assert connect(wire.url, me.secret).resume(job).state == JobState.QUEUED
 
 
-# Away.
+# Outages.
 
 
-def test_a_service_that_comes_back_in_time_is_waited_for(
-    connect: Any, me: Any, wire: Any, later: Any
-) -> None:
+def test_call_succeeds_after_a_short_outage(connect: Any, me: Any, wire: Any, later: Any) -> None:
     client = connect(wire.url, me.secret, retry=25.0)
     client.jobs()
     wire.tear()
@@ -115,7 +116,7 @@ def test_a_service_that_comes_back_in_time_is_waited_for(
     assert time.monotonic() - began > 0.2
 
 
-def test_a_service_that_stays_away_is_told_of_in_time(connect: Any, me: Any, wire: Any) -> None:
+def test_long_outage_raises_an_error_in_time(connect: Any, me: Any, wire: Any) -> None:
     client = connect(wire.url, me.secret, retry=0.3)
     client.jobs()
     wire.tear()
@@ -124,19 +125,19 @@ def test_a_service_that_stays_away_is_told_of_in_time(connect: Any, me: Any, wir
         client.jobs()
     assert 0.2 <= time.monotonic() - began < 25.0
     assert str(caught.value) == (
-        f"the service at {wire.url} does not answer (Connection refused): is it running, and is this its "
-        "address?"
+        f"the service at {wire.url} does not answer (Connection refused): check that it runs and that the "
+        "address is right"
     )
 
 
-def test_nobody_waits_who_does_not_want_to(connect: Any, wire: Any, pauses: list[float]) -> None:
+def test_call_without_retries_fails_immediately(connect: Any, wire: Any, pauses: list[float]) -> None:
     wire.tear()
     with pytest.raises(ServiceUnreachableError):
         connect(wire.url, retry=0.0).jobs()
     assert pauses == []
 
 
-def test_a_service_that_hangs_is_told_of(connect: Any, scripted: Any) -> None:
+def test_hanging_service_raises_an_error_in_time(connect: Any, scripted: Any) -> None:
     server = scripted(EMPTY, delay=60.0)
     began = time.monotonic()
     with pytest.raises(ServiceUnreachableError, match=r"does not answer \(timed out|ReadTimeout\)"):
@@ -145,76 +146,74 @@ def test_a_service_that_hangs_is_told_of(connect: Any, scripted: Any) -> None:
 
 
 @pytest.mark.parametrize("url", ["127.0.0.1:8000", "localhost", "ftp://here", "http://", "http://[::1", ""])
-def test_what_is_no_address_is_refused_at_once(connect: Any, url: str) -> None:
+def test_malformed_address_is_rejected_immediately(connect: Any, url: str) -> None:
     with pytest.raises(Exception, match="write http://HOST:PORT") as caught:
         connect(url)
     assert type(caught.value).__name__ == "SettingsError"
 
 
-# No time.
+# Busy services.
 
 
-def test_a_service_that_has_no_time_is_asked_again_when_it_says(
-    connect: Any, scripted: Any, pauses: list[float]
-) -> None:
-    server = scripted(refused(429, 1), refused(503), EMPTY)
+def test_call_is_repeated_after_the_requested_delay(connect: Any, scripted: Any, pauses: list[float]) -> None:
+    server = scripted(problem_answer(429, 1), problem_answer(503), EMPTY)
     assert connect(server.url).jobs().items == ()
     first, second = pauses
     assert first >= 1.0
-    assert second <= max(transport.DELAYS)
+    assert second <= max(transport.RETRY_DELAYS)
 
 
-# Their moments stand in no test's name: every process that collects has its own.
+# Explicit ids, because the dates differ between the processes that collect the tests.
 @pytest.mark.parametrize(
     "after",
     ["soon", "-5", "", from_now(-3600.0), "1e9", "٣"],
-    ids=["soon", "negative", "empty", "gone by", "no whole number", "foreign digit"],
+    ids=["word", "negative", "empty", "past date", "not an integer", "non-ASCII digit"],
 )
-def test_what_is_no_time_to_come_back_at_is_passed_over(
+def test_invalid_retry_after_header_is_ignored(
     connect: Any, scripted: Any, pauses: list[float], after: str
 ) -> None:
-    server = scripted(refused(503, after.encode().decode("latin-1")), EMPTY)
+    server = scripted(problem_answer(503, after.encode().decode("latin-1")), EMPTY)
     assert connect(server.url).jobs().items == ()
-    assert [pause <= max(transport.DELAYS) for pause in pauses] == [True]
+    assert [pause <= max(transport.RETRY_DELAYS) for pause in pauses] == [True]
 
 
-@pytest.mark.parametrize("after", [3, from_now(3600.0)], ids=["seconds", "moment"])
-def test_who_cannot_wait_so_long_is_told_at_once(connect: Any, scripted: Any, after: object) -> None:
-    server = scripted(refused(429, after, "quota-exceeded"), EMPTY)
+@pytest.mark.parametrize("after", [3, from_now(3600.0)], ids=["seconds", "date"])
+def test_delay_beyond_the_retry_time_fails_immediately(connect: Any, scripted: Any, after: object) -> None:
+    server = scripted(problem_answer(429, after, "quota-exceeded"), EMPTY)
     with pytest.raises(ServiceError, match="not now") as caught:
         connect(server.url).jobs()
     assert (caught.value.status, caught.value.type) == (429, "/problems/quota-exceeded")
-    assert len(server.asked) == 1
+    assert len(server.requests) == 1
 
 
-def test_a_service_that_never_has_time_says_why_in_the_end(connect: Any, scripted: Any) -> None:
-    server = scripted(refused(503, kind="store-unavailable"))
+def test_permanently_busy_service_raises_its_problem(connect: Any, scripted: Any) -> None:
+    server = scripted(problem_answer(503, kind="store-unavailable"))
     with pytest.raises(ServiceError) as caught:
         connect(server.url, retry=0.2).jobs()
     assert caught.value.type == "/problems/store-unavailable"
-    assert 1 < len(server.asked) < 5  # at 0, 0.03, 0.09, 0.19 seconds
+    assert 1 < len(server.requests) < 5  # at 0, 0.03, 0.09, 0.19 seconds
 
 
-def test_a_gateway_leaves_open_whether_it_was_done(connect: Any, scripted: Any) -> None:
+def test_gateway_error_repeats_idempotent_calls_only(connect: Any, scripted: Any) -> None:
     for status in (502, 504):
         server = scripted((status, {}, b"gateway"), (202, {}, b"{}"))
         with pytest.raises(ServiceError, match="gateway"):
             connect(server.url).resume("0")
-        assert len(server.asked) == 1
+        assert len(server.requests) == 1
         server = scripted((status, {}, b"gateway"), EMPTY)
         assert connect(server.url).jobs().items == ()
 
 
 @pytest.mark.parametrize("status", [400, 404, 409, 422, 500, 507])
-def test_a_refusal_is_not_asked_again(connect: Any, scripted: Any, status: int) -> None:
-    server = scripted(refused(status, 0))
+def test_permanent_problem_is_not_repeated(connect: Any, scripted: Any, status: int) -> None:
+    server = scripted(problem_answer(status, 0))
     with pytest.raises(ServiceError, match="not now"):
         connect(server.url).call(calls.job("0"))
-    assert len(server.asked) == 1
+    assert len(server.requests) == 1
 
 
 @pytest.mark.nightly
-def test_who_asks_too_much_is_served_when_the_service_says(connect: Any, tmp_path: Any) -> None:
+def test_rate_limited_client_waits_as_requested(connect: Any, tmp_path: Any) -> None:
     with served(tmp_path / "busy", rate=2.0, burst=1) as busy:
         _, secret = busy.store.keys.create("test", frozenset({"read"}))
         client = connect(busy.url, secret)

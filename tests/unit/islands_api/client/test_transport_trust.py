@@ -1,4 +1,4 @@
-"""Keys and certificates: a key is sent and never shown, and a service is what its certificate says."""
+"""API keys and certificates: keys are sent but never shown, and certificates are verified."""
 
 import shutil
 import ssl
@@ -18,13 +18,13 @@ from islands_service.settings import ServiceSettings
 from islands_service.store import Store
 from support.service import Service, kept, listening
 
-#: What must not be seen anywhere.
-SECRET = "islands_this-is-nobody-s-key-and-secret-all-the-same"
+#: Unknown API key that must not appear in any output.
+SECRET = "islands_this-is-an-unknown-key-and-secret-all-the-same"
 
 
 @pytest.fixture(scope="module")
 def guarded(serve: Any) -> Iterator[Service]:
-    """A service that asks everybody for a key."""
+    """A service that requires keys from all clients."""
     with serve(rate=0, require_keys=True) as running:
         yield running
 
@@ -38,7 +38,7 @@ def authority() -> trustme.CA:
 def secure(
     tmp_path_factory: pytest.TempPathFactory, prepared_sqlite: Path, authority: trustme.CA
 ) -> Iterator[int]:
-    """The port of a service that speaks TLS, with a certificate of a private authority for 127.0.0.1."""
+    """Port of a service with TLS and a certificate of a private authority for 127.0.0.1."""
     folder = tmp_path_factory.mktemp("secure")
     issued = authority.issue_cert("127.0.0.1")
     issued.private_key_pem.write_to_path(folder / "key.pem")
@@ -50,20 +50,20 @@ def secure(
         yield int(url.rpartition(":")[2])
 
 
-def shown(error: BaseException) -> str:
-    """All that a program would print of an error."""
+def format_error(error: BaseException) -> str:
+    """Return all texts that a program could print about an error."""
     return "".join(traceback.format_exception(error)) + repr(error) + repr(vars(error))
 
 
 # Keys.
 
 
-def test_a_key_opens_what_is_its_owner_s(connect: Any, guarded: Service) -> None:
+def test_key_gives_access_to_the_data_of_its_owner(connect: Any, guarded: Service) -> None:
     _, one = guarded.store.keys.create("one", frozenset({"read", "write"}))
     _, other = guarded.store.keys.create("other", frozenset({"read"}))
     owner = guarded.store.keys.find(one).owner  # type: ignore[union-attr]
     job = connect(guarded.url, one).submit(kept(guarded.store, owner), ["u_V"], "y_um")
-    # A key that was read from a file has the end of its line with it.
+    # A key that was read from a file includes the line break.
     assert connect(guarded.url, f" {one}\r\n").job(job) == job
     with pytest.raises(ServiceError) as caught:
         connect(guarded.url, other).job(job)
@@ -74,26 +74,28 @@ def test_a_key_opens_what_is_its_owner_s(connect: Any, guarded: Service) -> None
 
 
 @pytest.mark.parametrize(
-    ("key", "told"), [(None, "this service needs a key"), (SECRET, "the key is unknown")]
+    ("key", "message"), [(None, "this service needs a key"), (SECRET, "the key is unknown")]
 )
-def test_who_has_no_key_is_told_so(connect: Any, guarded: Service, key: str | None, told: str) -> None:
-    with pytest.raises(ServiceError, match=told) as caught:
+def test_missing_or_unknown_key_is_rejected(
+    connect: Any, guarded: Service, key: str | None, message: str
+) -> None:
+    with pytest.raises(ServiceError, match=message) as caught:
         connect(guarded.url, key).jobs()
     assert (caught.value.status, caught.value.type) == (401, "/problems/no-key")
-    with pytest.raises(ServiceError, match=told):
+    with pytest.raises(ServiceError, match=message):
         list(connect(guarded.url, key).events("0"))
 
 
 @pytest.mark.parametrize(
     "key", ["", "  ", f"{SECRET}\nX-Other: 1", f"{SECRET} {SECRET}", f"{SECRET}ü", f"\0{SECRET}"]
 )
-def test_what_is_no_key_is_refused_without_showing_it(connect: Any, key: str) -> None:
+def test_malformed_key_is_rejected_without_showing_the_key(connect: Any, key: str) -> None:
     with pytest.raises(SettingsError, match="give it as 'islands keys create' printed it") as caught:
         connect("http://127.0.0.1:9", key)
-    assert SECRET not in shown(caught.value)
+    assert SECRET not in format_error(caught.value)
 
 
-def test_a_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted: Any) -> None:
+def test_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted: Any) -> None:
     server = scripted((500, {}, b"oh"))
     clients = [
         connect(guarded.url, SECRET),
@@ -105,23 +107,23 @@ def test_a_key_is_sent_and_never_shown(connect: Any, guarded: Service, scripted:
         for call in (client.jobs, partial(client.wait, "0")):
             with pytest.raises((ServiceError, ServiceUnreachableError)) as caught:
                 call()
-            assert SECRET not in shown(caught.value)
+            assert SECRET not in format_error(caught.value)
         assert SECRET not in repr(client) + str(client) + repr(vars(getattr(client, "client", client)))
-    assert {headers["Authorization"] for *_, headers in server.asked} == {f"Bearer {SECRET}"}
-    assert all(headers["User-Agent"].startswith("islands/") for *_, headers in server.asked)
+    assert {headers["Authorization"] for *_, headers in server.requests} == {f"Bearer {SECRET}"}
+    assert all(headers["User-Agent"].startswith("islands/") for *_, headers in server.requests)
     assert SECRET not in str(guarded.logs)
 
 
-def test_without_a_key_none_is_sent(connect: Any, scripted: Any) -> None:
+def test_client_without_a_key_sends_no_authorization(connect: Any, scripted: Any) -> None:
     server = scripted((200, {}, b'{"items": []}'))
     connect(server.url).jobs()
-    assert "Authorization" not in server.asked[0][2]
+    assert "Authorization" not in server.requests[0][2]
 
 
 # Certificates.
 
 
-def test_a_private_authority_is_trusted_when_its_file_is_given(
+def test_private_authority_is_trusted_if_its_file_is_given(
     connect: Any, secure: int, authority: trustme.CA, tmp_path: Path
 ) -> None:
     path = tmp_path / "authority.pem"
@@ -131,7 +133,7 @@ def test_a_private_authority_is_trusted_when_its_file_is_given(
         assert connect(f"https://127.0.0.1:{secure}", verify=verify).jobs().items == ()
 
 
-def test_an_authority_in_the_environment_is_trusted(
+def test_authority_in_the_environment_is_trusted(
     connect: Any, secure: int, authority: trustme.CA, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     authority.cert_pem.write_to_path(tmp_path / "authority.pem")
@@ -140,10 +142,10 @@ def test_an_authority_in_the_environment_is_trusted(
 
 
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
-def test_a_certificate_that_does_not_hold_is_refused_at_once(
+def test_invalid_certificate_is_rejected_immediately(
     connect: Any, secure: int, authority: trustme.CA, tmp_path: Path, name: str
 ) -> None:
-    # Of an authority that nobody knows; of one that is known, for another name.
+    # A certificate of an unknown authority, and one of a known authority for another name.
     path = tmp_path / "authority.pem"
     (authority if name == "localhost" else trustme.CA()).cert_pem.write_to_path(path)
     client = connect(f"https://{name}:{secure}", SECRET, verify=str(path), retry=60.0)
@@ -153,9 +155,9 @@ def test_a_certificate_that_does_not_hold_is_refused_at_once(
         ) as caught:
             call()
         assert "SSL_CERT_FILE" in str(caught.value)
-        assert SECRET not in shown(caught.value)
+        assert SECRET not in format_error(caught.value)
 
 
-def test_an_authority_s_file_that_is_not_there_is_told_of(connect: Any, tmp_path: Path) -> None:
+def test_missing_authority_file_raises_an_error(connect: Any, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         connect("https://127.0.0.1:9", verify=str(tmp_path / "none.pem"))
