@@ -1,4 +1,4 @@
-"""The command line ``islands``: each command is one file, listed in `islands_api.cli.app`."""
+"""Command line ``islands``: one file per command. Read `islands_api.cli.app` first."""
 
 from islands_api.cli.app import main
 

@@ -1,4 +1,4 @@
-"""The table of commands, and what becomes of an error: one line that says what to do, exit code 2."""
+"""Table of commands, and error handling: one line on standard error and exit code 2."""
 
 import os
 import sys
@@ -12,10 +12,10 @@ from typer.core import TyperGroup
 from islands.errors import IslandsError
 from islands_api.cli.console import errors
 
-#: What tells libraries of linear algebra how many threads to take.
+#: Environment variables that set the number of threads of linear algebra libraries.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
-#: Every command is a file of its own with a function, or a group of commands, of the command's name.
+#: Commands, in the order of the help. Each is a file with a function or a group of the command's name.
 COMMANDS = (
     *("identify", "fit", "diagnose", "simulate", "show", "demo"),
     *("bench", "trials", "systems", "serve", "jobs", "keys"),
@@ -23,10 +23,10 @@ COMMANDS = (
 
 
 class Commands(TyperGroup):
-    """Imports a command when it is called for: one that asks a service about its jobs needs no kernels."""
+    """Group that imports a command on demand, so that ``islands jobs`` does not load the kernels."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; report an error in one line and exit with 2, or 130 where it was interrupted."""
+        """Run the command. Report an error in one line and exit with code 2, or 130 if interrupted."""
         try:
             return super().invoke(ctx)
         except (IslandsError, OSError) as error:
@@ -37,19 +37,18 @@ class Commands(TyperGroup):
             sys.exit(130)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
-        """Return the names in the table's order."""
+        """Return the names in the order of the table."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
-        """Return a command, or None where there is none of that name."""
+        """Return a command, or None if no command has the name."""
         if cmd_name not in COMMANDS:
             return None
-        found = getattr(import_module(f"islands_api.cli.commands.{cmd_name}"), cmd_name)
-        if not isinstance(found, typer.Typer):
-            alone = typer.Typer(pretty_exceptions_enable=False)
-            alone.command(name=cmd_name)(found)
-            found = alone
-        command = typer.main.get_command(found)
+        group = getattr(import_module(f"islands_api.cli.commands.{cmd_name}"), cmd_name)
+        if not isinstance(group, typer.Typer):
+            function, group = group, typer.Typer(pretty_exceptions_enable=False)
+            group.command(name=cmd_name)(function)
+        command = typer.main.get_command(group)
         command.name = cmd_name
         return command
 
@@ -69,8 +68,8 @@ def _islands() -> None:
 
 def main() -> None:
     """Run the command line."""
-    # Matrices are small here, and islands, trials and other jobs have the cores: threads of linear algebra
-    # would wait for each other, and sums depend on how many they are. NumPy is not imported yet.
+    # The matrices are small, and the cores are busy with islands and jobs: more threads would wait for each
+    # other, and the sums would depend on their number. Must be set before NumPy is imported.
     for name in THREADS:
         os.environ.setdefault(name, "1")
     app()

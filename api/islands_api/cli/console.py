@@ -1,4 +1,4 @@
-"""Where the command line writes: results to standard output, progress and errors to standard error."""
+"""Consoles: results go to standard output, progress and errors to standard error."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -28,7 +28,7 @@ def print_message(message: str, _fraction: float | None = None, /) -> None:
 
 @contextmanager
 def progress(title: str) -> Iterator[Display]:
-    """Show a moving bar while something runs."""
+    """Show a progress bar during the context."""
     columns = (
         SpinnerColumn(),
         TextColumn("{task.fields[title]}"),
@@ -40,22 +40,22 @@ def progress(title: str) -> Iterator[Display]:
     task = bar.add_task("", total=1.0, title=title)
     with Live(bar, console=errors, transient=True, refresh_per_second=10) as live:
 
-        def tell(message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
+        def show(message: str, fraction: float | None = None, /, lines: Sequence[str] = ()) -> None:
             bar.update(task, description=message, completed=fraction)
             live.update(Group(bar, *(Text(line) for line in lines)))
 
-        yield tell
+        yield show
 
 
 def compile_kernels() -> None:
-    """Compile the kernels where that has not been done, and show that it goes on."""
-    # Most of the core: a command that needs no kernels must not wait for it.
+    """Compile the kernels if they are not in the cache, and show a progress bar meanwhile."""
+    # Imported here because it loads most of the core: other commands must start fast.
     from islands.facade.warm_up import warm_up  # noqa: PLC0415
 
     with ExitStack() as stack:
 
-        def tell(line: str) -> None:
+        def announce(line: str) -> None:
             errors.print(line, markup=False)
             stack.enter_context(progress("kernels"))("", 0.0)
 
-        warm_up(tell)
+        warm_up(announce)

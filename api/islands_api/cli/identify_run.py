@@ -1,4 +1,4 @@
-"""A run of ``islands identify`` in its folder: record, search, checkpoints, result."""
+"""Run of ``islands identify`` in its folder: record, search, checkpoints, result."""
 
 import json
 import signal
@@ -32,20 +32,37 @@ from islands_api.cli.output_folder import show_result
 from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
 
+#: File of the search state.
 CHECKPOINT = "checkpoint.json"
+
+#: File of the hall of fame.
 HALL = "hall.json"
+
+#: File of the metrics on the test data.
 TEST = "test.json"
 
-#: Seconds between two checkpoints: what a crash may cost.
-CHECKPOINT_EVERY = 10.0
+#: Least seconds between two checkpoints: the work that a crash may lose.
+CHECKPOINT_SECONDS = 10.0
 
-#: Part of a run that may go into checkpoints: of a thousand islands one takes half a minute.
-CHECKPOINT_SHARE = 0.05
+#: Largest fraction of the run time spent on checkpoints. One of a thousand islands takes half a minute.
+CHECKPOINT_FRACTION = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """How to run: nothing of it changes what is found, but for an end by the clock."""
+    """Options of a run that do not change its result, except for ``wall_time``.
+
+    Attributes
+    ----------
+    engine : str, optional
+        Name of an engine.
+    address : str, optional
+        Address of a Ray cluster.
+    wall_time : float, optional
+        Seconds after which the search stops.
+    verbose : bool
+        Whether the memory used by the caches is printed.
+    """
 
     engine: str | None
     address: str | None
@@ -53,118 +70,134 @@ class RunOptions:
     verbose: bool
 
     def engine_for(self, islands: int) -> str:
-        """Return the engine's name: Ray takes three seconds to start, and a single island gains nothing."""
+        """Return the name of the engine. Ray starts in three seconds; one island gains nothing from it."""
         return self.engine or ("ray" if islands > 1 or self.address else "serial")
 
 
 def run(
-    manner: RunOptions,
+    run_options: RunOptions,
     folder: Path,
     job: dict[str, Any],
     state: SearchState | None = None,
     spent: float = 0.0,
 ) -> None:
-    """Run a job in a folder, or go on with it from a state that took some seconds; print what was found."""
+    """Run a job in a folder, or resume it, and print the result.
+
+    Parameters
+    ----------
+    job : dict
+        Record, columns, preset, seed and changed settings.
+    state : SearchState, optional
+        State from which the search is resumed.
+    spent : float
+        Seconds that the search took to reach this state.
+    """
     settings = resolve_settings(job["preset"], job["changes"])
-    data, held_out, tested = _data(job, settings)
+    data, held_out, test_data = _read_data(job, settings)
     folder.mkdir(parents=True, exist_ok=True)
     compile_kernels()
-    carry_out = ENGINES[manner.engine_for(settings.islands)]
+    start_engine = ENGINES[run_options.engine_for(settings.islands)]
     with (
-        progress("identify") as tell,
-        # Ray takes over SIGTERM when it starts: it comes before our own handlers.
-        carry_out(manner.address, print_message) as engine,
-        _stop_requests(manner.wall_time) as stop,
+        progress("identify") as show,
+        # Ray installs a handler for SIGTERM when it starts, so it starts before our handlers are installed.
+        start_engine(run_options.address, print_message) as engine,
+        _stop_requests(run_options.wall_time) as stop,
     ):
         if state is None:
-            # What another run left here belongs to that run.
+            # Delete the files of an earlier run.
             for name in (CHECKPOINT, HALL, TEST):
                 (folder / name).unlink(missing_ok=True)
-        watch = _Watch(folder, job, tell, state, spent)
+        checkpoints = _CheckpointWriter(folder, job, show, state, spent)
         arguments: dict[str, Any] = {"preset": job["preset"], "seed": job["seed"], **job["changes"]}
         began = perf_counter() - spent
         try:
             result = islands.identify(
-                data, held_out, start=state, progress=watch, stop=stop, engine=engine, **arguments
+                data, held_out, start=state, progress=checkpoints, stop=stop, engine=engine, **arguments
             )
         finally:
-            # Also where the engine failed: no finished epoch is lost.
-            watch.write()
+            # Also after an engine failure, so that no finished epoch is lost.
+            checkpoints.write()
         result = result.with_wall_time(perf_counter() - began)
-        tell("figures", 1.0)
+        show("figures", 1.0)
         result.save(folder)
     if result.search_result.search.ended_by == "stopped":
-        errors.print(f"stopped: the result is the best so far; go on with --resume {folder}", markup=False)
-        if manner.wall_time is not None:
-            errors.print("an end by --wall-time is not reproducible: how far a search gets by then differs")
+        errors.print(f"stopped: the result is the best so far; continue with --resume {folder}", markup=False)
+        if run_options.wall_time is not None:
+            errors.print(
+                "a result limited by --wall-time is not reproducible: it depends on the speed of the run"
+            )
     show_result(result, folder)
-    if manner.verbose:
+    if run_options.verbose:
         for name, (size, limit) in result.search_result.search.caches.items():
             output.print(f"cache of {name}: {size / 1e6:.1f} of {limit / 1e6:.1f} MB", markup=False)
-    if tested is not None:
-        _test(result, tested, folder)
+    if test_data is not None:
+        _evaluate_test(result, test_data, folder)
 
 
-def _test(result: islands.Result, tested: islands.Dataset, folder: Path) -> None:
-    simulated = result.best.simulate(tested)
-    found = asdict(metrics(tested.y, simulated.y)) if simulated.outcome else {}
-    numbers = {name: value if isfinite(value) else None for name, value in found.items()}
+def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: Path) -> None:
+    """Simulate the best model on the test data; print and write the metrics."""
+    simulated = result.best.simulate(test_data)
+    errors_by_name = asdict(metrics(test_data.y, simulated.y)) if simulated.outcome else {}
+    numbers = {name: value if isfinite(value) else None for name, value in errors_by_name.items()}
     document = {"outcome": str(simulated.outcome), **numbers}
     (folder / TEST).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    text = f"test data, touched by nothing before: free run {simulated.outcome}"
-    if found:
-        text += f", MAPE {found['mape']:.4f} %, R2 {found['r2']:.5f}, RMSE {found['rmse']:.6g}"
+    text = f"test data, not used before: free run {simulated.outcome}"
+    if errors_by_name:
+        mape, r2, rmse = (errors_by_name[name] for name in ("mape", "r2", "rmse"))
+        text += f", MAPE {mape:.4f} %, R2 {r2:.5f}, RMSE {rmse:.6g}"
     output.print(text, markup=False)
 
 
-def _data(
+def _read_data(
     job: dict[str, Any], settings: Settings
 ) -> tuple[islands.Dataset, islands.Dataset | float, islands.Dataset | None]:
+    """Read the data for estimation, validation (or its fraction) and the final test."""
     for name, known in job["sha256"].items():
         if fingerprint(name) != known:
-            raise RecordError(f"{name} has changed since the run began: bring back the file, or start anew")
+            raise RecordError(f"{name} has changed since the run began: restore the file, or start a new run")
     path = Path(job["record"])
     columns = (job["inputs"], job["output"], job["dt"])
     data = read_record(path, *columns, parse_rows(job["rows"]))
     held_out = options.validation(job["validation"], path, *columns, job["rows"])
     if job["test"] is None:
         return data, held_out, None
-    tested = options.validation(job["test"], path, *columns, job["rows"], "--test")
-    if isinstance(tested, float):
-        parts = islands.split(data, tested)
-        data, tested = parts.estimation, parts.validation
-    _refuse_test(tested, [data] if isinstance(held_out, float) else [data, held_out], settings)
-    return data, held_out, tested
+    test_data = options.validation(job["test"], path, *columns, job["rows"], "--test")
+    if isinstance(test_data, float):
+        parts = islands.split(data, test_data)
+        data, test_data = parts.estimation, parts.validation
+    _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], settings)
+    return data, held_out, test_data
 
 
-def _refuse_test(tested: islands.Dataset, others: list[islands.Dataset], settings: Settings) -> None:
+def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], settings: Settings) -> None:
+    """Check that the test data overlaps no other data, has the same sampling time and is long enough."""
     for other in others:
-        ahead = round((tested.start - other.start) / other.dt)
-        if tested.sha256 == other.sha256 and -tested.samples < ahead < other.samples:
+        offset = round((test_data.start - other.start) / other.dt)
+        if test_data.sha256 == other.sha256 and -test_data.samples < offset < other.samples:
             raise SettingsError(
-                "--test has samples that estimate or validate, and nothing may touch it: keep --rows and "
-                "--validation off it"
+                "--test has samples that are used for estimation or validation: exclude them by --rows and "
+                "--validation"
             )
     dt, lag = others[0].dt, settings.maximum_lag
-    if abs(tested.dt - dt) > SAME_DT * dt:
+    if abs(test_data.dt - dt) > SAME_DT * dt:
         raise RecordError(
-            f"the test data was sampled at {tested.dt} s, the record at {dt} s: resample one of them"
+            f"the test data was sampled at {test_data.dt} s, the record at {dt} s: resample one of them"
         )
-    if tested.samples <= lag:
+    if test_data.samples <= lag:
         raise RecordError(
-            f"the test data has {tested.samples} samples and lags reach down to {lag}: give more"
+            f"the test data has {test_data.samples} samples, and the largest lag is {lag}: give more samples"
         )
 
 
-class _Watch:
-    """Shows where the search stands and writes checkpoints."""
+class _CheckpointWriter:
+    """Search callback that shows the progress and writes checkpoints."""
 
     def __init__(
-        self, folder: Path, job: dict[str, Any], tell: Display, state: SearchState | None, spent: float
+        self, folder: Path, job: dict[str, Any], show: Display, state: SearchState | None, spent: float
     ) -> None:
         self._folder, self._job = folder, job
-        self._show = search_progress(tell)
-        self._next = -inf  # the first populations are kept at once
+        self._show = search_progress(show)
+        self._next = -inf  # the first populations are written immediately
         self._began = monotonic() - spent
         self._state = state
 
@@ -175,46 +208,50 @@ class _Watch:
             self.write()
 
     def write(self) -> None:
-        """Write the last epoch, unless there is none."""
+        """Write a checkpoint of the last epoch, if an epoch has ended."""
         if self._state is not None:
             now = monotonic()
-            about = {"job": self._job, "wall_s": now - self._began, **state_document(self._state)}
+            header = {"job": self._job, "wall_s": now - self._began, **state_document(self._state)}
             write_hall(self._state.archipelago.hall_of_fame, self._folder / HALL)
-            write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, about)
+            write_checkpoint(self._state.archipelago, self._folder / CHECKPOINT, header)
             took = monotonic() - now
-            self._next = now + took + max(CHECKPOINT_EVERY, took / CHECKPOINT_SHARE)
+            self._next = now + took + max(CHECKPOINT_SECONDS, took / CHECKPOINT_FRACTION)
 
 
 @contextmanager
 def _stop_requests(wall_time: float | None) -> Iterator[Callable[[], bool]]:
-    """Turn Ctrl-C, SIGTERM and the end of the time into a wish to stop; a second Ctrl-C interrupts."""
-    wished = [False]
+    """Yield a function that returns whether Ctrl-C, SIGTERM or the time limit requests a stop.
+
+    A second Ctrl-C raises `KeyboardInterrupt`.
+    """
+    requested = False
     until = inf if wall_time is None else monotonic() + wall_time
 
-    def wish(number: int, _frame: object) -> None:
-        if wished[0] and number == signal.SIGINT:
+    def request_stop(number: int, _frame: object) -> None:
+        nonlocal requested
+        if requested and number == signal.SIGINT:
             raise KeyboardInterrupt
-        wished[0] = True
+        requested = True
 
-    before = {number: signal.signal(number, wish) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, request_stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield lambda: wished[0] or monotonic() > until
+        yield lambda: requested or monotonic() > until
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-def stored(folder: Path) -> tuple[dict[str, Any], SearchState, float]:
-    """Read a folder's checkpoint: its job, where the search stands, and the seconds that it has taken.
+def load_run(folder: Path) -> tuple[dict[str, Any], SearchState, float]:
+    """Read the checkpoint of a folder: the job, the search state, and the seconds spent.
 
     Raises
     ------
     ModelError
-        There is none, or it is damaged.
+        The checkpoint is missing or damaged.
     """
     path = folder / CHECKPOINT
-    archipelago, about = read_checkpoint(path)
+    archipelago, header = read_checkpoint(path)
     try:
-        return dict(about["job"]), state_from_document(archipelago, about), float(about["wall_s"])
+        return dict(header["job"]), state_from_document(archipelago, header), float(header["wall_s"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ModelError(f"{path} is no checkpoint of islands identify: {error!r}") from error
+        raise ModelError(f"{path} is not a checkpoint of islands identify: {error!r}") from error

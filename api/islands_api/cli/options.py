@@ -1,4 +1,4 @@
-"""Options that several commands share, and how their texts are understood."""
+"""Options that several commands share, and parsing of their values."""
 
 from pathlib import Path
 from typing import Annotated
@@ -22,7 +22,7 @@ Inputs = Annotated[
 ]
 Output = Annotated[str, typer.Option("--output", help="Output column.")]
 SamplingTime = Annotated[
-    float | None, typer.Option("--dt", help="Sampling time in seconds, where the record has no time column.")
+    float | None, typer.Option("--dt", help="Sampling time in seconds, if the record has no time column.")
 ]
 Rows = Annotated[
     str | None, typer.Option("--rows", help="START:STOP, the samples of the record to use; all by default.")
@@ -33,32 +33,32 @@ ModelFile = Annotated[
     typer.Argument(help="A model file, an extended.json, or published:12, published:13, published:14."),
 ]
 Channels = Annotated[
-    list[str] | None, typer.Option("--channel", help="Column that may couple in, a temperature perhaps.")
+    list[str] | None, typer.Option("--channel", help="Column that may couple in, for example a temperature.")
 ]
 Simulated = Annotated[
-    str, typer.Option("--simulation", help=f"{', '.join(KINDS)}; after a colon what it needs.")
+    str, typer.Option("--simulation", help=f"{', '.join(KINDS)}; a colon separates its argument.")
 ]
 Tolerances = Annotated[
     list[str] | None,
-    typer.Option("--tolerance", help="PARAM=REL: how well a parameter is known, 0.02 for 2 %."),
+    typer.Option("--tolerance", help="PARAM=REL: relative standard deviation of a parameter, 0.02 for 2 %."),
 ]
 
-#: Where a model may come from, besides a file: ``published:13``.
+#: Prefix of a published model: ``published:13``.
 PUBLISHED = "published:"
 
 
 def columns(texts: list[str]) -> list[str]:
-    """Split ``--input a,b`` and join what was repeated."""
+    """Return the column names of a repeated option whose values may be lists, such as ``--input a,b``."""
     return [name for text in texts for name in text.split(",") if name]
 
 
 def single_input(inputs: list[str]) -> str:
-    """Return the one input that drives a simulation.
+    """Return the single input that drives a simulation.
 
     Raises
     ------
     SettingsError
-        There is none, or there are several.
+        The number of inputs is not one.
     """
     if len(inputs) != 1:
         raise SettingsError(
@@ -73,7 +73,7 @@ def tolerances(texts: list[str]) -> dict[str, float]:
     Raises
     ------
     SettingsError
-        A text is no name with a number.
+        A text is not a name and a number.
     """
     found = {}
     for text in texts:
@@ -94,15 +94,19 @@ def validation(
     used: str | None = None,
     option: str = "--validation",
 ) -> Dataset | float:
-    """Read ``--validation``: a fraction of the record's end, rows of the record's file, or a file of its own.
+    """Read ``--validation``: a fraction of the record's end, rows of the record's file, or another file.
 
-    ``--test`` is read in the same way; ``option`` is what a message calls it. ``used`` are the ``--rows``
-    that estimate; rows that are held out have to be others.
+    Parameters
+    ----------
+    used : str, optional
+        The ``--rows`` used for estimation. Validation rows must not overlap them.
+    option : str
+        Name of the option in messages; ``--test`` is read in the same way.
 
     Raises
     ------
     SettingsError
-        It is none of the three, or rows that estimate as well.
+        The text is none of the three, or the rows overlap those used for estimation.
     """
     if text is None:
         return 0.25
@@ -110,7 +114,7 @@ def validation(
         return read_record(text, inputs, output, dt)
     if ":" in text:
         if used is None or overlap(parse_rows(used), parse_rows(text)):
-            raise SettingsError(f"{option} {text}: say with --rows START:STOP which other samples estimate")
+            raise SettingsError(f"{option} {text}: give --rows START:STOP, other samples for estimation")
         return read_record(record, inputs, output, dt, parse_rows(text))
     try:
         return float(text)
@@ -121,7 +125,7 @@ def validation(
 
 
 def extended(text: str) -> LocalExtendedSpec | None:
-    """Read an extended simulation; None where the file is none."""
+    """Read an extended simulation; return None if the file is not one."""
     if text.startswith(PUBLISHED) or not is_extended(text):
         return None
     found = parse_spec(f"model:{text}")
@@ -130,7 +134,7 @@ def extended(text: str) -> LocalExtendedSpec | None:
 
 
 def model(text: str) -> Model:
-    """Read a model file, or take a published model: ``published:12``."""
+    """Read a model file, or return a published model such as ``published:12``."""
     if text.startswith(PUBLISHED):
         return published(text.removeprefix(PUBLISHED)).model
     return read_model(text)

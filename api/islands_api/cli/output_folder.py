@@ -1,4 +1,4 @@
-"""The folder that a command writes to: checked before the work, named after it."""
+"""Output folder of a command: the check before the work and the message after it."""
 
 import os
 from pathlib import Path
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:
-    """Check that a result can be written to a folder and overwrites no other one.
+    """Check that a result can be written to a folder without overwriting another result.
 
     Raises
     ------
     SettingsError
-        The folder holds a result and ``force`` is false, the path or a part of it is a file, or the folder is
-        not writable.
+        The folder contains a result and ``force`` is false, the path or a part of it is a file, or the folder
+        is not writable.
     """
-    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not there.is_dir():
-        raise SettingsError(f"--out {folder}: {there} is a file, give a folder")
-    if not os.access(there, os.W_OK):
-        raise SettingsError(f"--out {folder}: nothing may be written in {there}, give another folder")
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise SettingsError(f"--out {folder}: {existing} is a file, give a folder")
+    if not os.access(existing, os.W_OK):
+        raise SettingsError(f"--out {folder}: {existing} is not writable, give another folder")
     if (folder / result).exists() and not force:
         raise SettingsError(f"{folder} holds a result already: give another --out, or --force to replace it")
 

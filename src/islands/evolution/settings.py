@@ -130,7 +130,7 @@ class Settings:
     structure: str = "phi"
     constraints: str = _option("hysteresis", " or ".join(CONSTRAINTS))
     fitness: str = "shooting"
-    shooting: int = _option(500, "Samples of an interval.", after="max_height")
+    shooting: int = _option(500, "Samples of a shooting interval.", after="max_height")
     tournament: int = 3
     high_level: float = 0.5
     outer: float = 0.5
@@ -142,17 +142,19 @@ class Settings:
     from_library: float = 0.0
     distinct: bool = False
     refine: bool = False
-    islands: int = _option(1, "Islands that evolve side by side.")
+    islands: int = _option(1, "Number of islands that evolve in parallel.")
     topology: str = _option("isolated", f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
-    migrate_every: int | str = _option(10, "Generations; 5,100:20 is 20 from generation 100 on.")
-    migrants: int | str = _option(1, "For each neighbour; may change likewise.")
-    emigrants: str = _option("best", f"Who leaves: {', '.join(SELECTION_POLICIES)}.")
-    replaced: str = _option("worst", f"Whose place they take: {', '.join(REPLACEMENT_POLICIES)}.")
+    migrate_every: int | str = _option(
+        10, "Generations between migrations; 5,100:20 is 5, and 20 from generation 100 on."
+    )
+    migrants: int | str = _option(1, "Individuals sent to each neighbour; may change likewise.")
+    emigrants: str = _option("best", f"Which individuals migrate: {', '.join(SELECTION_POLICIES)}.")
+    replaced: str = _option("worst", f"Which individuals are replaced: {', '.join(REPLACEMENT_POLICIES)}.")
     characters: tuple[str, ...] = _option(
         (), f"Repeat it, islands take turns: {', '.join(ISLAND_PROFILES)}.", "--character"
     )
-    max_evaluations: int = _option(0, "End with the epoch that reaches it.")
-    target_error: float = _option(0.0, "RMSE; end with the epoch that reaches it.")
+    max_evaluations: int = _option(0, "Stop after the epoch that reaches this number.")
+    target_error: float = _option(0.0, "Stop after the epoch that reaches this RMSE.")
 
     def __post_init__(self) -> None:
         _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)

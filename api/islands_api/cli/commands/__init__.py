@@ -1,1 +1,1 @@
-"""Commands of the command line, one file each, listed in `islands_api.cli.app`."""
+"""Commands, one file each; the table of commands is in `islands_api.cli.app`."""

@@ -1,4 +1,4 @@
-"""``islands bench``: how fast this machine evaluates, beside plain numpy and compiled C."""
+"""``islands bench``: evaluation speed of this machine, compared with plain numpy and compiled C."""
 
 import json
 import os
@@ -23,32 +23,33 @@ from islands_api.cli.output_folder import check_folder
 
 def bench(
     quick: Annotated[
-        bool, typer.Option("--quick", help="Within a minute: fewer individuals, no whole run of case 1.")
+        bool, typer.Option("--quick", help="At most a minute: fewer individuals, no whole run of case 1.")
     ] = False,
     json_file: Annotated[Path | None, typer.Option("--json", help="JSON file to write.")] = None,
     out: Annotated[Path, typer.Option("--out", help="Folder for the figures.")] = Path("bench-out"),
 ) -> None:
-    """Measure evaluations, kernels and whole searches on this machine. Leave it alone meanwhile."""
+    """Measure evaluations, kernels and whole searches on this machine, which should be otherwise idle."""
     check_folder(out, force=True)
     if json_file is not None:
         check_folder(json_file.parent, force=True)
     compile_kernels()
-    with progress("bench") as tell:
-        report = _measured(quick, tell)
-        tell("figures", 1.0)
+    with progress("bench") as show:
+        report = _run_measurement(quick, show)
+        show("figures", 1.0)
         figures = save_scalings(report.scalings, out)
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps(to_document(report), indent=2) + "\n", encoding="utf-8")
-    _show(report)
+    _print_report(report)
     for path in (*figures, *([json_file] if json_file else [])):
         output.print(str(path), markup=False)
 
 
-def _measured(quick: bool, tell: ProgressCallback) -> BenchmarkReport:
-    """Measure in a process of its own: a linear algebra library reads its threads when it is loaded.
+def _run_measurement(quick: bool, show: ProgressCallback) -> BenchmarkReport:
+    """Measure in a separate process with one thread per linear algebra library.
 
-    They wait in a loop, and their waiting would be counted as CPU time of plain numpy.
+    A library reads the number of threads when it is loaded. Its threads busy-wait, which would count as CPU
+    time of plain numpy.
     """
     os.environ.update(dict.fromkeys(THREADS, "1"))
     context = get_context("spawn")
@@ -57,25 +58,25 @@ def _measured(quick: bool, tell: ProgressCallback) -> BenchmarkReport:
     process.start()
     sending.close()
     try:
-        return _followed(receiving, tell)
+        return _receive_report(receiving, show)
     finally:
-        process.terminate()  # without effect on one that is done
+        process.terminate()  # no effect on a process that has ended
         process.join()
 
 
-def _followed(receiving: Connection, tell: ProgressCallback) -> BenchmarkReport:
-    """Pass on what the measuring process tells, until it sends the report or its error."""
+def _receive_report(receiving: Connection, show: ProgressCallback) -> BenchmarkReport:
+    """Show the progress messages of the measuring process until it sends its report or error."""
     while True:
         try:
             message = receiving.recv()
         except EOFError as error:
             raise ChildProcessError(
-                "the process that measures ended before it was done: see what it wrote above, or whether "
-                "the system stopped it for want of memory"
+                "the measuring process ended early: see its output above, or check whether the system "
+                "stopped it because memory ran out"
             ) from error
         match message:
-            case str(text), float(share):
-                tell(text, share)
+            case str(text), float(fraction):
+                show(text, fraction)
             case BenchmarkReport():
                 return message
             case _:
@@ -84,14 +85,16 @@ def _followed(receiving: Connection, tell: ProgressCallback) -> BenchmarkReport:
 
 def _measure(quick: bool, sending: Connection) -> None:
     try:
-        sending.send(measure(quick, lambda text, share=None, /: sending.send((text, float(share or 0.0)))))
+        sending.send(
+            measure(quick, lambda text, fraction=None, /: sending.send((text, float(fraction or 0.0))))
+        )
     except IslandsError as error:
         sending.send(error)
     except KeyboardInterrupt:
-        pass  # whoever pressed the key stopped the command as well, which says so
+        pass  # Ctrl-C reaches the parent process too, which reports it
 
 
-def _show(report: BenchmarkReport) -> None:
+def _print_report(report: BenchmarkReport) -> None:
     table = Table("ms of CPU per individual", *report.kinds, title=f"{report.samples} samples, medians")
     kinds = report.kinds
     rows: dict[str, Sequence[float | None]] = {

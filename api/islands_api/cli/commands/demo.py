@@ -1,4 +1,4 @@
-"""``islands demo``: the paper's case 1 from nothing, beside the paper's Table 1."""
+"""``islands demo``: identification of the paper's case 1, compared with the paper's Table 1."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,19 +21,23 @@ from islands_api.cli.output_folder import check_folder, show_result
 from islands_api.cli.search_progress import search_progress
 from islands_service.engines import ENGINES
 
-#: As many as the smallest machine has cores.
+#: Number of islands: one for each core of the smallest supported machine.
 ISLANDS = 2
 
-SYSTEM, VARIANT = "bouc-wen-piezo", "authors"
+#: System of the paper's case 1.
+SYSTEM = "bouc-wen-piezo"
 
-#: Parts that neither estimate nor validate: what they say of a model is a test of it.
+#: Variant of the system with the parameters of the authors.
+VARIANT = "authors"
+
+#: Parts of the record that select the model. The other parts are test data.
 SELECTING = ("estimation", "validation")
 
 
 def demo(
     out: Annotated[Path, typer.Option("--out", help="Folder for the result.")] = Path("demo-out"),
 ) -> None:
-    """Make the paper's case-1 record, identify it, and print the models beside the paper's Table 1."""
+    """Make the paper's case-1 record, identify it, and print the models next to the paper's Table 1."""
     check_folder(out, force=True)
     records = {part: make_record(SYSTEM, VARIANT, part) for part in SYSTEMS[SYSTEM].parts}
     estimation, validation = (records[part] for part in SELECTING)
@@ -43,18 +47,18 @@ def demo(
     compile_kernels()
     began = perf_counter()
     with (
-        progress("demo") as tell,
+        progress("demo") as show,
         ENGINES["ray"](None, print_message) as engine,
     ):
         result = islands.identify(
             *(estimation, validation),
             preset="paper-case1",
             islands=ISLANDS,
-            progress=search_progress(tell),
+            progress=search_progress(show),
             engine=engine,
         )
         result = result.with_wall_time(perf_counter() - began)
-        tell("figures", 1.0)
+        show("figures", 1.0)
         result.save(out)
     show_result(result, out)
 
@@ -64,29 +68,30 @@ def demo(
     )
     for number, entry in zip(("12", "13"), published, strict=True):
         size = str(entry.model.size)
-        table.add_row(f"({number}), Table 1", size, *_cells(*entry.mape, *entry.r2))
-        found = [_errors(entry.model, record) for record in (estimation, validation)]
-        table.add_row(f"({number}), its printed parameters", size, *_row(found))
+        table.add_row(f"({number}), Table 1", size, *_format_cells(*entry.mape, *entry.r2))
+        errors_by_part = [_compute_metrics(entry.model, record) for record in (estimation, validation)]
+        table.add_row(f"({number}), its printed parameters", size, *_format_row(errors_by_part))
     for fitted in result.models:
-        found = [fitted.metrics[part]["free_run"] for part in SELECTING]
-        table.add_row(f"found here, rank {fitted.rank}", str(fitted.model.size), *_row(found))
+        errors_by_part = [fitted.metrics[part]["free_run"] for part in SELECTING]
+        table.add_row(f"found here, rank {fitted.rank}", str(fitted.model.size), *_format_row(errors_by_part))
     output.print(table)
 
-    table = Table("record that selected nothing", "found, rank 1", "(12)", "(13)", title="Free run, MAPE %")
+    table = Table("test record", "found, rank 1", "(12)", "(13)", title="Free run, MAPE %")
     for part, record in records.items():
         if part not in SELECTING:
             models = [result.best.model, *(entry.model for entry in published)]
-            table.add_row(part, *(f"{_errors(model, record).mape:.3f}" for model in models))
+            table.add_row(part, *(f"{_compute_metrics(model, record).mape:.3f}" for model in models))
     output.print(table)
 
 
-def _errors(model: Model, record: Dataset) -> Metrics:
+def _compute_metrics(model: Model, record: Dataset) -> Metrics:
+    """Return the metrics of a free run."""
     return metrics(record.y, free_run(model, record).y)
 
 
-def _row(found: Sequence[Metrics]) -> list[str]:
-    return _cells(*(error.mape for error in found), *(error.r2 for error in found))
+def _format_row(found: Sequence[Metrics]) -> list[str]:
+    return _format_cells(*(error.mape for error in found), *(error.r2 for error in found))
 
 
-def _cells(mape_estimation: float, mape_validation: float, *r2: float) -> list[str]:
+def _format_cells(mape_estimation: float, mape_validation: float, *r2: float) -> list[str]:
     return [f"{mape_estimation:.4f}", f"{mape_validation:.4f}", *(f"{value:.5f}" for value in r2)]

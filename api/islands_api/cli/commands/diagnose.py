@@ -1,4 +1,4 @@
-"""``islands diagnose``: what a simulation gets wrong about a record, why, and what mending it is worth."""
+"""``islands diagnose``: errors of a simulation on a record, their causes, and the gain of a correction."""
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -11,7 +11,7 @@ import typer
 from islands.data.dataset import Dataset
 from islands.discrepancy.detectability import SelfTest, self_test
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
-from islands.discrepancy.diagnosis import diagnose as diagnosed
+from islands.discrepancy.diagnosis import diagnose as run_diagnosis
 from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.facade.explain_residual import explain_residual
@@ -26,8 +26,14 @@ from islands_api.cli.console import Display, compile_kernels, output, progress
 from islands_api.cli.output_folder import check_folder
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise, summarise_self_test
 
-#: Files of a result.
-RESULT, EXTENDED, REPORT = "discrepancy.json", "extended.json", "report.html"
+#: File of the result document.
+RESULT = "discrepancy.json"
+
+#: File of the extended simulation.
+EXTENDED = "extended.json"
+
+#: File of the report.
+REPORT = "report.html"
 
 
 def diagnose(
@@ -43,7 +49,7 @@ def diagnose(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     tested: Annotated[
         bool,
-        typer.Option("--self-test", help="Find out what this record could show: takes minutes."),
+        typer.Option("--self-test", help="Estimate which effects this record can reveal; takes minutes."),
     ] = False,
     workers: Annotated[
         int | None,
@@ -51,86 +57,89 @@ def diagnose(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
-    """Show what a simulation gets wrong about a record, name the cause, and measure the gain."""
+    """Find the errors of a simulation on a record, name their causes, and measure the gain of correction."""
     check_folder(out, force, RESULT)
     compile_kernels()
-    with progress("diagnose") as tell:
-        tell("reading", 0.0)
-        asked = parse_spec(simulated)
-        inner = innermost(asked)
+    with progress("diagnose") as show:
+        show("reading", 0.0)
+        spec = parse_spec(simulated)
+        inner = innermost(spec)
         column = inner.column if isinstance(inner, ColumnSpec) else None
-        data, columns = _read(
+        data, columns = _read_record(
             record, options.columns(inputs), channels or [], column, output_column, dt, rows
         )
-        simulator = make_simulator(asked, data, columns)
-        known = options.tolerances(tolerance or [])
-        with _cores(workers, tested) as spread:
+        simulator = make_simulator(spec, data, columns)
+        tolerances = options.tolerances(tolerance or [])
+        with _parallel_map(workers, tested) as parallel:
             began = perf_counter()
-            found = diagnosed(data, simulator, known, seed, tell, spread)
-            tell("a formula for what has no name", 0.8)
-            proposal = explain_residual(found, seed)
+            diagnosis = run_diagnosis(data, simulator, tolerances, seed, show, parallel)
+            show("a formula for the unexplained residual", 0.8)
+            formula = explain_residual(diagnosis, seed)
             wall = perf_counter() - began
-            shown = _self_tested(found, simulator, known, seed, spread, tell) if tested else None
-        tell("figures", 0.9)
-        write(found, out, record.name, wall, shown, proposal)
-    output.print(summarise(found, proposal), markup=False)
-    if shown is not None:
-        output.print(summarise_self_test(shown), markup=False)
+            limits = (
+                _run_self_test(diagnosis, simulator, tolerances, seed, parallel, show) if tested else None
+            )
+        show("figures", 0.9)
+        write(diagnosis, out, record.name, wall, limits, formula)
+    output.print(summarise(diagnosis, formula), markup=False)
+    if limits is not None:
+        output.print(summarise_self_test(limits), markup=False)
     output.print(f"{out}/: {', '.join(path.name for path in sorted(out.iterdir()))}", markup=False)
 
 
 def write(
-    found: Diagnosis,
+    diagnosis: Diagnosis,
     folder: Path,
     name: str,
     wall_s: float,
     tested: SelfTest | None = None,
-    proposal: ResidualFormula | None = None,
+    formula: ResidualFormula | None = None,
 ) -> None:
-    """Write a diagnosis: the document last, so that where it is everything is."""
+    """Write a diagnosis into a folder. The document is written last: if it exists, the folder is complete."""
     folder.mkdir(parents=True, exist_ok=True)
     for path in (folder / EXTENDED, folder / RESULT):
         path.unlink(missing_ok=True)
-    (folder / REPORT).write_bytes(diagnosis_report(name, found, tested, proposal))
-    if found.gain is not None:
-        (folder / EXTENDED).write_text(extended_json(found.best, found.record))
-    document = diagnosis_document(found, wall_s, tested, proposal)
+    (folder / REPORT).write_bytes(diagnosis_report(name, diagnosis, tested, formula))
+    if diagnosis.gain is not None:
+        (folder / EXTENDED).write_text(extended_json(diagnosis.best, diagnosis.record))
+    document = diagnosis_document(diagnosis, wall_s, tested, formula)
     (folder / RESULT).write_text(as_json(document))
 
 
-def _self_tested(
-    found: Diagnosis,
+def _run_self_test(
+    diagnosis: Diagnosis,
     simulator: Simulator,
     tolerance: Mapping[str, float],
     seed: int,
-    spread: ParallelMap,
-    tell: Display,
+    parallel: ParallelMap,
+    show: Display,
 ) -> SelfTest:
-    """Carry out the self-test, and show how long it will take."""
-    tell("self-test", 0.0)
+    """Run the self-test and show the remaining time."""
+    show("self-test", 0.0)
     began = perf_counter()
 
-    def show(message: str, fraction: float | None = None, /) -> None:
+    def update(message: str, fraction: float | None = None, /) -> None:
         left = (perf_counter() - began) * (1 / fraction - 1) if fraction else 0.0
-        tell(f"self-test, {message}, {_duration(left)} left", fraction)
+        show(f"self-test, {message}, {_format_duration(left)} left", fraction)
 
-    return self_test(found, simulator, tolerance, seed, spread, progress=show)
+    return self_test(diagnosis, simulator, tolerance, seed, parallel, progress=update)
 
 
-def _cores(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:
+def _parallel_map(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:
+    """Return the built-in map for one worker, else a pool of Ray actors."""
     if workers == 1 or (workers is None and not tested):
         return nullcontext(map)
-    # An analysis of some seconds need not wait for Ray.
+    # Imported here: an analysis of a few seconds must not wait for Ray.
     from islands_service.runtime.parallel_map import ray_pool  # noqa: PLC0415
 
     return ray_pool(workers)
 
 
-def _duration(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
-def _read(
+def _read_record(
     record: Path,
     inputs: list[str],
     channels: list[str],
@@ -139,10 +148,10 @@ def _read(
     dt: float | None,
     rows: str | None,
 ) -> tuple[Dataset, Mapping[str, Any]]:
-    """Read the record, and beside it the column that is the simulation, if one is."""
-    beside = [] if column is None else [column]
+    """Read the record, and separately the column of a simulation that was recorded in it."""
+    extra = [] if column is None else [column]
     whole = read_record(
-        record, [options.single_input(inputs), *channels, *beside], output_column, dt, parse_rows(rows)
+        record, [options.single_input(inputs), *channels, *extra], output_column, dt, parse_rows(rows)
     )
     kept = 1 + len(channels)
     return whole.first_inputs(kept), {} if column is None else {column: whole.u[:, kept]}

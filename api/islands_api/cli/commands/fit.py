@@ -1,4 +1,4 @@
-"""``islands fit``: forward selection over a library, and (constrained) least squares."""
+"""``islands fit``: forward selection from a library with (constrained) least squares."""
 
 from pathlib import Path
 from time import perf_counter
@@ -30,12 +30,14 @@ def fit(
         ),
     ] = None,
     library: Annotated[str, typer.Option("--library", help=" or ".join(LIBRARIES))] = "phi-polynomial",
-    degree: Annotated[int | None, typer.Option("--degree", help="By default what suits the library.")] = None,
-    lags: Annotated[int | None, typer.Option("--lags", help="By default what suits the library.")] = None,
+    degree: Annotated[
+        int | None, typer.Option("--degree", help="By default the value of the library.")
+    ] = None,
+    lags: Annotated[int | None, typer.Option("--lags", help="By default the value of the library.")] = None,
     max_terms: Annotated[int, typer.Option("--max-terms", help="Size of the largest model.")] = 10,
     constraints: Annotated[
         str | None,
-        typer.Option("--constraints", help=f"{' or '.join(CONSTRAINTS)}; by default what suits the library."),
+        typer.Option("--constraints", help=f"{' or '.join(CONSTRAINTS)}; by default those of the library."),
     ] = None,
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
@@ -47,8 +49,8 @@ def fit(
     check_folder(out, force)
     names = options.columns(inputs)
     compile_kernels()
-    with progress("fit") as tell:
-        tell("reading", 0.0)
+    with progress("fit") as show:
+        show("reading", 0.0)
         data = read_record(record, names, output_column, dt, parse_rows(rows))
         held_out = options.validation(validation, record, names, output_column, dt, rows)
         began = perf_counter()
@@ -62,8 +64,8 @@ def fit(
             constraints=constraints,
             shooting=shooting,
             seed=seed,
-            progress=tell,
+            progress=show,
         ).with_wall_time(perf_counter() - began)
-        tell("figures", 1.0)
+        show("figures", 1.0)
         result.save(out)
     show_result(result, out)

@@ -1,4 +1,4 @@
-"""``islands identify``: evolution by MGGP/FROE, refinement, validation."""
+"""``islands identify``: search by MGGP/FROE, refinement, validation."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,13 +8,13 @@ import typer
 from islands.errors import SettingsError, lookup
 from islands.io.records import fingerprint
 from islands_api.cli import options
-from islands_api.cli.identify_run import RunOptions, run, stored
+from islands_api.cli.identify_run import RunOptions, load_run, run
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, with_search_options
 from islands_service.engines import ENGINES
 
-#: Options that say how to run, not what: they may differ from one resumption to the next.
-RUNNING = ("resume", "engine", "ray_address", "wall_time", "verbose")
+#: Options of the run rather than of the search: allowed with ``--resume``.
+RUN_OPTIONS = ("resume", "engine", "ray_address", "wall_time", "verbose")
 
 
 @with_search_options
@@ -34,35 +34,41 @@ def identify(
     ] = None,
     test: Annotated[
         str | None,
-        typer.Option("--test", help="FILE, FRACTION of the end, or START:STOP: nothing touches it."),
+        typer.Option(
+            "--test", help="FILE, FRACTION of the end, or START:STOP; used for the final test only."
+        ),
     ] = None,
     search: SearchOptions = DEFAULTS,
     engine: Annotated[
         str | None,
-        typer.Option("--engine", help=f"{' or '.join(ENGINES)}; ray by default where there are islands."),
+        typer.Option("--engine", help=f"{' or '.join(ENGINES)}; by default ray for several islands."),
     ] = None,
     ray_address: Annotated[
         str | None, typer.Option("--ray-address", help="HOST:PORT of a cluster; this machine by default.")
     ] = None,
     wall_time: Annotated[
         float | None,
-        typer.Option("--wall-time", help="Stop after so many seconds. Not reproducible: machines differ."),
+        typer.Option(
+            "--wall-time", help="Stop after this number of seconds. Not reproducible: machines differ."
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
-    resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to go on with.")] = None,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Tell what the caches take, too.")] = False,
+    resume: Annotated[Path | None, typer.Option("--resume", help="Folder of a run to continue.")] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Also print the memory used by the caches.")
+    ] = False,
 ) -> None:
-    """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR goes on."""
+    """Identify a record by evolution. Ctrl-C keeps the best so far; --resume DIR continues."""
     if engine is not None:
         lookup(ENGINES, engine, "engine")
     if wall_time is not None and not wall_time > 0.0:
         raise SettingsError(f"--wall-time is a number of seconds above 0, got {wall_time}")
     if ray_address is not None and engine == "serial":
-        raise SettingsError("--ray-address goes with --engine ray: the serial engine runs in this process")
-    manner = RunOptions(engine, ray_address, wall_time, verbose)
+        raise SettingsError("--ray-address requires --engine ray: the serial engine runs in this process")
+    run_options = RunOptions(engine, ray_address, wall_time, verbose)
     if resume is not None:
-        _refuse_others(context)
-        run(manner, resume, *stored(resume))
+        _check_resume(context)
+        run(run_options, resume, *load_run(resume))
     else:
         if record is None or not inputs or output_column is None or out is None:
             raise SettingsError("give RECORD, --input, --output and --out, or --resume DIR")
@@ -85,11 +91,12 @@ def identify(
             "seed": search.seed,
             "changes": dict(search.changes),
         }
-        run(manner, out, job)
+        run(run_options, out, job)
 
 
-def _refuse_others(context: typer.Context) -> None:
+def _check_resume(context: typer.Context) -> None:
+    """Check that only options of the run are given with ``--resume``."""
     for name in context.params:
         source = context.get_parameter_source(name)
-        if name not in RUNNING and source is not None and source.name == "COMMANDLINE":
-            raise SettingsError("--resume goes on with the run's own record and settings: give nothing else")
+        if name not in RUN_OPTIONS and source is not None and source.name == "COMMANDLINE":
+            raise SettingsError("--resume uses the record and the settings of the run: do not give others")

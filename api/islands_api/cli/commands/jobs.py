@@ -1,4 +1,4 @@
-"""``islands jobs``: submit jobs to a service and follow them. It speaks REST and nothing else."""
+"""``islands jobs``: submission and monitoring of jobs, over REST only."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +12,7 @@ from islands_api.cli.console import errors, output
 from islands_api.cli.output_folder import check_folder
 from islands_api.cli.search_options import DEFAULTS, SearchOptions, Seed, with_search_options
 from islands_api.client import Client, JobFailedError
-from islands_api.client.diagnosis_calls import simulation_of
+from islands_api.client.diagnosis_calls import parse_simulation
 from islands_api.schemas import JobView
 from islands_service.domain.job import DISCREPANCY, JobState
 
@@ -24,25 +24,28 @@ jobs = typer.Typer(
 
 Url = Annotated[str, typer.Option("--url", envvar="ISLANDS_URL", help="The service's address.")]
 ApiKey = Annotated[
-    str | None, typer.Option("--key", envvar="ISLANDS_KEY", help="Not needed on the service's own machine.")
+    str | None,
+    typer.Option("--key", envvar="ISLANDS_KEY", help="API key; not needed on the service's own machine."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Name = Annotated[str, typer.Option("--name", help="For people.")]
-Priority = Annotated[int, typer.Option("--priority", help="Higher ones go first.")]
+Name = Annotated[str, typer.Option("--name", help="Name of the job, for display.")]
+Priority = Annotated[int, typer.Option("--priority", help="Jobs of higher priority run first.")]
 IdempotencyKey = Annotated[
-    str | None, typer.Option("--idempotency-key", help="The same one again is the same job.")
+    str | None,
+    typer.Option("--idempotency-key", help="Submitting again with the same key returns the same job."),
 ]
-Watch = Annotated[bool, typer.Option("--watch", help="Wait for it, and print what it found.")]
+Watch = Annotated[bool, typer.Option("--watch", help="Wait for the job and print its result.")]
 Id = Annotated[str, typer.Argument(help="The job's id.")]
 
+#: Default address of the service.
 LOCAL = "http://127.0.0.1:8000"
 
-#: Seconds for which a service that is away is waited for. Somebody looks on; one that is watched may take the
-#: client's own time to be started again.
-PATIENCE = 5.0
+#: Seconds during which a command repeats a call to an unreachable service. Watching a job uses the client's
+#: default, which is longer.
+RETRY_SECONDS = 5.0
 
-#: The most characters of a job's name.
-_NAME = 200
+#: Largest length of a job's name.
+_MAX_NAME_LENGTH = 200
 
 
 @jobs.command()
@@ -68,17 +71,17 @@ def submit(
 ) -> None:
     """Upload a record and submit a job that identifies it."""
     names = options.columns(inputs)
-    held_out = _held_out(validation)
+    held_out = _parse_validation(validation)
     with _client(url, key) as client:
         dataset = client.upload(record, names, output_column if rows is None else None, dt)
-        validating: float | dict[str, Any] | None
+        validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
-                validating = {"dataset": client.upload(held_out, names, output_column, dt).id}
+                validation_data = {"dataset": client.upload(held_out, names, output_column, dt).id}
             case str():
-                validating = {"dataset": dataset.id, "rows": held_out}
+                validation_data = {"dataset": dataset.id, "rows": held_out}
             case _:
-                validating = held_out
+                validation_data = held_out
         job = client.submit(
             dataset,
             names,
@@ -87,8 +90,8 @@ def submit(
             seed=search.seed,
             dt=dt,
             rows=rows,
-            validation=validating,
-            name=_called(name, record),
+            validation=validation_data,
+            name=_make_name(name, record),
             priority=priority,
             idempotency_key=idempotency_key,
             **search.changes,
@@ -118,24 +121,24 @@ def diagnose(
     watch: Watch = False,
     as_json: Json = False,
 ) -> None:
-    """Upload a record and submit a job that finds out what a simulation gets wrong about it."""
-    driving, known = options.single_input(options.columns(inputs)), options.tolerances(tolerance or [])
-    beside = options.columns(channels or [])
-    asked = simulation_of(simulated)
-    read = [driving, *beside, *([asked["column"]] if "column" in asked else [])]
+    """Upload a record and submit a job that diagnoses the errors of a simulation on it."""
+    driving, tolerances = options.single_input(options.columns(inputs)), options.tolerances(tolerance or [])
+    channel_names = options.columns(channels or [])
+    simulation = parse_simulation(simulated)
+    read = [driving, *channel_names, *([simulation["column"]] if "column" in simulation else [])]
     with _client(url, key) as client:
         whole = output_column if rows is None else None
         job = client.diagnose(
             client.upload(record, read, whole, dt),
             driving,
             output_column,
-            asked,
-            channels=beside,
-            tolerance=known,
+            simulation,
+            channels=channel_names,
+            tolerance=tolerances,
             seed=seed,
             dt=dt,
             rows=rows,
-            name=_called(name, record),
+            name=_make_name(name, record),
             priority=priority,
             idempotency_key=idempotency_key,
         )
@@ -148,7 +151,7 @@ def diagnose(
 @jobs.command("list")
 def list_jobs(
     state: Annotated[str | None, typer.Option("--state", help=", ".join(JobState))] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="The most jobs to list.")] = 50,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Largest number of jobs to list.")] = 50,
     url: Url = LOCAL,
     key: ApiKey = None,
     as_json: Json = False,
@@ -166,14 +169,14 @@ def list_jobs(
 
 @jobs.command()
 def show(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Show a job as it stands."""
+    """Show the current state of a job."""
     with _client(url, key) as client:
         views.show_job(client.job(job), as_json)
 
 
 @jobs.command()
 def watch(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Follow a job until it has ended, and print what it found. Ctrl-C stops the watching, not the job."""
+    """Follow a job until it has ended, and print its result. Ctrl-C stops watching, not the job."""
     with _client(url, key) as client:
         now = client.job(job)
     _follow(url, key, now, as_json)
@@ -188,7 +191,7 @@ def cancel(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False)
 
 @jobs.command()
 def resume(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False) -> None:
-    """Have a job that failed or was cancelled go on from its last checkpoint."""
+    """Resume a job that has failed or was cancelled from its last checkpoint."""
     with _client(url, key) as client:
         views.show_job(client.resume(job), as_json)
 
@@ -197,44 +200,42 @@ def resume(job: Id, url: Url = LOCAL, key: ApiKey = None, as_json: Json = False)
 def result(
     job: Id,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the result, its models and figures, its report.")
+        Path | None, typer.Option("--out", help="Folder for the result with its models, figures and report.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
     url: Url = LOCAL,
     key: ApiKey = None,
     as_json: Json = False,
 ) -> None:
-    """Show what a job that has succeeded found, and download it."""
+    """Show the result of a job that has succeeded, and download it."""
     if out is not None:
-        # It brings the kernels along: who only looks does not wait for them.
-
-        for kept in views.RESULTS.values():
-            check_folder(out, force, kept.file)
+        for kind in views.RESULTS.values():
+            check_folder(out, force, kind.file)
     with _client(url, key) as client:
         document = client.result(job)
-        kept = views.RESULTS["models" if "models" in document else "verdict"]
+        kind = views.RESULTS["models" if "models" in document else "verdict"]
         if out is not None:
-            kept.download(client, job, document, out)
+            kind.download(client, job, document, out)
         if as_json:
             views.print_json(document)
         else:
-            kept.show(client, job, document)
+            kind.show(client, job, document)
             if out is not None:
-                output.print(f"{out}/: {kept.holds}", markup=False)
+                output.print(f"{out}/: {kind.contents}", markup=False)
 
 
-def _called(name: str, record: Path) -> str:
-    """Return what a job is called: as its record, unless it has a name."""
-    return name or "".join(each for each in record.name if each.isprintable())[:_NAME]
+def _make_name(name: str, record: Path) -> str:
+    """Return the name of a job; if it is empty, the file name of the record."""
+    return name or "".join(each for each in record.name if each.isprintable())[:_MAX_NAME_LENGTH]
 
 
-def _held_out(text: str | None) -> Path | str | float | None:
-    """Read ``--validation``: a file, rows of the record, or a fraction of its end; before anything is sent.
+def _parse_validation(text: str | None) -> Path | str | float | None:
+    """Read ``--validation``: a file, rows of the record, or a fraction of its end.
 
     Raises
     ------
     SettingsError
-        It is none of the three.
+        The text is none of the three.
     """
     if text is None:
         return None
@@ -251,31 +252,32 @@ def _held_out(text: str | None) -> Path | str | float | None:
 
 
 def _client(url: str, key: str | None) -> Client:
-    return Client(url, key, retry=PATIENCE)
+    return Client(url, key, retry=RETRY_SECONDS)
 
 
 def _follow(url: str, key: str | None, job: JobView, as_json: bool) -> None:
-    """Show a job's progress until it has ended, then what it found.
+    """Show the progress of a job until it has ended, then its result.
 
     Raises
     ------
     JobFailedError
+        The job has failed or was cancelled.
     """
     errors.print(f"job {job.id}", markup=False)
     with Client(url, key) as client:
         try:
-            with views.job_progress_bar() as tell:
-                for job in client.progress(job):  # noqa: B020, PLR1704 - as it is now
-                    tell(job)
+            with views.job_progress_bar() as update:
+                for job in client.progress(job):  # noqa: B020, PLR1704 - the current state replaces the old
+                    update(job)
         except KeyboardInterrupt:
-            errors.print(f"the job goes on: 'islands jobs watch {job.id}' follows it again", markup=False)
+            errors.print(f"the job continues: 'islands jobs watch {job.id}' follows it again", markup=False)
             raise
         if as_json:
             views.show_job(job, as_json)
         elif job.state == JobState.SUCCEEDED and job.kind == DISCREPANCY:
-            views.show_words(job)
+            views.show_diagnosis(job)
         elif job.state == JobState.SUCCEEDED:
             views.show_models(client.models(job))
     if job.state != JobState.SUCCEEDED:
-        detail = (job.problem or {}).get("detail", "resume it to go on")
+        detail = (job.problem or {}).get("detail", "resume it to continue")
         raise JobFailedError(f"job {job.id} {job.state}: {detail}")

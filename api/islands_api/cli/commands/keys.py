@@ -1,4 +1,4 @@
-"""``islands keys``: make, list and revoke the API keys of a service, in its database."""
+"""``islands keys``: create, list and revoke the API keys of a service, in its database."""
 
 from math import inf
 from pathlib import Path
@@ -15,18 +15,19 @@ from islands_service.store import Store
 from islands_service.store.keys import SCOPES
 
 keys = typer.Typer(
-    help="API keys of a service: make, list, revoke.", no_args_is_help=True, add_completion=False
+    help="API keys of a service: create, list, revoke.", no_args_is_help=True, add_completion=False
 )
 
 DataDir = Annotated[Path | None, typer.Option("--data-dir", help="The service's data folder.")]
 Database = Annotated[
-    str | None, typer.Option("--database", help="The service's database, if it has another.")
+    str | None, typer.Option("--database", help="The service's database, if it is not in the data folder.")
 ]
 
-_DAY = 86_400.0
+#: Seconds of a day.
+_DAY_SECONDS = 86_400.0
 
 
-def _store(data_dir: Path | None, database: str | None) -> Store:
+def _open_store(data_dir: Path | None, database: str | None) -> Store:
     settings = service_settings(data_dir=data_dir, database=database)
     settings.data_dir.mkdir(parents=True, exist_ok=True, mode=0o700)
     return Store(settings.url)
@@ -35,20 +36,24 @@ def _store(data_dir: Path | None, database: str | None) -> Store:
 @keys.command()
 def create(
     scopes: Annotated[list[str], typer.Option("--scope", help=f"Repeat it: {', '.join(SCOPES)}.")],
-    name: Annotated[str, typer.Option("--name", help="For whom, or for what.")] = "",
+    name: Annotated[str, typer.Option("--name", help="Name of the key, for display.")] = "",
     owner: Annotated[
         str | None,
-        typer.Option("--owner", help="Share this owner's data sets and jobs; a new one by default."),
+        typer.Option("--owner", help="Share this owner's data sets and jobs; a new owner by default."),
     ] = None,
-    days: Annotated[float | None, typer.Option("--days", help="Until it expires; never by default.")] = None,
+    days: Annotated[
+        float | None, typer.Option("--days", help="Days until the key expires; never by default.")
+    ] = None,
     data_dir: DataDir = None,
     database: Database = None,
 ) -> None:
-    """Make a key. It is shown once: only a hash of it is kept."""
+    """Create a key. It is shown once: only its hash is stored."""
     if days is not None and not 0.0 < days < inf:
         raise SettingsError(f"--days is a number of days above 0, got {days:g}")
-    with _store(data_dir, database) as store:
-        key, secret = store.keys.create(name, frozenset(scopes), owner, None if days is None else days * _DAY)
+    with _open_store(data_dir, database) as store:
+        key, secret = store.keys.create(
+            name, frozenset(scopes), owner, None if days is None else days * _DAY_SECONDS
+        )
     output.print(secret, markup=False)
     output.print(f"key {key.id} of owner {key.owner}: {', '.join(sorted(key.scopes))}", markup=False)
 
@@ -56,8 +61,8 @@ def create(
 @keys.command("list")
 def list_keys(data_dir: DataDir = None, database: Database = None) -> None:
     """List the keys, without their secrets."""
-    with _store(data_dir, database) as store:
-        # Where there is little room lines are broken: what is cut off names nothing.
+    with _open_store(data_dir, database) as store:
+        # Ids are never truncated; other columns wrap in a narrow terminal.
         table = Table(
             Column("key", no_wrap=True),
             *(Column(name, overflow="fold") for name in ("name", "owner", "scopes")),
@@ -65,7 +70,7 @@ def list_keys(data_dir: DataDir = None, database: Database = None) -> None:
         )
         for key in store.keys.all():
             state = "revoked" if key.revoked is not None else "expired" if key.expired else "valid"
-            # What somebody calls a key is no markup.
+            # Names may contain characters that Rich takes for markup.
             table.add_row(key.id, Text(key.name), Text(key.owner), ", ".join(sorted(key.scopes)), state)
     output.print(table)
 
@@ -76,7 +81,7 @@ def revoke(
     data_dir: DataDir = None,
     database: Database = None,
 ) -> None:
-    """End a key: it opens nothing any more within a second."""
-    with _store(data_dir, database) as store:
+    """Revoke a key. The service rejects it within a second."""
+    with _open_store(data_dir, database) as store:
         store.keys.revoke(key)
     output.print(f"key {key} is revoked", markup=False)

@@ -1,4 +1,4 @@
-"""``islands simulate``: predict a record with a model."""
+"""``islands simulate``: prediction of a record by a model."""
 
 from pathlib import Path
 from typing import Annotated
@@ -27,17 +27,19 @@ def simulate(
     out: Annotated[Path | None, typer.Option("--out", help="CSV file for time and y_sim.")] = None,
     inputs: Annotated[
         list[str] | None,
-        typer.Option("--input", help="Input column; by default what the model was fitted to."),
+        typer.Option("--input", help="Input column; by default that of the model."),
     ] = None,
-    output_column: Annotated[str | None, typer.Option("--output", help="Output column; likewise.")] = None,
+    output_column: Annotated[
+        str | None, typer.Option("--output", help="Output column; by default that of the model.")
+    ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    shooting: Annotated[int, typer.Option("--shooting", help="Samples of an interval.")] = SHOOTING,
+    shooting: Annotated[int, typer.Option("--shooting", help="Samples of a shooting interval.")] = SHOOTING,
 ) -> None:
-    """Simulate a model on a record; a free run needs the output in its first samples alone."""
+    """Simulate a model on a record. A free run needs only the first samples of the output."""
     extended = options.extended(model)
     if extended is not None:
-        _extended(extended, record, mode, out, inputs, output_column, dt, rows)
+        _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows)
         return
     chosen = options.model(model)
     data = read_record(
@@ -50,15 +52,15 @@ def simulate(
     )
     if chosen.dt is not None and abs(data.dt - chosen.dt) > 0.01 * chosen.dt:
         raise ModelError(
-            f"the model holds for a sampling time of {chosen.dt:g} s, the record has {data.dt:g} s"
+            f"the model is valid for a sampling time of {chosen.dt:g} s, the record has {data.dt:g} s"
         )
     compile_kernels()
     simulation = run(chosen, data, mode, shooting)
-    _show(data, simulation.y, f"{mode}: {simulation.outcome}", out)
+    _print_metrics(data, simulation.y, f"{mode}: {simulation.outcome}", out)
 
 
-def _extended(
-    asked: LocalExtendedSpec,
+def _simulate_extended(
+    spec: LocalExtendedSpec,
     record: Path,
     mode: str,
     out: Path | None,
@@ -67,20 +69,20 @@ def _extended(
     dt: float | None,
     rows: str | None,
 ) -> None:
-    """Simulate what a diagnosis has extended: from the record's first samples on."""
+    """Simulate the extended simulation of a diagnosis, starting at the record's first samples."""
     if mode != "free-run":
-        raise SettingsError(f"an extended simulation runs free: --mode {mode} is for models")
-    core = innermost(asked)
-    beside = (core.column,) if isinstance(core, ColumnSpec) else ()
-    driving = options.columns(inputs or list(asked.inputs))
-    whole = read_record(record, [*driving, *beside], output_column or asked.output, dt, parse_rows(rows))
+        raise SettingsError(f"an extended simulation supports free runs only: --mode {mode} is for models")
+    inner = innermost(spec)
+    recorded = (inner.column,) if isinstance(inner, ColumnSpec) else ()
+    driving = options.columns(inputs or list(spec.inputs))
+    whole = read_record(record, [*driving, *recorded], output_column or spec.output, dt, parse_rows(rows))
     data = whole.first_inputs(len(driving))
     compile_kernels()
-    y = simulate_spec(asked, data, dict.fromkeys(beside, whole.u[:, -1]))
-    _show(data, y, f"{mode}: {', '.join(effect.name for effect in asked.effects)} in it", out)
+    y = simulate_spec(spec, data, dict.fromkeys(recorded, whole.u[:, -1]))
+    _print_metrics(data, y, f"{mode}: with {', '.join(effect.name for effect in spec.effects)}", out)
 
 
-def _show(data: Dataset, y: NDArray[np.float64], line: str, out: Path | None) -> None:
+def _print_metrics(data: Dataset, y: NDArray[np.float64], line: str, out: Path | None) -> None:
     if out is not None:
         write_simulation(data, y, out)
         output.print(f"{out}: {data.samples} rows", markup=False)

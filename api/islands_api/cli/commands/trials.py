@@ -1,4 +1,4 @@
-"""``islands trials``: effects are hidden in data by code of its own, and the analysis has to find them."""
+"""``islands trials``: blind fault-injection trials of the discrepancy analysis."""
 
 import json
 from collections.abc import Sequence
@@ -27,144 +27,143 @@ from islands.performance.trials.trial import Trial, TrialOutcome, run_trial
 from islands_api.cli.console import compile_kernels, output, progress
 from islands_service.runtime.parallel_map import ray_pool
 
-#: Bands of the misfit of each effect in standard deviations of the noise: they are taken in turn.
+#: Bands of the misfit of an effect, in standard deviations of the noise; used in turn.
 BANDS = ((0.2, 1.0), (1.0, 4.0), (0.05, 0.2))
 
-#: The band of those that are hidden together.
-TOGETHER = BANDS[1]
+#: Band of effects that are injected together.
+COMBINED_BAND = BANDS[1]
 
-#: The pole of noise that remembers.
+#: Pole of coloured noise.
 POLE = 0.9
 
 
 def trials(
     cores: Annotated[
         list[str] | None,
-        typer.Option("--core", help=f"The simulation, repeated: {', '.join(CORES)}; the first by default."),
+        typer.Option("--core", help=f"Simulation; repeatable: {', '.join(CORES)}; the first by default."),
     ] = None,
     effects: Annotated[
         list[str] | None,
         typer.Option(
             "--effects",
-            help="Names to hide, repeated; by default all that the simulation can name, as 'all'.",
+            help="Effects to inject; repeatable; by default, or by 'all', all that the analysis can name.",
         ),
     ] = None,
     count: Annotated[int, typer.Option("--count", min=1, help="Trials of each effect.")] = 3,
     noise: Annotated[str, typer.Option("--noise", help="white or ar.")] = "white",
-    clean: Annotated[int, typer.Option("--clean", min=0, help="Records with nothing hidden in them.")] = 20,
+    clean: Annotated[int, typer.Option("--clean", min=0, help="Records without an effect.")] = 20,
     pairs: Annotated[int, typer.Option("--pairs", min=0, help="Records with two effects.")] = 0,
-    triples: Annotated[int, typer.Option("--triples", min=0, help="Records with three.")] = 0,
+    triples: Annotated[int, typer.Option("--triples", min=0, help="Records with three effects.")] = 0,
     open_set: Annotated[
         int,
-        typer.Option("--open-set", min=0, help="Records of each cause that has no name in the catalogue."),
+        typer.Option("--open-set", min=0, help="Records of each cause that is not in the catalogue."),
     ] = 2,
     variant: Annotated[
-        bool, typer.Option("--variant", help="Hide in forms unlike those that the analysis extends by.")
+        bool, typer.Option("--variant", help="Inject effects in other forms than those of the catalogue.")
     ] = False,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     seconds: Annotated[
         float | None,
         typer.Option(
-            "--seconds", min=10.0, help="Length of a record; by default what its system usually has."
+            "--seconds", min=10.0, help="Length of a record; by default the usual length of its system."
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Trials side by side, at the most.")
+        int | None, typer.Option("--workers", min=1, help="Largest number of trials that run in parallel.")
     ] = None,
     address: Annotated[str | None, typer.Option("--ray-address", help="HOST:PORT of a cluster.")] = None,
     figure: Annotated[
-        Path | None, typer.Option("--figure", help="An SVG file for the confusion matrix.")
+        Path | None, typer.Option("--figure", help="SVG file for the confusion matrix.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--json", help="A file for the outcomes.")] = None,
+    out: Annotated[Path | None, typer.Option("--json", help="JSON file for the outcomes.")] = None,
 ) -> None:
-    """Hide effects in simulated records, look for them, and count how often they are found and named."""
-    asked_cores = {name: lookup(CORES, name, "core") for name in cores or [next(iter(CORES))]}
+    """Inject effects into simulated records, diagnose them, and count how often they are found and named."""
+    cases = {name: lookup(CORES, name, "core") for name in cores or [next(iter(CORES))]}
     if noise not in ("white", "ar"):
         raise SettingsError(f"--noise {noise}: take white or ar")
     pole = POLE if noise == "ar" else 0.0
-    asked: list[Trial] = []
-    for core, simulated in asked_cores.items():
-        names, rng = _names(effects, simulated), np.random.default_rng(seed)
+    planned: list[Trial] = []
+    for core, simulated in cases.items():
+        names, rng = _select_effects(effects, simulated), np.random.default_rng(seed)
 
         def trial(
-            hidden: Sequence[str], turn: int, band: tuple[float, float] | None = None, core: str = core
+            injected: Sequence[str], turn: int, band: tuple[float, float] | None = None, core: str = core
         ) -> Trial:
-            unlike = variant and band is not None
-            return Trial(tuple(hidden), seed + turn, pole, band, unlike, seconds, core, oracle=True)
+            other_form = variant and band is not None
+            return Trial(tuple(injected), seed + turn, pole, band, other_form, seconds, core, oracle=True)
 
-        asked += [trial((name,), turn, BANDS[turn % len(BANDS)]) for name in names for turn in range(count)]
-        asked += [trial((), turn) for turn in range(clean)]
-        asked += [trial((name,), turn) for name in simulated.system.unknown for turn in range(open_set)]
+        planned += [trial((name,), turn, BANDS[turn % len(BANDS)]) for name in names for turn in range(count)]
+        planned += [trial((), turn) for turn in range(clean)]
+        planned += [trial((name,), turn) for name in simulated.system.unknown for turn in range(open_set)]
         for size, many in ((2, pairs), (3, triples)):
             if many and len(names) < size:
-                raise SettingsError(f"{size} effects at once need as many names: give more with --effects")
-            asked += [
-                trial([str(each) for each in rng.choice(names, size, replace=False)], turn, TOGETHER)
+                raise SettingsError(f"{size} effects at once need {size} names: give more with --effects")
+            planned += [
+                trial([str(each) for each in rng.choice(names, size, replace=False)], turn, COMBINED_BAND)
                 for turn in range(many)
             ]
     compile_kernels()
     found = []
-    with progress("trials") as tell, ray_pool(workers, address) as side_by_side:
-        for outcome in side_by_side(run_trial, asked):
+    with progress("trials") as show, ray_pool(workers, address) as parallel_map:
+        for outcome in parallel_map(run_trial, planned):
             found.append(outcome)
-            tell(f"{len(found)} of {len(asked)}", len(found) / len(asked))
+            show(f"{len(found)} of {len(planned)}", len(found) / len(planned))
     document: dict[str, Any] = {"cores": {}, "outcomes": [asdict(each) for each in found]}
-    for core, simulated in asked_cores.items():
+    for core, simulated in cases.items():
         outcomes = [each for each in found if each.trial.core == core]
-        document["cores"][core] = _told(core, simulated, outcomes)
+        document["cores"][core] = _report_case(core, simulated, outcomes)
         if figure is not None:
-            path = figure if len(asked_cores) == 1 else figure.with_stem(f"{figure.stem}-{core}")
-            title = f"{core}, {noise} noise: what was hidden, and what it was called"
+            path = figure if len(cases) == 1 else figure.with_stem(f"{figure.stem}-{core}")
+            title = f"{core}, {noise} noise: injected and named effects"
             save(draw_confusion(confusion(outcomes), simulated.nameable, title), path)
     if out is not None:
         out.write_text(json.dumps(document, indent=1))
 
 
-def _told(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:
-    """Say how one kind of simulation did; return the same as a document."""
+def _report_case(core: str, simulated: SimulatedCase, outcomes: Sequence[TrialOutcome]) -> dict[str, Any]:
+    """Print the scores of one simulation and return them as a document."""
     rows = score(outcomes, simulated.nameless, simulated.goals)
     bins = reliability([each for each in outcomes if not set(each.trial.effects) & set(simulated.nameless)])
-    output.print(_table(core, rows))
+    output.print(_make_table(core, rows))
     for each in bins:
-        output.print(_reliable(each), markup=False)
+        output.print(_format_bin(each), markup=False)
     wrong = {key: times for key, times in sorted(confusion(outcomes).items()) if key[0] != key[1]}
-    for (hidden, named), times in islice(wrong.items(), 40):
-        output.print(f"{hidden or 'nothing'} was called {named or 'nothing'}: {times}", markup=False)
+    for (injected, named), times in islice(wrong.items(), 40):
+        output.print(f"{injected or 'nothing'} was named {named or 'nothing'}: {times}", markup=False)
     shares = [{**asdict(each), "bounds": each.bounds} for each in rows if isinstance(each, Proportion)]
     measures = [asdict(each) for each in rows if isinstance(each, Statistic) and each.of]
     return {"shares": shares, "measures": measures, "reliability": [asdict(each) for each in bins]}
 
 
-def _names(effects: list[str] | None, simulated: SimulatedCase) -> list[str]:
+def _select_effects(effects: list[str] | None, simulated: SimulatedCase) -> list[str]:
     if not effects or effects == ["all"]:
         return list(simulated.nameable)
     unknown = set(effects) - set(simulated.system.known)
     if unknown:
         raise SettingsError(
-            f"nobody knows how to hide {', '.join(sorted(unknown))}: take some of "
-            f"{', '.join(simulated.system.known)}"
+            f"cannot inject {', '.join(sorted(unknown))}: choose from {', '.join(simulated.system.known)}"
         )
     return effects
 
 
-def _table(title: str, rows: Sequence[Proportion | Statistic]) -> Table:
+def _make_table(title: str, rows: Sequence[Proportion | Statistic]) -> Table:
     table = Table("", "trials", "", "95 %", "goal", "", title=title, title_justify="left")
     for row in rows:
         if row.of:
             goal = "" if row.goal is None else f"{'<=' if row.most else '>='} {row.goal:g}"
             kept = {True: "kept", False: "MISSED", None: ""}[row.kept]
-            table.add_row(row.name, f"{row.of}", *_value(row), goal, kept)
+            table.add_row(row.name, f"{row.of}", *_format_value(row), goal, kept)
     return table
 
 
-def _value(row: Proportion | Statistic) -> tuple[str, str]:
+def _format_value(row: Proportion | Statistic) -> tuple[str, str]:
     if isinstance(row, Statistic):
         return f"{row.value:.3f}", ""
     low, high = row.bounds
     return f"{row.percent:.1f} %", f"{low:.1f} to {high:.1f}"
 
 
-def _reliable(each: ReliabilityBin) -> str:
+def _format_bin(each: ReliabilityBin) -> str:
     return (
         f"confidence {each.low:g} to {each.high:g}: {each.count} names, said {100 * each.said:.0f} %, "
         f"right {100 * each.right:.0f} %"

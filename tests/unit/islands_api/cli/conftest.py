@@ -1,4 +1,4 @@
-"""The command line in this process, in a folder of its own."""
+"""Fixture that runs the command line in this process, in a temporary folder."""
 
 import sys
 from collections.abc import Callable

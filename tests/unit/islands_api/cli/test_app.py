@@ -1,4 +1,4 @@
-"""The command line from inside: how options are understood, and what becomes of every error."""
+"""Command line in this process: parsing of options, output folders, and errors."""
 
 import json
 import os
@@ -31,14 +31,14 @@ def record(samples=120, seed=0):
 
 @pytest.fixture(scope="module", autouse=True)
 def undrawn():
-    """Draw nothing: how a figure looks is no subject here."""
+    """Write empty figures; their content is tested elsewhere."""
     with undrawn_figures():
         yield
 
 
 @pytest.fixture
 def run(command_line):
-    """Run a command in a folder of its own; return exit code, standard output, standard error."""
+    """Run a command in a temporary folder; return exit code, standard output, standard error."""
     return command_line
 
 
@@ -47,7 +47,7 @@ FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3",
 
 @pytest.fixture(scope="module")
 def fit(tmp_path_factory):
-    """A folder with a record and what was fitted to it, and what the command said."""
+    """Folder with a record and the result of a fit, and the output of the command."""
     folder = tmp_path_factory.mktemp("fit")
     write_record(record(), folder / "r.csv")
     with chdir(folder):
@@ -56,10 +56,10 @@ def fit(tmp_path_factory):
 
 @pytest.fixture
 def fitted(fit, run):
-    """What the command said; the test has a folder like that in which it was run."""
-    folder, said = fit
+    """Output of the fit; the test runs in a copy of its folder."""
+    folder, printed = fit
     shutil.copytree(folder, Path.cwd(), dirs_exist_ok=True)
-    return said
+    return printed
 
 
 # Options.
@@ -88,7 +88,7 @@ def test_rows_are_start_and_stop(text, expected):
 
 
 @pytest.mark.parametrize("text", ["5", "a:b", "1:2:3", "", "1.5:3"])
-def test_other_rows_are_refused(text):
+def test_malformed_rows_are_rejected(text):
     with pytest.raises(SettingsError) as caught:
         parse_rows(text)
     assert str(caught.value) == f"cannot read the rows {text!r}: write START:STOP, for example 0:5000"
@@ -118,34 +118,34 @@ def test_validation_is_a_file_a_fraction_or_rows(tmp_path):
 @pytest.mark.parametrize(
     ("text", "used"), [("80:", None), ("80:", "0:81"), ("0:90", "80:"), ("50:60", "0:100"), (":", "0:10")]
 )
-def test_rows_that_estimate_cannot_be_held_out(tmp_path, text, used):
+def test_validation_rows_must_not_overlap_estimation_rows(tmp_path, text, used):
     write_record(record(), tmp_path / "r.csv")
-    with pytest.raises(SettingsError, match="say with --rows START:STOP which other samples estimate"):
+    with pytest.raises(SettingsError, match="give --rows START:STOP, other samples for estimation"):
         options.validation(text, tmp_path / "r.csv", ["u_V"], "y_um", None, used)
 
 
-def test_a_model_is_a_file_or_a_published_one(tmp_path):
+def test_model_is_a_file_or_a_published_model(tmp_path):
     write_model(PUBLISHED["12"].model, tmp_path / "m.json")
     assert options.model(str(tmp_path / "m.json")) == options.model("published:12") == PUBLISHED["12"].model
 
 
-# The folder for a result.
+# Output folders.
 
 
-def test_a_folder_that_is_new_or_holds_no_result_will_do(tmp_path):
+def test_new_folder_and_folder_without_result_are_accepted(tmp_path):
     check_folder(tmp_path, force=False)
     check_folder(tmp_path / "new" / "deeper", force=False)
     assert not (tmp_path / "new").exists()
 
 
-def test_a_result_is_replaced_by_force_alone(tmp_path):
+def test_result_is_replaced_only_with_force(tmp_path):
     (tmp_path / "result.json").write_text("{}")
     with pytest.raises(SettingsError, match="holds a result already: give another --out, or --force"):
         check_folder(tmp_path, force=False)
     check_folder(tmp_path, force=True)
 
 
-def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_done(tmp_path):
+def test_folder_below_a_file_is_rejected(tmp_path):
     file = tmp_path / "file"
     file.write_text("")
     for path in (file, file / "out", file / "out" / "deeper"):
@@ -154,17 +154,17 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_done(tmp_pat
         assert str(caught.value) == f"--out {path}: {file} is a file, give a folder"
 
 
-def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
-    # Whoever runs the tests may be allowed everything, so the question is answered here.
+def test_read_only_folder_is_rejected(tmp_path, monkeypatch):
+    # The user that runs the tests may have all permissions, so the check is replaced.
     monkeypatch.setattr(os, "access", lambda path, _mode: Path(path) != tmp_path)
-    with pytest.raises(SettingsError, match=r"nothing may be written in .*, give another folder"):
+    with pytest.raises(SettingsError, match=r"is not writable, give another folder"):
         check_folder(tmp_path / "out", force=False)
 
 
 # Commands.
 
 
-def test_fit_shows_what_it_found_and_where_it_is(fitted):
+def test_fit_prints_the_models_and_the_output_folder(fitted):
     out = fitted
     assert "120 samples, 0.01 s: u_V to y_um" in out
     assert "3 models estimated: 3 ok" in out
@@ -173,7 +173,7 @@ def test_fit_shows_what_it_found_and_where_it_is(fitted):
     assert json.loads(Path("out/result.json").read_text())["search"]["wall_s"] > 0.0
 
 
-def test_force_replaces_a_result_and_leaves_no_model_of_the_old_one(run, fitted):
+def test_force_replaces_a_result_and_all_its_models(run, fitted):
     assert len(list(Path("out/models").iterdir())) == 3
     code, _, err = run(*FIT)
     assert code == 2
@@ -182,7 +182,7 @@ def test_force_replaces_a_result_and_leaves_no_model_of_the_old_one(run, fitted)
     assert [path.name for path in Path("out/models").iterdir()] == ["01.json"]
 
 
-def test_simulate_takes_the_columns_that_the_model_names(run, fitted):
+def test_simulate_reads_the_columns_of_the_model(run, fitted):
     code, out, _ = run("simulate", "out/models/01.json", "r.csv", "--mode", "one-step", "--out", "s.csv")
     assert code == 0
     assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step: ok"]
@@ -195,28 +195,28 @@ def test_simulate_takes_the_columns_that_the_model_names(run, fitted):
     assert run("simulate", "out/models/01.json", "other.csv", *columns)[0] == 0
 
 
-def test_simulate_refuses_another_sampling_time(run):
+def test_simulate_rejects_another_sampling_time(run):
     write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
     code, _, err = run("simulate", "published:12", "slow.csv")
     assert code == 2
-    assert "the model holds for a sampling time of 0.001 s, the record has 0.0011 s" in err
+    assert "the model is valid for a sampling time of 0.001 s, the record has 0.0011 s" in err
 
 
-def test_systems_are_made_into_a_folder_with_any_name(run):
+def test_systems_make_writes_into_a_folder_with_brackets(run):
     Path("[red]").mkdir()
     code, out, _ = run("systems", "make", "s1", "--out", "[red]/a[b].csv")
     assert code == 0
     assert out.startswith("[red]/a[b].csv: 500 samples, ")
 
 
-def test_the_commands_are_listed(run):
+def test_help_lists_the_commands(run):
     code, out, _ = run("--help")
     assert code == 0
     for name in ("fit", "simulate", "show", "demo", "systems"):
         assert name in out
 
 
-# Errors: one line that says what to do, and no trace of the program.
+# Errors: one line that says what to do, and no traceback.
 
 
 @pytest.mark.parametrize(
@@ -229,7 +229,7 @@ def test_the_commands_are_listed(run):
         (("systems", "make", "s1", "--out", "no/where.csv"), "cannot write no/where.csv: No such file"),
     ],
 )
-def test_an_error_is_said_as_it_is_whatever_brackets_it_holds(run, arguments, message):
+def test_error_message_with_brackets_is_printed_verbatim(run, arguments, message):
     code, out, err = run(*arguments)
     assert code == 2
     assert out == ""
@@ -239,24 +239,24 @@ def test_an_error_is_said_as_it_is_whatever_brackets_it_holds(run, arguments, me
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "said"),
+    ("error", "code", "message"),
     [
         (IslandsError("take less"), 2, "error: take less"),
         (PermissionError(13, "Permission denied", "out"), 2, "error: [Errno 13] Permission denied: 'out'"),
         (OSError(28, "No space left on device"), 2, "error: [Errno 28] No space left on device"),
     ],
 )
-def test_what_stops_a_command_stops_it_with_a_message(run, monkeypatch, error, code, said):
+def test_deliberate_error_is_printed_as_a_message(run, monkeypatch, error, code, message):
     def stop(*_):
         raise error
 
     monkeypatch.setattr("islands_api.cli.commands.show.export", stop)
     found, _, err = run("show", "published:12")
     assert found == code
-    assert err.strip() == said
+    assert err.strip() == message
 
 
-def test_a_programming_error_is_not_hidden(run, monkeypatch):
+def test_programming_error_is_not_hidden(run, monkeypatch):
     def stop(*_):
         raise ZeroDivisionError
 
@@ -265,7 +265,7 @@ def test_a_programming_error_is_not_hidden(run, monkeypatch):
         run("show", "published:12")
 
 
-def test_an_interrupt_is_not_an_error_message(run, monkeypatch):
+def test_interrupt_exits_with_code_130(run, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 

@@ -1,4 +1,4 @@
-"""A folder in which ``islands identify`` runs in this process, and what happens to it there."""
+"""Fixtures that run ``islands identify`` in this process, interrupt it and replace its engines."""
 
 import signal
 from contextlib import contextmanager
@@ -13,9 +13,9 @@ from support.undrawn import undrawn_figures
 
 @pytest.fixture
 def run(request, monkeypatch, command_line):
-    """Run the command in a folder that holds ``r.csv``; return exit code, standard output, standard error.
+    """Run the command in a folder with ``r.csv``; return exit code, standard output, standard error.
 
-    Figures take most of a small run's time: only a test that asks for them has them.
+    Figures are written only for tests that use ``with_figures``: they take most of the time of a small run.
     """
     write_record(record(), "r.csv")
     if "with_figures" not in request.fixturenames:
@@ -31,24 +31,24 @@ def run(request, monkeypatch, command_line):
 
 @pytest.fixture
 def with_figures():
-    """Ask for figures, whose files hold an empty picture."""
+    """Write figures, as empty pictures."""
     with undrawn_figures():
         yield
 
 
 @pytest.fixture
 def watched(monkeypatch):
-    """Do something after every epoch."""
+    """Return a function that registers an action to be run after each epoch."""
 
     def by(watch):
-        monkeypatch.setattr(command, "search_progress", lambda _tell: lambda state, _settings: watch(state))
+        monkeypatch.setattr(command, "search_progress", lambda _show: lambda state, _settings: watch(state))
 
     return by
 
 
 @pytest.fixture
 def interrupted(watched):
-    """Send signals, Ctrl-C unless told otherwise, in a generation of one's choice."""
+    """Return a function that registers signals, Ctrl-C by default, to be sent in a generation."""
 
     def in_generation(chosen, *signals):
         def watch(state):
@@ -63,21 +63,21 @@ def interrupted(watched):
 
 @pytest.fixture
 def engines(monkeypatch):
-    """Tell which engine is asked for, at which address; all are serial ones, or what is given."""
+    """Return a function that replaces all engines by one and returns the requested names and addresses."""
 
     def table(engine):
-        asked = []
+        requested = []
 
         def entry(name):
             @contextmanager
-            def carry_out(address, tell):
-                asked.append((name, address))
-                tell("[an engine] speaks")
+            def start(address, tell):
+                requested.append((name, address))
+                tell("[an engine] message")
                 yield engine
 
-            return carry_out
+            return start
 
         monkeypatch.setattr(command, "ENGINES", {name: entry(name) for name in command.ENGINES})
-        return asked
+        return requested
 
     return table

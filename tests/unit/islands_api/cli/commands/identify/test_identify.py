@@ -1,4 +1,4 @@
-"""``islands identify`` from inside: what it keeps, what it refuses, and what its options say."""
+"""``islands identify`` in this process: files of a run, test data, and options."""
 
 import json
 import signal
@@ -15,10 +15,10 @@ from islands.simulation.predictors import free_run
 from islands_api.cli import identify_run as command
 from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models, record, refused
 
-# A run.
+# Files of a run.
 
 
-def test_a_run_leaves_a_result_a_checkpoint_and_no_litter(run, with_figures, tmp_path):
+def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4")
     assert (code, error) == (0, "")
     assert "out/: result.json, models/, figures/, summary.txt" in out
@@ -44,13 +44,13 @@ def test_a_run_leaves_a_result_a_checkpoint_and_no_litter(run, with_figures, tmp
     assert search["ended_by"] == "generations"
 
 
-def test_signals_are_as_before_when_a_run_is_over(run):
+def test_signal_handlers_are_restored_after_a_run(run):
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-def test_what_an_earlier_run_left_in_the_folder_is_not_taken_for_this_one_s(run, tmp_path):
+def test_files_of_an_earlier_run_are_deleted(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--test", "0.2")[0] == 0
     assert (tmp_path / "out/test.json").exists()
     assert (tmp_path / "out/hall.json").exists()
@@ -68,7 +68,7 @@ def test_what_an_earlier_run_left_in_the_folder_is_not_taken_for_this_one_s(run,
     assert not (tmp_path / "out/checkpoint.json").exists()
 
 
-def test_the_hall_of_fame_of_all_islands_stands_beside_the_checkpoint(run, tmp_path):
+def test_hall_of_fame_of_all_islands_is_written_with_the_checkpoint(run, tmp_path):
     assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
     archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
     assert len(archipelago.islands) == 2
@@ -78,10 +78,10 @@ def test_the_hall_of_fame_of_all_islands_stands_beside_the_checkpoint(run, tmp_p
     assert about["history"][-1][3] == best
 
 
-# Test data: nothing touches it.
+# Test data.
 
 
-def test_a_fraction_that_is_kept_for_the_test_changes_no_model(run, tmp_path):
+def test_values_of_the_test_data_do_not_change_the_models(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "one", "--test", "0.2")[0] == 0
     spoilt = record()
     y = spoilt.y.copy()
@@ -94,10 +94,10 @@ def test_a_fraction_that_is_kept_for_the_test_changes_no_model(run, tmp_path):
     good, bad = (json.loads((tmp_path / name / "test.json").read_text()) for name in ("one", "other"))
     assert good["outcome"] == bad["outcome"] == "ok"
     assert good["mape"] < 1.0 < bad["mape"]
-    assert f"touched by nothing before: free run ok, MAPE {bad['mape']:.4f} %" in out
+    assert f"not used before: free run ok, MAPE {bad['mape']:.4f} %" in out
 
 
-def test_the_test_may_be_a_file_or_rows_of_the_record(run, tmp_path):
+def test_test_data_is_a_file_or_rows_of_the_record(run, tmp_path):
     write_record(record(seed=3), "t.csv")
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "file", "--test", "t.csv")[0] == 0
     code, _, _ = run("r.csv", *COLUMNS, *SMALL, "--out", "rows", "--rows", "0:500", "--test", "500:700")
@@ -107,23 +107,23 @@ def test_the_test_may_be_a_file_or_rows_of_the_record(run, tmp_path):
     assert found[0] != found[1]
 
 
-def test_a_diverging_test_is_said_and_stored_as_null_never_as_a_number(tmp_path, capsys):
+def test_diverging_test_has_an_outcome_and_no_metrics(tmp_path, capsys):
     class Diverging:
         best = property(lambda self: self)
 
-        def simulate(self, tested):
-            return free_run(self.model, tested)
+        def simulate(self, test_data):
+            return free_run(self.model, test_data)
 
     result = Diverging()
     result.model = make_model([(parse("y(k-1)"), 2.0)])
-    command._test(result, record(), tmp_path)
+    command._evaluate_test(result, record(), tmp_path)
     document = json.loads((tmp_path / "test.json").read_text())
     assert list(document) == ["outcome"]
     assert document["outcome"].startswith("diverged: |y| left")
     assert "MAPE" not in capsys.readouterr().out
     result.model = make_model([(parse("y(k-1)"), 1.0)])
     still = record()
-    command._test(result, Dataset(still.u, np.ones(700), 0.01), tmp_path)
+    command._evaluate_test(result, Dataset(still.u, np.ones(700), 0.01), tmp_path)
     document = json.loads((tmp_path / "test.json").read_text())
     assert (document["mape"], document["rmse"]) == (None, 0.0)
 
@@ -131,31 +131,31 @@ def test_a_diverging_test_is_said_and_stored_as_null_never_as_a_number(tmp_path,
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--test", "500:700"), "--test 500:700: say with --rows"),
-        (("--rows", "0:600", "--test", "500:700"), "--test 500:700: say with --rows"),
+        (("--test", "500:700"), "--test 500:700: give --rows"),
+        (("--rows", "0:600", "--test", "500:700"), "--test 500:700: give --rows"),
         (
             ("--rows", "0:400", "--validation", "400:600", "--test", "500:700"),
-            "samples that estimate or validate",
+            "samples that are used for estimation or validation",
         ),
-        (("--rows", "0:400", "--validation", "300:600"), "--validation 300:600: say with --rows"),
-        (("--test", "r.csv"), "samples that estimate or validate"),
-        (("--rows", "100:700", "--test", "r.csv"), "samples that estimate or validate"),
+        (("--rows", "0:400", "--validation", "300:600"), "--validation 300:600: give --rows"),
+        (("--test", "r.csv"), "samples that are used for estimation or validation"),
+        (("--rows", "100:700", "--test", "r.csv"), "samples that are used for estimation or validation"),
         (("--test", "nowhere.csv"), "--test nowhere.csv: give a file that exists"),
         (("--test", "1.5"), "lies between 0 and 1, got 1.5"),
         (("--test", "slow.csv"), "sampled at 0.05 s, the record at 0.01 s: resample"),
         (
             ("--rows", "0:660", "--test", "660:700", "--max-height", "12"),
-            f"the test data has 40 samples and lags reach down to {DEEPEST}: give more",
+            f"the test data has 40 samples, and the largest lag is {DEEPEST}: give more samples",
         ),
     ],
 )
-def test_test_data_that_is_touched_or_unfit_is_refused_before_the_search(run, tmp_path, options, message):
+def test_overlapping_or_unsuitable_test_data_is_rejected(run, tmp_path, options, message):
     write_record(record(dt=0.05), "slow.csv")
     assert message in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out", *options))
     assert not (tmp_path / "out").exists()
 
 
-# Budgets.
+# Options.
 
 
 @pytest.mark.parametrize(
@@ -187,12 +187,12 @@ def test_test_data_that_is_touched_or_unfit_is_refused_before_the_search(run, tm
         (("--target-error", "nan"), "target_error is a number and not negative, got nan"),
     ],
 )
-def test_a_bad_budget_is_refused_by_name_and_leaves_no_folder(run, tmp_path, options, message):
+def test_invalid_option_is_rejected_by_name_without_a_folder(run, tmp_path, options, message):
     assert message in refused(run("r.csv", *COLUMNS, "--out", "out", *options))
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_missing_is_asked_for(run):
+def test_missing_arguments_are_named(run):
     assert "give RECORD, --input, --output and --out, or --resume DIR" in refused(
         run("r.csv", "--out", "out")
     )
@@ -235,7 +235,7 @@ def test_options_of_islands_reach_the_settings(run, tmp_path):
         }.items()
     )
     assert document["search"]["evaluations"] == 3 * 40
-    # Schedules and characters are read back from the checkpoint as they were given.
+    # Schedules and profiles are read back from the checkpoint unchanged.
     assert run("--resume", "out", "--engine", "serial")[0] == 0
     assert json.loads((tmp_path / "out/result.json").read_text())["settings"] == document["settings"]
 
@@ -248,12 +248,12 @@ def test_options_of_islands_reach_the_settings(run, tmp_path):
         (("--target-error", "1e3"), "target error", 0),
     ],
 )
-def test_a_run_ends_by_its_budget_and_says_so(run, tmp_path, options, ended_by, generations):
+def test_budget_ends_a_run_and_is_named_in_the_result(run, tmp_path, options, ended_by, generations):
     code, _, error = run("r.csv", *COLUMNS, *STEPWISE, *options, "--out", "out")
     assert (code, error) == (0, "")
     search = json.loads((tmp_path / "out/result.json").read_text())["search"]
     assert (search["ended_by"], search["generations"]) == (ended_by, generations)
-    # It has ended: resumed, nothing is left to be done.
+    # Resuming a run that has ended changes nothing.
     before = models(tmp_path / "out")
     assert run("--resume", "out")[0] == 0
     search = json.loads((tmp_path / "out/result.json").read_text())["search"]

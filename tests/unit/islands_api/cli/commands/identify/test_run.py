@@ -1,4 +1,4 @@
-"""A run of ``islands identify``: how it stops and goes on, and by which engine."""
+"""Run of ``islands identify``: stopping, checkpoints, resuming and engines."""
 
 import json
 import signal
@@ -24,14 +24,14 @@ from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models,
     ("generation", "number", "budget"),
     [(0, signal.SIGINT, STEPWISE), (2, signal.SIGTERM, STEPWISE), (2, signal.SIGINT, TWO)],
 )
-def test_stopped_it_keeps_the_best_so_far_and_resume_goes_on_as_if_never_stopped(
+def test_stopped_run_keeps_the_best_and_resumes_to_the_same_result(
     run, interrupted, tmp_path, generation, number, budget
 ):
     assert run("r.csv", *COLUMNS, *budget, "--out", "whole")[0] == 0
     interrupted(generation, number)
     code, out, error = run("r.csv", *COLUMNS, *budget, "--out", "out")
     assert code == 0
-    assert error == "stopped: the result is the best so far; go on with --resume out"
+    assert error == "stopped: the result is the best so far; continue with --resume out"
     assert "out/: result.json" in out
     stopped = json.loads((tmp_path / "out/result.json").read_text())
     assert stopped["search"]["generations"] == generation
@@ -46,13 +46,13 @@ def test_stopped_it_keeps_the_best_so_far_and_resume_goes_on_as_if_never_stopped
     assert (tmp_path / "out/hall.json").read_bytes() == (tmp_path / "whole/hall.json").read_bytes()
     one, other = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("whole", "out"))
     for document in (one, other):
-        # Seconds are the machine's; what a cache took is the process's.
+        # Times depend on the machine, and cache sizes on the process.
         for name in ("wall_s", "evaluations_per_second", "caches"):
             del document["search"][name]
     assert one == other
 
 
-def test_ctrl_c_in_the_last_generation_stops_nothing(run, interrupted):
+def test_ctrl_c_in_the_last_generation_has_no_effect(run, interrupted):
     interrupted(3)
     code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out")
     assert (code, error) == (0, "")
@@ -62,8 +62,8 @@ def test_ctrl_c_in_the_last_generation_stops_nothing(run, interrupted):
     ("signals", "code"),
     [((signal.SIGINT, signal.SIGINT), 130), ((signal.SIGTERM, signal.SIGTERM), 0)],
 )
-def test_a_second_ctrl_c_interrupts_and_the_epochs_before_are_kept(run, interrupted, tmp_path, signals, code):
-    """Whoever ends processes may send SIGTERM twice: that asks for no more than once does."""
+def test_second_ctrl_c_interrupts_and_keeps_finished_epochs(run, interrupted, tmp_path, signals, code):
+    """A second SIGTERM has no further effect: process managers may send it twice."""
     interrupted(1, *signals)
     before = signal.getsignal(signal.SIGINT)
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == code
@@ -72,7 +72,7 @@ def test_a_second_ctrl_c_interrupts_and_the_epochs_before_are_kept(run, interrup
     assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
 
 
-def test_an_epoch_that_cannot_be_shown_is_kept(run, watched, tmp_path):
+def test_epoch_is_kept_if_its_display_fails(run, watched, tmp_path):
     def broken(state):
         if state.archipelago.generation == 2:
             raise OSError(28, "No space left on device")
@@ -83,23 +83,23 @@ def test_an_epoch_that_cannot_be_shown_is_kept(run, watched, tmp_path):
     assert archipelago.generation == about["history"][-1][0] == 2
 
 
-def test_an_island_without_a_model_is_kept_as_none_and_comes_back(tmp_path):
-    """JSON knows no infinity."""
+def test_infinite_fitness_is_stored_as_null_and_restored(tmp_path):
+    """JSON has no infinity."""
     history = (
         HistoryPoint(0, 20, {}, (inf, inf)),
         HistoryPoint(1, 40, {2: 0.1 + 0.2}, (0.1 + 0.2, inf)),
         HistoryPoint(2, 60, {1: 0.0, 2: 5e-324}, (0.0, 5e-324)),
     )
     state = SearchState(empty_archipelago(2, 5), 60, 7, {"ok": 31, "diverged": 29}, history)
-    about = {"job": {"seed": 5}, "wall_s": 12.5, **state_document(state)}
-    assert [least for *_, least in about["history"]] == [[None, None], [0.1 + 0.2, None], [0.0, 5e-324]]
+    header = {"job": {"seed": 5}, "wall_s": 12.5, **state_document(state)}
+    assert [least for *_, least in header["history"]] == [[None, None], [0.1 + 0.2, None], [0.0, 5e-324]]
     path = tmp_path / command.CHECKPOINT
-    write_checkpoint(state.archipelago, path, about)
+    write_checkpoint(state.archipelago, path, header)
     assert "Infinity" not in path.read_text()
-    assert command.stored(tmp_path) == ({"seed": 5}, state, 12.5)
+    assert command.load_run(tmp_path) == ({"seed": 5}, state, 12.5)
 
 
-def test_an_engine_that_fails_loses_no_finished_epoch(run, engines, tmp_path):
+def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "whole")[0] == 0
     engines(Broken())
     assert "No space left" in run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[2]
@@ -110,8 +110,8 @@ def test_an_engine_that_fails_loses_no_finished_epoch(run, engines, tmp_path):
     assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
-def test_checkpoints_are_written_while_a_search_goes_on(run, watched, monkeypatch, tmp_path):
-    """Every ten seconds: by a clock on which an epoch takes six."""
+def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tmp_path):
+    """An epoch takes six seconds of the replaced clock."""
     clock, found = [0.0], []
     monkeypatch.setattr(command, "monotonic", lambda: clock[0])
 
@@ -122,13 +122,13 @@ def test_checkpoints_are_written_while_a_search_goes_on(run, watched, monkeypatc
 
     watched(watch)
     assert run("r.csv", *COLUMNS, *STEPWISE, "--generations", "6", "--out", "out")[0] == 0
-    # The first populations are kept at once.
+    # The first populations are written immediately.
     assert found == [None, 0, 0, 2, 2, 4, 4]
     assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
 
 
-def test_checkpoints_that_take_long_are_written_less_often(run, watched, monkeypatch, tmp_path):
-    """One takes a second on this clock, and an epoch ten: a twentieth of the time is every other epoch."""
+def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_path):
+    """A checkpoint takes one second of the replaced clock and an epoch ten; the limit is a twentieth."""
     clock, written = [0.0], []
     monkeypatch.setattr(command, "monotonic", lambda: clock[0])
 
@@ -147,7 +147,7 @@ def test_checkpoints_that_take_long_are_written_less_often(run, watched, monkeyp
     assert written == [0, 3, 6, 6]
 
 
-def test_the_clock_may_end_a_run(run, watched, monkeypatch, tmp_path):
+def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
     monkeypatch.setattr(command, "monotonic", lambda: clock[0])
 
@@ -158,18 +158,18 @@ def test_the_clock_may_end_a_run(run, watched, monkeypatch, tmp_path):
     code, _, error = run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--wall-time", "11")
     assert code == 0
     assert error.splitlines() == [
-        "stopped: the result is the best so far; go on with --resume out",
-        "an end by --wall-time is not reproducible: how far a search gets by then differs",
+        "stopped: the result is the best so far; continue with --resume out",
+        "a result limited by --wall-time is not reproducible: it depends on the speed of the run",
     ]
     search = json.loads((tmp_path / "out/result.json").read_text())["search"]
     assert (search["generations"], search["ended_by"]) == (1, "stopped")
-    # The seconds are counted anew: they are how long this process may take.
+    # The limit applies to each process, not to the whole run.
     assert "stopped" in run("--resume", "out", "--wall-time", "5")[2]
     assert json.loads((tmp_path / "out/result.json").read_text())["search"]["generations"] == 2
     assert run("--resume", "out")[2] == ""
 
 
-def test_the_time_of_a_resumed_run_counts_that_before_it(run, interrupted, tmp_path):
+def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted, tmp_path):
     interrupted(0)
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 0
     path = tmp_path / "out/checkpoint.json"
@@ -183,14 +183,14 @@ def test_the_time_of_a_resumed_run_counts_that_before_it(run, interrupted, tmp_p
     assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
 
 
-def test_a_run_that_is_done_is_resumed_to_the_same_result(run, tmp_path):
+def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
     before = models(tmp_path / "out")
     assert run("--resume", "out")[0] == 0
     assert models(tmp_path / "out") == before
 
 
-def test_it_is_resumed_from_another_folder_too(run, interrupted, tmp_path, monkeypatch):
+def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monkeypatch):
     write_record(record(seed=1), "v.csv")
     interrupted(1)
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out", "--validation", "v.csv")[0] == 0
@@ -200,7 +200,7 @@ def test_it_is_resumed_from_another_folder_too(run, interrupted, tmp_path, monke
 
 
 @pytest.mark.parametrize("changed", ["r.csv", "v.csv", "t.csv"])
-def test_a_file_that_changed_is_refused(run, interrupted, tmp_path, changed):
+def test_changed_file_is_rejected_on_resuming(run, interrupted, tmp_path, changed):
     for seed, name in enumerate(("v.csv", "t.csv"), start=1):
         write_record(record(seed=seed), name)
     interrupted(1)
@@ -220,7 +220,7 @@ def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
     (tmp_path / "out").mkdir()
     path = tmp_path / "out/checkpoint.json"
     write_checkpoint(empty_archipelago(1, 0), path, {})
-    assert "no checkpoint of islands identify: KeyError('job')" in refused(run("--resume", "out"))
+    assert "is not a checkpoint of islands identify: KeyError('job')" in refused(run("--resume", "out"))
 
 
 @pytest.mark.parametrize(
@@ -243,15 +243,15 @@ def test_resume_needs_a_checkpoint_of_this_command(run, tmp_path):
         ("--target-error", "0.5"),
     ],
 )
-def test_resume_takes_no_setting_else(run, more):
-    assert "give nothing else" in refused(run("--resume", "out", *more))
+def test_resume_rejects_record_and_settings(run, more):
+    assert "do not give others" in refused(run("--resume", "out", *more))
 
 
-# Engines: how a run is carried out, never what it finds.
+# Engines do not change the result.
 
 
 @pytest.mark.parametrize(
-    ("number", "manner", "expected"),
+    ("number", "words", "expected"),
     [
         (1, (), ("serial", None)),
         (2, (), ("ray", None)),
@@ -260,51 +260,51 @@ def test_resume_takes_no_setting_else(run, more):
         (1, ("--ray-address", "there:6379"), ("ray", "there:6379")),
     ],
 )
-def test_ray_carries_out_what_it_is_of_use_for_or_asked_for(run, engines, number, manner, expected):
-    asked = engines(SerialEngine())
-    code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--islands", number, *manner)
-    # What an engine has to say is said as it is.
-    assert (code, error) == (0, "[an engine] speaks")
-    # A run that goes on has as many islands as it began with.
-    assert run("--resume", "out", *manner)[0] == 0
-    assert asked == [expected] * 2
+def test_ray_runs_several_islands_by_default(run, engines, number, words, expected):
+    requested = engines(SerialEngine())
+    code, _, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--islands", number, *words)
+    # Messages of an engine are printed verbatim.
+    assert (code, error) == (0, "[an engine] message")
+    # A resumed run has the same number of islands.
+    assert run("--resume", "out", *words)[0] == 0
+    assert requested == [expected] * 2
 
 
-def test_islands_that_a_preset_brings_count_as_well(run, engines, monkeypatch):
+def test_islands_of_a_preset_select_the_engine(run, engines, monkeypatch):
     several = {"several": resolve_settings("hysteresis", {"islands": 2})}
     monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
-    asked = engines(SerialEngine())
+    requested = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--out", "out")[0] == 0
     assert run("--resume", "out")[0] == 0
     assert run("r.csv", *COLUMNS, *SMALL, "--preset", "several", "--islands", "1", "--out", "one")[0] == 0
-    assert asked == [("ray", None), ("ray", None), ("serial", None)]
+    assert requested == [("ray", None), ("ray", None), ("serial", None)]
 
 
 @pytest.mark.parametrize("more", [(), ("--resume", "out")])
-def test_an_address_for_the_serial_engine_is_refused_before_anything_is_done(run, tmp_path, more):
+def test_address_for_the_serial_engine_is_rejected(run, tmp_path, more):
     new = () if more else ("r.csv", *COLUMNS, *SMALL, "--out", "out")
     error = refused(run(*new, *more, "--engine", "serial", "--ray-address", "there:6379"))
-    assert "--ray-address goes with --engine ray: the serial engine runs in this process" in error
+    assert "--ray-address requires --engine ray: the serial engine runs in this process" in error
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("more", [(), ("--resume", "out")])
-def test_an_unknown_engine_is_refused_before_anything_is_done(run, tmp_path, more):
+def test_unknown_engine_is_rejected(run, tmp_path, more):
     new = () if more else ("r.csv", *COLUMNS, *SMALL, "--out", "out")
     message = "unknown engine 'dask': take one of serial, ray"
     assert message in refused(run(*new, *more, "--engine", "dask"))
     assert not (tmp_path / "out").exists()
 
 
-def test_how_a_run_is_carried_out_may_change_when_it_goes_on(run, engines, interrupted, tmp_path):
-    asked = engines(SerialEngine())
+def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
+    requested = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *TWO, "--out", "whole")[0] == 0
     interrupted(1)
     assert run("r.csv", *COLUMNS, *TWO, "--out", "out")[0] == 0
     interrupted(None)
-    manner = ("--engine", "ray", "--ray-address", "there:6379", "--wall-time", "1e9", "--verbose")
-    code, out, _ = run("--resume", "out", *manner)
+    words = ("--engine", "ray", "--ray-address", "there:6379", "--wall-time", "1e9", "--verbose")
+    code, out, _ = run("--resume", "out", *words)
     assert code == 0
     assert "cache of structures: " in out
-    assert asked == [("serial", None), ("serial", None), ("ray", "there:6379")]
+    assert requested == [("serial", None), ("serial", None), ("ray", "there:6379")]
     assert models(tmp_path / "out") == models(tmp_path / "whole")

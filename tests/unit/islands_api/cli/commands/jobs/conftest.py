@@ -1,4 +1,4 @@
-"""A service, and ``islands jobs`` in this process as its command line."""
+"""Fixtures of ``islands jobs``: a service, and the command line in this process."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ from support.stores import LONG, taken
 
 Run = Callable[..., tuple[int, str, str]]
 
-#: A search of a blink.
+#: Settings of a very short search.
 SMALL = {"population": 10, "generations": 3, "max_terms": 3, "shooting": 50, "max_height": 3, "islands": 2}
 
 
@@ -31,7 +31,7 @@ def service(serve: Any) -> Iterator[Service]:
 
 @pytest.fixture
 def owner(service: Service, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Whose test it is: the command line has the service's address and the owner's key."""
+    """Owner of the test; the command line has the address of the service and the owner's key."""
     key, secret = service.store.keys.create("test", frozenset({"read", "write"}))
     monkeypatch.setenv("ISLANDS_URL", service.url)
     monkeypatch.setenv("ISLANDS_KEY", secret)
@@ -40,15 +40,15 @@ def owner(service: Service, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.fixture
 def run(owner: str, monkeypatch: pytest.MonkeyPatch, command_line: Run, tmp_path: Path) -> Run:
-    """Run ``islands jobs`` in a folder that holds ``r.csv``; return exit code, standard output and error."""
-    monkeypatch.setattr(command, "PATIENCE", 0.2)
+    """Run ``islands jobs`` in a folder with ``r.csv``; return exit code, standard output and error."""
+    monkeypatch.setattr(command, "RETRY_SECONDS", 0.2)
     (tmp_path / "r.csv").write_bytes(csv())
     return partial(command_line, "jobs")
 
 
 @pytest.fixture
-def beside() -> Iterator[Callable[..., None]]:
-    """What does something beside the test, which ends with it."""
+def in_background() -> Iterator[Callable[..., None]]:
+    """Return a function that runs an action in a thread, joined at teardown."""
     with ExitStack() as stack:
 
         def start(action: Callable[..., Any], *arguments: Any) -> None:
@@ -61,7 +61,7 @@ def beside() -> Iterator[Callable[..., None]]:
 
 @pytest.fixture(scope="module")
 def found(service: Service) -> JobOutcome:
-    """What a small search finds: carried out by the coordinator's own function, without Ray."""
+    """Outcome of a small search, run by the function of the coordinator without Ray."""
     dataset = service.upload(csv(400)).json()["id"]
     spec = {"dataset": dataset, "inputs": ["u_V"], "output": "y_um", "settings": SMALL}
     job, _ = service.store.jobs.submit(Submission("local", spec, priority=100))
@@ -72,7 +72,7 @@ def found(service: Service) -> JobOutcome:
 
 @pytest.fixture
 def done(service: Service, owner: str, found: JobOutcome) -> str:
-    """A job that has succeeded, with its figures drawn."""
+    """A succeeded job with figures."""
     job = ahead(service, owner)
     service.store.leases.finish(taken(service.store, job), found)
     blob = Blobs(service.settings.blobs).write(b"<svg/>")

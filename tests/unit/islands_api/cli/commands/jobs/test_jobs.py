@@ -1,4 +1,4 @@
-"""``islands jobs`` from inside, against a real server: what is shown, watched and downloaded."""
+"""``islands jobs`` in this process with a real server: show, watch and download."""
 
 import json
 import os
@@ -22,13 +22,13 @@ from support.stores import FAILED, at_once, brought_on, taken
 Run = Callable[..., tuple[int, str, str]]
 
 
-# Look.
+# List and show.
 
 
 def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) -> None:
     first = ahead(service, owner, name="[/b] one")
     service.store.leases.report(taken(service.store, first), brought_on(3))
-    time.sleep(0.005)  # a store may count milliseconds, and of those of one no job is the newer
+    time.sleep(0.005)  # a store may have a resolution of one millisecond
     second = ahead(service, owner, name="two")
     code, out, _ = run("list")
     assert code == 0
@@ -43,14 +43,14 @@ def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) ->
     assert [job["id"] for job in json.loads(run("list", "--limit", 1, "--json")[1])["items"]] == [second]
 
 
-def test_more_jobs_than_a_page_are_listed(run: Run, service: Service, owner: str) -> None:
+def test_list_may_be_longer_than_a_page(run: Run, service: Service, owner: str) -> None:
     made = [job.id for job in at_once([partial(queued, service.store, owner)] * 202)]
     listed = [job["id"] for job in json.loads(run("list", "--limit", 201, "--json")[1])["items"]]
     assert len(set(listed)) == 201
     assert set(listed) < set(made)
 
 
-def test_a_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: str) -> None:
+def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: str) -> None:
     job = ahead(service, owner)
     assert run("show", job)[:2] == (0, f"job {job}: queued\n")
     assert run("cancel", job)[:2] == (0, f"job {job}: cancelled\n")
@@ -62,7 +62,7 @@ def test_a_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner:
     assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
 
 
-def test_a_job_that_succeeded_shows_its_equation(run: Run, done: str, found: JobOutcome) -> None:
+def test_succeeded_job_shows_its_equation(run: Run, done: str, found: JobOutcome) -> None:
     assert found.summary is not None
     out = run("show", done)[1]
     assert out.splitlines()[0] == f"job {done}: succeeded"
@@ -72,17 +72,17 @@ def test_a_job_that_succeeded_shows_its_equation(run: Run, done: str, found: Job
 # Watch.
 
 
-def test_a_job_is_submitted_watched_and_shown(
-    run: Run, service: Service, owner: str, found: JobOutcome, beside: Callable[..., None]
+def test_job_is_submitted_watched_and_shown(
+    run: Run, service: Service, owner: str, found: JobOutcome, in_background: Callable[..., None]
 ) -> None:
-    def carry_out() -> None:
+    def run_job() -> None:
         waiting = eventually(lambda: service.store.jobs.page(owner).jobs)
         lease = taken(service.store, waiting[0].id)  # type: ignore[index]
         service.store.leases.report(lease, brought_on(2))
         time.sleep(0.3)
         service.store.leases.finish(lease, found)
 
-    beside(carry_out)
+    in_background(run_job)
     code, out, err = run("submit", "r.csv", *COLUMNS, "--priority", 100, "--watch")
     assert code == 0, err
     assert err.splitlines()[0] == f"job {service.store.jobs.page(owner).jobs[0].id}"
@@ -91,13 +91,13 @@ def test_a_job_is_submitted_watched_and_shown(
     assert "Property 1" in out
 
 
-def test_watching_prints_the_ended_job_as_json(run: Run, done: str) -> None:
+def test_watch_prints_the_ended_job_as_json(run: Run, done: str) -> None:
     code, out, _ = run("watch", done, "--json")
     assert code == 0
     assert json.loads(out)["state"] == "succeeded"
 
 
-def test_watching_a_job_that_fails_says_why(run: Run, service: Service, owner: str) -> None:
+def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, owner: str) -> None:
     job = ahead(service, owner)
     service.store.leases.finish(taken(service.store, job), FAILED)
     code, out, err = run("watch", job)
@@ -108,7 +108,7 @@ def test_watching_a_job_that_fails_says_why(run: Run, service: Service, owner: s
     assert json.loads(out)["problem"]["detail"] == "it broke"
 
 
-def test_an_interrupted_watcher_leaves_the_job_running(service: Service, owner: str) -> None:
+def test_interrupting_watch_does_not_cancel_the_job(service: Service, owner: str) -> None:
     job = ahead(service, owner)
     taken(service.store, job)
     with subprocess.Popen(
@@ -116,16 +116,16 @@ def test_an_interrupted_watcher_leaves_the_job_running(service: Service, owner: 
         env={**os.environ},
         stderr=subprocess.PIPE,
         text=True,
-        # Whoever runs the tests in the background of a shell ignores it, and so would this one.
+        # A shell ignores SIGINT in background processes, and the child would inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no thread yet
     ) as process:
-        # It has been answered once, and waits for a change.
+        # The command has received one answer and waits for a change.
         eventually(lambda: any(each.get("path") == f"/v1/jobs/{job}" for each in service.logs))
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert f"the job goes on: 'islands jobs watch {job}' follows it again" in err
+    assert f"the job continues: 'islands jobs watch {job}' follows it again" in err
     assert "Traceback" not in err
     now = service.store.jobs.get(owner, job)
     assert (now.state, now.cancel_requested) == ("running", False)
@@ -134,7 +134,7 @@ def test_an_interrupted_watcher_leaves_the_job_running(service: Service, owner: 
 # Results.
 
 
-def test_a_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) -> None:
+def test_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome) -> None:
     code, out, err = run("result", done, "--out", "out")
     assert code == 0, err
     assert out.splitlines()[-1] == "out/: result.json, models/, figures/"
@@ -150,17 +150,17 @@ def test_a_result_is_shown_and_downloaded(run: Run, done: str, found: JobOutcome
     assert json.loads(run("result", done, "--json")[1]) == result
 
 
-def test_a_result_is_asked_for_once(run: Run, service: Service, done: str) -> None:
+def test_result_is_requested_once(run: Run, service: Service, done: str) -> None:
     service.logs.clear()
     assert run("result", done)[0] == 0
     assert [each["path"] for each in service.logs if "path" in each] == [f"/v1/jobs/{done}/result"]
 
 
-def test_a_result_is_replaced_by_force_alone_and_without_leftovers(run: Run, done: str) -> None:
+def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) -> None:
     assert run("result", done, "--out", "out")[0] == 0
-    Path("out/models/99.json").write_text("of another job")
-    Path("out/figures/old.svg").write_text("of another job")
-    Path("out/notes.txt").write_text("of mine")
+    Path("out/models/99.json").write_text("another job")
+    Path("out/figures/old.svg").write_text("another job")
+    Path("out/notes.txt").write_text("notes")
     code, _, err = run("result", done, "--out", "out")
     assert code == 2
     assert "holds a result already" in err
@@ -168,16 +168,16 @@ def test_a_result_is_replaced_by_force_alone_and_without_leftovers(run: Run, don
     assert run("result", done, "--out", "out", "--force")[0] == 0
     assert not Path("out/models/99.json").exists()
     assert not Path("out/figures/old.svg").exists()
-    assert Path("out/notes.txt").read_text() == "of mine"
+    assert Path("out/notes.txt").read_text() == "notes"
 
 
-# Refusals: one line, exit code 2.
+# Errors: one line, exit code 2.
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
-        (("show", "nobody"), "there is no job 'nobody'"),
+        (("show", "unknown"), "there is no job 'unknown'"),
         (("list", "--state", "lost"), "state"),
         (("submit", "nowhere.csv", *COLUMNS), "No such file or directory: 'nowhere.csv'"),
         (("submit", "r.csv", "--input", "u_mV", "--output", "y_um"), "u_mV"),
@@ -191,22 +191,22 @@ def test_a_result_is_replaced_by_force_alone_and_without_leftovers(run: Run, don
         (("list", "--url", "http://127.0.0.1:9"), "the service at http://127.0.0.1:9 does not answer"),
         (
             ("watch", "x", "--url", "http://127.0.0.1:9"),
-            "does not answer (Connection refused): is it running",
+            "does not answer (Connection refused): check that it runs",
         ),
         (("list", "--key", "islands_wrong"), "the key is unknown"),
     ],
 )
-def test_a_refusal_is_one_line(run: Run, service: Service, owner: str, arguments: Any, told: str) -> None:
+def test_error_is_one_line(run: Run, service: Service, owner: str, arguments: Any, message: str) -> None:
     code, out, err = run(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("error: ")
-    assert told in err
+    assert message in err
     assert len(err.splitlines()) == 1
     assert service.store.jobs.page(owner).jobs == ()
 
 
 @pytest.mark.parametrize("name", ["result", "cancel", "resume"])
-def test_what_a_job_s_state_does_not_allow_is_refused(
+def test_command_in_the_wrong_state_of_a_job_is_rejected(
     run: Run, service: Service, owner: str, done: str, name: str
 ) -> None:
     job = ahead(service, owner) if name == "result" else done
@@ -216,7 +216,7 @@ def test_what_a_job_s_state_does_not_allow_is_refused(
     assert len(err.splitlines()) == 1
 
 
-def test_options_name_another_service_and_another_key(
+def test_options_name_the_service_and_the_key(
     run: Run, service: Service, owner: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     secret = os.environ["ISLANDS_KEY"]
@@ -229,8 +229,10 @@ def test_options_name_another_service_and_another_key(
     assert "islands_wrong" not in err
     monkeypatch.delenv("ISLANDS_KEY")
     kept(service.store)
-    assert run("list", "--url", service.url, "--json")[0] == 0  # on this machine nobody needs one
+    assert (
+        run("list", "--url", service.url, "--json")[0] == 0
+    )  # no key is needed on the service's own machine
 
 
-def test_a_service_that_is_away_is_not_waited_for_long() -> None:
-    assert command.PATIENCE <= 5.0
+def test_unreachable_service_is_retried_for_a_short_time() -> None:
+    assert command.RETRY_SECONDS <= 5.0

@@ -1,4 +1,4 @@
-"""``islands jobs submit`` and ``diagnose`` from inside: what is sent, and what is refused."""
+"""``islands jobs submit`` and ``diagnose`` in this process: submitted values and errors."""
 
 import json
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from support.stores import taken
 
 Run = Callable[..., tuple[int, str, str]]
 
-#: A value for every option that is a setting: what is written, and what the job has to say then.
+#: For every option that is a setting: values on the command line, and the value in the job.
 VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "population": (("40",), 40),
     "generations": (("7",), 7),
@@ -42,7 +42,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
 
 
 def option(name: str) -> str:
-    """The option that is a parameter of ``submit``."""
+    """Return the option of a parameter of ``submit``."""
     made = typer.main.get_command(command.jobs)
     return next(each.opts[0] for each in made.commands["submit"].params if each.name == name)  # type: ignore[attr-defined]
 
@@ -50,7 +50,7 @@ def option(name: str) -> str:
 # Submit.
 
 
-def test_a_submitted_job_is_printed_as_json_and_is_there(run: Run, service: Service, owner: str) -> None:
+def test_submitted_job_is_stored_and_printed_as_json(run: Run, service: Service, owner: str) -> None:
     code, out, err = run("submit", "r.csv", *COLUMNS, "--preset", "narx", "--json")
     assert (code, err) == (0, "")
     printed = json.loads(out)
@@ -61,10 +61,16 @@ def test_a_submitted_job_is_printed_as_json_and_is_there(run: Run, service: Serv
         *(["u_V"], "y_um"),
     )
     assert service.store.datasets.get(owner, job.spec["dataset"]).name == "r.csv"
-    assert set(job.spec) == {"dataset", "inputs", "output", "preset", "seed"}  # no option speaks unasked
+    assert set(job.spec) == {
+        "dataset",
+        "inputs",
+        "output",
+        "preset",
+        "seed",
+    }  # options that are not given are not sent
 
 
-def test_every_setting_reaches_the_job(run: Run, service: Service, owner: str) -> None:
+def test_all_settings_reach_the_job(run: Run, service: Service, owner: str) -> None:
     assert set(VALUES) == set(SETTINGS)
     given = [word for name, (texts, _) in VALUES.items() for text in texts for word in (option(name), text)]
     words = ("--seed", 9, "--dt", 0.01, "--rows", "0:150", "--json")
@@ -76,7 +82,7 @@ def test_every_setting_reaches_the_job(run: Run, service: Service, owner: str) -
     assert Identification.model_validate(spec).changes.keys() == set(SETTINGS)
 
 
-def test_identify_and_submit_take_the_same_settings_in_the_same_words() -> None:
+def test_identify_and_submit_have_the_same_search_options() -> None:
     alone = typer.Typer()
     alone.command()(identify)
     ours = {each.name: each.opts for each in typer.main.get_command(command.jobs).commands["submit"].params}  # type: ignore[attr-defined]
@@ -86,14 +92,14 @@ def test_identify_and_submit_take_the_same_settings_in_the_same_words() -> None:
     }
 
 
-def test_what_else_is_said_of_a_job_reaches_it(run: Run, service: Service, owner: str) -> None:
+def test_name_priority_and_idempotency_key_reach_the_job(run: Run, service: Service, owner: str) -> None:
     words = ("--name", "[red] one", "--priority", 5, "--idempotency-key", "k-1")
     job = json.loads(run("submit", "r.csv", *COLUMNS, *words, "--json")[1])
     assert (job["name"], job["priority"]) == ("[red] one", 5)
     assert run("submit", "r.csv", *COLUMNS, *words)[1] == f"job {job['id']}: queued\n"
 
 
-def test_a_record_lends_its_name_as_far_as_it_goes(run: Run, tmp_path: Path) -> None:
+def test_default_name_is_the_printable_file_name(run: Run, tmp_path: Path) -> None:
     long = tmp_path / ("x\n" + "y" * 240 + ".csv")
     long.write_bytes(csv())
     code, out, err = run("submit", long, *COLUMNS, "--validation", "0.4", "--json")
@@ -126,7 +132,7 @@ def test_validation_is_rows_or_a_file(
 
 @pytest.fixture
 def diagnosed(service: Service, owner: str) -> str:
-    """A discrepancy job that has succeeded."""
+    """A succeeded discrepancy job."""
     spec = held("0-csv")
     job = service.store.jobs.submit(Submission(owner, spec, DISCREPANCY, "piezo", priority=100))[0].id
     blobs = Blobs(service.settings.blobs)
@@ -142,7 +148,7 @@ def diagnosed(service: Service, owner: str) -> str:
     return job
 
 
-def test_a_discrepancy_job_is_submitted_as_it_is_said(run: Run, service: Service, owner: str) -> None:
+def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: str) -> None:
     words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--priority", 5)
     code, out, err = run("diagnose", "r.csv", *COLUMNS, *words, "--rows", "0:150", "--json")
     assert (code, err) == (0, "")
@@ -158,23 +164,23 @@ def test_a_discrepancy_job_is_submitted_as_it_is_said(run: Run, service: Service
 
 
 @pytest.mark.parametrize(
-    ("arguments", "why"),
+    ("arguments", "message"),
     [
         (("--simulation", "pendulum"), "unknown simulation 'pendulum'"),
         (("--simulation", "bouc-wen-piezo", "--tolerance", "dp"), "write PARAM=REL, for example dp=0.01"),
         (("--simulation", "bouc-wen-piezo", "--input", "t_s"), "is driven by one input, got u_V, t_s"),
         (("--simulation", "column:y_sim"), "has no column y_sim"),
-        (("--simulation", "python:a.py:run"), "a service runs no code of others"),
+        (("--simulation", "python:a.py:run"), "a service does not run code of its clients"),
     ],
 )
-def test_what_cannot_be_diagnosed_is_refused_in_a_line(run: Run, arguments: Any, why: str) -> None:
+def test_invalid_diagnosis_is_rejected_in_one_line(run: Run, arguments: Any, message: str) -> None:
     code, out, err = run("diagnose", "r.csv", *COLUMNS, *arguments)
     assert (code, out) == (2, "")
-    assert why in err
+    assert message in err
     assert "Traceback" not in err
 
 
-def test_a_diagnosis_is_watched_listed_and_shown_in_words(run: Run, diagnosed: str) -> None:
+def test_diagnosis_is_watched_listed_and_shown_as_text(run: Run, diagnosed: str) -> None:
     words = "It lacks something.\n  thermal-drift\n"
     assert run("watch", diagnosed)[1] == words
     assert run("show", diagnosed)[1] == f"job {diagnosed}: succeeded\n{words}"
@@ -184,9 +190,9 @@ def test_a_diagnosis_is_watched_listed_and_shown_in_words(run: Run, diagnosed: s
     assert line.endswith("piezo (named: thermal-drift)")
 
 
-def test_a_diagnosis_is_downloaded_as_the_command_line_writes_it(run: Run, diagnosed: str) -> None:
+def test_downloaded_diagnosis_equals_that_of_the_command_line(run: Run, diagnosed: str) -> None:
     Path("out").mkdir()
-    Path("out/notes.txt").write_text("of mine")
+    Path("out/notes.txt").write_text("notes")
     code, out, err = run("result", diagnosed, "--out", "out")
     assert code == 0, err
     assert out.splitlines()[-1].startswith("out/: discrepancy.json, report.html, extended.json")
