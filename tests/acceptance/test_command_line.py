@@ -17,7 +17,7 @@ from support.undrawn import undrawn_figures
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Six seconds of the consistent piezo to estimate on, and three to validate on."""
+    """Six seconds of the consistent piezo for estimation, and three for validation."""
     base = tmp_path_factory.mktemp("piezo")
     write_record(consistent_estimation(4, 6.0), base / "long.csv")
     write_record(consistent_validation(3.0), base / "sine.csv")
@@ -33,7 +33,7 @@ def fit(base: Path, out: str) -> None:
 
 @pytest.fixture(scope="module")
 def folder(records: Path) -> Path:
-    """The records, and what ``islands fit`` makes of the first 5 s; its figures are not drawn."""
+    """The records, and the result of ``islands fit`` on the first 5 s, with empty figures."""
     with undrawn_figures():
         fit(records, "fit")
     return records
@@ -46,15 +46,15 @@ def result(folder: Path) -> dict[str, Any]:
 
 def test_systems_are_listed_and_made(tmp_path: Path) -> None:
     assert "bouc-wen-piezo" in succeed("systems", "list")
-    asked = ("bouc-wen-piezo", "--variant", "consistent", "--part", "validation")
-    succeed("systems", "make", *asked, "--out", tmp_path / "sine.csv")
+    options = ("bouc-wen-piezo", "--variant", "consistent", "--part", "validation")
+    succeed("systems", "make", *options, "--out", tmp_path / "sine.csv")
     with (tmp_path / "sine.csv").open() as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == ["t_s", "u_V", "y_um"]
     assert len(rows) == 20_001
 
 
-def test_a_result_says_what_was_read_searched_and_found(result: dict[str, Any]) -> None:
+def test_result_describes_record_settings_and_search(result: dict[str, Any]) -> None:
     assert result["record"]["samples"] == 5_000
     assert result["record"]["dt"] == pytest.approx(1e-3, rel=1e-9)
     assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
@@ -66,7 +66,7 @@ def test_a_result_says_what_was_read_searched_and_found(result: dict[str, Any]) 
     assert result["search"]["wall_s"] > 0
 
 
-def test_models_come_best_first_with_metrics_and_physics(result: dict[str, Any]) -> None:
+def test_models_are_best_first_with_metrics_and_physics(result: dict[str, Any]) -> None:
     errors = [model["metrics"]["validation"]["free_run"]["rmse"] for model in result["models"]]
     assert errors == sorted(errors)
     best = result["models"][0]
@@ -81,7 +81,7 @@ def test_models_come_best_first_with_metrics_and_physics(result: dict[str, Any])
     assert all(term["standard_error"] >= 0 for term in best["terms"])
 
 
-def test_the_folder_holds_models_figures_and_a_summary(folder: Path, result: dict[str, Any]) -> None:
+def test_folder_contains_models_figures_and_a_summary(folder: Path, result: dict[str, Any]) -> None:
     for model in result["models"]:
         document = json.loads((folder / "fit" / "models" / f"{model['rank']:02d}.json").read_text())
         assert document["terms"] == model["terms"]
@@ -90,8 +90,8 @@ def test_the_folder_holds_models_figures_and_a_summary(folder: Path, result: dic
     assert result["models"][0]["equation"] in (folder / "fit" / "summary.txt").read_text()
 
 
-def same_files(one: Path, other: Path) -> None:
-    """Compare two results to the bit; ``result.json`` holds how long a search took."""
+def assert_same_files(one: Path, other: Path) -> None:
+    """Check that two results are bit-identical except for ``result.json``, which contains times."""
     paths = [path for path in sorted(one.rglob("*")) if path.is_file() and path.name != "result.json"]
     assert len(paths) > 8
     for path in paths:
@@ -99,17 +99,17 @@ def same_files(one: Path, other: Path) -> None:
 
 
 @pytest.mark.ci
-def test_the_same_fit_gives_the_same_models_bit_for_bit(folder: Path) -> None:
+def test_repeated_fit_gives_bit_identical_models(folder: Path) -> None:
     with undrawn_figures():
         fit(folder, "again")
-    same_files(folder / "fit", folder / "again")
+    assert_same_files(folder / "fit", folder / "again")
 
 
 @pytest.mark.ci
-def test_the_same_fit_draws_the_same_figures_bit_for_bit(records: Path) -> None:
+def test_repeated_fit_draws_bit_identical_figures(records: Path) -> None:
     for out in ("drawn", "drawn again"):
         fit(records, out)
-    same_files(records / "drawn", records / "drawn again")
+    assert_same_files(records / "drawn", records / "drawn again")
     for path in (records / "drawn" / "figures").iterdir():
         assert path.stat().st_size > 5_000, path.name
 
@@ -170,7 +170,7 @@ def test_published_models_are_shown_in_every_format(number: str) -> None:
     )
 
 
-def test_errors_say_what_to_do_and_nothing_is_lost(folder: Path) -> None:
+def test_errors_say_what_to_do_and_keep_existing_results(folder: Path) -> None:
     record, out = folder / "sine.csv", folder / "never"
     base = ["fit", record, "--output", "y_um", "--out", out]
     assert "u_mV" in fail(*base, "--input", "u_mV")

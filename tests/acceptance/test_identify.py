@@ -1,4 +1,4 @@
-"""The command identify: a search, its files, an interruption and its resumption."""
+"""The command ``islands identify``: a search, its files, interrupting and resuming."""
 
 import json
 import signal
@@ -15,9 +15,9 @@ from support.undrawn import undrawn_figures
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record of 4000 samples and what six generations make of it, the last fifth kept for a test.
+    """Record of 4000 samples and the result of six generations with empty figures.
 
-    Its figures are not drawn.
+    The last fifth of the record is test data.
     """
     base = tmp_path_factory.mktemp("hysteresis")
     write_hysteresis(base / "record.csv")
@@ -29,14 +29,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return base
 
 
-def with_generations(document: dict[str, Any], generations: int, out: Path) -> None:
-    """Give a run that has ended another last generation: its budget is not part of its random numbers."""
+def change_generations(document: dict[str, Any], generations: int, out: Path) -> None:
+    """Change the last generation of a run. Random numbers do not depend on the budget."""
     document["about"]["job"]["changes"].update(generations=generations, max_evaluations=0)
     (out / "checkpoint.json").write_text(json.dumps(document))
 
 
-def found_the_same(one: Path, other: Path) -> None:
-    """Compare all that two runs say of their searches, except for their times."""
+def assert_same_search(one: Path, other: Path) -> None:
+    """Check that two runs have the same results and search statistics, except for times."""
     assert found(one) == found(other)
     searches = [stored(out)["search"] for out in (one, other)]
     for name in ("generations", "evaluations", "duplicates", "outcomes", "feasible_share", "full_set"):
@@ -45,7 +45,7 @@ def found_the_same(one: Path, other: Path) -> None:
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
-def test_one_command_turns_a_record_into_constrained_models(folder: Path) -> None:
+def test_identify_finds_constrained_models(folder: Path) -> None:
     result = stored(folder / "whole")
     assert result["search"]["generations"] == 6
     assert result["search"]["evaluations"] == 7 * 30
@@ -63,7 +63,7 @@ def test_one_command_turns_a_record_into_constrained_models(folder: Path) -> Non
     assert tested["mape"] < 0.5
 
 
-def test_the_folder_holds_models_figures_and_a_checkpoint(folder: Path) -> None:
+def test_folder_contains_models_figures_and_a_checkpoint(folder: Path) -> None:
     names = {path.name for path in (folder / "whole").iterdir()}
     assert names >= {"result.json", "summary.txt", "checkpoint.json", "hall.json", "test.json"}
     assert names >= {"models", "figures"}
@@ -73,7 +73,7 @@ def test_the_folder_holds_models_figures_and_a_checkpoint(folder: Path) -> None:
     assert shown.strip() in (folder / "whole/summary.txt").read_text()
 
 
-def test_a_run_that_its_budget_ended_goes_on_to_the_same_models(folder: Path) -> None:
+def test_run_ended_by_its_budget_resumes_to_the_same_models(folder: Path) -> None:
     out = folder / "budget"
     with undrawn_figures():
         succeed(
@@ -82,13 +82,13 @@ def test_a_run_that_its_budget_ended_goes_on_to_the_same_models(folder: Path) ->
         )
         assert stored(out)["search"]["ended_by"] == "evaluations"
         assert stored(out)["search"]["generations"] < 6
-        with_generations(json.loads((out / "checkpoint.json").read_text()), 6, out)
+        change_generations(json.loads((out / "checkpoint.json").read_text()), 6, out)
         succeed("identify", "--resume", out)
-    found_the_same(out, folder / "whole")
+    assert_same_search(out, folder / "whole")
 
 
 @pytest.mark.ci
-def test_ctrl_c_writes_a_result_and_a_checkpoint_and_resume_goes_on_to_the_same_models(folder: Path) -> None:
+def test_run_stopped_by_ctrl_c_resumes_to_the_same_models(folder: Path) -> None:
     out = folder / "stopped"
     running = subprocess.Popen(
         [
@@ -100,34 +100,34 @@ def test_ctrl_c_writes_a_result_and_a_checkpoint_and_resume_goes_on_to_the_same_
         text=True,
     )
     try:
-        # The first populations are kept at once.
+        # The first populations are written immediately.
         eventually(lambda: (out / "checkpoint.json").exists() or running.poll() is not None)
         running.send_signal(signal.SIGINT)
-        said, complained = running.communicate(timeout=60)
+        printed, complaints = running.communicate(timeout=60)
     finally:
         running.kill()
-    assert running.returncode == 0, complained
-    assert f"stopped: the result is the best so far; go on with --resume {out}" in complained
-    assert "Traceback" not in complained
-    assert "MAPE val. %" in said
+    assert running.returncode == 0, complaints
+    assert f"stopped: the result is the best so far; continue with --resume {out}" in complaints
+    assert "Traceback" not in complaints
+    assert "MAPE val. %" in printed
     result, document = stored(out), json.loads((out / "checkpoint.json").read_text())
     assert result["models"]
     stopped_at = result["search"]["generations"]
     assert stopped_at == document["islands"][0]["generation"] < 1_000_000
 
-    # Few generations more, instead of a million.
+    # A few more generations instead of a million.
     last = stopped_at + 2
-    with_generations(document, last, out)
+    change_generations(document, last, out)
     succeed("identify", "--resume", out)
     never = folder / "never-stopped"
     succeed(
         *("identify", folder / "record.csv", *COLUMNS, *BUDGET, "--generations", last),
         *("--test", 0.2, "--out", never),
     )
-    found_the_same(out, never)
+    assert_same_search(out, never)
 
 
-def test_a_record_that_changed_is_refused_on_resume(folder: Path) -> None:
+def test_changed_record_is_rejected_on_resuming(folder: Path) -> None:
     record, before = folder / "record.csv", (folder / "whole/result.json").read_bytes()
     kept = record.read_text()
     try:
@@ -138,7 +138,7 @@ def test_a_record_that_changed_is_refused_on_resume(folder: Path) -> None:
     assert (folder / "whole/result.json").read_bytes() == before
 
 
-def test_a_budget_that_makes_no_sense_is_refused_in_a_line(folder: Path) -> None:
+def test_invalid_budget_is_rejected_in_one_line(folder: Path) -> None:
     base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
     assert fail(*base, "--population", 0).strip() == "error: population is at least 1, got 0"
     assert not (folder / "never").exists()

@@ -1,4 +1,4 @@
-"""The installed package, away from its sources: a dozen commands, each in a process of its own."""
+"""The installed package without its sources: a dozen commands, each in a separate process."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from support.command_line import BUDGET, COLUMNS, ISLANDS, write_hysteresis, wri
 
 pytestmark = pytest.mark.ci
 
-#: Files that are no modules, by package: without one of them a report, a page or a type checker fails.
+#: Data files by package, which reports, the dashboard and type checkers need.
 DATA = {
     "islands": ("py.typed",),
     "islands_api": ("py.typed", "dashboard/index.html", "dashboard/islands.css", "dashboard/islands.js"),
@@ -22,7 +22,7 @@ DATA = {
 
 
 def run(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run the command as a process of its own, in a folder without sources."""
+    """Run the command in a separate process, in a folder without sources."""
     environment = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
     command = [str(ISLANDS), *map(str, arguments)]
     return subprocess.run(
@@ -39,7 +39,7 @@ def succeed(*arguments: object, folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a record of an actuator, of 5 s, and one of a hysteresis, of 1000 samples."""
+    """Folder with a record of an actuator (5 s) and one of a hysteresis (1000 samples)."""
     base = tmp_path_factory.mktemp("user")
     succeed("systems", "make", "bouc-wen-piezo", "--part", "validation", "--out", "long.csv", folder=base)
     lines = (base / "long.csv").read_text().splitlines(keepends=True)
@@ -56,7 +56,7 @@ def model(folder: Path) -> str:
     return "fit/models/01.json"
 
 
-def test_the_packages_are_installed_with_their_data(folder: Path) -> None:
+def test_packages_are_installed_with_their_data(folder: Path) -> None:
     for package, names in DATA.items():
         for name in names:
             assert files(package).joinpath(name).is_file(), (package, name)
@@ -67,14 +67,14 @@ def test_the_packages_are_installed_with_their_data(folder: Path) -> None:
     assert Path(done.stdout.strip()).is_file()
 
 
-def test_the_help_lists_every_command(folder: Path) -> None:
-    said = succeed("--help", folder=folder)
+def test_help_lists_all_commands(folder: Path) -> None:
+    printed = succeed("--help", folder=folder)
     for command in ("identify", "fit", "diagnose", "simulate", "show", "systems", "serve", "jobs", "keys"):
-        assert command in said
+        assert command in printed
 
 
 @pytest.mark.parametrize(("group", "command"), [("keys", "create"), ("jobs", "submit")])
-def test_a_group_of_commands_has_help(folder: Path, group: str, command: str) -> None:
+def test_command_groups_have_help(folder: Path, group: str, command: str) -> None:
     assert command in succeed(group, "--help", folder=folder)
 
 
@@ -82,7 +82,7 @@ def test_systems_are_listed(folder: Path) -> None:
     assert "bouc-wen-piezo" in succeed("systems", "list", folder=folder)
 
 
-def test_a_fit_writes_models_and_figures(folder: Path, model: str) -> None:
+def test_fit_writes_models_and_figures(folder: Path, model: str) -> None:
     result = json.loads((folder / "fit/result.json").read_text())
     assert result["models"][0]["physics"]["property_1"] is True
     figures = sorted((folder / "fit/figures").glob("*.svg"))
@@ -91,7 +91,7 @@ def test_a_fit_writes_models_and_figures(folder: Path, model: str) -> None:
     assert (folder / model).is_file()
 
 
-def test_a_model_is_shown_as_text_and_as_a_program_that_runs(folder: Path, model: str) -> None:
+def test_model_is_shown_as_text_and_as_a_valid_program(folder: Path, model: str) -> None:
     assert succeed("show", model, folder=folder).startswith("y(k) = ")
     source = succeed("show", model, "--format", "python", folder=folder)
     names: dict[str, object] = {}
@@ -99,13 +99,13 @@ def test_a_model_is_shown_as_text_and_as_a_program_that_runs(folder: Path, model
     assert callable(names["simulate"])
 
 
-def test_a_model_is_simulated(folder: Path, model: str) -> None:
-    said = succeed("simulate", model, "piezo.csv", "--out", "simulated.csv", folder=folder)
-    assert "ok" in said
+def test_model_is_simulated(folder: Path, model: str) -> None:
+    printed = succeed("simulate", model, "piezo.csv", "--out", "simulated.csv", folder=folder)
+    assert "ok" in printed
     assert len((folder / "simulated.csv").read_text().splitlines()) == 5_001
 
 
-def test_a_small_search_finds_models(folder: Path) -> None:
+def test_small_search_finds_models(folder: Path) -> None:
     search = ("--generations", 2, "--engine", "serial", "--out", "found")
     succeed("identify", "hysteresis.csv", *COLUMNS, *BUDGET, *search, folder=folder)
     result = json.loads((folder / "found/result.json").read_text())
@@ -113,7 +113,7 @@ def test_a_small_search_finds_models(folder: Path) -> None:
     assert result["models"]
 
 
-def test_a_diagnosis_writes_a_report(folder: Path) -> None:
+def test_diagnosis_writes_a_report(folder: Path) -> None:
     write_offset(folder / "offset.csv")
     succeed(
         *("diagnose", "offset.csv", *COLUMNS, "--simulation", "column:theirs_um", "--out", "diagnosis"),
@@ -124,7 +124,7 @@ def test_a_diagnosis_writes_a_report(folder: Path) -> None:
     assert "<img " in (folder / "diagnosis/report.html").read_text()
 
 
-def test_a_file_that_is_no_record_is_refused_in_a_line(folder: Path) -> None:
+def test_empty_record_is_rejected_in_one_line(folder: Path) -> None:
     (folder / "empty.csv").write_text("")
     done = run("fit", "empty.csv", *COLUMNS, "--out", "never", folder=folder)
     assert done.returncode == 2

@@ -1,4 +1,4 @@
-"""The command identify with islands: the same models on every engine, and how islands live."""
+"""The command ``islands identify`` with several islands: settings, and equal results on all engines."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from islands_service.engines import ENGINES
 from support.command_line import BUDGET, COLUMNS, fail, found, stored, succeed, write_hysteresis
 from support.undrawn import undrawn_figures
 
-#: Three islands, and generations whose migrations leave each of them at another time.
+#: Options of three islands with a migration schedule.
 ISLANDS = (
     *("--generations", 6, "--islands", 3, "--topology", "bidirectional-ring"),
     *("--migrate-every", "2,4:1", "--migrants", 2, "--emigrants", "front", "--replaced", "random"),
@@ -19,7 +19,7 @@ ISLANDS = (
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A record of 1000 samples, and what three islands make of it in this process."""
+    """Record of 1000 samples, and the result of three islands with the serial engine."""
     base = tmp_path_factory.mktemp("islands")
     write_hysteresis(base / "record.csv")
     lines = (base / "record.csv").read_text().splitlines(keepends=True)
@@ -29,12 +29,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def identify(base: Path, out: str, *options: object) -> str:
-    """Identify the record; no figure is drawn."""
+    """Identify the record with empty figures."""
     with undrawn_figures():
         return succeed("identify", base / "record.csv", *COLUMNS, *BUDGET, *options, "--out", base / out)
 
 
-def test_a_result_says_how_its_islands_lived(folder: Path) -> None:
+def test_result_contains_the_settings_of_the_islands(folder: Path) -> None:
     result = stored(folder / "serial")
     settings = result["settings"]
     assert (settings["islands"], settings["topology"], settings["migrate_every"]) == (
@@ -49,7 +49,7 @@ def test_a_result_says_how_its_islands_lived(folder: Path) -> None:
 
 
 @pytest.mark.ci
-def test_every_engine_finds_the_same_bytes(folder: Path, ray_address: str) -> None:
+def test_engines_give_bit_identical_results(folder: Path, ray_address: str) -> None:
     assert set(ENGINES) == {"serial", "ray"}
     identify(folder, "ray", *ISLANDS, "--engine", "ray", "--ray-address", ray_address)
     assert found(folder / "ray") == found(folder / "serial")
@@ -60,12 +60,12 @@ def test_every_engine_finds_the_same_bytes(folder: Path, ray_address: str) -> No
 
 
 @pytest.mark.ci
-def test_isolated_islands_find_at_least_what_the_first_finds_alone(folder: Path) -> None:
+def test_isolated_islands_are_at_least_as_good_as_a_single_island(folder: Path) -> None:
     best = []
     for count in (1, 3):
         out = f"isolated-{count}"
-        asked = ("--generations", 4, "--islands", count, "--topology", "isolated", "--engine", "serial")
-        identify(folder, out, *asked)
+        options = ("--generations", 4, "--islands", count, "--topology", "isolated", "--engine", "serial")
+        identify(folder, out, *options)
         assert stored(folder / out)["search"]["evaluations"] == count * 5 * 30
         sizes: dict[int, float] = {}
         for each in json.loads((folder / out / "hall.json").read_text())["hall"]:
@@ -77,11 +77,11 @@ def test_isolated_islands_find_at_least_what_the_first_finds_alone(folder: Path)
 
 
 @pytest.mark.ci
-def test_a_run_on_a_ray_of_its_own_goes_on_with_another_engine(folder: Path) -> None:
+def test_run_on_a_local_ray_resumes_with_another_engine(folder: Path) -> None:
     out = folder / "moved"
-    said = identify(folder, "moved", *ISLANDS, "--max-evaluations", 250, "--engine", "ray")
-    assert "MAPE val. %" in said
-    # Three islands of thirty: generation 2 is the first stop with 250 individuals behind it.
+    printed = identify(folder, "moved", *ISLANDS, "--max-evaluations", 250, "--engine", "ray")
+    assert "MAPE val. %" in printed
+    # Three islands of thirty: generation 2 is the first end of an epoch after 250 individuals.
     assert stored(out)["search"]["ended_by"] == "evaluations"
     assert stored(out)["search"]["generations"] == 2
     document = (out / "checkpoint.json").read_text()
@@ -91,7 +91,7 @@ def test_a_run_on_a_ray_of_its_own_goes_on_with_another_engine(folder: Path) -> 
     assert found(out) == found(folder / "serial")
 
 
-def test_impossible_islands_are_refused_in_a_line(folder: Path) -> None:
+def test_invalid_island_options_are_rejected_in_one_line(folder: Path) -> None:
     base = ("identify", folder / "record.csv", *COLUMNS, "--out", folder / "never")
     for options, message in (
         (("--islands", 0), "islands is at least 1, got 0"),

@@ -1,4 +1,4 @@
-"""What is named on measured records of which the cause is known, and what that is worth on unseen ones."""
+"""Diagnosis of measured records with known causes: named effects, and errors on unseen records."""
 
 from functools import cache
 
@@ -14,8 +14,8 @@ pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 
 
 @cache
-def diagnosed(name: str) -> Diagnosis:
-    """Diagnose a record of the benchmark; skip the test where it is absent."""
+def diagnose(name: str) -> Diagnosis:
+    """Diagnose a record of the benchmark; skip the test if the record is absent."""
     case = CASES[name]
     try:
         record = case.record()
@@ -25,7 +25,7 @@ def diagnosed(name: str) -> Diagnosis:
 
 
 def causes(found: Diagnosis) -> tuple[Finding, ...]:
-    """Return what was named beside the noise."""
+    """Return the named effects except for the noise."""
     return tuple(each for each in found.effects if each.explained_fraction is not None)
 
 
@@ -33,35 +33,35 @@ def names(found: Diagnosis) -> list[str]:
     return [each.name for each in causes(found)]
 
 
-def missed(name: str) -> dict[str, list[float]]:
-    """Return the errors on records that nothing has seen: before, and with what was found."""
-    found = diagnosed(name)
+def get_errors(name: str) -> dict[str, list[float]]:
+    """Return the errors on unseen records without and with the named effects."""
+    found = diagnose(name)
     return errors(CASES[name], found.record, found)
 
 
 def test_silverbox_has_a_cubic_spring() -> None:
-    found = diagnosed("silverbox")
+    found = diagnose("silverbox")
     assert names(found)[0] == "cubic-stiffness"
     # The best published: 0.36, 0.26 and 0.32 mV.
-    after = {name: row[1] for name, row in missed("silverbox").items()}
+    after = {name: row[1] for name, row in get_errors("silverbox").items()}
     assert after["multisine"] < 0.30
     assert after["arrow"] < 0.40
     assert after["arrow_noextrap"] < 0.33
-    before = {name: row[0] for name, row in missed("silverbox").items()}
+    before = {name: row[0] for name, row in get_errors("silverbox").items()}
     assert min(before[name] / after[name] for name in after) > 10
 
 
-def test_the_bouc_wen_benchmark_has_a_hysteresis_and_nothing_else() -> None:
-    found = diagnosed("bouc-wen")
+def test_bouc_wen_benchmark_has_a_hysteresis_only() -> None:
+    found = diagnose("bouc-wen")
     assert names(found) == ["second-hysteresis"]
-    before, after = missed("bouc-wen")["multisine"]
+    before, after = get_errors("bouc-wen")["multisine"]
     assert before > 100.0
     assert after < 1.0
 
 
-def test_the_bouc_wen_benchmark_is_what_its_authors_have_made() -> None:
+def test_bouc_wen_benchmark_has_the_published_parameters() -> None:
     """Noel and Schoukens 2016: mass 2, alpha 5e4, beta gamma 800, beta delta -1100."""
-    found = diagnosed("bouc-wen")
+    found = diagnose("bouc-wen")
     element = found.effects[0].parameters
     own = [parameter.name for parameter in found.best.simulation.simulator.parameters]
     mass = float(found.best.values[own.index("m")])
@@ -71,33 +71,33 @@ def test_the_bouc_wen_benchmark_is_what_its_authors_have_made() -> None:
     assert mass == pytest.approx(2.0, rel=0.01)
 
 
-def test_the_tanks_overflow() -> None:
-    found = diagnosed("tanks")
+def test_tanks_have_an_overflow() -> None:
+    found = diagnose("tanks")
     assert "state-clip" in names(found)
     assert len(names(found)) > 1
-    before, after = missed("tanks")["val"]
+    before, after = get_errors("tanks")["val"]
     assert before > 0.6
     assert after < 0.30
 
 
 @pytest.mark.parametrize("which", [2, 5])
-def test_a_damper_has_a_hysteresis_or_dry_friction(which: int) -> None:
-    found = diagnosed(f"damper 0.8712 V {which}")
+def test_damper_has_a_hysteresis_or_dry_friction(which: int) -> None:
+    found = diagnose(f"damper 0.8712 V {which}")
     assert names(found)[0] in ("second-hysteresis", "coulomb-friction")
     assert found.gain is not None
     assert found.gain.reduction_percent > 50
 
 
 @pytest.mark.parametrize("name", ["furnace", "dryer"])
-def test_a_model_without_a_delay_lacks_one(name: str) -> None:
-    first = causes(diagnosed(name))[0]
+def test_missing_delay_of_a_linear_model_is_named(name: str) -> None:
+    first = causes(diagnose(name))[0]
     assert "delay" in (first.name, *first.equivalents)
 
 
 @pytest.mark.parametrize("name", ["furnace, delayed", "dryer, delayed"])
-def test_with_the_delay_in_it_no_cause_is_named(name: str) -> None:
-    """These are linear: nothing nonlinear hides in them."""
-    found = diagnosed(name)
+def test_linear_model_with_the_delay_has_no_effect(name: str) -> None:
+    """The systems are linear."""
+    found = diagnose(name)
     assert names(found) == []
     assert found.gain is None
     assert np.isfinite(found.noise_floor)

@@ -1,7 +1,6 @@
-"""Forward selection on measured records, beside what is known of them.
+"""Forward selection on measured records, compared with published results.
 
-The records are no part of the repository; where they come from and what others attained on them stands in
-the README of the folder that has them.
+The records are not part of the repository; the README of their folder lists sources and published results.
 """
 
 import numpy as np
@@ -14,7 +13,7 @@ pytestmark = pytest.mark.nightly
 
 
 # Silverbox: an electronic Duffing oscillator. Its input is band-limited and sampled at the same instants as
-# the output, so y(k) answers u(k).
+# the output, so that y(k) depends on u(k).
 
 TESTS = ("idx_test_multisine", "idx_test_arrow", "idx_test_arrow_noextrap")
 
@@ -50,7 +49,7 @@ def test_silverbox_is_simulated_to_less_than_half_a_millivolt():
     assert 0.2 < without_extrapolation < 0.45
 
 
-def test_without_the_input_of_the_same_instant_silverbox_is_out_by_ten_times_as_much():
+def test_silverbox_without_direct_feedthrough_is_ten_times_less_accurate():
     multisine, arrow, without_extrapolation = silverbox_errors("u")
     assert multisine == pytest.approx(3.5, rel=0.1)
     assert arrow == pytest.approx(3.75, rel=0.1)
@@ -70,36 +69,36 @@ def piezo():
     return rows(25_001, 37_501), rows(37_501, 50_001)
 
 
-def test_a_constrained_model_of_the_measured_piezo_is_accurate_and_stays_where_it_is(piezo):
+def test_constrained_model_of_the_measured_piezo_does_not_drift(piezo):
     best = islands.fit(*piezo, constraints="hysteresis").best
     assert best.metrics["validation"]["free_run"].mape < 0.2
     assert best.physics.property_1 is True
     assert best.physics.hold_drift_percent < 1e-6
-    # Five times the rate is not asked of it: one record of one rate does not tell a model that it may diverge
-    # there, and the check says so.
+    # Five times the rate is not required: a record of one rate does not determine the behaviour there, and
+    # the check reports the divergence.
     bounded = {excursion.name for excursion in best.physics.excursions if excursion.bounded}
     assert bounded >= {"minor-loops", "amplitude x 0.5", "rate x 0.25"}
 
 
-def test_without_the_constraint_the_same_accuracy_drifts_away_in_a_hold(piezo):
+def test_unconstrained_model_of_the_measured_piezo_drifts_in_a_hold(piezo):
     best = islands.fit(*piezo, constraints="none").best
     assert best.metrics["validation"]["free_run"].mape < 0.2
     assert best.physics.property_1 is False
     assert best.physics.hold_drift_percent > 20.0
 
 
-# Controls: linear systems, in which nothing nonlinear hides.
+# Controls: linear systems.
 
 
 @pytest.mark.parametrize(
     ("name", "column", "output", "dt", "share"),
     [
-        # The furnace's disturbance is as large as what the input moves, and its last quarter is its wildest.
+        # The furnace's disturbance is as large as the effect of its input, and largest in the last quarter.
         ("gas_furnace.csv", "u_gasrate_ft3min", "y_CO2_pct", None, 0.6),
         ("daisy_hairdryer.csv", "u_V", "y_temp", 0.08, 0.15),
     ],
 )
-def test_a_linear_control_is_fitted_to_a_part_of_its_spread(name, column, output, dt, share):
+def test_linear_control_is_fitted_to_a_fraction_of_its_deviation(name, column, output, dt, share):
     record = islands.read_record(measured_record(name), [column], output, dt)
     found = islands.fit(record, library="polynomial")
     spread = record.y.std()

@@ -1,4 +1,4 @@
-"""Bad input over REST: each kind is refused in words that say where it is wrong, and nothing is kept."""
+"""Invalid input over REST is rejected with a message that locates the error, and nothing is stored."""
 
 import gzip
 import io
@@ -27,10 +27,13 @@ from support.service import (
     spec,
 )
 
-#: What the process that looks into a file may take, and what a compressed file may unpack to.
-MEMORY, UNPACKED = 1_000_000_000, 50_000_000
+#: Memory budget of the inspection process, in bytes.
+MEMORY = 1_000_000_000
 
-#: A picture, as far as anybody looks.
+#: Largest size of an unpacked file, in bytes.
+UNPACKED = 50_000_000
+
+#: First bytes of a picture.
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(256))
 
 
@@ -43,7 +46,7 @@ def shared(tmp_path_factory):
 
 @pytest.fixture
 def service(shared):
-    """A service that holds nothing before a test, and nothing after it."""
+    """A service without jobs and data sets, before and after a test."""
     assert nothing_stored(shared)
     yield shared
     for job in shared.client.get("/v1/jobs").json()["items"]:
@@ -55,26 +58,26 @@ def service(shared):
         path.unlink()
 
 
-def header(samples):
-    """How NumPy's format announces a column."""
+def make_header(samples):
+    """Return the header of a column in NumPy's format."""
     stream = io.BytesIO()
     npy.write_array_header_1_0(stream, {"descr": "<f8", "fortran_order": False, "shape": (samples,)})
     return stream.getvalue()
 
 
-def claiming(samples, stored=64):
-    """An archive whose columns claim samples that are not there."""
+def make_archive_with_false_size(samples, stored=64):
+    """Return an archive whose headers claim more samples than it stores."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for name in ("u", "y"):
-            archive.writestr(f"{name}.npy", header(samples) + bytes(stored))
+            archive.writestr(f"{name}.npy", make_header(samples) + bytes(stored))
     return stream.getvalue()
 
 
-def bomb(samples, members):
-    """An archive of zeros, of a thousandth of what it unpacks to; nobody gets as far as its checksum."""
+def make_zip_bomb(samples, members):
+    """Return an archive of zeros that unpacks to a thousand times its size; its checksums are not valid."""
     pack = zlib.compressobj(9, zlib.DEFLATED, -15)
-    head, block = header(samples), bytes(1 << 20)
+    head, block = make_header(samples), bytes(1 << 20)
     blocks = 8 * samples // len(block)
     packed = pack.compress(head) + pack.flush(zlib.Z_FULL_FLUSH)
     packed += (pack.compress(block) + pack.flush(zlib.Z_FULL_FLUSH)) * blocks + pack.flush()
@@ -89,17 +92,25 @@ def bomb(samples, members):
     return files + directory + b"PK\5\6" + struct.pack("<4H2LH", *sizes)
 
 
-#: Files that nobody could use: content, name, what the message says.
-REFUSED = {
+#: Unusable files: content, name, and parts of the message.
+UNUSABLE = {
     "empty": (b"", "a.csv", ("a.csv is empty", "export the record again")),
     "header alone": (b"t_s,u_V,y_um\n", "a.csv", ("a header in line 1 and not a single sample",)),
     "text as archive": (csv(), "a.npz", ("a.npz is not a NumPy archive", "numpy.savez")),
     "program": (csv(), "a.exe", ("a.exe: its name must end in one of .csv", "export the record")),
     "picture": (PNG, "a.csv", ("a.csv, line 1: byte 0x89", "is not UTF-8: save the file as UTF-8")),
-    "2 GB header": (claiming(2**28), "a.npz", (f"column u claims {2**28} samples", "the file is damaged")),
-    "0.8 GB header": (claiming(10**8), "a.npz", ("claims 800000000 bytes, and the file stores 64", "anew")),
-    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it anew")),
-    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it anew")),
+    "2 GB header": (
+        make_archive_with_false_size(2**28),
+        "a.npz",
+        (f"column u claims {2**28} samples", "the file is damaged"),
+    ),
+    "0.8 GB header": (
+        make_archive_with_false_size(10**8),
+        "a.npz",
+        ("claims 800000000 bytes, and the file stores 64", "write it again"),
+    ),
+    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it again")),
+    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it again")),
     "long name": (
         csv().replace(b"y_um", b"y" * 100_000),
         "a.csv",
@@ -123,29 +134,29 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_file_that_nobody_could_use_is_refused_and_not_kept(service, case):
-    content, name, words = REFUSED[case]
+@pytest.mark.parametrize("case", UNUSABLE)
+def test_unusable_file_is_rejected_and_not_stored(service, case):
+    content, name, words = UNUSABLE[case]
     detail = problem_of(service.upload(content, name), 422, "invalid-record")
     for word in words:
         assert word in detail
     assert nothing_stored(service)
 
 
-def test_a_name_that_a_job_can_say_is_kept_and_a_longer_one_is_nowhere_repeated(service):
-    """A thousand of them would stand in every message and in every list of data sets."""
+def test_longest_column_name_is_accepted_and_longer_ones_are_shortened(service):
+    """Messages and lists of data sets would repeat a long name many times."""
     name = "y" * 199
     stored = service.upload(csv().replace(b"y_um", name.encode() + b"1")).json()["id"]
     assert service.submit(**{**spec(stored), "output": name + "1"}).status_code == 202
     longer = csv().replace(b"y_um", name.encode() + b"12")
-    for asked in ({}, {"output": "force"}, {"inputs": ["u_V"], "output": "force"}):
-        detail = problem_of(service.upload(longer, "a.csv", **asked), 422, "invalid-record")
+    for given in ({}, {"output": "force"}, {"inputs": ["u_V"], "output": "force"}):
+        detail = problem_of(service.upload(longer, "a.csv", **given), 422, "invalid-record")
         assert "whose name has 201 characters" in detail
         assert len(detail) < 200
 
 
-def test_a_zip_bomb_ends_the_process_that_reads_it_and_nothing_else(service):
-    packed = bomb(samples=1 << 27, members=2)
+def test_zip_bomb_ends_only_the_inspection_process(service):
+    packed = make_zip_bomb(samples=1 << 27, members=2)
     assert len(packed) < 3_000_000
     detail = problem_of(service.upload(packed, "a.npz"), 422, "invalid-record")
     assert "a.npz cannot be read within 1.0 GB of memory and 120 s" in detail
@@ -153,7 +164,7 @@ def test_a_zip_bomb_ends_the_process_that_reads_it_and_nothing_else(service):
     assert nothing_stored(service)
 
 
-def test_a_gzip_bomb_is_cut_off_at_the_limit(service):
+def test_gzip_bomb_is_cut_off_at_the_limit(service):
     member = gzip.compress(b"t_s,u_V,y_um\n" + b"0" * 10_000_000)
     began = time.process_time()
     gzip.decompress(member)
@@ -166,13 +177,13 @@ def test_a_gzip_bomb_is_cut_off_at_the_limit(service):
     assert nothing_stored(service)
 
 
-def test_a_sound_gzip_is_unpacked(service):
+def test_valid_gzip_is_unpacked(service):
     answer = service.upload(gzip.compress(csv()), "a.csv.gz")
     assert (answer.status_code, answer.json()["name"]) == (201, "a.csv")
     assert answer.json() == {**service.upload(csv(), "a.csv").json(), "created": answer.json()["created"]}
 
 
-def test_a_decimal_comma_is_read_and_the_preview_says_so(service):
+def test_decimal_comma_is_read_with_a_warning_in_the_preview(service):
     stored = service.upload(csv(200, ";", ","), "a.csv").json()
     assert stored["preview"]["warnings"] == [
         "the comma in a.csv, line 2, column t_s (0,000000) is read as a decimal mark"
@@ -182,8 +193,8 @@ def test_a_decimal_comma_is_read_and_the_preview_says_so(service):
     assert service.submit(**spec(stored["id"])).status_code == 202
 
 
-#: Records of which a part cannot be used: content, name, the column's problem or a warning.
-DOUBTFUL = {
+#: Partly unusable records: content, and parts of the column's problem or warning.
+DEFECTIVE = {
     "mixed marks": (
         csv(200, ";", ",", y_um={9: "0.5"}),
         (
@@ -213,7 +224,7 @@ DOUBTFUL = {
         csv(t_s={50: "0.4812"}),
         ("a.csv, line 50, column t_s is off the uniform grid", "from 0.47 to 0.4812", "usual step is 0.01"),
     ),
-    "time stands still": (
+    "repeated time": (
         csv(t_s={50: "0.47"}),
         ("a.csv, line 50, column t_s repeats the time stamp 0.47", "resample to a uniform grid"),
     ),
@@ -221,32 +232,32 @@ DOUBTFUL = {
 }
 
 
-#: Of those, what is said at the fast level.
+#: Records that are tested at the fast test level.
 FAST = ("NaN", "uneven time")
 
 
 @pytest.mark.parametrize(
-    "case", [case if case in FAST else pytest.param(case, marks=pytest.mark.ci) for case in DOUBTFUL]
+    "case", [case if case in FAST else pytest.param(case, marks=pytest.mark.ci) for case in DEFECTIVE]
 )
-def test_what_spoils_a_record_is_said_at_the_upload_and_refuses_the_job_that_needs_it(service, case):
-    content, words = DOUBTFUL[case]
+def test_defect_of_a_record_is_reported_and_rejects_its_jobs(service, case):
+    content, words = DEFECTIVE[case]
     name = "a.npz" if content.startswith(b"PK") else "a.csv"
     stored = service.upload(content, name)
     assert stored.status_code == 201
     preview = stored.json()["preview"]
-    said = {each["name"]: each["problem"] for each in preview["columns"]}
-    assert [name for name, problem in said.items() if problem and name != "dt"] in ([], ["y_um"])
-    told = said["y_um"] or " ".join(preview["warnings"])
+    problems = {each["name"]: each["problem"] for each in preview["columns"]}
+    assert [name for name, problem in problems.items() if problem and name != "dt"] in ([], ["y_um"])
+    message = problems["y_um"] or " ".join(preview["warnings"])
     job = problem_of(service.submit(**spec(stored.json()["id"])), 422, "invalid-record")
     for word in words:
-        assert word in told
+        assert word in message
         assert word in job
     assert service.client.get("/v1/jobs").json()["items"] == []
 
 
 @pytest.mark.parametrize("case", ["text", "two lengths", "uneven time"])
-def test_an_upload_that_names_its_columns_is_refused_where_the_job_would_be(service, case):
-    content, words = DOUBTFUL[case]
+def test_upload_with_columns_is_rejected_like_a_job(service, case):
+    content, words = DEFECTIVE[case]
     name = "a.npz" if content.startswith(b"PK") else "a.csv"
     checked = service.upload(content, name, inputs=["u_V"], output="y_um")
     detail = problem_of(checked, 422, "invalid-record")
@@ -254,7 +265,7 @@ def test_an_upload_that_names_its_columns_is_refused_where_the_job_would_be(serv
     assert nothing_stored(service)
 
 
-def test_an_output_alone_is_checked_too(service):
+def test_upload_with_an_output_only_is_checked(service):
     detail = problem_of(service.upload(csv(y_um={7: "NaN"}), "a.csv", output="y_um"), 422, "invalid-record")
     assert "a.csv, line 7, column y_um is empty or NaN" in detail
     detail = problem_of(service.upload(csv(), "a.csv", output="force"), 422, "invalid-record")
@@ -262,8 +273,8 @@ def test_an_output_alone_is_checked_too(service):
     assert nothing_stored(service)
 
 
-#: Orders that no service carries out: what is changed, the type, what the message says.
-ORDERS = {
+#: Invalid jobs: changed fields, type of the problem, and parts of its message.
+INVALID_JOBS = {
     "unknown preset": ({"preset": "magic"}, "invalid-settings", ("magic", "hysteresis", "narx")),
     "no islands": ({"settings": {"islands": 0}}, "invalid-settings", ("islands is at least 1, got 0",)),
     "unknown primitive": (
@@ -297,20 +308,20 @@ ORDERS = {
 }
 
 
-@pytest.mark.parametrize("case", ORDERS)
-def test_an_order_that_no_service_carries_out_is_refused(service, case):
-    changes, kind, words = ORDERS[case]
+@pytest.mark.parametrize("case", INVALID_JOBS)
+def test_invalid_job_is_rejected(service, case):
+    changes, kind, words = INVALID_JOBS[case]
     detail = problem_of(service.submit(**spec(kept(service.store), **changes)), 422, kind)
     for word in words:
         assert word in detail
     assert service.client.get("/v1/jobs").json()["items"] == []
 
 
-def test_a_million_islands_are_refused_before_memory_is_taken_for_them(service):
-    order = spec(kept(service.store), settings={"islands": 1_000_000, "topology": "fully-connected"})
-    service.submit(**order)
+def test_too_many_islands_are_rejected_before_allocation(service):
+    job = spec(kept(service.store), settings={"islands": 1_000_000, "topology": "fully-connected"})
+    service.submit(**job)
     tracemalloc.start()
-    detail = problem_of(service.submit(**order), 422, "invalid-settings")
+    detail = problem_of(service.submit(**job), 422, "invalid-settings")
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert detail == "islands is at most 256 on this service, got 1000000"
@@ -331,22 +342,22 @@ def test_a_million_islands_are_refused_before_memory_is_taken_for_them(service):
         ("DELETE", "/v1/jobs/{}"),
     ],
 )
-def test_anothers_job_is_as_if_it_were_not_there(service, method, path):
-    theirs, nobodys = queued(service.store, "somebody else").id, "0" * 32
+def test_job_of_another_owner_is_not_found(service, method, path):
+    theirs, missing = queued(service.store, "another owner").id, "0" * 32
     headers = {**service.key(), "X-Request-ID": "same"}
-    answers = [service.client.request(method, path.format(job), headers=headers) for job in (theirs, nobodys)]
+    answers = [service.client.request(method, path.format(job), headers=headers) for job in (theirs, missing)]
     assert problem_of(answers[0], 404, "no-such-job") == f"there is no job {theirs!r}"
-    assert answers[0].content.replace(theirs.encode(), nobodys.encode()) == answers[1].content
+    assert answers[0].content.replace(theirs.encode(), missing.encode()) == answers[1].content
     dates = {"date"}
     assert {k: v for k, v in answers[0].headers.items() if k not in dates} == {
         k: v for k, v in answers[1].headers.items() if k not in dates
     }
-    assert service.store.jobs.get("somebody else", theirs).version == 1
+    assert service.store.jobs.get("another owner", theirs).version == 1
 
 
-def test_anothers_data_set_is_as_if_it_were_not_there(service):
-    theirs = kept(service.store, "somebody else")
-    nobodys = "0" * 32 + "-csv"
+def test_data_set_of_another_owner_is_not_found(service):
+    theirs = kept(service.store, "another owner")
+    missing = "0" * 32 + "-csv"
     headers = {**service.key(), "X-Request-ID": "same"}
     for method, path in (("GET", "/v1/datasets/{}"), ("DELETE", "/v1/datasets/{}"), ("POST", "/v1/jobs")):
         answers = [
@@ -356,22 +367,24 @@ def test_anothers_data_set_is_as_if_it_were_not_there(service):
                 json=spec(dataset) if method == "POST" else None,
                 headers=headers,
             )
-            for dataset in (theirs, nobodys)
+            for dataset in (theirs, missing)
         ]
         assert theirs in problem_of(answers[0], 404, "no-such-dataset")
-        assert answers[0].content.replace(theirs.encode(), nobodys.encode()) == answers[1].content
-    assert service.store.datasets.get("somebody else", theirs)
+        assert answers[0].content.replace(theirs.encode(), missing.encode()) == answers[1].content
+    assert service.store.datasets.get("another owner", theirs)
 
 
-def test_an_expired_key_opens_nothing(service):
+def test_expired_key_is_rejected(service):
     answer = service.client.get("/v1/jobs", headers=service.key(seconds=0.0))
     assert problem_of(answer, 401, "no-key") == (
         "the key has expired: ask the operator of this service for another one"
     )
+=======
+    assert problem_of(answer, 401, "no-key").startswith("the key has expired: ask ")
     assert answer.headers["www-authenticate"] == 'Bearer realm="islands"'
 
 
-def test_a_revoked_key_opens_nothing_a_second_later(service, monkeypatch):
+def test_revoked_key_is_rejected_a_second_later(service, monkeypatch):
     header = service.key()
     assert service.client.get("/v1/jobs", headers=header).status_code == 200
     (key,) = [key for key in service.store.keys.all() if key.revoked is None and not key.expired][-1:]

@@ -1,4 +1,4 @@
-"""The command trials: what it counts, and that most of what is hidden is found."""
+"""The command ``islands trials``: its counts, and detection rates of injected effects."""
 
 import json
 from contextlib import nullcontext
@@ -12,13 +12,13 @@ from support.command_line import fail, succeed
 from support.undrawn import undrawn_figures
 
 
-def percentages(told: dict[str, Any]) -> dict[str, float]:
-    """Return what was counted of a core's trials, in percent of those that count."""
-    return {share["name"]: 100 * share["count"] / share["of"] for share in told["shares"] if share["of"]}
+def percentages(scores: dict[str, Any]) -> dict[str, float]:
+    """Return the proportions of a simulation's trials in percent."""
+    return {share["name"]: 100 * share["count"] / share["of"] for share in scores["shares"] if share["of"]}
 
 
-def test_impossible_trials_are_refused() -> None:
-    assert "nobody knows how to hide gravity" in fail("trials", "--effects", "gravity")
+def test_invalid_trials_are_rejected() -> None:
+    assert "cannot inject gravity" in fail("trials", "--effects", "gravity")
     assert "take white or ar" in fail("trials", "--noise", "pink")
     assert "unknown core 'gravity'" in fail("trials", "--core", "gravity")
     assert "2 effects at once" in fail("trials", "--effects", "offset", "--pairs", 1)
@@ -26,14 +26,14 @@ def test_impossible_trials_are_refused() -> None:
 
 @pytest.mark.ci
 def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In this process, one after the other."""
+    """The trials run in this process, one after the other."""
     pool = "islands_api.cli.commands.trials.ray_pool"
     monkeypatch.setattr(pool, lambda _workers, _address: nullcontext(map))
-    asked = ("trials", "--core", "column", "--effects", "offset", "--count", 1, "--clean", 1)
+    command = ("trials", "--core", "column", "--effects", "offset", "--count", 1, "--clean", 1)
     more = ("--open-set", 0, "--seconds", 10, "--seed", 8, "--json", tmp_path / "trials.json")
     with undrawn_figures():
-        said = succeed(*asked, *more, "--figure", tmp_path / "confusion.svg")
-    assert "column" in said
+        printed = succeed(*command, *more, "--figure", tmp_path / "confusion.svg")
+    assert "column" in printed
     document = json.loads((tmp_path / "trials.json").read_text())
     assert [(each["trial"]["effects"], each["named"]) for each in document["outcomes"]] == [
         (["offset"], ["offset"]),
@@ -48,30 +48,30 @@ def test_trials_are_counted_by_simulation(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.nightly
-def test_trials_are_counted_and_the_same_each_time(tmp_path: Path) -> None:
-    asked = ("trials", "--effects", "offset", "--effects", "cubic-stiffness", "--count", 1, "--clean", 2)
+def test_repeated_trials_give_identical_counts(tmp_path: Path) -> None:
+    command = ("trials", "--effects", "offset", "--effects", "cubic-stiffness", "--count", 1, "--clean", 2)
     more = ("--open-set", 0, "--pairs", 1, "--seconds", 20, "--seed", 7)
     runs = (("first.json", ()), ("again.json", ("--workers", 1)))
-    said = [succeed(*asked, *more, *limit, "--json", tmp_path / name) for name, limit in runs]
-    assert "pairs exact" in said[0]
+    printed = [succeed(*command, *more, *limit, "--json", tmp_path / name) for name, limit in runs]
+    assert "pairs exact" in printed[0]
     assert (tmp_path / "first.json").read_text() == (tmp_path / "again.json").read_text()
     document = json.loads((tmp_path / "first.json").read_text())
     assert len(document["outcomes"]) == 5
-    told = document["cores"]["bouc-wen-piezo"]
-    assert {share["name"]: share["of"] for share in told["shares"]}["pairs exact"] == 1
-    assert "share of the oracle's gain, median" in {measure["name"] for measure in told["measures"]}
-    assert sum(each["count"] for each in told["reliability"]) >= 2
+    scores = document["cores"]["bouc-wen-piezo"]
+    assert {share["name"]: share["of"] for share in scores["shares"]}["pairs exact"] == 1
+    assert "share of the oracle's gain, median" in {measure["name"] for measure in scores["measures"]}
+    assert sum(each["count"] for each in scores["reliability"]) >= 2
 
 
 @pytest.mark.nightly
-def test_each_simulation_has_a_table_and_a_figure(tmp_path: Path) -> None:
-    said = succeed(
+def test_simulations_have_separate_tables_and_figures(tmp_path: Path) -> None:
+    printed = succeed(
         *("trials", "--core", "column", "--core", "second-order", "--effects", "offset", "--count", 1),
         *("--clean", 1, "--open-set", 0, "--seconds", 10, "--seed", 8),
         *("--figure", tmp_path / "confusion.svg"),
     )
-    assert "column" in said
-    assert "second-order" in said
+    assert "column" in printed
+    assert "second-order" in printed
     assert {path.name for path in tmp_path.iterdir()} == {
         "confusion-column.svg",
         "confusion-second-order.svg",
@@ -86,12 +86,12 @@ FAMILIES = (
 
 
 @pytest.mark.ci
-def test_an_effect_of_each_family_is_found(tmp_path: Path) -> None:
-    """In processes side by side, as trials are carried out."""
+def test_effect_of_each_family_is_found(tmp_path: Path) -> None:
+    """The trials run in parallel processes, as usual."""
     assert {CATALOGUE[name].family for name in FAMILIES} == {each.family for each in CATALOGUE.values()}
-    asked = [each for name in FAMILIES for each in ("--effects", name)]
+    effects = [each for name in FAMILIES for each in ("--effects", name)]
     succeed(
-        *("trials", *asked, "--count", 1, "--clean", 1, "--open-set", 0, "--seconds", 20),
+        *("trials", *effects, "--count", 1, "--clean", 1, "--open-set", 0, "--seconds", 20),
         *("--seed", 910_200, "--json", tmp_path / "trials.json"),
     )
     document = json.loads((tmp_path / "trials.json").read_text())
@@ -102,7 +102,7 @@ def test_an_effect_of_each_family_is_found(tmp_path: Path) -> None:
     assert counted["false names on clean records"] == 0.0
 
 
-# Not the goals: what an analysis that got worse would miss.
+# Limits below the goals, which detect a degraded analysis.
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("core", "first", "within", "pairs", "false_names"),
@@ -114,7 +114,7 @@ def test_an_effect_of_each_family_is_found(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.timeout(1800)
-def test_most_of_what_is_hidden_is_found(
+def test_most_injected_effects_are_found(
     tmp_path: Path, core: str, first: float, within: float, pairs: float, false_names: float
 ) -> None:
     succeed(
