@@ -73,9 +73,9 @@ def check_url(url: str) -> str:
     try:
         parsed = httpx.URL(url)
     except httpx.InvalidURL as error:
-        raise SettingsError(f"{url!r} is no address ({error}): write http://HOST:PORT") from error
+        raise SettingsError(f"{url!r} is not an address ({error}): write http://HOST:PORT") from error
     if parsed.scheme not in ("http", "https") or not parsed.host:
-        raise SettingsError(f"{url!r} is no address of a service: write http://HOST:PORT")
+        raise SettingsError(f"{url!r} is not the address of a service: write http://HOST:PORT")
     return url
 
 

@@ -187,7 +187,7 @@ def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) 
             "--validation often: give a file that exists",
         ),
         (("submit", "r.csv", *COLUMNS, "--key", "no key"), "give it as 'islands keys create' printed it"),
-        (("list", "--url", "here"), "'here' is no address of a service"),
+        (("list", "--url", "here"), "'here' is not the address of a service"),
         (("list", "--url", "http://127.0.0.1:9"), "the service at http://127.0.0.1:9 does not answer"),
         (
             ("watch", "x", "--url", "http://127.0.0.1:9"),
