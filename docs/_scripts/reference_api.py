@@ -6,6 +6,7 @@ from tables import page, section
 
 import islands
 import islands_api
+from islands_api.client.base import BaseClient, Endpoint
 
 
 def python() -> str:
@@ -23,7 +24,23 @@ def client() -> str:
         "Python client",
         "The public names of the package `islands_api`: clients of a running service.",
         *_groups(islands_api),
+        section(
+            "Calls",
+            "Methods of `Client` and of `AsyncClient`. A method has the parameters of the function below, "
+            "sends its request and returns the answer, whose type is the argument of `RequestSpec`.",
+            *_calls(),
+        ),
     )
+
+
+def _calls() -> list[str]:
+    """Return a reference to the function of each call, in the order of the client."""
+    functions = [
+        getattr(BaseClient, name).__wrapped__
+        for name, member in vars(BaseClient).items()
+        if isinstance(member, Endpoint)
+    ]
+    return [f"::: {each.__module__}.{each.__name__}" for each in functions]
 
 
 def _groups(package: ModuleType) -> list[str]:

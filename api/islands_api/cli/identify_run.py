@@ -70,7 +70,7 @@ class RunOptions:
     verbose: bool
 
     def engine_for(self, islands: int) -> str:
-        """Return the name of the engine. Ray starts in three seconds; one island gains nothing from it."""
+        """Return the name of the engine. Ray starts in three seconds, and one island does not need it."""
         return self.engine or ("ray" if islands > 1 or self.address else "serial")
 
 

@@ -18,12 +18,12 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random gen
 
 @dataclass(frozen=True, slots=True)
 class SearchOptions:
-    """Options of a search, as they were given.
+    """Preset, seed and changed settings from the command line.
 
     Attributes
     ----------
     changes : mapping
-        The given settings, by name; every other setting has the value of the preset.
+        Settings that were given, by name. All others have the value of the preset.
     """
 
     preset: str = "hysteresis"
