@@ -107,10 +107,10 @@ UNUSABLE = {
     "0.8 GB header": (
         make_archive_with_false_size(10**8),
         "a.npz",
-        ("claims 800000000 bytes, and the file stores 64", "write it again"),
+        ("claims 800000000 bytes, and the file stores 64", "write it"),
     ),
-    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it again")),
-    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it again")),
+    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it")),
+    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it")),
     "long name": (
         csv().replace(b"y_um", b"y" * 100_000),
         "a.csv",
@@ -379,8 +379,6 @@ def test_expired_key_is_rejected(service):
     assert problem_of(answer, 401, "no-key") == (
         "the key has expired: ask the operator of this service for another one"
     )
-=======
-    assert problem_of(answer, 401, "no-key").startswith("the key has expired: ask ")
     assert answer.headers["www-authenticate"] == 'Bearer realm="islands"'
 
 
