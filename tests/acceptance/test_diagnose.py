@@ -59,7 +59,7 @@ def test_diagnose_names_the_missing_effect(folder: Path) -> None:
 def test_report_is_a_single_file_with_a_summary(folder: Path) -> None:
     text = (folder / "out/report.html").read_text()
     assert "thermal-drift: k = " in text
-    assert "which nothing else has\nseen" in text
+    assert "on the last quarter of the record, which is held out" in text
     assert text.count("<img ") == 4
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
 
@@ -143,7 +143,7 @@ def test_self_test_reports_detection_limits_and_false_alarms(
     assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == clean
     assert f"Of {clean} records like this one with nothing wrong in them" in printed
     text = (offset_record / out / "report.html").read_text()
-    assert "smallest strength that was named" in text
+    assert "smallest detected strength" in text
     assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)
 
 

@@ -160,7 +160,7 @@ def test_zip_bomb_ends_only_the_inspection_process(service):
     assert len(packed) < 3_000_000
     detail = problem_of(service.upload(packed, "a.npz"), 422, "invalid-record")
     assert "a.npz cannot be read within 1.0 GB of memory and 120 s" in detail
-    assert "unpacks to more than this service takes" in detail
+    assert "unpacks to more than this service accepts" in detail
     assert nothing_stored(service)
 
 
