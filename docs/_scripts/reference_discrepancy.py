@@ -10,7 +10,7 @@ from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS, NoiseDetector
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
-from islands.io.simulator_spec.specification import KINDS, PARAMETERS
+from islands.io.simulator_spec.specification import SIMULATORS
 
 Entry = Effect | EffectTemplate | NoiseDetector
 
@@ -94,12 +94,12 @@ def simulators() -> str:
     """Return the page of the simulators that can be diagnosed."""
     rows = (
         (
-            code(name + kind.argument),
-            escape(kind.summary),
-            codes(PARAMETERS.get(name, ())),
-            escape(kind.estimated),
+            code(entry.name + entry.argument),
+            escape(entry.summary),
+            codes(entry.parameters),
+            escape(entry.estimated),
         )
-        for name, kind in KINDS.items()
+        for entry in SIMULATORS.values()
     )
     return page(
         "Simulators",

@@ -24,7 +24,7 @@ from islands.evolution.settings import Settings
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS
-from islands.io.simulator_spec.specification import KINDS
+from islands.io.simulator_spec.specification import SIMULATORS
 from islands.model.candidate_library import LIBRARIES
 from islands.model.primitives import PRIMITIVES
 from islands.systems.catalogue import SYSTEMS
@@ -41,7 +41,7 @@ NAMES = {
     "islands": [*TOPOLOGIES, *SELECTION_POLICIES, *REPLACEMENT_POLICIES, *ISLAND_PROFILES, *ENGINES],
     "primitives": [*PRIMITIVES],
     "effects": [*CATALOGUE, *OF_EACH, *DETECTORS],
-    "simulators": [name + kind.argument for name, kind in KINDS.items()],
+    "simulators": [entry.name + entry.argument for entry in SIMULATORS.values()],
     "systems": [*SYSTEMS, *(f"published:{name}" for name in PUBLISHED)],
     "problems": [problem.type for problem in PROBLEMS.values()],
     "output-formats": [*EXPORTS, *FIGURES, *SEARCH_FIGURES, *READERS],

@@ -28,7 +28,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     base = tmp_path_factory.mktemp("extended")
     example = made()["bouc-wen-piezo"]
     effect, record = CATALOGUE["cubic-stiffness"], example.record
-    core = example.core
+    core = example.simulator
     simulation = ExtendedSimulator(core, (effect,), make_context(record, core, count_fitted_samples(record)))
     values = simulation.nominal
     values[simulation.get_slice(effect)] = STRENGTH

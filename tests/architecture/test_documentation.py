@@ -22,7 +22,7 @@ from islands.evolution.settings import Settings
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
 from islands.io.export import EXPORTS
 from islands.io.records import READERS
-from islands.io.simulator_spec.specification import KINDS, PARAMETERS
+from islands.io.simulator_spec.specification import SIMULATORS
 from islands.model.candidate_library import LIBRARIES
 from islands.systems.catalogue import SYSTEMS
 from islands.systems.published_models import PUBLISHED
@@ -114,7 +114,7 @@ def test_make_targets_of_a_page_exist(page: Path) -> None:
             EXPORTS,
         ),
         *(READERS, TOPOLOGIES, SELECTION_POLICIES, REPLACEMENT_POLICIES, ENGINES, CATALOGUE, OF_EACH),
-        *(DETECTORS, KINDS),
+        *(DETECTORS, SIMULATORS),
     ],
     ids=lambda table: next(iter(table)),
 )
@@ -136,10 +136,6 @@ def test_every_effect_says_what_resembles_it_and_what_distinguishes_it() -> None
     for entry in [*CATALOGUE.values(), *OF_EACH.values(), *DETECTORS.values()]:
         assert entry.similar_to, entry.name
         assert entry.distinguished_by, entry.name
-
-
-def test_simulators_with_parameters_are_simulators() -> None:
-    assert PARAMETERS.keys() <= KINDS.keys()
 
 
 def test_the_page_on_records_names_every_suffix() -> None:

@@ -9,7 +9,7 @@ from islands.discrepancy.effects import CATALOGUE, OF_EACH
 from islands.discrepancy.inference.noise_detectors import DETECTORS
 from islands.discrepancy.inference.verdict import Verdict
 from islands.discrepancy.interfaces.effect import SimulationContext
-from islands.io.simulator_spec.specification import KINDS
+from islands.io.simulator_spec.specification import SIMULATORS
 from support.repository import DOCS
 
 DIAGNOSE = (DOCS / "how-to" / "diagnose-a-simulation.md").read_text()
@@ -44,7 +44,7 @@ def test_the_table_of_effects_has_the_parameters_of_an_effect(name: str, scene: 
 
 
 def test_the_guide_of_the_diagnosis_has_every_simulation_and_every_verdict() -> None:
-    assert not [kind for kind in KINDS if not re.search(rf"^\| `{kind}[\[:`]", DIAGNOSE, re.MULTILINE)]
+    assert not [kind for kind in SIMULATORS if not re.search(rf"^\| `{kind}[\[:`]", DIAGNOSE, re.MULTILINE)]
     assert not [verdict for verdict in Verdict if f"| `{verdict}` |" not in DIAGNOSE]
 
 

@@ -1,4 +1,4 @@
-"""One simulation of every kind, each with a short record that it could have made."""
+"""A specification of every simulator, each with a short record that the simulator could have produced."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,11 +22,14 @@ from islands.io.simulator_spec.specification import (
     ProgramSpec,
 )
 
-#: A function of the user's own, in a file.
+#: File with a simulator that is a Python function.
 PROGRAM = Path(__file__).with_name("naive_damper.py")
 
-#: Samples of a record, and seconds between two.
-SAMPLES, DT = 600, 0.01
+#: Samples of a record.
+SAMPLES = 600
+
+#: Sampling time in seconds.
+DT = 0.01
 
 MODEL = {
     "schema": "islands.model/1",
@@ -42,19 +45,19 @@ MODEL = {
 
 @dataclass(frozen=True)
 class Made:
-    """A simulation as it is asked for, and a record."""
+    """A specification, and a record to compare it with."""
 
     spec: LocalSpec
     record: Dataset
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @cached_property
-    def core(self) -> Simulator:
+    def simulator(self) -> Simulator:
         return make_simulator(self.spec, self.record, self.columns)
 
 
 def wave(samples: int = SAMPLES, dt: float = DT) -> NDArray[np.float64]:
-    """Return five sines that have no common period within the record."""
+    """Return a sum of five sines without a common period in the record."""
     t = dt * np.arange(samples)
     return sum(
         size * np.sin(2 * np.pi * f * t + p)
@@ -76,29 +79,29 @@ def recorded(
     )
 
 
-def with_a_degree_of_freedom(u: NDArray[np.float64], m: float, c: float, k: float) -> NDArray[np.float64]:
-    """Return the motion of ``m x'' + c x' + k x = u`` from rest, the input running straight."""
+def simulate_oscillator(u: NDArray[np.float64], m: float, c: float, k: float) -> NDArray[np.float64]:
+    """Simulate ``m x'' + c x' + k x = u`` from rest, with an input that is linear between samples."""
     _, x, _ = scipy.signal.lsim(([1.0], [m, c, k]), u, DT * np.arange(u.size))
     return np.asarray(x)
 
 
 @cache
 def made() -> Mapping[str, Made]:
-    """Return all of them, by name."""
+    """Return the specifications and their records by name."""
     u = wave()
     rng = np.random.default_rng(11)
-    along = with_a_degree_of_freedom(u, 0.5, 4.0, 200.0)
-    moved = with_a_degree_of_freedom(u, 2.0, 6.0, 0.0)
+    oscillation = simulate_oscillator(u, 0.5, 4.0, 200.0)
+    position = simulate_oscillator(u, 2.0, 6.0, 0.0)
     level = 5.0 + scipy.signal.lfilter([0.02], [1, -0.98], np.abs(u) / 10)
     plain = recorded(u, 0.8 * u + 0.01 * rng.standard_normal(u.size))
-    oscillator = recorded(u, along, units=("N", "m"))
+    oscillator = recorded(u, oscillation, units=("N", "m"))
     spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
     return {
         "bouc-wen-piezo": Made(PhysicalSpec(kind="bouc-wen-piezo"), plain),
         "second-order": Made(spring, oscillator),
         "rigid-axis": Made(
             PhysicalSpec(kind="rigid-axis", parameters={"m": 2.0, "c": 6.0, "F": 1.0}),
-            recorded(u, moved, units=("N", "m")),
+            recorded(u, position, units=("N", "m")),
         ),
         "cascaded-tanks": Made(
             PhysicalSpec(kind="cascaded-tanks", parameters={"k1": 2.0, "k2": 2.0, "k3": 1.0}),
@@ -129,7 +132,7 @@ def made() -> Mapping[str, Made]:
 
 
 def extension(core: LocalSpec, **effect: object) -> dict[str, object]:
-    """Return the document of an extension of an oscillator."""
+    """Return the document of an extended oscillator, with one effect if its fields are given."""
     frame = {"unit": "m", "peak": 0.2, "rate": 0.5, "force_unit": "N", "force": 40.0}
     return {
         "inputs": ["u_N"],

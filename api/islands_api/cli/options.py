@@ -10,7 +10,7 @@ from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.records import read_record
 from islands.io.records.row_range import overlap, parse_rows
-from islands.io.simulator_spec.specification import KINDS, LocalExtendedSpec, is_extended, parse_spec
+from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, is_extended, parse_spec
 from islands.model.model import Model
 from islands.systems.published_models import published
 
@@ -36,7 +36,7 @@ Channels = Annotated[
     list[str] | None, typer.Option("--channel", help="Column that may couple in, for example a temperature.")
 ]
 Simulated = Annotated[
-    str, typer.Option("--simulation", help=f"{', '.join(KINDS)}; a colon separates its argument.")
+    str, typer.Option("--simulation", help=f"{', '.join(SIMULATORS)}; a colon separates its argument.")
 ]
 Tolerances = Annotated[
     list[str] | None,

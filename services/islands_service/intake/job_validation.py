@@ -12,7 +12,7 @@ from islands.io.models import model_from_json
 from islands.io.records.column_names import find_column
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.records.validation import check_choice
-from islands.io.simulator_spec.specification import PARAMETERS, ModelSpec, PhysicalSpec, innermost
+from islands.io.simulator_spec.specification import SIMULATORS, ModelSpec, PhysicalSpec, innermost
 from islands_service.domain.job_spec import (
     LIMITS,
     MAX_SHIFT,
@@ -137,7 +137,7 @@ def _check_simulation(spec: Discrepancy) -> None:
 
 def _check_parameters(core: PhysicalSpec, tolerance: Mapping[str, float]) -> None:
     """Reject unknown parameters. Initial values are not checked, since their number depends on the record."""
-    known = PARAMETERS[core.kind]
+    known = SIMULATORS[core.kind].parameters
     for name in (*core.parameters, *tolerance):
         if name not in known and not name.startswith("initial "):
             raise SettingsError(f"{core.kind} has no parameter {name!r}: it has {', '.join(known)}")

@@ -1,10 +1,11 @@
 """The Bouc-Wen piezoelectric actuator of the paper's equation (11), with places for effects."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from islands.data.dataset import Dataset
 from islands.discrepancy.effects.time_variation import gain_over_time
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, Site
@@ -69,6 +70,13 @@ class BoucWenPiezoSimulator:
             *(0.0, h),
         )
         return dp * gain_over_time(own, context) * x - h + add_output_forces(x, context, forces)
+
+
+def make_bouc_wen_piezo(
+    given: Mapping[str, float], _record: Dataset, _estimation_samples: int
+) -> BoucWenPiezoSimulator:
+    """Make a simulator; parameters that are not given have the values of the paper."""
+    return BoucWenPiezoSimulator(replace(BoucWenPiezo(), **given))
 
 
 def _about(nominal: float) -> tuple[float, float]:

@@ -107,12 +107,15 @@ class CascadedTanksSimulator:
         return y
 
 
-def make_cascaded_tanks(given: Mapping[str, float], record: Dataset) -> CascadedTanksSimulator:
-    """Return the core of parameters that are given; what is missing is estimated from a record.
+def make_cascaded_tanks(
+    given: Mapping[str, float], record: Dataset, estimation_samples: int
+) -> CascadedTanksSimulator:
+    """Make a simulator; estimate the parameters that are not given from the estimation part of a record.
 
     A start that holds the balance of mean flows for every pair of a grid, and the best of them: the analysis
     calibrates it.
     """
+    record = record[:estimation_samples]
     u, y = np.ascontiguousarray(record.u[:, 0]), record.y
     units = (record.input_units[0] or "1", record.output_unit or "1")
     level, pumped = max(float(np.mean(y)), 1e-6), max(abs(float(np.mean(u))), 1e-6)

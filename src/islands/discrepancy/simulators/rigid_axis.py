@@ -154,8 +154,10 @@ class RigidAxisSimulator:
         return position[which], rate[which]
 
 
-def make_rigid_axis(given: Mapping[str, float], record: Dataset, seen: int) -> RigidAxisSimulator:
-    """Return the core of parameters that are given; what is missing is estimated from what may be seen.
+def make_rigid_axis(
+    given: Mapping[str, float], record: Dataset, estimation_samples: int
+) -> RigidAxisSimulator:
+    """Make a simulator; estimate the parameters that are not given from the estimation part of a record.
 
     The estimate is that of the inverse dynamics: least squares of the force on smoothed acceleration, rate
     and direction (Olsen and Petersen 2001).
@@ -167,11 +169,11 @@ def make_rigid_axis(given: Mapping[str, float], record: Dataset, seen: int) -> R
         scipy.signal.savgol_filter(y, SMOOTHED, 3, deriv=order, delta=dt) for order in (1, 2)
     )
     usual = float(np.std(rate)) or 1.0
-    columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * usual))])[:seen]
+    columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * usual))])[:estimation_samples]
     names = ("m", "c", "F")
     free = [place for place, name in enumerate(names) if name not in given]
     known = np.array([given.get(name, 0.0) for name in names])
-    force = scipy.signal.savgol_filter(record.u[:, 0], SMOOTHED, 3)[:seen]
+    force = scipy.signal.savgol_filter(record.u[:, 0], SMOOTHED, 3)[:estimation_samples]
     known[free] = scipy.optimize.lsq_linear(
         columns[:, free], force - columns @ known, bounds=(1e-12, np.inf)
     ).x

@@ -17,18 +17,15 @@ from islands.discrepancy.simulators.python_function import PythonFunctionSimulat
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
 from islands.discrepancy.simulators.saved_extension import SavedExtension
 from islands.io.models import model_json
+from islands.io.simulator_spec.spec_base import EffectSpec, FrameSpec, ScalesSpec, ValueSpec
 from islands.io.simulator_spec.specification import (
     ColumnSpec,
-    EffectSpec,
-    FrameSpec,
     LinearSpec,
     LocalExtendedSpec,
     LocalSpec,
     ModelSpec,
     PhysicalSpec,
     ProgramSpec,
-    ScalesSpec,
-    ValueSpec,
 )
 
 
@@ -113,7 +110,7 @@ def describe_extension(
         case PythonFunctionSimulator():
             path, _, function = simulator.source.rpartition(":")
             return ProgramSpec(kind="python", path=path, function=function, parameters=named)
-    return PhysicalSpec(kind=simulator.name, parameters=named)  # type: ignore[arg-type]
+    return PhysicalSpec(kind=simulator.name, parameters=named)
 
 
 def _extended(

@@ -2,9 +2,8 @@
 
 import json
 import runpy
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from types import MappingProxyType
+from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -17,21 +16,18 @@ from islands.discrepancy.effects import CATALOGUE
 from islands.discrepancy.interfaces.context import ForceCoordinate, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.interfaces.simulator import Simulator
-from islands.discrepancy.simulators.bouc_wen_piezo import BoucWenPiezoSimulator
-from islands.discrepancy.simulators.cascaded_tanks import make_cascaded_tanks
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator
 from islands.discrepancy.simulators.linear import LinearSimulator, estimate_linear
 from islands.discrepancy.simulators.narx import NarxSimulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.discrepancy.simulators.recorded_output import RecordedOutput
-from islands.discrepancy.simulators.rigid_axis import make_rigid_axis
 from islands.discrepancy.simulators.saved_extension import SavedExtension
-from islands.discrepancy.simulators.second_order import make_second_order
 from islands.errors import ModelError, RecordError, SettingsError, lookup
 from islands.io.models import model_from_json
+from islands.io.simulator_spec.spec_base import ParameterRange, SimulatorEntry
 from islands.io.simulator_spec.specification import (
-    PARAMETERS,
+    SIMULATORS,
     ColumnSpec,
     ExtendedSpec,
     LinearSpec,
@@ -43,7 +39,6 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
-from islands.systems.bouc_wen import BoucWenPiezo
 
 #: The fewest samples that where a motion begins, and constants, are estimated from.
 FEWEST = 20
@@ -70,25 +65,20 @@ def make_simulator(
     SettingsError, ModelError
         It asks for nothing that there is.
     """
-    found = parse_spec(asked) if isinstance(asked, str) else asked
-    match found:
-        case PhysicalSpec(kind=kind, parameters=parameters):
-            return PHYSICAL[kind](parameters, record)
-        case LinearSpec(numerator=None):
-            return estimate_linear(found.order, found.delay, _estimable(record))
-        case LinearSpec():
-            return LinearSimulator(
-                *(np.array(found.numerator), np.array(found.denominator), found.level, found.delay),
-                record.output_unit or "1",
-            )
-        case ProgramSpec(path=path, function=function, parameters=parameters):
-            return _program(path, function, parameters)
-        case ModelSpec(model=document, name=name):
-            return _model(document, name, record)
-        case ExtendedSpec():
-            return _extension(found, record, columns or {})
-        case ColumnSpec(column=name):
-            return _column(name, lookup(columns or {}, name, "column"), record)
+    spec = parse_spec(asked) if isinstance(asked, str) else asked
+    if isinstance(spec, ExtendedSpec):
+        return _extension(spec, record, columns or {})
+    entry = SIMULATORS[spec.kind]
+    factory = resolve_name(entry.factory)
+    simulator: Simulator
+    if isinstance(spec, PhysicalSpec):
+        _check_parameters(entry, spec.parameters)
+        if entry.estimated:
+            _check_estimable(record)
+        simulator = factory(spec.parameters, record, estimation_part(record).samples)
+    else:
+        simulator = factory(spec, record, columns or {})
+    return simulator
 
 
 def simulate_spec(
@@ -174,8 +164,21 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
     return SavedExtension(solved, tuple(added), np.array(values), scales)
 
 
-def _column(name: str, found: Any, record: Dataset) -> Simulator:
-    output = np.asarray(found, dtype=np.float64)
+def make_linear(spec: LinearSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
+    """Make a linear model of the given coefficients, or estimate it from the estimation part of a record."""
+    if spec.numerator is None:
+        _check_estimable(record)
+        return estimate_linear(spec.order, spec.delay, estimation_part(record))
+    return LinearSimulator(
+        *(np.array(spec.numerator), np.array(spec.denominator), spec.level, spec.delay),
+        record.output_unit or "1",
+    )
+
+
+def make_recorded_output(spec: ColumnSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
+    """Take a column of a record as the output of a simulation."""
+    name = spec.column
+    output = np.asarray(lookup(columns, name, "column"), dtype=np.float64)
     if output.shape != record.y.shape:
         raise RecordError(
             f"column {name} has the shape {output.shape}, the measured output {record.y.shape}: give a "
@@ -186,48 +189,21 @@ def _column(name: str, found: Any, record: Dataset) -> Simulator:
     return RecordedOutput(name, output)
 
 
-def _piezo(given: Mapping[str, float], _record: Dataset) -> Simulator:
-    return BoucWenPiezoSimulator(replace(BoucWenPiezo(), **_known(given, "bouc-wen-piezo")))
-
-
-def _second_order(given: Mapping[str, float], record: Dataset) -> Simulator:
-    return make_second_order(_known(given, "second-order"), _estimable(record))
-
-
-def _axis(given: Mapping[str, float], record: Dataset) -> Simulator:
-    known = _positive(_known(given, "rigid-axis"), "c", "F")
-    return make_rigid_axis(known, record, _estimable(record).samples)
-
-
-def _tanks(given: Mapping[str, float], record: Dataset) -> Simulator:
-    return make_cascaded_tanks(_positive(_known(given, "cascaded-tanks")), _estimable(record))
-
-
-def _estimable(record: Dataset) -> Dataset:
-    """Return what estimation may see of a record, once it is known that it tells something."""
-    if record.samples < FEWEST:
-        raise RecordError(
-            f"the record has {record.samples} samples, and a simulation that begins where it does takes "
-            f"{FEWEST} at least: give a longer one"
-        )
-    if np.isnan(record.y).any():
-        raise RecordError("the measured output has gaps: repair them, or select rows without any")
-    return estimation_part(record)
-
-
-def _program(path: str, name: str, given: Mapping[str, float]) -> Simulator:
-    """Run a file of the user's own and take a function out of it."""
+def make_python_function(spec: ProgramSpec, _record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
+    """Run a Python file and make a simulator of one of its functions."""
     try:
-        function = runpy.run_path(path).get(name)
+        function = runpy.run_path(spec.path).get(spec.function)
     except (Exception, SystemExit) as error:
-        raise SettingsError(f"{path} cannot be run: {type(error).__name__}: {error}") from error
+        raise SettingsError(f"{spec.path} cannot be run: {type(error).__name__}: {error}") from error
     if not callable(function):
-        raise SettingsError(f"{path} has no function {name!r}: write python:FILE.py:FUNCTION")
-    return PythonFunctionSimulator(function, f"{path}:{name}", given)
+        raise SettingsError(f"{spec.path} has no function {spec.function!r}: write python:FILE.py:FUNCTION")
+    return PythonFunctionSimulator(function, f"{spec.path}:{spec.function}", spec.parameters)
 
 
-def _model(document: Mapping[str, Any], name: str, record: Dataset) -> Simulator:
-    model = model_from_json(json.dumps(document), name)
+def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
+    """Make a simulator of an identified model; its free run starts from the first measured outputs."""
+    name = spec.name
+    model = model_from_json(json.dumps(spec.model), name)
     if model.dt is not None and abs(model.dt - record.dt) > 1e-3 * record.dt:
         raise SettingsError(
             f"{name} was identified at {model.dt:g} s, the record is sampled at {record.dt:g} s: give a "
@@ -238,26 +214,24 @@ def _model(document: Mapping[str, Any], name: str, record: Dataset) -> Simulator
     return NarxSimulator(model, name, record.y[: model.maximum_lag])
 
 
-def _known(given: Mapping[str, float], kind: str) -> Mapping[str, float]:
-    if unknown := given.keys() - set(PARAMETERS[kind]):
-        known = ", ".join(PARAMETERS[kind])
+def _check_parameters(entry: SimulatorEntry, given: Mapping[str, float]) -> None:
+    if unknown := given.keys() - entry.parameters.keys():
+        known = ", ".join(entry.parameters)
         raise SettingsError(f"there is no parameter {', '.join(sorted(unknown))}: the parameters are {known}")
-    return given
-
-
-def _positive(given: Mapping[str, float], *perhaps_zero: str) -> Mapping[str, float]:
     for name, value in given.items():
-        if value < 0.0 or (value == 0.0 and name not in perhaps_zero):
+        allowed = entry.parameters[name]
+        if allowed == ParameterRange.REAL or value > 0.0:
+            continue
+        if value < 0.0 or allowed == ParameterRange.POSITIVE:
             raise SettingsError(f"{name} = {value:g} is no such system's: give a positive value")
-    return given
 
 
-#: What makes a physical system of the parameters that are given; a new one is one entry here.
-PHYSICAL: Mapping[str, Callable[[Mapping[str, float], Dataset], Simulator]] = MappingProxyType(
-    {
-        "bouc-wen-piezo": _piezo,
-        "second-order": _second_order,
-        "rigid-axis": _axis,
-        "cascaded-tanks": _tanks,
-    }
-)
+def _check_estimable(record: Dataset) -> None:
+    """Raise `RecordError` if a record is too short for an estimate, or has gaps."""
+    if record.samples < FEWEST:
+        raise RecordError(
+            f"the record has {record.samples} samples, and a simulation that begins where it does takes "
+            f"{FEWEST} at least: give a longer one"
+        )
+    if np.isnan(record.y).any():
+        raise RecordError("the measured output has gaps: repair them, or select rows without any")

@@ -1,57 +1,47 @@
-"""Simulations as they are asked for: a text on the command line, JSON over REST.
+"""Specifications of simulators: text on the command line, JSON over REST, and the table of all simulators.
 
-Specifications are checked here. Simulators are made in `islands.io.simulator_spec.factory`, which needs the
-kernels.
+This module checks specifications and does not import the kernels; `islands.io.simulator_spec.factory` makes
+simulators. To add a simulator, write its class and add an entry to `SIMULATORS`.
 """
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    PositiveFloat,
-    ValidationError,
-    model_validator,
+from pydantic import ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from islands.errors import ModelError, SettingsError, lookup
+from islands.io.simulator_spec.spec_base import (
+    EffectSpec,
+    ParameterRange,
+    ScalesSpec,
+    SimulatorEntry,
+    SimulatorSpec,
+    SpecModel,
 )
-
-from islands.errors import ModelError, SettingsError
 
 EXTENDED_SCHEMA: Literal["islands.extended/1"] = "islands.extended/1"
 
-#: Parameters of the physical systems that can be given.
-PARAMETERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "bouc-wen-piezo": ("A", "beta", "gamma", "dp"),
-        "second-order": ("m", "c", "k"),
-        "rigid-axis": ("m", "c", "F", "vs"),
-        "cascaded-tanks": ("k1", "k2", "k3"),
-    }
-)
 
+class PhysicalSpec(SimulatorSpec):
+    """A physical system; parameters that are not given have their nominal value or are estimated."""
 
-class _Spec(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class PhysicalSpec(_Spec):
-    """A physical system of ours; parameters that are not given are nominal, or estimated where nothing is."""
-
-    kind: Literal["bouc-wen-piezo", "second-order", "rigid-axis", "cascaded-tanks"]
+    kind: "PhysicalKind"
     parameters: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=32)
 
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "LocalSpec":
+        """Parse the path of a JSON file with parameters, or nothing."""
+        return cls(kind=kind, parameters=_read_object(text, SettingsError) if text else {})
 
-class LinearSpec(_Spec):
-    """A linear model, estimated from the part of the record that is not locked away.
 
-    ``order`` poles and as many zeros; the input may act ``delay`` samples late. Or given: coefficients of
-    u(k - delay), u(k - delay - 1), ..., of y(k-1), y(k-2), ..., and the output's level at rest.
+class LinearSpec(SimulatorSpec):
+    """A linear model, given by its coefficients or estimated from the estimation part of the record.
+
+    It has ``order`` poles and as many zeros; the input is delayed by ``delay`` samples. The coefficients are
+    those of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ...; ``level`` is the output at rest.
     """
 
     kind: Literal["linear"]
@@ -62,7 +52,7 @@ class LinearSpec(_Spec):
     level: FiniteFloat = 0.0
 
     @model_validator(mode="after")
-    def _complete(self) -> "LinearSpec":
+    def _check_number_of_coefficients(self) -> "LinearSpec":
         if self.numerator is not None and (len(self.numerator), len(self.denominator)) != (
             self.order + 1,
             self.order,
@@ -70,72 +60,58 @@ class LinearSpec(_Spec):
             raise ValueError(f"order {self.order} takes {self.order + 1} and {self.order} coefficients")
         return self
 
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "LocalSpec":
+        """Parse ``ORDER`` or ``ORDER:DELAY``."""
+        order, _, delay = text.partition(":")
+        return cls.model_validate({"kind": kind, "order": order, "delay": delay or 0})
 
-class ProgramSpec(_Spec):
-    """A Python function of the user's own: on the command line alone, since it is run here."""
+
+class ProgramSpec(SimulatorSpec):
+    """A Python function in a file. Accepted on the command line only, since it runs on this machine."""
 
     kind: Literal["python"]
     path: str
     function: str
     parameters: dict[str, FiniteFloat] = Field(default_factory=dict, max_length=64)
 
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "LocalSpec":
+        """Parse ``FILE.py:FUNCTION``."""
+        path, _, function = text.rpartition(":")
+        return cls.model_validate({"kind": kind, "path": path, "function": function})
 
-class ModelSpec(_Spec):
-    """An identified model: what a model file holds."""
+
+class ModelSpec(SimulatorSpec):
+    """An identified model: the content of a model file."""
 
     kind: Literal["model"]
     model: dict[str, Any]
     name: str = Field(default="model", max_length=200)
 
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "LocalSpec":
+        """Parse the path of a model file or of an extended simulation."""
+        document = _read_object(text, ModelError)
+        if document.get("schema") == EXTENDED_SCHEMA:
+            return LocalExtendedSpec.model_validate(document)
+        return cls.model_validate({"kind": kind, "model": document, "name": f"model {Path(text).name}"})
 
-class ColumnSpec(_Spec):
-    """A column of the record: the output as somebody else's simulation has it."""
+
+class ColumnSpec(SimulatorSpec):
+    """A column of the record: the output of another simulation."""
 
     kind: Literal["column"]
     column: Annotated[str, Field(min_length=1, max_length=200)]
 
-
-class ValueSpec(_Spec):
-    """A value of an effect."""
-
-    value: FiniteFloat
-    unit: str = ""
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> "LocalSpec":
+        """Parse the name of a column."""
+        return cls.model_validate({"kind": kind, "column": text})
 
 
-class EffectSpec(_Spec):
-    """An effect with its values."""
-
-    name: str
-    site: str = ""
-    parameters: dict[str, ValueSpec]
-
-
-class FrameSpec(_Spec):
-    """The coordinate that forces act on."""
-
-    unit: str
-    peak: PositiveFloat
-    rate: PositiveFloat
-    force_unit: str
-    force: PositiveFloat
-    sense: FiniteFloat
-    dissipates: bool
-    sharp: PositiveFloat
-
-
-class ScalesSpec(_Spec):
-    """The record that effects were found in: some of their values are parts of its peaks or its duration."""
-
-    dt: PositiveFloat
-    input_peak: PositiveFloat
-    output_peak: PositiveFloat
-    fitted_s: PositiveFloat
-    duration_s: PositiveFloat
-    frame: FrameSpec
-
-
-class ExtendedSpec(_Spec):
-    """A simulation with effects in it, as a diagnosis writes it."""
+class ExtendedSpec(SpecModel):
+    """A simulator with effects, as a diagnosis writes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, serialize_by_alias=True)
 
@@ -151,142 +127,153 @@ class ExtendedSpec(_Spec):
 
 
 class LocalExtendedSpec(ExtendedSpec):
-    """The same; the simulation may be a program of the user's own."""
+    """A simulator with effects, which may be a Python function."""
 
     core: "LocalSpec"  # type: ignore[assignment]
 
 
-def innermost(spec: "SimulationSpec | LocalSpec") -> "SimulationSpec | LocalSpec":
-    """Return the simulation that has no effects in it."""
+_PHYSICAL = "islands.discrepancy.simulators"
+_FACTORY = "islands.io.simulator_spec.factory"
+
+_ENTRIES = (
+    SimulatorEntry(
+        "bouc-wen-piezo",
+        "[:FILE.json]",
+        "Piezoelectric actuator: y = dp u - h, h' = A u' - beta |u'| h - gamma u' |h|. Parameters that "
+        "are not given have the values of the paper",
+        PhysicalSpec,
+        f"{_PHYSICAL}.bouc_wen_piezo:make_bouc_wen_piezo",
+        dict.fromkeys(("A", "beta", "gamma", "dp"), ParameterRange.REAL),
+    ),
+    SimulatorEntry(
+        "second-order",
+        "[:FILE.json]",
+        "Oscillator: m x'' + c x' + k x = u, y = x",
+        PhysicalSpec,
+        f"{_PHYSICAL}.second_order:make_second_order",
+        dict.fromkeys(("m", "c", "k"), ParameterRange.REAL),
+        estimated="m, c, k; position and rate at the first sample",
+    ),
+    SimulatorEntry(
+        "rigid-axis",
+        "[:FILE.json]",
+        "Axis with friction: m x'' + c x' + F tanh(x' / vs) = u, y = x. It restarts every half second "
+        "from a state fitted to the measured output (multiple shooting), because its free run drifts",
+        PhysicalSpec,
+        f"{_PHYSICAL}.rigid_axis:make_rigid_axis",
+        {
+            "m": ParameterRange.POSITIVE,
+            "c": ParameterRange.NONNEGATIVE,
+            "F": ParameterRange.NONNEGATIVE,
+            "vs": ParameterRange.POSITIVE,
+        },
+        estimated="m, c, F, vs",
+    ),
+    SimulatorEntry(
+        "cascaded-tanks",
+        "[:FILE.json]",
+        "Two tanks: x1' = k3 u - k1 sqrt(x1), x2' = k1 sqrt(x1) - k2 sqrt(x2), y = x2",
+        PhysicalSpec,
+        f"{_PHYSICAL}.cascaded_tanks:make_cascaded_tanks",
+        dict.fromkeys(("k1", "k2", "k3"), ParameterRange.POSITIVE),
+        estimated="k1, k2, k3; both levels at the first sample",
+    ),
+    SimulatorEntry(
+        "linear",
+        ":ORDER[:DELAY]",
+        "Linear model of order 0 to 10, with as many zeros as poles; the input acts DELAY samples late",
+        LinearSpec,
+        f"{_FACTORY}:make_linear",
+        estimated="all coefficients, the level and the initial state",
+    ),
+    SimulatorEntry(
+        "model",
+        ":FILE.json",
+        "Identified model with one input, in free run; or an extended simulation (`extended.json`)",
+        ModelSpec,
+        f"{_FACTORY}:make_identified_model",
+        estimated="all parameters except those of terms that are linear in the output alone",
+    ),
+    SimulatorEntry(
+        "column",
+        ":NAME",
+        "Column of the record: the output of another simulation. Effects on its input or in its equation "
+        "cannot be searched for",
+        ColumnSpec,
+        f"{_FACTORY}:make_recorded_output",
+    ),
+    SimulatorEntry(
+        "python",
+        ":FILE.py:FUNCTION",
+        "Function `(u, dt, **parameters)` that returns the output; arguments with a number as default "
+        "are parameters. The file is executed, so REST does not accept it",
+        ProgramSpec,
+        f"{_FACTORY}:make_python_function",
+        estimated="its parameters",
+        is_remote=False,
+    ),
+)
+
+#: All simulators by name.
+SIMULATORS: Mapping[str, SimulatorEntry] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+
+if TYPE_CHECKING:
+    PhysicalKind: TypeAlias = str
+else:
+    PhysicalKind = Literal[tuple(entry.name for entry in _ENTRIES if entry.spec is PhysicalSpec)]
+
+# Type checkers require explicit unions; a test compares both with the table.
+#: Specifications that REST accepts.
+SimulationSpec: TypeAlias = Annotated[
+    PhysicalSpec | LinearSpec | ModelSpec | ColumnSpec | ExtendedSpec, Field(discriminator="kind")
+]
+
+#: Specifications that the command line and the Python functions accept.
+LocalSpec: TypeAlias = Annotated[
+    PhysicalSpec | LinearSpec | ModelSpec | ColumnSpec | LocalExtendedSpec | ProgramSpec,
+    Field(discriminator="kind"),
+]
+
+PhysicalSpec.model_rebuild()
+ExtendedSpec.model_rebuild()
+LocalExtendedSpec.model_rebuild()
+
+
+def parse_spec(text: str) -> LocalSpec:
+    """Parse ``NAME`` or ``NAME:ARGUMENTS``, the form of a simulator on the command line.
+
+    Raises
+    ------
+    SettingsError, ModelError
+        There is no such simulator, its arguments are invalid, or a file cannot be read.
+    """
+    kind, _, arguments = text.partition(":")
+    entry = lookup(SIMULATORS, kind, "simulation")
+    try:
+        spec: LocalSpec = entry.spec.from_text(kind, arguments)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise SettingsError(f"{text}: {where}: {first['msg']}") from error
+    return spec
+
+
+def innermost(spec: SimulationSpec | LocalSpec) -> SimulationSpec | LocalSpec:
+    """Return the specification of the simulator without effects."""
     while isinstance(spec, ExtendedSpec):
         spec = spec.core
     return spec
 
 
-#: What may be asked for over REST.
-SimulationSpec: TypeAlias = Annotated[
-    PhysicalSpec | LinearSpec | ModelSpec | ColumnSpec | ExtendedSpec, Field(discriminator="kind")
-]
-
-#: What may be asked for here.
-LocalSpec: TypeAlias = Annotated[
-    PhysicalSpec | LinearSpec | ModelSpec | ColumnSpec | LocalExtendedSpec | ProgramSpec,
-    Field(discriminator="kind"),
-]
-ExtendedSpec.model_rebuild()
-LocalExtendedSpec.model_rebuild()
-
-
-@dataclass(frozen=True, slots=True)
-class SimulatorKind:
-    """A kind of simulator that can be specified on the command line.
-
-    Attributes
-    ----------
-    argument : str
-        What follows the name; brackets are optional parts.
-    summary : str
-    estimated : str
-        What is estimated from the record unless it is given; empty if nothing is.
-    """
-
-    argument: str
-    summary: str
-    estimated: str = ""
-
-
-#: Kinds of simulators by the name that their text on the command line begins with.
-KINDS: Mapping[str, SimulatorKind] = MappingProxyType(
-    {
-        "bouc-wen-piezo": SimulatorKind(
-            "[:FILE.json]",
-            "Piezoelectric actuator: y = dp u - h, h' = A u' - beta |u'| h - gamma u' |h|. Parameters that "
-            "are not given have the values of the paper",
-        ),
-        "second-order": SimulatorKind(
-            "[:FILE.json]",
-            "Oscillator: m x'' + c x' + k x = u, y = x",
-            "m, c, k; position and rate at the first sample",
-        ),
-        "rigid-axis": SimulatorKind(
-            "[:FILE.json]",
-            "Axis with friction: m x'' + c x' + F tanh(x' / vs) = u, y = x. It restarts every half second "
-            "from a state fitted to the measured output (multiple shooting), because its free run drifts",
-            "m, c, F, vs",
-        ),
-        "cascaded-tanks": SimulatorKind(
-            "[:FILE.json]",
-            "Two tanks: x1' = k3 u - k1 sqrt(x1), x2' = k1 sqrt(x1) - k2 sqrt(x2), y = x2",
-            "k1, k2, k3; both levels at the first sample",
-        ),
-        "linear": SimulatorKind(
-            ":ORDER[:DELAY]",
-            "Linear model of order 0 to 10, with as many zeros as poles; the input acts DELAY samples late",
-            "all coefficients, the level and the initial state",
-        ),
-        "model": SimulatorKind(
-            ":FILE.json",
-            "Identified model with one input, in free run; or an extended simulation (`extended.json`)",
-            "all parameters except those of terms that are linear in the output alone",
-        ),
-        "column": SimulatorKind(
-            ":NAME",
-            "Column of the record: the output of another simulation. Effects on its input or in its equation "
-            "cannot be searched for",
-        ),
-        "python": SimulatorKind(
-            ":FILE.py:FUNCTION",
-            "Function `(u, dt, **parameters)` that returns the output; arguments with a number as default "
-            "are parameters. The file is executed, so REST does not accept it",
-            "its parameters",
-        ),
-    }
-)
-
-
-def parse_spec(text: str) -> LocalSpec:
-    """Read what the command line asks for: a name, and behind a colon what it needs.
-
-    Raises
-    ------
-    SettingsError, ModelError
-        The text asks for nothing that there is, or names a file that cannot be read.
-    """
-    kind, _, rest = text.partition(":")
-    try:
-        match kind:
-            case "model":
-                document = _object(rest, ModelError)
-                if document.get("schema") == EXTENDED_SCHEMA:
-                    return LocalExtendedSpec.model_validate(document)
-                return ModelSpec(kind=kind, model=document, name=f"model {Path(rest).name}")
-            case "linear":
-                order, _, delay = rest.partition(":")
-                return LinearSpec(kind=kind, order=order, delay=delay or 0)  # type: ignore[arg-type]
-            case "python":
-                path, _, function = rest.rpartition(":")
-                return ProgramSpec(kind=kind, path=path, function=function)
-            case "column":
-                return ColumnSpec(kind=kind, column=rest)
-            case "bouc-wen-piezo" | "second-order" | "rigid-axis" | "cascaded-tanks":
-                return PhysicalSpec(kind=kind, parameters=_object(rest, SettingsError) if rest else {})
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
-        raise SettingsError(f"{text}: {where}: {first['msg']}") from error
-    raise SettingsError(f"unknown simulation {kind!r}: take one of {', '.join(KINDS)}")
-
-
 def is_extended(path: str) -> bool:
-    """Tell whether a file holds an extended simulation; one that cannot be read does not."""
+    """Return whether a file holds an extended simulation; False if it cannot be read."""
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return _read_object(path, ModelError).get("schema") == EXTENDED_SCHEMA
+    except ModelError:
         return False
-    return isinstance(found, dict) and found.get("schema") == EXTENDED_SCHEMA
 
 
-def _object(path: str, failure: type[ModelError] | type[SettingsError]) -> dict[str, Any]:
+def _read_object(path: str, failure: type[ModelError] | type[SettingsError]) -> dict[str, Any]:
     """Read a file that holds a JSON object."""
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))

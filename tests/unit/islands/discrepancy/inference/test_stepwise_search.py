@@ -214,7 +214,7 @@ def test_refinement_replaces_a_wrong_effect_by_a_better_one() -> None:
 def test_equivalent_effects_keep_the_catalogue_order(seed: int) -> None:
     """Rounding does not decide: a sensor offset and a constant force are not distinguishable."""
     oscillator = made()["second-order"]
-    record, core = oscillator.record, oscillator.core
+    record, core = oscillator.record, oscillator.simulator
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(record.samples)
     base, target = calibrate_to(replace(record, y=record.y + 0.01 + noise), core)
     effects = select_effects(core, base.simulation.context, {})

@@ -15,7 +15,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.intersample import InterSample, ResampledSimulator, resample_context
 from islands.discrepancy.simulators.second_order import SecondOrderSimulator
 from islands.systems.second_order import SecondOrder
-from support.simulated_records import recorded, wave, with_a_degree_of_freedom
+from support.simulated_records import recorded, simulate_oscillator, wave
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def stepwise(u: Array) -> Array:
 
 @pytest.mark.parametrize(
     ("hold", "exact"),
-    [(InterSample.FOH, with_a_degree_of_freedom), (InterSample.ZOH, lambda u, *_: stepwise(u))],
+    [(InterSample.FOH, simulate_oscillator), (InterSample.ZOH, lambda u, *_: stepwise(u))],
     ids=["first-order", "zero-order"],
 )
 def test_finer_steps_come_to_the_exact_motion(hold: InterSample, exact) -> None:

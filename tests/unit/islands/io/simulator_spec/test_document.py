@@ -38,7 +38,7 @@ def asked(request: pytest.FixtureRequest) -> Made:
 
 def extended(asked: Made, effects: list[Effect]) -> CalibrationResult:
     """Put effects into a simulation, at points that a search would begin from."""
-    core = asked.core
+    core = asked.simulator
     fitted = count_fitted_samples(asked.record)
     scene = make_context(asked.record, core, fitted)
     simulation_ = ExtendedSimulator(core, catalogue_order(effects), scene)
@@ -53,7 +53,7 @@ def extended(asked: Made, effects: list[Effect]) -> CalibrationResult:
 
 def known(asked: Made) -> list[Effect]:
     """Return the effects that the simulation may get."""
-    core = asked.core
+    core = asked.simulator
     scene = make_context(asked.record, core, count_fitted_samples(asked.record))
     return select_effects(core, scene, {})
 
@@ -91,7 +91,7 @@ def fixed(asked: Made, effects: Iterable[Effect]) -> list[Effect]:
 
     Simulations that begin at the measured output begin elsewhere on another record.
     """
-    core = asked.core
+    core = asked.simulator
     scene = make_context(asked.record, core, count_fitted_samples(asked.record))
     return [
         effect for effect in effects if not any(parameter.initial for parameter in effect.parameters(scene))
@@ -109,7 +109,7 @@ def test_what_is_written_simulates_the_same(asked: Made) -> None:
 )
 def test_each_effect_by_itself_simulates_the_same(asked: Made) -> None:
     found = fixed(asked, known(asked))
-    if begins(ExtendedSimulator(asked.core, (), extended(asked, []).simulation.context)):
+    if begins(ExtendedSimulator(asked.simulator, (), extended(asked, []).simulation.context)):
         found = found[::6]  # each is a fit
     for effect in found:
         simulates_the_same(asked, extended(asked, [effect]))
@@ -145,7 +145,7 @@ def test_with_other_effects_in_it_it_is_extended_once_more(asked: Made) -> None:
     first, *_ = chosen(asked)
     spec = LocalExtendedSpec.model_validate(json.loads(extended_json(extended(asked, [first]), asked.record)))
     outer = Made(spec, asked.record, asked.columns)
-    core = outer.core
+    core = outer.simulator
     assert first.name in core.built_in_effects
     further = [each for each in fixed(outer, known(outer)) if each.name != first.name][:1]
     simulates_the_same(outer, extended(outer, further))
@@ -167,7 +167,7 @@ def test_diagnosed_again_it_lacks_nothing(kind: str, name: str, point: tuple[flo
     y = fit.simulation.simulate(values)
     noise = 0.02 * y.std() * np.random.default_rng(21).standard_normal(y.size)
     record = replace(asked.record, y=y + noise)
-    found = diagnose(record, asked.core)
+    found = diagnose(record, asked.simulator)
     assert [each.name for each in found.effects][:1] == [name]
     spec = LocalExtendedSpec.model_validate(extended_document(found.best, record))
     second = diagnose(record, make_simulator(spec, record, asked.columns))

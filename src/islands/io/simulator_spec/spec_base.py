@@ -1,0 +1,106 @@
+"""Parts of specifications: base classes, effects of an extended simulation, and the type of a table entry."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat
+
+
+class SpecModel(BaseModel):
+    """Base class of all parts of a specification: immutable, without unknown fields."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ValueSpec(SpecModel):
+    """Value of a parameter of an effect."""
+
+    value: FiniteFloat
+    unit: str = ""
+
+
+class EffectSpec(SpecModel):
+    """An effect and the values of its parameters."""
+
+    name: str
+    site: str = ""
+    parameters: dict[str, ValueSpec]
+
+
+class FrameSpec(SpecModel):
+    """Coordinate that forces act on."""
+
+    unit: str
+    peak: PositiveFloat
+    rate: PositiveFloat
+    force_unit: str
+    force: PositiveFloat
+    sense: FiniteFloat
+    dissipates: bool
+    sharp: PositiveFloat
+
+
+class ScalesSpec(SpecModel):
+    """Scales of the record in which the effects were found; some of their values are relative to these."""
+
+    dt: PositiveFloat
+    input_peak: PositiveFloat
+    output_peak: PositiveFloat
+    fitted_s: PositiveFloat
+    duration_s: PositiveFloat
+    frame: FrameSpec
+
+
+class SimulatorSpec(SpecModel):
+    """Base class of the specifications in the table of simulators."""
+
+    @classmethod
+    def from_text(cls, kind: str, text: str) -> Any:
+        """Parse the ``text`` that follows ``kind:`` on the command line."""
+        raise NotImplementedError
+
+
+class ParameterRange(StrEnum):
+    """Values that a parameter of a physical system can have."""
+
+    REAL = "any"
+    NONNEGATIVE = "zero or positive"
+    POSITIVE = "positive"
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatorEntry:
+    """Entry of the table of simulators.
+
+    Attributes
+    ----------
+    name : str
+        Name on the command line, and ``kind`` of the specification.
+    argument : str
+        Text that follows the name on the command line; brackets are optional parts.
+    summary : str
+        Description for the reference, without a final period.
+    spec : type
+        Pydantic model of the specification.
+    factory : str
+        ``module:function``, imported when the first simulator is made, since it needs the kernels. A physical
+        system takes the given parameters, the record and the number of samples of its estimation part; any
+        other simulator takes its specification, the record and the columns of the record's file.
+    parameters : mapping
+        Parameters of a physical system that can be given, and their ranges.
+    estimated : str
+        What is estimated from the record unless it is given; empty if nothing is.
+    is_remote : bool
+        Whether REST accepts the simulator.
+    """
+
+    name: str
+    argument: str
+    summary: str
+    spec: type[SimulatorSpec]
+    factory: str
+    parameters: Mapping[str, ParameterRange] = field(default_factory=dict)
+    estimated: str = ""
+    is_remote: bool = True

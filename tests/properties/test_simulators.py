@@ -1,0 +1,177 @@
+"""Properties of every simulator: its declarations are correct, and effects at rest have no response."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
+from islands.discrepancy.interfaces.context import SimulationContext
+from islands.discrepancy.interfaces.effect import Effect, Site
+from islands.discrepancy.interfaces.simulator import Simulator
+from islands.discrepancy.simulators import (
+    intersample,
+    linear,
+    narx,
+    python_function,
+    recorded_output,
+    saved_extension,
+)
+from islands.discrepancy.simulators.extended import ExtendedSimulator
+from islands.io.simulator_spec.specification import SIMULATORS, PhysicalSpec
+from support.simulated_records import made
+
+#: Classes of the simulators that are not physical systems; "held" is inside an extension.
+CLASSES = {
+    "linear": linear.LinearSimulator,
+    "model": narx.NarxSimulator,
+    "column": recorded_output.RecordedOutput,
+    "python": python_function.PythonFunctionSimulator,
+    "held": intersample.ResampledSimulator,
+    "extended": saved_extension.SavedExtension,
+}
+
+#: Modules of the package that define no simulator of a specification.
+SHARED_MODULES = {"__init__", "coordinates", "extended"}
+
+
+def make(name: str) -> Simulator:
+    found = made()[name].simulator
+    return found.simulator if name == "held" else found
+
+
+@pytest.fixture(params=list(made()))
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture
+def simulator(name: str) -> Simulator:
+    return make(name)
+
+
+@pytest.fixture
+def context(name: str, simulator: Simulator) -> SimulationContext:
+    record = made()[name].record
+    return make_context(record, simulator, count_fitted_samples(record))
+
+
+@pytest.fixture
+def alone(simulator: Simulator, context: SimulationContext) -> ExtendedSimulator:
+    return ExtendedSimulator(simulator, (), context)
+
+
+def possible_effects(simulator: Simulator, context: SimulationContext) -> list[Effect]:
+    """Return all effects that can enter, including gains and wrong parameters, which require tolerances."""
+    free = select_effects(simulator, context, {})
+    tolerance = {each.name: 0.1 for each in simulator.parameters if not each.initial}
+    return list(
+        {each.name: each for each in (*free, *select_effects(simulator, context, tolerance))}.values()
+    )
+
+
+def test_every_simulator_has_a_record() -> None:
+    assert {*SIMULATORS, "held", "extended"} == made().keys()
+    modules = {path.stem for path in Path(intersample.__file__).parent.glob("*.py")}
+    assert modules - SHARED_MODULES == {type(make(name)).__module__.rpartition(".")[2] for name in made()}
+
+
+def test_a_simulator_has_the_class_of_its_name(name: str, simulator: Simulator) -> None:
+    if name in SIMULATORS and SIMULATORS[name].spec is PhysicalSpec:
+        assert simulator.name == name
+        assert type(simulator).__module__ == SIMULATORS[name].factory.partition(":")[0]
+    else:
+        assert isinstance(simulator, CLASSES[name])
+    assert simulator.name
+    assert set(simulator.sites) <= set(Site)
+    assert isinstance(simulator.is_continuous_time, bool)
+
+
+def test_a_simulation_has_a_finite_value_for_every_sample(
+    alone: ExtendedSimulator, context: SimulationContext
+) -> None:
+    simulated = alone.simulate(alone.nominal)
+    assert simulated.shape == context.u.shape
+    assert simulated.dtype == np.float64
+    assert np.isfinite(simulated).all()
+
+
+def test_the_same_input_gives_the_same_bits(
+    name: str, alone: ExtendedSimulator, simulator: Simulator, context: SimulationContext
+) -> None:
+    u = context.u.copy()
+    first = alone.simulate(alone.nominal)
+    again = ExtendedSimulator(simulator, (), context)
+    assert np.array_equal(again.simulate(again.nominal), first)
+    other = ExtendedSimulator(made()[name].simulator if name != "held" else simulator, (), context)
+    assert np.array_equal(other.simulate(other.nominal), first)
+    assert np.array_equal(context.u, u)
+
+
+def test_nominal_values_are_within_bounds_that_have_a_width(alone: ExtendedSimulator) -> None:
+    lower, upper = alone.bounds
+    assert np.isfinite(alone.nominal).all()
+    assert (lower <= alone.nominal).all()
+    assert (alone.nominal <= upper).all()
+    assert (lower < upper).all()
+    assert (alone.scales > 0.0).all()
+
+
+def test_every_parameter_changes_the_output(alone: ExtendedSimulator) -> None:
+    at_rest = alone.simulate(alone.nominal)
+    for place, parameter in enumerate(alone.parameters):
+        values = alone.nominal
+        values[place] += alone.scales[place]
+        changed = alone.simulate(np.minimum(values, alone.bounds[1])) - at_rest
+        assert np.isfinite(changed).all(), parameter
+        assert np.max(np.abs(changed)) > 0.0, parameter
+
+
+def test_names_of_parameters_and_effects_are_unique(simulator: Simulator, context: SimulationContext) -> None:
+    names = [each.name for each in simulator.parameters]
+    assert len(set(names)) == len(names)
+    found = select_effects(simulator, context, {})
+    assert len({each.name for each in found}) == len(found)
+    for effect in possible_effects(simulator, context):
+        own = [each.name for each in effect.parameters(context)]
+        assert len(set(own)) == len(own), effect.name
+
+
+def test_the_force_coordinate_has_units_and_positive_scales(context: SimulationContext) -> None:
+    coordinate = context.force_coordinate
+    assert min(coordinate.peak, coordinate.rate, coordinate.force, coordinate.friction_smoothing) > 0.0
+    assert coordinate.unit
+    assert coordinate.force_unit
+    assert coordinate.sign in (-1.0, 1.0)
+    assert coordinate.lower_bound == (0.0 if coordinate.is_dissipative else -np.inf)
+
+
+def test_an_effect_at_rest_does_not_change_the_output(
+    simulator: Simulator, alone: ExtendedSimulator, context: SimulationContext
+) -> None:
+    at_rest = alone.simulate(alone.nominal)
+    found = possible_effects(simulator, context)
+    assert found
+    for effect in found:
+        extended = alone.with_effects([effect])
+        assert np.array_equal(extended.simulate(extended.nominal), at_rest), effect.name
+
+
+def test_every_possible_effect_changes_the_output_at_a_starting_point(
+    simulator: Simulator, alone: ExtendedSimulator, context: SimulationContext
+) -> None:
+    """Starting points are within bounds; the response to one of them at least is finite and not zero."""
+    at_rest = alone.simulate(alone.nominal)
+    residual = 0.01 * context.output_peak * np.sin(2 * np.pi * 7.3 * context.time)
+    for effect in possible_effects(simulator, context):
+        extended = alone.with_effects([effect])
+        lower, upper = extended.bounds
+        changes = []
+        for point in effect.starting_points(context, residual):
+            values = extended.nominal
+            values[extended.get_slice(effect)] = point
+            assert (lower <= values).all(), effect.name
+            assert (values <= upper).all(), effect.name
+            changes.append(np.max(np.abs(extended.simulate(values) - at_rest)))
+        assert np.isfinite(changes).any(), effect.name
+        assert np.nanmax(changes) > 0.0, effect.name

@@ -1,0 +1,72 @@
+"""Table of simulators: the unions of specifications, the factories and the text forms agree with it."""
+
+from inspect import signature
+from pkgutil import resolve_name
+from typing import get_args
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from islands.errors import SettingsError
+from islands.io.simulator_spec.spec_base import SimulatorEntry
+from islands.io.simulator_spec.specification import (
+    SIMULATORS,
+    ExtendedSpec,
+    LocalExtendedSpec,
+    LocalSpec,
+    PhysicalSpec,
+    SimulationSpec,
+    parse_spec,
+)
+
+
+@pytest.fixture(params=SIMULATORS)
+def entry(request: pytest.FixtureRequest) -> SimulatorEntry:
+    return SIMULATORS[request.param]
+
+
+def members(annotated: object) -> set[type]:
+    union, _ = get_args(annotated)
+    return set(get_args(union))
+
+
+def test_the_local_union_has_the_models_of_the_table() -> None:
+    assert members(LocalSpec) == {entry.spec for entry in SIMULATORS.values()} | {LocalExtendedSpec}
+
+
+def test_the_remote_union_has_the_remote_models_of_the_table() -> None:
+    remote = {entry.spec for entry in SIMULATORS.values() if entry.is_remote}
+    assert members(SimulationSpec) == remote | {ExtendedSpec}
+
+
+def test_an_entry_has_its_name_as_key_and_kind(entry: SimulatorEntry) -> None:
+    assert SIMULATORS[entry.name] is entry
+    assert entry.name in get_args(entry.spec.model_fields["kind"].annotation)
+
+
+def test_an_entry_has_a_summary_without_a_final_period(entry: SimulatorEntry) -> None:
+    assert entry.summary
+    assert not entry.summary.endswith(".")
+
+
+def test_a_factory_can_be_imported_and_takes_three_arguments(entry: SimulatorEntry) -> None:
+    assert len(signature(resolve_name(entry.factory)).parameters) == 3
+
+
+def test_only_physical_systems_have_parameters_in_the_table(entry: SimulatorEntry) -> None:
+    assert bool(entry.parameters) == (entry.spec is PhysicalSpec)
+
+
+def test_physical_systems_are_parsed_without_arguments() -> None:
+    for name, entry in SIMULATORS.items():
+        if entry.spec is PhysicalSpec:
+            assert parse_spec(name) == PhysicalSpec(kind=name)
+
+
+def test_a_kind_outside_the_table_is_refused() -> None:
+    with pytest.raises(ValidationError, match="literal_error"):
+        PhysicalSpec(kind="pendulum")
+    with pytest.raises(ValidationError, match="union_tag_invalid"):
+        TypeAdapter(SimulationSpec).validate_python({"kind": "pendulum"})
+    with pytest.raises(SettingsError, match="unknown simulation 'pendulum': take one of bouc-wen-piezo"):
+        parse_spec("pendulum")
