@@ -1,4 +1,4 @@
-"""Simulation context: the input of a simulation, and the scales of its record."""
+"""Input of a simulation, scales of its record, and parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,19 +16,23 @@ class ForceCoordinate:
 
     Attributes
     ----------
-    unit, peak : str, float
-        Of the coordinate.
+    unit : str
+        Unit of the coordinate.
+    peak : float
+        Largest absolute value of the coordinate.
     rate : float
-        Its usual rate, per second.
-    force_unit, force : str, float
-        Unit and size of what acts on it.
+        Typical rate of the coordinate, per second.
+    force_unit : str
+        Unit of a force.
+    force : float
+        Peak of the forces that drive the coordinate.
     sign : float
         Sign of friction that is added to an output: -1 if the output follows the coordinate, 1 if the output
         is the force.
     is_dissipative : bool
         Whether strengths of friction and hysteresis are bounded below by zero.
     friction_smoothing : float
-        Width of the transition of dry friction relative to the usual rate; a step has no derivative.
+        Width of the smoothed sign change of dry friction, relative to the typical rate.
     """
 
     unit: str
@@ -42,7 +46,7 @@ class ForceCoordinate:
 
     @property
     def lower_bound(self) -> float:
-        """Lower bound of a strength that can only dissipate."""
+        """Lower bound of the strength of friction and hysteresis."""
         return 0.0 if self.is_dissipative else -np.inf
 
 
@@ -53,25 +57,25 @@ class SimulationContext:
     Attributes
     ----------
     u : ndarray, shape (samples,)
-        The input.
+        Input.
     dt : float
-        Sampling time in seconds; times of changes count from the first sample.
+        Sampling time in seconds. The first sample is at time zero.
     channels : mapping
         Other measured signals by name, each (samples,).
     units : mapping
-        Their units.
+        Units of the channels.
     input_peak, output_peak : float
-        Largest absolute values; of the output as the nominal simulation has it.
+        Largest absolute values of the input and of the output of the nominal simulation.
     input_unit, output_unit : str
     fit_end_time : float
         End of the estimation part, in seconds after the first sample.
     intersample_values : ndarray, shape (2, samples), or None
-        The input half a step and a full step after each sample, before a jump; None if it is linear between
-        samples.
+        Input half a step and a full step after each sample; at a discontinuity the left limit. None if the
+        input is linear between samples.
     reference_duration : float or None
         Reference duration in seconds for strengths over the whole record; None for the duration of the input.
     force_coordinate : ForceCoordinate
-        Coordinate that forces act on; by default the input, and forces are added to the output.
+        Coordinate that forces act on. By default it is the input, and forces are added to the output.
     """
 
     u: Signal
@@ -101,7 +105,7 @@ class SimulationContext:
         return self.dt * np.arange(self.u.size, dtype=np.float64)
 
     def get_intersample_values(self, x: Signal) -> Signal:
-        """Return ``midway``, or linear interpolation of the input ``x`` if that is None."""
+        """Return ``intersample_values``, or those of linear interpolation of the input ``x`` if None."""
         if self.intersample_values is not None:
             return self.intersample_values
         end = np.append(x[1:], x[-1])
@@ -115,7 +119,7 @@ class SimulationContext:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A physical quantity.
+    """Parameter of a simulator or of an effect.
 
     Attributes
     ----------
@@ -123,13 +127,13 @@ class Parameter:
     unit : str
         Empty if dimensionless.
     nominal : float
-        Starting value of a parameter of a simulator; value at which an effect vanishes.
+        Initial value in the calibration of a simulator; value at which an effect vanishes.
     scale : float
         Typical change; finite differences take a hundredth of it.
     lower, upper : float
         Bounds.
     initial : bool
-        Whether it is an initial state, which belongs to the record and not to the simulator.
+        Whether the parameter is an initial state, which belongs to the record and not to the simulator.
     """
 
     name: str

@@ -32,18 +32,19 @@ class Effect:
     ----------
     name : str
     summary : str
-        One sentence with the form of the effect, without a period.
+        One line with the equation of the effect, without a period.
     family : str
+        Group of effects in reports.
     site : Site
     parameters : callable
         ``context -> tuple of Parameter``: the strength first, then the shape. The effect vanishes at the
         nominal strength.
     starting_points : callable
-        ``(context, residual) -> points``: starting points of the calibration, a value for each parameter; the
-        residual is that of the current simulation, shape (samples,).
+        ``(context, residual) -> points``: starting points of the calibration, each with a value for every
+        parameter. The residual is that of the current simulation, shape (samples,).
     form : callable, ForceLaw or None
-        A map of a signal, or a force law on the coordinate. None if the equation of the simulator has the
-        parameters of the effect, by name.
+        Map of a signal, or force law on the coordinate. None if the simulator implements the effect; it
+        receives the parameters by name.
     source : str
         Publication that describes the form.
     is_applicable : callable
@@ -51,17 +52,17 @@ class Effect:
     linear_parameters : int
         Number of leading parameters to which the response of a weak effect is proportional.
     is_gain : bool
-        Whether the effect is a gain. Gains are searched for only if every parameter has a tolerance, since
-        calibration absorbs them otherwise.
+        Whether the effect is a gain. Gains are searched for only if every parameter has a tolerance;
+        otherwise calibration absorbs them.
     extra_degrees_of_freedom : int
-        Degrees of freedom added to the number of parameters in the information criterion, for an instant or a
-        frequency that was searched for among all samples.
+        Degrees of freedom added to the number of parameters in the information criterion, for example for an
+        instant or a frequency that is selected among all samples.
     confounded_with : tuple or None
         Another effect with the same mean response, and the factor between the values of both.
     similar_to : str
         Names of effects with a similar response, for the reference.
     distinguished_by : str
-        What distinguishes it from those, for the reference.
+        Observation that distinguishes the effect from those, for the reference.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Effect:
 
     @property
     def cause(self) -> str:
-        """Name in the catalogue, without a state or a parameter."""
+        """Name without the state or parameter after the colon."""
         return self.name.partition(":")[0]
 
 
@@ -93,7 +94,7 @@ class EffectTemplate:
     Attributes
     ----------
     name, summary : str
-        As in `Effect`; the name of an effect is followed by a colon and the name of its state or parameter.
+        As in `Effect`. The name of an effect is this name, a colon and the name of a state or parameter.
     similar_to, distinguished_by : str
         As in `Effect`.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
 from islands.systems.mechanics import WIDTH, Elements, compiled, integrate_along
 
-#: ``(coordinate, rate, own state, numbers) -> number``, a scalar function that can be compiled.
+#: ``(coordinate, rate, internal state, numbers) -> number``: a scalar function that Numba can compile.
 Law = Callable[[float, float, float, Any], float]
 
 
@@ -20,15 +20,15 @@ class ForceLaw:
     Attributes
     ----------
     force : callable
-        ``(x, rate, z, numbers) -> force``; the numbers are the values of the effect, then the constants.
+        ``(x, rate, z, numbers) -> force``. The numbers are the values of the effect, then the constants.
     state_derivative : callable or None
         ``(x, rate, z, numbers) -> z'``: derivative of the internal state.
     constants : callable
-        ``context -> numbers`` that are not calibrated.
+        ``context -> numbers``: constants, which are not calibrated.
     is_dissipative : bool
-        Whether it dissipates energy, like friction and drag.
+        Whether the force dissipates energy, as friction and drag do.
     initial_state_index : int or None
-        Index of the value that is the initial internal state; None if that is zero.
+        Index of the value that is the initial internal state; None if the initial state is zero.
     """
 
     force: Law
@@ -39,39 +39,42 @@ class ForceLaw:
 
 
 def pack_force_laws(
-    parts: Sequence[tuple[ForceLaw, Signal]], context: SimulationContext, balance: bool
+    forces: Sequence[tuple[ForceLaw, Signal]], context: SimulationContext, balance: bool
 ) -> Elements:
-    """Return force laws and their values as arrays for the kernels.
+    """Pack force laws and their values into arrays for the kernels.
 
     Parameters
     ----------
+    forces : sequence
+        Force laws and the values of each.
+    context : SimulationContext
     balance : bool
-        True if they enter a balance of forces, in which all of them resist; false if they are added to an
-        output, where friction has the sign of the force coordinate.
+        Whether the forces enter an equation of motion, in which all of them resist. Otherwise they are added
+        to the output, and dissipative forces have the sign of the force coordinate.
     """
-    numbers = np.zeros((len(parts), WIDTH))
-    for row, (element, values) in zip(numbers, parts, strict=True):
+    numbers = np.zeros((len(forces), WIDTH))
+    for row, (element, values) in zip(numbers, forces, strict=True):
         given = (*values, *element.constants(context))
         row[: len(given)] = given
     return Elements(
-        np.array([compiled(element.force).address for element, _ in parts], dtype=np.int64),
+        np.array([compiled(element.force).address for element, _ in forces], dtype=np.int64),
         np.array(
             [
                 compiled(element.state_derivative).address if element.state_derivative else 0
-                for element, _ in parts
+                for element, _ in forces
             ],
             dtype=np.int64,
         ),
         np.array(
             [
                 -1.0 if balance else context.force_coordinate.sign if element.is_dissipative else 1.0
-                for element, _ in parts
+                for element, _ in forces
             ]
         ),
         np.array(
             [
                 0.0 if element.initial_state_index is None else values[element.initial_state_index]
-                for element, values in parts
+                for element, values in forces
             ]
         ),
         numbers,
@@ -79,14 +82,14 @@ def pack_force_laws(
 
 
 def add_output_forces(
-    x: Signal, context: SimulationContext, parts: Sequence[tuple[ForceLaw, Signal]]
+    x: Signal, context: SimulationContext, forces: Sequence[tuple[ForceLaw, Signal]]
 ) -> Signal:
-    """Return the sum of force laws on the coordinate ``x``, for a simulator without inertia."""
+    """Return the sum of the forces on the coordinate ``x``, for a simulator without inertia."""
     total = np.zeros(x.size)
-    if not parts:
+    if not forces:
         return total
     x = np.ascontiguousarray(x)
     integrate_along(
-        x, np.gradient(x, context.dt), context.dt, pack_force_laws(parts, context, balance=False), total
+        x, np.gradient(x, context.dt), context.dt, pack_force_laws(forces, context, balance=False), total
     )
     return total

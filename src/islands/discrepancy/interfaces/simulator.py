@@ -6,16 +6,16 @@ from typing import Protocol
 from islands.discrepancy.interfaces.context import ForceCoordinate, Parameter, Signal, SimulationContext
 from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
 
-#: Force laws on the coordinate of a simulator, and the values of each.
+#: Force laws on the coordinate of a simulator, each with its values.
 Forces = Sequence[tuple[ForceLaw, Signal]]
 
 
 class Simulator(Protocol):
-    """A simulator: its parameters, and the sites at which effects can enter."""
+    """Simulator: parameters, sites at which effects can enter, and simulation of the output."""
 
     @property
     def name(self) -> str:
-        """Name on the command line."""
+        """Name in reports; that of the command line for a physical system."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -27,25 +27,30 @@ class Simulator(Protocol):
 
     @property
     def supported_effects(self) -> frozenset[str]:
-        """Names of catalogue effects that its state equation supports."""
+        """Names of the effects of the catalogue that the state equation supports."""
 
     @property
     def built_in_effects(self) -> frozenset[str]:
-        """Names of effects already modelled by the simulator; excluded from the search."""
+        """Names of the effects already modelled by the simulator; excluded from the search."""
 
     @property
     def state_effects(self) -> tuple[Effect, ...]:
-        """Effects on its states, in addition to the catalogue."""
+        """Effects on the states of the simulator, in addition to the catalogue."""
 
     @property
     def is_continuous_time(self) -> bool:
-        """Whether it integrates an equation, so that the input between samples matters."""
+        """Whether a differential equation is integrated, so that the input between samples matters."""
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
         """Return the coordinate that forces act on; ``output`` is the nominal output, shape (samples,)."""
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
         """Simulate the output.
 
@@ -53,15 +58,15 @@ class Simulator(Protocol):
         ----------
         values : ndarray, shape (parameters,)
         x : ndarray, shape (samples,)
-            The input after the input maps.
-        scene : SimulationContext
-        own : mapping
-            Parameters of supported effects by name; a missing one is zero.
+            Input after the input maps.
+        context : SimulationContext
+        effect_parameters : mapping
+            Parameters of supported effects by name; an effect without parameters here is not active.
         forces : sequence
-            Force laws on the coordinate.
+            Force laws on the coordinate, each with its values.
 
         Returns
         -------
         ndarray, shape (samples,)
-            The output before the output maps.
+            Output before the output maps.
         """
