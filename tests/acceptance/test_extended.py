@@ -84,7 +84,7 @@ def test_exported_program_reproduces_the_record(folder: Path) -> None:
         ({}, ("--mode", "one-step"), "an extended simulation supports free runs only"),
         ({"times": 0}, (), "times"),
         ({"core": {"kind": "pendulum"}}, (), "pendulum"),
-        ({"effects": [{"name": "wormhole", "parameters": {}}]}, (), "knows no effect 'wormhole'"),
+        ({"effects": [{"name": "wormhole", "parameters": {}}]}, (), "has no effect 'wormhole'"),
         ({"inputs": ["u_A"]}, (), "no column u_A"),
     ],
 )

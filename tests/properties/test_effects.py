@@ -1,4 +1,4 @@
-"""Laws of every effect in the catalogue: at rest it does nothing, and what it says of itself is true."""
+"""Properties of every effect in the catalogue: no response at rest, and correct declarations."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 
 
 @pytest.fixture(scope="module")
-def scene() -> SimulationContext:
+def context() -> SimulationContext:
     rng = np.random.default_rng(3)
     time = np.arange(1500) * 0.01
     u = 40 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.11 * time)
@@ -19,8 +19,8 @@ def scene() -> SimulationContext:
 
 
 @pytest.fixture(scope="module")
-def alone(scene: SimulationContext) -> ExtendedSimulator:
-    return ExtendedSimulator(BoucWenPiezoSimulator(), (), scene)
+def alone(context: SimulationContext) -> ExtendedSimulator:
+    return ExtendedSimulator(BoucWenPiezoSimulator(), (), context)
 
 
 @pytest.fixture(params=CATALOGUE)
@@ -28,30 +28,32 @@ def extended(request: pytest.FixtureRequest, alone: ExtendedSimulator) -> Extend
     return alone.with_effects([CATALOGUE[request.param]])
 
 
-def at(extended: ExtendedSimulator, point: tuple[float, ...]) -> np.ndarray:
+def make_values(extended: ExtendedSimulator, point: tuple[float, ...]) -> np.ndarray:
     values = extended.nominal
     values[extended.get_slice(extended.effects[0])] = point
     return values
 
 
-def grid(extended: ExtendedSimulator) -> tuple[tuple[float, ...], ...]:
+def starting_points(extended: ExtendedSimulator) -> tuple[tuple[float, ...], ...]:
     residual = 0.1 * np.sin(2 * np.pi * 7.3 * extended.context.time)
     return tuple(extended.effects[0].starting_points(extended.context, residual))
 
 
-def test_at_rest_an_effect_does_nothing(extended: ExtendedSimulator, alone: ExtendedSimulator) -> None:
+def test_an_effect_at_rest_does_not_change_the_output(
+    extended: ExtendedSimulator, alone: ExtendedSimulator
+) -> None:
     assert np.array_equal(extended.simulate(extended.nominal), alone.simulate(alone.nominal))
 
 
-def test_every_point_that_a_search_begins_from_does_something_and_is_allowed(
+def test_every_starting_point_is_within_bounds_and_has_a_response(
     extended: ExtendedSimulator, alone: ExtendedSimulator
 ) -> None:
     lower, upper = extended.bounds
-    points = grid(extended)
+    points = starting_points(extended)
     assert points
     at_rest = alone.simulate(alone.nominal)
     for point in points:
-        values = at(extended, point)
+        values = make_values(extended, point)
         assert (values >= lower).all()
         assert (values <= upper).all()
         simulated = extended.simulate(values)
@@ -59,13 +61,15 @@ def test_every_point_that_a_search_begins_from_does_something_and_is_allowed(
         assert np.max(np.abs(simulated - at_rest)) > 1e-4
 
 
-def test_what_is_called_linear_is(extended: ExtendedSimulator, alone: ExtendedSimulator) -> None:
-    """Half a strength has half the response; a small one nearly, where a core lies between."""
+def test_the_response_is_proportional_to_the_linear_parameters(
+    extended: ExtendedSimulator, alone: ExtendedSimulator
+) -> None:
+    """Half the strength has half the response; approximately if the effect acts before the simulator."""
     effect = extended.effects[0]
     if effect.linear_parameters == 0:
-        pytest.skip("it has a threshold")
+        pytest.skip("the effect has a threshold")
     at_rest = alone.simulate(alone.nominal)
-    point = np.array(grid(extended)[0])
+    point = np.array(starting_points(extended)[0])
     part = slice(0, effect.linear_parameters)
     exact = effect.site in (Site.FORCE, Site.OUTPUT) and effect.family != "timing"
     size = 1.0 if exact else 1e-3
@@ -73,19 +77,19 @@ def test_what_is_called_linear_is(extended: ExtendedSimulator, alone: ExtendedSi
     for strength in (size, size / 2):
         scaled = point.copy()
         scaled[part] *= strength
-        responses.append(extended.simulate(at(extended, tuple(scaled))) - at_rest)
-    wrong = float(np.std(responses[1] - responses[0] / 2))
-    assert wrong <= (1e-9 if exact else 0.1) * float(np.std(responses[0]) + abs(np.mean(responses[0])))
+        responses.append(extended.simulate(make_values(extended, tuple(scaled))) - at_rest)
+    error = float(np.std(responses[1] - responses[0] / 2))
+    assert error <= (1e-9 if exact else 0.1) * float(np.std(responses[0]) + abs(np.mean(responses[0])))
 
 
-def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: ExtendedSimulator) -> None:
+def test_a_hundredth_of_a_scale_is_a_suitable_step_of_a_derivative(extended: ExtendedSimulator) -> None:
     """Steps of a hundredth and of a fiftieth of a parameter's scale agree within a fifth."""
     if extended.effects[0].name == "stiction":
-        pytest.skip("it changes by leaps")
-    points = grid(extended)
-    base = at(extended, points[len(points) // 2])
+        pytest.skip("the response is discontinuous")
+    points = starting_points(extended)
+    base = make_values(extended, points[len(points) // 2])
     _, upper = extended.bounds
-    there = extended.simulate(base)
+    reference = extended.simulate(base)
     for place in range(extended.get_slice(extended.effects[0]).start, base.size):
         slopes = []
         for part in (0.01, 0.02):
@@ -96,13 +100,13 @@ def test_a_derivative_by_a_hundredth_of_a_scale_is_one(extended: ExtendedSimulat
             )
             moved = base.copy()
             moved[place] += step
-            slopes.append((extended.simulate(moved) - there) / step)
+            slopes.append((extended.simulate(moved) - reference) / step)
         size = np.linalg.norm(slopes[0])
         assert size > 0.0
         assert np.linalg.norm(slopes[1] - slopes[0]) < 0.2 * size
 
 
-def test_an_effect_says_where_it_comes_from(extended: ExtendedSimulator) -> None:
+def test_the_declarations_of_an_effect_are_complete_and_consistent(extended: ExtendedSimulator) -> None:
     effect = extended.effects[0]
     parameters = effect.parameters(extended.context)
     assert parameters
@@ -115,7 +119,7 @@ def test_an_effect_says_where_it_comes_from(extended: ExtendedSimulator) -> None
     assert effect.site != Site.CORE or effect.name in extended.simulator.supported_effects
 
 
-def test_a_memory_of_simulations_changes_none(alone: ExtendedSimulator) -> None:
+def test_the_cache_of_a_simulation_does_not_change_its_output(alone: ExtendedSimulator) -> None:
     values = alone.nominal
     first = alone.simulate(values).copy()
     for factor in (1.1, 0.9, 1.2, 0.8, 1.3, 1.0):

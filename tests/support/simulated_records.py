@@ -44,7 +44,7 @@ MODEL = {
 
 
 @dataclass(frozen=True)
-class Made:
+class SpecAndRecord:
     """A specification, and a record to compare it with."""
 
     spec: LocalSpec
@@ -86,7 +86,7 @@ def simulate_oscillator(u: NDArray[np.float64], m: float, c: float, k: float) ->
 
 
 @cache
-def made() -> Mapping[str, Made]:
+def made() -> Mapping[str, SpecAndRecord]:
     """Return the specifications and their records by name."""
     u = wave()
     rng = np.random.default_rng(11)
@@ -97,32 +97,32 @@ def made() -> Mapping[str, Made]:
     oscillator = recorded(u, oscillation, units=("N", "m"))
     spring = PhysicalSpec(kind="second-order", parameters={"m": 0.5, "c": 4.0, "k": 200.0})
     return {
-        "bouc-wen-piezo": Made(PhysicalSpec(kind="bouc-wen-piezo"), plain),
-        "second-order": Made(spring, oscillator),
-        "rigid-axis": Made(
+        "bouc-wen-piezo": SpecAndRecord(PhysicalSpec(kind="bouc-wen-piezo"), plain),
+        "second-order": SpecAndRecord(spring, oscillator),
+        "rigid-axis": SpecAndRecord(
             PhysicalSpec(kind="rigid-axis", parameters={"m": 2.0, "c": 6.0, "F": 1.0}),
             recorded(u, position, units=("N", "m")),
         ),
-        "cascaded-tanks": Made(
+        "cascaded-tanks": SpecAndRecord(
             PhysicalSpec(kind="cascaded-tanks", parameters={"k1": 2.0, "k2": 2.0, "k3": 1.0}),
             recorded(np.abs(u) / 10, level),
         ),
-        "linear": Made(
+        "linear": SpecAndRecord(
             LinearSpec(
                 kind="linear", order=1, delay=2, numerator=(0.1, 0.05), denominator=(0.85,), level=0.3
             ),
             plain,
         ),
-        "model": Made(ModelSpec(kind="model", model=MODEL, name="m"), plain),
-        "column": Made(ColumnSpec(kind="column", column="theirs"), plain, {"theirs": 0.8 * u}),
-        "python": Made(
+        "model": SpecAndRecord(ModelSpec(kind="model", model=MODEL, name="m"), plain),
+        "column": SpecAndRecord(ColumnSpec(kind="column", column="theirs"), plain, {"theirs": 0.8 * u}),
+        "python": SpecAndRecord(
             ProgramSpec(kind="python", path=str(PROGRAM), function="force", parameters={"c": 0.1}), plain
         ),
-        "held": Made(
+        "held": SpecAndRecord(
             LocalExtendedSpec.model_validate({**extension(spring), "hold": "zero-order", "times": 4}),
             oscillator,
         ),
-        "extended": Made(
+        "extended": SpecAndRecord(
             LocalExtendedSpec.model_validate(
                 extension(spring, name="cubic-stiffness", parameters={"k": {"value": 50.0}})
             ),

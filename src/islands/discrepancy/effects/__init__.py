@@ -1,4 +1,4 @@
-"""Catalogue of effects: what the analysis searches for, one file per family.
+"""Catalogue of effects, one file per family.
 
 To add an effect, define it in the file of its family and add it to `EFFECTS`.
 """
@@ -38,7 +38,8 @@ from islands.discrepancy.effects.time_variation import AGEING, GAIN_STEP
 from islands.discrepancy.effects.timing import CLOCK_SKEW, DELAY, RESONANCE, SENSOR_LAG
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate
 
-#: All effects, in the order in which maps act on a signal. It breaks ties: another order changes results.
+#: All effects, in the order in which maps act on a signal. The order also breaks ties between scores: another
+#: order changes results.
 EFFECTS: tuple[Effect, ...] = (
     DELAY,
     CLOCK_SKEW,
@@ -77,7 +78,7 @@ EFFECTS: tuple[Effect, ...] = (
 #: Effects by name.
 CATALOGUE: Mapping[str, Effect] = {effect.name: effect for effect in EFFECTS}
 
-#: Effects that exist once for each state, parameter or model of a simulation, by name.
+#: Templates of the effects that exist once for each state, parameter or model of a simulation, by name.
 OF_EACH: Mapping[str, EffectTemplate] = {
     template.name: template
     for template in (WRONG_PARAMETER, STATE_CLIP, INPUT_OFFSET, OUTFLOW_LAW, MODEL_FORM)
@@ -91,13 +92,13 @@ def summary_of(name: str) -> str:
 
 
 def catalogue_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Return effects in the order in which they act: the catalogue's order, then other maps by name."""
+    """Sort effects in the order in which they act: that of the catalogue, then other maps by name."""
     places = {name: place for place, name in enumerate(CATALOGUE)}
 
     def place(effect: Effect) -> tuple[int, str]:
         if effect.name in places:
             return places[effect.name], ""
-        # Effects of parameters and states are part of the equation: their order has no meaning.
+        # Effects on parameters and states are part of the equation; their order does not matter.
         return (-1, "") if effect.form is None else (len(places), effect.name)
 
     return tuple(sorted(effects, key=place))

@@ -1,12 +1,12 @@
 """Effects on the baseline: offsets, drifts and jumps."""
 
-from islands.discrepancy.effects.channels import channel, channel_unit, has_channel, spread
-from islands.discrepancy.effects.time_variation import instant_bounds, instant_grid, smooth_step
+from islands.discrepancy.effects.channels import channel, channel_range, channel_unit, has_channel
+from islands.discrepancy.effects.time_variation import candidate_instants, instant_bounds, smooth_step
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, EffectTemplate, Signal, SimulationContext, Site
 
 
-def _offset_form(y: Signal, values: Signal, _scene: SimulationContext) -> Signal:
+def _offset_form(y: Signal, values: Signal, _context: SimulationContext) -> Signal:
     return y + values[0]
 
 
@@ -14,17 +14,17 @@ def _offset_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
 
 
-def _offset_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _offset_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * context.output_peak,),)
 
 
 OFFSET = Effect(
     name="offset",
-    summary="The output is measured from another zero: y + c",
+    summary="Zero offset of the output: y + c",
     family="baseline",
     site=Site.OUTPUT,
     parameters=_offset_parameters,
-    starting_points=_offset_grid,
+    starting_points=_offset_starting_points,
     form=_offset_form,
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, even-nonlinearity, input-offset",
@@ -33,13 +33,13 @@ OFFSET = Effect(
 
 
 def input_offset(state: str) -> Effect:
-    """Return the effect on one state, in the unit of the input."""
+    """Return the effect on the balance of one state, in the unit of the input."""
     label = f"{INPUT_OFFSET.name}:{state}"
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
         return (Parameter(label, context.input_unit, 0.0, 0.01 * context.input_peak),)
 
-    def grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    def starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
         return ((0.02 * context.input_peak,),)
 
     return Effect(
@@ -48,16 +48,15 @@ def input_offset(state: str) -> Effect:
         family="baseline",
         site=Site.CORE,
         parameters=parameters,
-        starting_points=grid,
+        starting_points=starting_points,
         form=None,
         source="Schoukens and Noel, Three benchmarks addressing open challenges, 2017",
     )
 
 
-#: The effect for one state or parameter.
 INPUT_OFFSET = EffectTemplate(
     "input-offset",
-    "Something flows in, or pushes, beside the input: + c in the balance of one state",
+    "Constant flow or force in addition to the input: + c in the balance of one state",
     similar_to="offset, outflow-law",
     distinguished_by="an offset filtered by the equation; in tanks it shifts with the level",
 )
@@ -71,17 +70,19 @@ def _linear_drift_parameters(context: SimulationContext) -> tuple[Parameter, ...
     return (Parameter("c", context.output_unit, 0.0, 0.01 * context.output_peak),)
 
 
-def _linear_drift_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _linear_drift_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * context.output_peak,),)
 
 
 LINEAR_DRIFT = Effect(
     name="linear-drift",
-    summary="The output drifts: y + c t / T over the record's duration T",
+    summary="Linear drift of the output: y + c t / T over the record's duration T",
     family="baseline",
     site=Site.OUTPUT,
     parameters=_linear_drift_parameters,
-    starting_points=_linear_drift_grid,
+    starting_points=_linear_drift_starting_points,
     form=_linear_drift_form,
     source="Doebelin, Measurement Systems, section 3",
     similar_to="jump, thermal-drift, exponential-creep",
@@ -100,17 +101,17 @@ def _jump_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _jump_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02 * context.output_peak, instant) for instant in instant_grid(context))
+def _jump_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02 * context.output_peak, instant) for instant in candidate_instants(context))
 
 
 JUMP = Effect(
     name="jump",
-    summary="The output's zero jumps: y + c behind an instant",
+    summary="Jump of the output's zero: y + c after an instant",
     family="baseline",
     site=Site.OUTPUT,
     parameters=_jump_parameters,
-    starting_points=_jump_grid,
+    starting_points=_jump_starting_points,
     form=_jump_form,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
@@ -129,22 +130,24 @@ def _thermal_drift_parameters(context: SimulationContext) -> tuple[Parameter, ..
             "k",
             f"{context.output_unit}/{channel_unit(context, True)}",
             0.0,
-            0.01 * context.output_peak / spread(context, True),
+            0.01 * context.output_peak / channel_range(context, True),
         ),
     )
 
 
-def _thermal_drift_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.output_peak / spread(context, True),),)
+def _thermal_drift_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.output_peak / channel_range(context, True),),)
 
 
 THERMAL_DRIFT = Effect(
     name="thermal-drift",
-    summary="The output follows a temperature: y + k (T - T(0)), T a given channel",
+    summary="The output follows a temperature: y + k (T - T(0)), where T is a given channel",
     family="baseline",
     site=Site.OUTPUT,
     parameters=_thermal_drift_parameters,
-    starting_points=_thermal_drift_grid,
+    starting_points=_thermal_drift_starting_points,
     form=_thermal_drift_form,
     source="Doebelin, Measurement Systems, section 2",
     is_applicable=lambda context: has_channel(context, True),

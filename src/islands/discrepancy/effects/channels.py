@@ -1,31 +1,31 @@
-"""Channels that were recorded beside the output: a temperature by its unit, or a neighbour's signal."""
+"""Channels of a context that vary: the first temperature, recognised by its unit, and the first other one."""
 
 import numpy as np
 
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
 
-#: Units of temperatures.
+#: Units by which a channel is recognised as a temperature.
 TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
 
 
 def has_channel(context: SimulationContext, thermal: bool) -> bool:
-    """Tell whether a channel was recorded that is a temperature, or one that is none, and that moves."""
+    """Return whether there is a channel that varies and is (``thermal``) or is not a temperature."""
     return _name(context, thermal) is not None
 
 
 def channel(context: SimulationContext, thermal: bool) -> Signal:
-    """Return the channel; a temperature from its first value on, since its zero says nothing here."""
+    """Return the channel; a temperature relative to its first value, since its zero is arbitrary."""
     signal = context.channels[_name(context, thermal) or ""]
     return signal - signal[0] if thermal else signal
 
 
 def channel_unit(context: SimulationContext, thermal: bool) -> str:
-    """Return the channel's unit."""
+    """Return the unit of the channel; "1" if it has none."""
     return context.units[_name(context, thermal) or ""] or "1"
 
 
-def spread(context: SimulationContext, thermal: bool) -> float:
-    """Return how far the channel moves."""
+def channel_range(context: SimulationContext, thermal: bool) -> float:
+    """Return the difference between the largest and the smallest value of the channel."""
     return float(np.ptp(channel(context, thermal)))
 
 

@@ -18,25 +18,27 @@ def _exponential_creep_parameters(context: SimulationContext) -> tuple[Parameter
     )
 
 
-def _exponential_creep_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _exponential_creep_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     taus = (max(part * context.fit_end_time, 6 * context.dt) for part in (0.003, 0.01, 0.03, 0.1, 0.3))
     return tuple((0.03, float(np.log(tau))) for tau in taus)
 
 
 EXPONENTIAL_CREEP = Effect(
     name="exponential-creep",
-    summary="The output creeps: y + kappa times y behind a low-pass of time constant tau",
+    summary="Exponential creep of the output: y + kappa times y after a low-pass with time constant tau",
     family="memory",
     site=Site.OUTPUT,
     parameters=_exponential_creep_parameters,
-    starting_points=_exponential_creep_grid,
+    starting_points=_exponential_creep_starting_points,
     form=_exponential_creep_form,
     source="Kuhnen and Janocha, Inverse feedforward controller for complex hysteretic nonlinearities, 1999",
     similar_to="relaxation, logarithmic-creep, linear-drift",
     distinguished_by="the output continues at constant input, with one time constant",
 )
 
-#: Time constants in seconds.
+#: Time constants of the low-passes of logarithmic creep, in seconds.
 TAUS = (0.3, 1.0, 3.0, 10.0, 30.0)
 
 
@@ -44,23 +46,23 @@ def _logarithmic_creep_form(y: Signal, values: Signal, context: SimulationContex
     return y + values[0] * sum(low_pass(y, tau, context.dt) - y[0] for tau in TAUS)
 
 
-def _logarithmic_creep_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
+def _logarithmic_creep_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("kappa", "", 0.0, 0.005, -0.3, 0.3),)
 
 
-def _logarithmic_creep_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _logarithmic_creep_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.01,),)
 
 
 LOGARITHMIC_CREEP = Effect(
     name="logarithmic-creep",
-    summary=(
-        "The output creeps with the logarithm of time: y + kappa times a sum of low-passes, two to a decade"
-    ),
+    summary="Logarithmic creep of the output: y + kappa times a sum of low-passes, two per decade",
     family="memory",
     site=Site.OUTPUT,
     parameters=_logarithmic_creep_parameters,
-    starting_points=_logarithmic_creep_grid,
+    starting_points=_logarithmic_creep_starting_points,
     form=_logarithmic_creep_form,
     source="Jung and Gweon, Creep characteristics of piezoelectric actuators, 2000",
     similar_to="exponential-creep",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from islands.discrepancy.effects.channels import channel, channel_unit, has_channel, spread
+from islands.discrepancy.effects.channels import channel, channel_range, channel_unit, has_channel
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
@@ -17,22 +17,24 @@ def _cross_coupling_parameters(context: SimulationContext) -> tuple[Parameter, .
             "k",
             f"{context.output_unit}/{channel_unit(context, False)}",
             0.0,
-            0.01 * context.output_peak / spread(context, False),
+            0.01 * context.output_peak / channel_range(context, False),
         ),
     )
 
 
-def _cross_coupling_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return ((0.02 * context.output_peak / spread(context, False),),)
+def _cross_coupling_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return ((0.02 * context.output_peak / channel_range(context, False),),)
 
 
 CROSS_COUPLING = Effect(
     name="cross-coupling",
-    summary="A neighbour couples in: y + k w, w a given channel",
+    summary="Another signal couples into the output: y + k w, where w is a given channel",
     family="disturbance",
     site=Site.OUTPUT,
     parameters=_cross_coupling_parameters,
-    starting_points=_cross_coupling_grid,
+    starting_points=_cross_coupling_starting_points,
     form=_cross_coupling_form,
     source="Ljung, System Identification, 2nd ed., section 13",
     is_applicable=lambda context: has_channel(context, False),
@@ -56,8 +58,10 @@ def _periodic_disturbance_parameters(context: SimulationContext) -> tuple[Parame
     )
 
 
-def _periodic_disturbance_grid(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
-    # The strongest line of what is left, between the samples of its spectrum.
+def _periodic_disturbance_starting_points(
+    context: SimulationContext, residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    # Strongest line of the residual; zero padding resolves frequencies between the bins of the spectrum.
     fitted = int(context.fit_end_time / context.dt)
     seen = residual[:fitted] * np.hanning(fitted)
     spectrum = np.abs(np.fft.rfft(seen, 4 * fitted))
@@ -72,11 +76,11 @@ def _periodic_disturbance_grid(context: SimulationContext, residual: Signal) -> 
 
 PERIODIC_DISTURBANCE = Effect(
     name="periodic-disturbance",
-    summary="A sine of a frequency of its own is added",
+    summary="Sinusoidal disturbance of unknown frequency, added to the output",
     family="disturbance",
     site=Site.OUTPUT,
     parameters=_periodic_disturbance_parameters,
-    starting_points=_periodic_disturbance_grid,
+    starting_points=_periodic_disturbance_starting_points,
     form=_periodic_disturbance_form,
     source="Stoica and Moses, Spectral Analysis of Signals, section 4",
     linear_parameters=2,

@@ -1,4 +1,4 @@
-"""Filters that effects share: low-pass responses and fractional delays."""
+"""Filters that several effects use: first-order low-pass and fractional delay."""
 
 from math import exp, factorial
 
@@ -7,7 +7,7 @@ import scipy
 
 from islands.discrepancy.interfaces.effect import Signal
 
-#: Coefficients of s^0 to s^3, one row for each of the neighbours at -1, 0, 1, 2: Lagrange's polynomials.
+#: Coefficients of s^0 to s^3 of the cubic Lagrange polynomials, one row for each neighbour at -1, 0, 1, 2.
 _LAGRANGE = np.array(
     [
         [0.0, -1 / 3, 1 / 2, -1 / 6],
@@ -17,15 +17,18 @@ _LAGRANGE = np.array(
     ]
 )
 
-#: From which steps in time constants on moments are computed by recursion, and terms of their series below.
-_LONG, _TERMS = 1.0, 20
+#: Step, relative to the time constant, from which the moments are computed by recursion; by series below it.
+_RECURSION_STEP = 1.0
+
+#: Terms of the series of the moments.
+_SERIES_TERMS = 20
 
 
 def low_pass(signal: Signal, tau: float, dt: float) -> Signal:
-    """Return what follows a signal with a time constant, exactly for a cubic through four neighbours.
+    """Filter a signal with a first-order low-pass; exact if the signal is a cubic through four neighbours.
 
-    A straight line between samples would do for slow signals alone: of ten samples a period it makes a lag
-    of half a sample look like something else.
+    Linear interpolation between samples is accurate for slow signals only: at ten samples per period, its
+    error makes a lag of half a sample look like another effect.
     """
     step = dt / tau
     weights = _LAGRANGE @ _moments(step)
@@ -38,10 +41,10 @@ def low_pass(signal: Signal, tau: float, dt: float) -> Signal:
 
 def _moments(step: float) -> Signal:
     """Return the integrals of ``step exp(-step (1 - s)) s^n`` over s from 0 to 1, n from 0 to 3."""
-    if step < _LONG:
+    if step < _RECURSION_STEP:
         return np.array(
             [
-                step * exp(-step) * sum(step**m / (factorial(m) * (n + m + 1)) for m in range(_TERMS))
+                step * exp(-step) * sum(step**m / (factorial(m) * (n + m + 1)) for m in range(_SERIES_TERMS))
                 for n in range(4)
             ]
         )
@@ -51,13 +54,13 @@ def _moments(step: float) -> Signal:
     return np.array(moments)
 
 
-#: Neighbours that an interpolation goes through: with four, a signal of ten samples a period is out by as
-#: much as a delay of a hundredth of a sample.
+#: Offsets of the neighbours that an interpolation uses. With four neighbours, the error for a signal of ten
+#: samples per period is as large as that of a delay of a hundredth of a sample.
 _NEIGHBOURS = (-2, -1, 0, 1, 2, 3)
 
 
 def interpolate_at(signal: Signal, at: Signal) -> Signal:
-    """Interpolate through six neighbours (Lagrange) at positions counted in samples; the ends are held."""
+    """Interpolate at positions in samples, through six neighbours (Lagrange); the end values are held."""
     last = signal.size - 1
     at = np.clip(at, 0.0, last)
     first = np.minimum(at.astype(np.int64), max(last - 1, 0))

@@ -8,20 +8,22 @@ from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, Simu
 
 
 def _coulomb_friction_force(_x: float, rate: float, _z: float, numbers: Any) -> float:
-    # Smooth within a part of the usual rate: a step would have no derivative.
+    # Smoothed around zero rate: calibration requires a derivative, and a step has none.
     return numbers[0] * tanh(rate / numbers[1])
 
 
-def _coulomb_friction_turning(context: SimulationContext) -> tuple[float, ...]:
+def _coulomb_friction_constants(context: SimulationContext) -> tuple[float, ...]:
     return (context.force_coordinate.friction_smoothing * context.force_coordinate.rate,)
 
 
 def _coulomb_friction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    frame = context.force_coordinate
-    return (Parameter("F", frame.force_unit, 0.0, 0.005 * frame.force, frame.lower_bound),)
+    coordinate = context.force_coordinate
+    return (Parameter("F", coordinate.force_unit, 0.0, 0.005 * coordinate.force, coordinate.lower_bound),)
 
 
-def _coulomb_friction_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _coulomb_friction_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.01 * context.force_coordinate.force,),)
 
 
@@ -31,8 +33,8 @@ COULOMB_FRICTION = Effect(
     family="memory",
     site=Site.FORCE,
     parameters=_coulomb_friction_parameters,
-    starting_points=_coulomb_friction_grid,
-    form=ForceLaw(_coulomb_friction_force, constants=_coulomb_friction_turning, is_dissipative=True),
+    starting_points=_coulomb_friction_starting_points,
+    form=ForceLaw(_coulomb_friction_force, constants=_coulomb_friction_constants, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="backlash, second-hysteresis",
     distinguished_by="a step of the residual at rate zero",
@@ -44,25 +46,29 @@ def _viscous_force(_x: float, rate: float, _z: float, c: Any) -> float:
 
 
 def _viscous_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    frame = context.force_coordinate
+    coordinate = context.force_coordinate
     return (
         Parameter(
-            "c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate, frame.lower_bound
+            "c",
+            f"{coordinate.force_unit} s/{coordinate.unit}",
+            0.0,
+            0.01 * coordinate.force / coordinate.rate,
+            coordinate.lower_bound,
         ),
     )
 
 
-def _viscous_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _viscous_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate,),)
 
 
 VISCOUS = Effect(
     name="viscous",
-    summary="A force against the rate: - c x'",
+    summary="Viscous friction: - c x'",
     family="timing",
     site=Site.FORCE,
     parameters=_viscous_parameters,
-    starting_points=_viscous_grid,
+    starting_points=_viscous_starting_points,
     form=ForceLaw(_viscous_force, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="delay, sensor-lag",
@@ -75,8 +81,15 @@ def _viscous_asymmetry_force(_x: float, rate: float, _z: float, c: Any) -> float
 
 
 def _viscous_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    frame = context.force_coordinate
-    return (Parameter("c", f"{frame.force_unit} s/{frame.unit}", 0.0, 0.01 * frame.force / frame.rate),)
+    coordinate = context.force_coordinate
+    return (
+        Parameter(
+            "c",
+            f"{coordinate.force_unit} s/{coordinate.unit}",
+            0.0,
+            0.01 * coordinate.force / coordinate.rate,
+        ),
+    )
 
 
 VISCOUS_ASYMMETRY = Effect(
@@ -85,7 +98,7 @@ VISCOUS_ASYMMETRY = Effect(
     family="memory",
     site=Site.FORCE,
     parameters=_viscous_asymmetry_parameters,
-    starting_points=_viscous_grid,
+    starting_points=_viscous_starting_points,
     form=ForceLaw(_viscous_asymmetry_force, is_dissipative=True),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit, 1994",
     similar_to="offset, loop-asymmetry",
@@ -98,22 +111,24 @@ def _quadratic_drag_force(_x: float, rate: float, _z: float, c: Any) -> float:
 
 
 def _quadratic_drag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    frame = context.force_coordinate
-    unit = f"{frame.force_unit} s^2/{frame.unit}^2"
-    return (Parameter("c", unit, 0.0, 0.01 * frame.force / frame.rate**2, frame.lower_bound),)
+    coordinate = context.force_coordinate
+    unit = f"{coordinate.force_unit} s^2/{coordinate.unit}^2"
+    return (Parameter("c", unit, 0.0, 0.01 * coordinate.force / coordinate.rate**2, coordinate.lower_bound),)
 
 
-def _quadratic_drag_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _quadratic_drag_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.02 * context.force_coordinate.force / context.force_coordinate.rate**2,),)
 
 
 QUADRATIC_DRAG = Effect(
     name="quadratic-drag",
-    summary="Drag of a turbulent flow: - c |x'| x'",
+    summary="Quadratic drag, as in turbulent flow: - c |x'| x'",
     family="shape",
     site=Site.FORCE,
     parameters=_quadratic_drag_parameters,
-    starting_points=_quadratic_drag_grid,
+    starting_points=_quadratic_drag_starting_points,
     form=ForceLaw(_quadratic_drag_force, is_dissipative=True),
     source="Worden and Tomlinson, Nonlinearity in Structural Dynamics, section 2",
     similar_to="viscous; on a single sine also second-hysteresis",

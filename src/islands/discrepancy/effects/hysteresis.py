@@ -1,4 +1,4 @@
-"""Effects with hysteresis: stiction, backlash, a second hysteresis, asymmetric loops."""
+"""Effects with hysteresis: stiction, backlash, a second hysteresis, changes of the loop."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Signal, Simu
 from islands.systems.hysteresis_operators import play_from, slider
 
 
-def _stiction_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
+def _stiction_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
     if values[0] <= 0.0:
         return u
     moved = np.empty_like(u)
@@ -25,18 +25,19 @@ def _stiction_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _stiction_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    # It changes by leaps, so that no derivative leads to the best one: a fine grid has to.
+def _stiction_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+    # The response to the breakaway distance is discontinuous, so that derivatives do not lead to the optimum:
+    # a fine grid replaces them.
     return tuple((float(part) * context.input_peak,) for part in np.geomspace(0.005, 0.3, 24))
 
 
 STICTION = Effect(
     name="stiction",
-    summary="The input acts in slips: it moves only beyond a breakaway distance",
+    summary="Stick-slip of the input: it moves only after a breakaway distance",
     family="memory",
     site=Site.INPUT,
     parameters=_stiction_parameters,
-    starting_points=_stiction_grid,
+    starting_points=_stiction_starting_points,
     form=_stiction_form,
     source="Choudhury, Thornhill and Shah, Modelling valve stiction, 2005",
     linear_parameters=0,
@@ -45,7 +46,7 @@ STICTION = Effect(
 )
 
 
-def _backlash_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
+def _backlash_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
     return play_from(u, values[0]) if values[0] > 0.0 else u
 
 
@@ -55,17 +56,17 @@ def _backlash_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _backlash_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _backlash_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return tuple((part * context.input_peak,) for part in (0.005, 0.0175, 0.05, 0.125))
 
 
 BACKLASH = Effect(
     name="backlash",
-    summary="The input acts through a play of half width b",
+    summary="Backlash of the input: a play of half width b",
     family="memory",
     site=Site.INPUT,
     parameters=_backlash_parameters,
-    starting_points=_backlash_grid,
+    starting_points=_backlash_starting_points,
     form=_backlash_form,
     source="Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     confounded_with=(STICTION, 2.0),
@@ -74,11 +75,13 @@ BACKLASH = Effect(
 )
 
 
-def _relaxation_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
+def _relaxation_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("relaxation", "1/s", 0.0, 0.05, -0.05, 10.0),)
 
 
-def _relaxation_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _relaxation_starting_points(
+    _context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.1,), (1.0,))
 
 
@@ -88,7 +91,7 @@ RELAXATION = Effect(
     family="memory",
     site=Site.CORE,
     parameters=_relaxation_parameters,
-    starting_points=_relaxation_grid,
+    starting_points=_relaxation_starting_points,
     form=None,
     source="Bouc-Wen models with relaxation; Ikhouane and Rodellar, Systems with Hysteresis, section 2",
     similar_to="exponential-creep",
@@ -109,17 +112,19 @@ def _rate_dependent_loop_parameters(context: SimulationContext) -> tuple[Paramet
     )
 
 
-def _rate_dependent_loop_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _rate_dependent_loop_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.1 / context.force_coordinate.rate,),)
 
 
 RATE_DEPENDENT_LOOP = Effect(
     name="rate-dependent-loop",
-    summary="The loop's shape changes with the rate: beta, gamma (1 + k |u'|)",
+    summary="The shape of the loop depends on the rate: beta and gamma times (1 + k |u'|)",
     family="memory",
     site=Site.CORE,
     parameters=_rate_dependent_loop_parameters,
-    starting_points=_rate_dependent_loop_grid,
+    starting_points=_rate_dependent_loop_starting_points,
     form=None,
     source="Al Janaideh et al., generalized rate-dependent hysteresis models, 2009",
     similar_to="viscous, delay",
@@ -140,7 +145,9 @@ def _loop_asymmetry_parameters(context: SimulationContext) -> tuple[Parameter, .
     )
 
 
-def _loop_asymmetry_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _loop_asymmetry_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.04 / context.input_peak,),)
 
 
@@ -150,55 +157,74 @@ LOOP_ASYMMETRY = Effect(
     family="memory",
     site=Site.CORE,
     parameters=_loop_asymmetry_parameters,
-    starting_points=_loop_asymmetry_grid,
+    starting_points=_loop_asymmetry_starting_points,
     form=None,
     source="Wang and Wen, Parameter estimation of Bouc-Wen with asymmetry, 1998",
     similar_to="jump, offset, viscous-asymmetry",
     distinguished_by="the two branches of the loop are not mirror images",
 )
 
-#: Starting points: how quickly it turns, in one over the coordinate's peak, and g in parts of chi.
-_SECOND_HYSTERESIS_QUICK, _SECOND_HYSTERESIS_BENT = (0.3, 1.0, 2.5, 8.0, 25.0), (0.0, 0.8, -1.2)
+#: Starting points of chi, times the peak of the coordinate.
+_SECOND_HYSTERESIS_CHI = (0.3, 1.0, 2.5, 8.0, 25.0)
+
+#: Starting points of g, relative to chi.
+_SECOND_HYSTERESIS_G = (0.0, 0.8, -1.2)
 
 
 def _second_hysteresis_force(_x: float, _rate: float, z: float, numbers: Any) -> float:
     return numbers[0] * z
 
 
-def _second_hysteresis_memory(_x: float, rate: float, z: float, numbers: Any) -> float:
+def _second_hysteresis_derivative(_x: float, rate: float, z: float, numbers: Any) -> float:
     return rate - numbers[1] * abs(rate) * z - numbers[2] * rate * abs(z)
 
 
 def _second_hysteresis_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
-    frame = context.force_coordinate
-    turn = 1.0 / frame.peak
+    coordinate = context.force_coordinate
+    inverse_peak = 1.0 / coordinate.peak
     return (
-        Parameter("k", f"{frame.force_unit}/{frame.unit}", 0.0, 0.01 * frame.force * turn, frame.lower_bound),
-        Parameter("chi", f"1/{frame.unit}", turn, 0.3 * turn, 0.0, 100.0 * turn),
-        Parameter("g", f"1/{frame.unit}", 0.0, 0.3 * turn, -50.0 * turn, 50.0 * turn),
         Parameter(
-            "z0", frame.unit, 0.0, 0.05 * frame.peak, -3.0 * frame.peak, 3.0 * frame.peak, initial=True
+            "k",
+            f"{coordinate.force_unit}/{coordinate.unit}",
+            0.0,
+            0.01 * coordinate.force * inverse_peak,
+            coordinate.lower_bound,
+        ),
+        Parameter("chi", f"1/{coordinate.unit}", inverse_peak, 0.3 * inverse_peak, 0.0, 100.0 * inverse_peak),
+        Parameter(
+            "g", f"1/{coordinate.unit}", 0.0, 0.3 * inverse_peak, -50.0 * inverse_peak, 50.0 * inverse_peak
+        ),
+        Parameter(
+            "z0",
+            coordinate.unit,
+            0.0,
+            0.05 * coordinate.peak,
+            -3.0 * coordinate.peak,
+            3.0 * coordinate.peak,
+            initial=True,
         ),
     )
 
 
-def _second_hysteresis_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    frame = context.force_coordinate
+def _second_hysteresis_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    coordinate = context.force_coordinate
     return tuple(
-        (0.03 * frame.force / frame.peak, quick / frame.peak, bent * quick / frame.peak, 0.0)
-        for quick in _SECOND_HYSTERESIS_QUICK
-        for bent in _SECOND_HYSTERESIS_BENT
+        (0.03 * coordinate.force / coordinate.peak, chi / coordinate.peak, g * chi / coordinate.peak, 0.0)
+        for chi in _SECOND_HYSTERESIS_CHI
+        for g in _SECOND_HYSTERESIS_G
     )
 
 
 SECOND_HYSTERESIS = Effect(
     name="second-hysteresis",
-    summary="A hysteretic element, beside one that may be there: + k z, z' = x' - chi |x'| z - g x' |z|",
+    summary="An additional hysteretic element: + k z, z' = x' - chi |x'| z - g x' |z|",
     family="memory",
     site=Site.FORCE,
     parameters=_second_hysteresis_parameters,
-    starting_points=_second_hysteresis_grid,
-    form=ForceLaw(_second_hysteresis_force, _second_hysteresis_memory, initial_state_index=3),
+    starting_points=_second_hysteresis_starting_points,
+    form=ForceLaw(_second_hysteresis_force, _second_hysteresis_derivative, initial_state_index=3),
     source="Ikhouane and Rodellar, Systems with Hysteresis, section 2",
     similar_to="exponential-creep, coulomb-friction, cubic-stiffness; on a single sine also quadratic-drag",
     distinguished_by="memory that does not depend on the rate: repeat the record at another frequency",

@@ -1,4 +1,7 @@
-"""The model's own form is wrong: it lacks psi |y - c u|, |psi| (y - c u), psi(k-1), psi its regressors."""
+"""Model-form error: terms psi |y - c u|, |psi| (y - c u) and psi(k-1) that an identified model lacks.
+
+psi is a regressor of the model, c the slope of a line over the input.
+"""
 
 import re
 from collections.abc import Sequence
@@ -15,111 +18,124 @@ from islands.model.primitives import MUL, PRIMITIVES, SUB
 from islands.model.regressor import Regressor, regressor
 from islands.model.rendering import plain
 
-#: The name of the effect.
+#: Name of the effect.
 CORE_SHAPE = "core-shape"
 
-#: The name of the slope c.
+#: Name of the slope c.
 SLOPE = f"{CORE_SHAPE} c"
 
-#: How the slope is read within a term.
-_SLOPE_READ = re.compile(r"u2\(k-\d+\)")
+#: The slope in the text of a term.
+_SLOPE_PATTERN = re.compile(r"u2\(k-\d+\)")
 
-#: Regressors of the least degree that are folded, and those that are read a sample further back, at the most.
-_FOLDED, _SHIFTED = 4, 8
+#: Largest number of regressors of the lowest degree that are multiplied by a distance.
+_MAX_MULTIPLIED = 4
 
-#: A change of a coefficient that matters, relative to that of the regressor it stands beside, and the part of
-#: it that a derivative steps.
-_SCALE, _STEP = 0.01, 0.01
+#: Largest number of regressors that are delayed by a sample.
+_MAX_DELAYED = 8
 
-#: What it costs, in values, however many coefficients it has. That the form of an identified model is wrong
-#: is no surprise: it pays no more than what imitates it, a second hysteresis and friction beside it. Nor
-#: less: by chance every coefficient gains one, in minus twice the log-likelihood.
-_PRICE = 4
+#: Typical change of a coefficient, relative to the coefficient of the regressor that the term contains.
+_SCALE = 0.01
 
-#: Slopes c that are tried, in parts of the output's own slope over the input.
+#: Step of a finite difference, relative to the typical change.
+_STEP = 0.01
+
+#: Degrees of freedom of the effect in the information criterion, for any number of coefficients. An error in
+#: the form of an identified model is likely a priori. The penalty is therefore not larger than that of a
+#: second hysteresis with friction, which imitates the effect. It is not smaller either: by chance, each
+#: coefficient lowers minus twice the log-likelihood by one.
+_DEGREES_OF_FREEDOM = 4
+
+#: Trial values of the slope c, relative to the slope of a regression of the output on the input.
 _SLOPES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 
-#: Of these so many are starts; as far, in the ratio of the peaks, the slope may go; and directions that are
-#: so much fainter than the strongest one are left alone at the start.
-_STARTS, _FAR, _FAINT = 2, 10.0, 1e-2
+#: Number of trial slopes that become starting points.
+_STARTING_POINTS = 2
+
+#: Bound of the slope, relative to the ratio of the peaks of output and input.
+_MAX_SLOPE = 10.0
+
+#: Singular values below this fraction of the largest one are ignored in the fit of a starting point.
+_CUTOFF = 1e-2
 
 
 @dataclass(frozen=True, slots=True)
 class MissingTerm:
-    """A term that a model may lack; it vanishes wherever the model's own regressor does.
+    """Term that a model may lack; it is zero where the regressor that it contains is zero.
 
     Attributes
     ----------
     name : str
-        Of its coefficient.
+        Name of its coefficient.
     regressor : Regressor
-        Its second input, which never moves, is the slope c.
-    beside : int
-        Place of the model's regressor that it is made of.
-    folded : bool
-        It is that regressor times a distance in the unit of the output.
+        The term; its second input, a constant, is the slope c.
+    base_index : int
+        Index of the regressor of the model that the term contains.
+    has_distance : bool
+        Whether the term is that regressor times a distance, which has the unit of the output.
     """
 
     name: str
     regressor: Regressor
-    beside: int
-    folded: bool
+    base_index: int
+    has_distance: bool
 
-    def at(self, slope: float) -> Expression:
-        """Return the term with a slope written into it."""
-        return _at(self.regressor.expression, slope)
+    def with_slope(self, slope: float) -> Expression:
+        """Return the term with a value in place of the slope."""
+        return _insert_slope(self.regressor.expression, slope)
 
 
-def missing_terms(model: Model, among: Sequence[int]) -> tuple[MissingTerm, ...]:
-    """Return the terms that a model may lack, beside those of its regressors whose places are given.
+def missing_terms(model: Model, indices: Sequence[int]) -> tuple[MissingTerm, ...]:
+    """Return the terms that a model may lack, made of the regressors with the given indices.
 
-    What a loop's width depends on is the distance of the output from a line over the input: a polynomial in
-    both has no such fold. And a model reads no further back than it was told to.
+    The width of a hysteresis loop depends on the absolute distance of the output from a line over the input,
+    which a polynomial in both cannot represent. A delayed regressor may exceed the maximum
+    lag of the search that found the model.
     """
-    reading = sorted(
-        (place for place in among if model.regressors[place].lags),
+    ordered = sorted(
+        (place for place in indices if model.regressors[place].lags),
         key=lambda place: (model.regressors[place].degree, model.regressors[place].maximum_lag),
     )
-    least = model.regressors[reading[0]].degree if reading else 0
-    plainest = [place for place in reading if model.regressors[place].degree == least][:_FOLDED]
-    psi = {place: model.regressors[place].expression for place in reading}
-    near, far = (_distance(lag) for lag in (1, 2))
-    asked = [(place, _product(psi[place], _size(near)), True) for place in plainest]
-    asked += [(place, _product(psi[place], _size(far)), True) for place in plainest]
-    # The nearest one's size times levels is what models of hysteresis have.
-    asked += [(place, _product(_size(psi[place]), near), True) for place in plainest[1:]]
-    asked += [(place, Shift(1, psi[place]), False) for place in reading[:_SHIFTED]]
+    lowest = model.regressors[ordered[0]].degree if ordered else 0
+    simplest = [place for place in ordered if model.regressors[place].degree == lowest][:_MAX_MULTIPLIED]
+    psi = {place: model.regressors[place].expression for place in ordered}
+    latest, previous = (_make_distance(lag) for lag in (1, 2))
+    candidates = [(place, _multiply(psi[place], _take_absolute(latest)), True) for place in simplest]
+    candidates += [(place, _multiply(psi[place], _take_absolute(previous)), True) for place in simplest]
+    # Models of hysteresis already have the absolute value of the first regressor times levels.
+    candidates += [(place, _multiply(_take_absolute(psi[place]), latest), True) for place in simplest[1:]]
+    candidates += [(place, Shift(1, psi[place]), False) for place in ordered[:_MAX_DELAYED]]
     known, found = set(model.regressors), []
-    for place, expression, folded in asked:
+    for place, expression, has_distance in candidates:
         _, item = regressor(expression)
         if item is not None and item not in known:
             known.add(item)
             text = plain(item.expression, inputs=2).replace("u1(", "u(")
-            name = f"{CORE_SHAPE} {_SLOPE_READ.sub('c', text)}"
-            found.append(MissingTerm(name, item, place, folded))
+            name = f"{CORE_SHAPE} {_SLOPE_PATTERN.sub('c', text)}"
+            found.append(MissingTerm(name, item, place, has_distance))
     return tuple(found)
 
 
-def _distance(lag: int) -> Expression:
-    """Return y - c u, so many samples back."""
-    return Apply(SUB, (Lagged(0, lag), _product(Lagged(2, lag), Lagged(1, lag))))
+def _make_distance(lag: int) -> Expression:
+    """Return ``y - c u``, delayed by a number of samples."""
+    return Apply(SUB, (Lagged(0, lag), _multiply(Lagged(2, lag), Lagged(1, lag))))
 
 
-def _product(*factors: Expression) -> Expression:
+def _multiply(*factors: Expression) -> Expression:
     return Apply(MUL, factors)
 
 
-def _size(expression: Expression) -> Expression:
+def _take_absolute(expression: Expression) -> Expression:
     return Apply(PRIMITIVES["abs"], (expression,))
 
 
 def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm]) -> Effect:
-    """Return the effect on a model: the coefficients of the terms that it lacks, and their slope.
+    """Return the effect of a wrong form: the coefficients of the terms that a model lacks, and their slope.
 
     Parameters
     ----------
-    core : Simulator
-        The model as a simulation; the effect's parameters are its own, by their names.
+    simulator : Simulator
+        Simulator of the model; it supports the parameters of the effect by name.
+    model : Model
     terms : sequence of MissingTerm
     """
     theta = model.parameters
@@ -127,41 +143,43 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
         found = []
         for term in terms:
-            size = _SCALE * abs(theta[term.beside]) or _SCALE
-            found.append(Parameter(term.name, "", 0.0, size / context.output_peak if term.folded else size))
+            size = _SCALE * abs(theta[term.base_index]) or _SCALE
+            found.append(
+                Parameter(term.name, "", 0.0, size / context.output_peak if term.has_distance else size)
+            )
         slope = context.output_peak / context.input_peak
         unit = f"{context.output_unit}/{context.input_unit}"
-        return (*found, Parameter(SLOPE, unit, slope, 0.02 * slope, -_FAR * slope, _FAR * slope))
+        return (*found, Parameter(SLOPE, unit, slope, 0.02 * slope, -_MAX_SLOPE * slope, _MAX_SLOPE * slope))
 
-    def grid(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
-        seen = round(context.fit_end_time / context.dt)
+    def starting_points(context: SimulationContext, residual: Signal) -> tuple[tuple[float, ...], ...]:
+        fitted = round(context.fit_end_time / context.dt)
         own, added = simulator.parameters, parameters(context)[:-1]
-        at = np.array([each.nominal for each in own])
+        nominal = np.array([each.nominal for each in own])
 
-        def simulated(values: Signal, **shape: float) -> Signal:
-            return simulator.simulate(values, context.u, context, shape, ())[:seen]
+        def simulate(values: Signal, **shape: float) -> Signal:
+            return simulator.simulate(values, context.u, context, shape, ())[:fitted]
 
-        rest = simulated(at)
-        moved = at + _STEP * np.diag([each.scale for each in own])
-        known = [(simulated(values) - rest) / _STEP for values in moved]
-        u = context.u[:seen]
-        usual = float(np.polyfit(u, rest, 1)[0])
-        tried: list[tuple[float, tuple[float, ...]]] = []
-        for part in _SLOPES:
-            slope = part * usual
+        at_rest = simulate(nominal)
+        moved = nominal + _STEP * np.diag([each.scale for each in own])
+        known = [(simulate(values) - at_rest) / _STEP for values in moved]
+        u = context.u[:fitted]
+        regression_slope = float(np.polyfit(u, at_rest, 1)[0])
+        trials: list[tuple[float, tuple[float, ...]]] = []
+        for factor in _SLOPES:
+            slope = factor * regression_slope
             columns = known + [
-                (simulated(at, **{SLOPE: slope, each.name: _STEP * each.scale}) - rest) / _STEP
+                (simulate(nominal, **{SLOPE: slope, each.name: _STEP * each.scale}) - at_rest) / _STEP
                 for each in added
             ]
             design = np.column_stack(columns)
             if not np.isfinite(design).all():
                 continue
             sizes = np.linalg.norm(design, axis=0) + 1e-300
-            found = np.linalg.lstsq(design / sizes, residual[:seen], rcond=_FAINT)[0] / sizes
-            left = float(np.sum((residual[:seen] - design @ found) ** 2))
+            found = np.linalg.lstsq(design / sizes, residual[:fitted], rcond=_CUTOFF)[0] / sizes
+            remaining = float(np.sum((residual[:fitted] - design @ found) ** 2))
             scales = [each.scale for each in added]
-            tried.append((left, (*(found[len(own) :] * scales).tolist(), slope)))
-        return tuple(point for _, point in sorted(tried)[:_STARTS])
+            trials.append((remaining, (*(found[len(own) :] * scales).tolist(), slope)))
+        return tuple(point for _, point in sorted(trials)[:_STARTING_POINTS])
 
     return Effect(
         name=CORE_SHAPE,
@@ -169,28 +187,27 @@ def model_form(simulator: Simulator, model: Model, terms: Sequence[MissingTerm])
         family="shape",
         site=Site.CORE,
         parameters=parameters,
-        starting_points=grid,
+        starting_points=starting_points,
         form=None,
         source="Ikhouane and Rodellar, Systems with Hysteresis, section 2; Billings, Nonlinear System "
         "Identification, section 2",
         linear_parameters=len(terms),
-        extra_degrees_of_freedom=_PRICE - len(terms) - 1,
+        extra_degrees_of_freedom=_DEGREES_OF_FREEDOM - len(terms) - 1,
     )
 
 
-def _at(expression: Expression, slope: float) -> Expression:
+def _insert_slope(expression: Expression, slope: float) -> Expression:
     match expression:
         case Lagged(2, _):
             return Constant(slope)
         case Apply(primitive, arguments):
-            return Apply(primitive, tuple(_at(argument, slope) for argument in arguments))
+            return Apply(primitive, tuple(_insert_slope(argument, slope) for argument in arguments))
     return expression
 
 
-#: The effect for a model and the terms that it lacks.
 MODEL_FORM = EffectTemplate(
     CORE_SHAPE,
-    "The model's own form is wrong: it lacks psi |y - c u|, |psi| (y - c u), psi(k-1), psi its regressors",
+    "The model lacks terms psi |y - c u|, |psi| (y - c u) or psi(k-1), where psi is one of its regressors",
     similar_to="second-hysteresis, coulomb-friction, exponential-creep",
     distinguished_by="a loop that is too wide or too narrow wherever the input moves",
 )

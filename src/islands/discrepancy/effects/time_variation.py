@@ -8,35 +8,41 @@ import scipy
 from islands.discrepancy.interfaces.context import Parameter
 from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationContext, Site
 
-#: Instants that a search begins from, and parts of the fitted record that are left free at its ends: what
-#: changes there can be told from nothing by a few samples alone.
-INSTANTS, MARGIN = 27, 0.06
+#: Number of candidate instants of a change.
+INSTANTS = 27
+
+#: Margin at both ends of the estimation part, relative to its duration, without a search for changes: too few
+#: samples would show them.
+MARGIN = 0.06
 
 
-def instant_grid(context: SimulationContext) -> tuple[float, ...]:
-    """Return times that a search for a change begins from, in seconds."""
+def candidate_instants(context: SimulationContext) -> tuple[float, ...]:
+    """Return the instants from which the search for a change starts, in seconds."""
     first, last = instant_bounds(context)
     return tuple(float(time) for time in np.linspace(first, last, INSTANTS))
 
 
 def instant_bounds(context: SimulationContext) -> tuple[float, float]:
-    """Return the first and the last time at which a change may be looked for."""
+    """Return the first and the last possible instant of a change, in seconds."""
     return MARGIN * context.fit_end_time, (1.0 - MARGIN) * context.fit_end_time
 
 
 def smooth_step(context: SimulationContext, instant: float) -> Signal:
-    """Return 0 before an instant and 1 behind it, within a few samples: a jump would have no derivative."""
+    """Return a step from 0 to 1 at an instant, smoothed over a few samples so that it has a derivative."""
     out: Signal = scipy.special.expit((context.time - instant) / (2 * context.dt))
     return out
 
 
-def gain_over_time(own: Mapping[str, float], context: SimulationContext) -> Signal | float:
-    """Return the factor of a gain that steps or ages, for a core that understands both; 1 if it does not."""
+def gain_over_time(effect_parameters: Mapping[str, float], context: SimulationContext) -> Signal | float:
+    """Return the gain factor of the effects ``gain-step`` and ``ageing``; 1 if neither is active."""
     gain: Signal | float = 1.0
-    if "gain-step" in own:
-        gain = gain * (1.0 + own["gain-step"] * smooth_step(context, own["gain-step instant"]))
-    if "ageing" in own:
-        gain = gain * (1.0 + own["ageing"] * context.time / context.duration)
+    if "gain-step" in effect_parameters:
+        gain = gain * (
+            1.0
+            + effect_parameters["gain-step"] * smooth_step(context, effect_parameters["gain-step instant"])
+        )
+    if "ageing" in effect_parameters:
+        gain = gain * (1.0 + effect_parameters["ageing"] * context.time / context.duration)
     return gain
 
 
@@ -47,17 +53,19 @@ def _gain_step_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _gain_step_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
-    return tuple((0.02, instant) for instant in instant_grid(context))
+def _gain_step_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
+    return tuple((0.02, instant) for instant in candidate_instants(context))
 
 
 GAIN_STEP = Effect(
     name="gain-step",
-    summary="The gain changes at an instant: gain (1 + k) behind it",
+    summary="Step of the gain at an instant: gain (1 + k) after it",
     family="change",
     site=Site.CORE,
     parameters=_gain_step_parameters,
-    starting_points=_gain_step_grid,
+    starting_points=_gain_step_starting_points,
     form=None,
     source="Basseville and Nikiforov, Detection of Abrupt Changes",
     extra_degrees_of_freedom=1,
@@ -66,21 +74,21 @@ GAIN_STEP = Effect(
 )
 
 
-def _ageing_parameters(_scene: SimulationContext) -> tuple[Parameter, ...]:
+def _ageing_parameters(_context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("ageing", "", 0.0, 0.01, -0.9, 2.0),)
 
 
-def _ageing_grid(_scene: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _ageing_starting_points(_context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.02,),)
 
 
 AGEING = Effect(
     name="ageing",
-    summary="The gain drifts: gain (1 + k t / T) over the record's duration T",
+    summary="Drift of the gain: gain (1 + k t / T) over the record's duration T",
     family="change",
     site=Site.CORE,
     parameters=_ageing_parameters,
-    starting_points=_ageing_grid,
+    starting_points=_ageing_starting_points,
     form=None,
     source="Doebelin, Measurement Systems, section 3",
     similar_to="gain-step, linear-drift",

@@ -20,7 +20,7 @@ def _delay_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _delay_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _delay_starting_points(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
     return ((0.5 * context.dt,), (2 * context.dt,), (6 * context.dt,))
 
 
@@ -30,7 +30,7 @@ DELAY = Effect(
     family="timing",
     site=Site.INPUT,
     parameters=_delay_parameters,
-    starting_points=_delay_grid,
+    starting_points=_delay_starting_points,
     form=_delay_form,
     source="Ljung, System Identification, 2nd ed., section 16",
     similar_to="sensor-lag, resonance, viscous",
@@ -38,7 +38,7 @@ DELAY = Effect(
 )
 
 
-def _clock_skew_form(u: Signal, values: Signal, _scene: SimulationContext) -> Signal:
+def _clock_skew_form(u: Signal, values: Signal, _context: SimulationContext) -> Signal:
     return interpolate_at(u, np.arange(u.size) * (1.0 + values[0]))
 
 
@@ -46,17 +46,19 @@ def _clock_skew_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("e", "", 0.0, 0.01 * context.dt / context.fit_end_time, -0.02, 0.02),)
 
 
-def _clock_skew_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _clock_skew_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.5 * context.dt / context.fit_end_time,), (-0.5 * context.dt / context.fit_end_time,))
 
 
 CLOCK_SKEW = Effect(
     name="clock-skew",
-    summary="The clocks of input and output run apart: u(t (1 + e))",
+    summary="The clocks of input and output differ in rate: u(t (1 + e))",
     family="timing",
     site=Site.INPUT,
     parameters=_clock_skew_parameters,
-    starting_points=_clock_skew_grid,
+    starting_points=_clock_skew_starting_points,
     form=_clock_skew_form,
     source="Schoukens and Pintelon, System Identification: A Frequency Domain Approach, section 2",
     similar_to="delay",
@@ -72,24 +74,26 @@ def _sensor_lag_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     return (Parameter("tau", "s", 0.0, context.dt, 0.0, context.fit_end_time / 4),)
 
 
-def _sensor_lag_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _sensor_lag_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return ((0.3 * context.dt,), (2 * context.dt,), (6 * context.dt,))
 
 
 SENSOR_LAG = Effect(
     name="sensor-lag",
-    summary="The sensor follows with a time constant: tau y' + y = v",
+    summary="First-order lag of the sensor: tau y' + y = v",
     family="timing",
     site=Site.OUTPUT,
     parameters=_sensor_lag_parameters,
-    starting_points=_sensor_lag_grid,
+    starting_points=_sensor_lag_starting_points,
     form=_sensor_lag_form,
     source="Doebelin, Measurement Systems, section 3",
     similar_to="delay, resonance, viscous",
     distinguished_by="the amplitude falls with the frequency",
 )
 
-#: Radians of a sample: a faster mode is not there for this record.
+#: Largest natural frequency in radians per sample; a faster mode has no effect on the record.
 FASTEST = 2.6
 
 
@@ -98,8 +102,9 @@ def _resonance_form(y: Signal, values: Signal, context: SimulationContext) -> Si
     w = 2 * np.pi / period if period > 0.0 else np.inf
     if w * context.dt > FASTEST:
         return y
-    # Bilinear, with the resonance itself kept where it is. In finer steps, the output interpolated between
-    # its samples, it takes the place of a delay where these are sparse (the gas furnace, the hair dryer).
+    # Bilinear transform, prewarped at the resonance. A discretisation with finer steps, which interpolates
+    # the output between samples, would imitate a delay on coarsely sampled records (the gas furnace, the hair
+    # dryer).
     k = w / np.tan(w * context.dt / 2)
     scale = k * k + 2 * zeta * w * k + w * w
     b = w * w / scale
@@ -116,7 +121,9 @@ def _resonance_parameters(context: SimulationContext) -> tuple[Parameter, ...]:
     )
 
 
-def _resonance_grid(context: SimulationContext, _residual: Signal) -> tuple[tuple[float, ...], ...]:
+def _resonance_starting_points(
+    context: SimulationContext, _residual: Signal
+) -> tuple[tuple[float, ...], ...]:
     return tuple(
         (period * context.dt, zeta) for period in (2.9, 5.0, 9.0, 16.0, 30.0) for zeta in (0.03, 0.1, 0.3)
     )
@@ -124,11 +131,11 @@ def _resonance_grid(context: SimulationContext, _residual: Signal) -> tuple[tupl
 
 RESONANCE = Effect(
     name="resonance",
-    summary="A second-order mode follows the output: y'' + 2 zeta w y' + w^2 y = w^2 v",
+    summary="Second-order mode in series with the output: y'' + 2 zeta w y' + w^2 y = w^2 v",
     family="timing",
     site=Site.OUTPUT,
     parameters=_resonance_parameters,
-    starting_points=_resonance_grid,
+    starting_points=_resonance_starting_points,
     form=_resonance_form,
     source="Ljung, System Identification, 2nd ed., section 4",
     similar_to="delay, sensor-lag",

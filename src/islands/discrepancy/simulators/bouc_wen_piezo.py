@@ -1,4 +1,4 @@
-"""The Bouc-Wen piezoelectric actuator of the paper's equation (11), with places for effects."""
+"""Bouc-Wen piezoelectric actuator, equation (11) of the paper."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ class BoucWenPiezoSimulator:
     Attributes
     ----------
     piezo : BoucWenPiezo
-        Nominal parameters; by default the paper's.
+        Nominal parameters; by default those of the paper.
     """
 
     piezo: BoucWenPiezo = field(default_factory=BoucWenPiezo)
@@ -38,10 +38,10 @@ class BoucWenPiezoSimulator:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """A, beta, gamma, dp: a fifth to five times what they are nominally."""
+        """A, beta, gamma and dp, between a fifth and five times their nominal values."""
         return tuple(
-            Parameter(name, unit, nominal, part * abs(nominal), *_about(nominal))
-            for name, unit, nominal, part in (
+            Parameter(name, unit, nominal, fraction * abs(nominal), *_make_bounds(nominal))
+            for name, unit, nominal, fraction in (
                 ("A", "um/V", self.piezo.A, 0.01),
                 ("beta", "1/V", self.piezo.beta, 0.03),
                 ("gamma", "1/V", self.piezo.gamma, 0.03),
@@ -50,26 +50,31 @@ class BoucWenPiezoSimulator:
         )
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the input as the coordinate."""
         return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         A, beta, gamma, dp = values
         h = np.empty_like(x)
         bouc_wen(
             np.ascontiguousarray(x),
             *(context.dt, A, beta, gamma),
             *(
-                own.get("relaxation", 0.0),
-                own.get("rate-dependent-loop", 0.0),
-                own.get("loop-asymmetry", 0.0),
+                effect_parameters.get("relaxation", 0.0),
+                effect_parameters.get("rate-dependent-loop", 0.0),
+                effect_parameters.get("loop-asymmetry", 0.0),
             ),
             *(0.0, h),
         )
-        return dp * gain_over_time(own, context) * x - h + add_output_forces(x, context, forces)
+        return dp * gain_over_time(effect_parameters, context) * x - h + add_output_forces(x, context, forces)
 
 
 def make_bouc_wen_piezo(
@@ -79,6 +84,6 @@ def make_bouc_wen_piezo(
     return BoucWenPiezoSimulator(replace(BoucWenPiezo(), **given))
 
 
-def _about(nominal: float) -> tuple[float, float]:
+def _make_bounds(nominal: float) -> tuple[float, float]:
     ends = (0.2 * nominal, 5.0 * nominal)
     return min(ends), max(ends)

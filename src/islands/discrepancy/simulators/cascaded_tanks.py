@@ -1,4 +1,4 @@
-"""Two tanks in cascade: a pump fills the upper one, the level of the lower one is measured."""
+"""Two tanks in cascade: a pump fills the upper tank, the level of the lower tank is measured."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,29 +16,34 @@ from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.systems.tanks import cascade
 
-#: What the states are called.
-UPPER, LOWER = "upper", "lower"
+#: Name of the level of the upper tank in effects.
+UPPER = "upper"
 
-#: Where an estimate begins: how long the lower tank takes to empty, in parts of the record, and how high the
-#: upper one stands beside the lower one.
-_SLOW, _HIGH = np.geomspace(0.005, 0.2, 8), (0.3, 1.0, 3.0)
+#: Name of the level of the lower tank in effects.
+LOWER = "lower"
+
+#: Trial values of the time in which the lower tank empties, relative to the duration of the record.
+_EMPTYING_TIMES = np.geomspace(0.005, 0.2, 8)
+
+#: Trial values of the level of the upper tank, relative to that of the lower tank.
+_LEVEL_RATIOS = (0.3, 1.0, 3.0)
 
 
 @dataclass(frozen=True, slots=True)
 class CascadedTanksSimulator:
     """``x1' = k3 u - k1 sqrt(x1)``, ``x2' = k1 sqrt(x1) - k2 sqrt(x2)``, ``y = x2``.
 
-    Both tanks are as wide as each other: the level of the upper one, which nobody measures, has the unit of
-    the other's.
+    Both tanks have the same cross section. The level of the upper tank is not measured and has the unit of
+    the output.
 
     Attributes
     ----------
     k1, k2, k3 : float
-        Outflow of the upper and of the lower tank, and the pump's gain.
+        Outflow constants of the upper and of the lower tank, and gain of the pump.
     initial : tuple of float
-        Levels at the first sample, upper and lower.
+        Levels of the upper and of the lower tank at the first sample.
     units : tuple of str
-        Of input and output.
+        Units of input and output.
     """
 
     k1: float
@@ -59,7 +64,7 @@ class CascadedTanksSimulator:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The three constants, and the levels at the first sample."""
+        """Constants k1, k2, k3, and the levels at the first sample."""
         pump, level = self.units
         flow = f"{level}^0.5/s"
         return (
@@ -78,29 +83,37 @@ class CascadedTanksSimulator:
         )
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the input as the coordinate."""
         return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], _forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        _forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         k1, k2, k3, upper, lower = map(float, values)
-        gain, offset = k3 * gain_over_time(own, context), k3 * own.get(f"input-offset:{UPPER}", 0.0)
+        gain, offset = (
+            k3 * gain_over_time(effect_parameters, context),
+            k3 * effect_parameters.get(f"input-offset:{UPPER}", 0.0),
+        )
         y = np.empty(x.size)
         cascade(
             *(x * gain + offset, context.get_intersample_values(x) * gain + offset, context.dt),
             (
                 k1,
-                own.get(f"outflow-law:{UPPER}", 0.0),
-                own.get(f"state-clip:{UPPER}", inf),
-                own.get(f"state-clip:{UPPER} caught", 0.0),
+                effect_parameters.get(f"outflow-law:{UPPER}", 0.0),
+                effect_parameters.get(f"state-clip:{UPPER}", inf),
+                effect_parameters.get(f"state-clip:{UPPER} caught", 0.0),
             ),
             (
                 k2,
-                own.get(f"outflow-law:{LOWER}", 0.0),
-                own.get(f"state-clip:{LOWER}", inf),
-                k3 * own.get(f"input-offset:{LOWER}", 0.0),
+                effect_parameters.get(f"outflow-law:{LOWER}", 0.0),
+                effect_parameters.get(f"state-clip:{LOWER}", inf),
+                k3 * effect_parameters.get(f"input-offset:{LOWER}", 0.0),
             ),
             *(max(upper, 0.0), max(lower, 0.0), y),
         )
@@ -112,25 +125,28 @@ def make_cascaded_tanks(
 ) -> CascadedTanksSimulator:
     """Make a simulator; estimate the parameters that are not given from the estimation part of a record.
 
-    A start that holds the balance of mean flows for every pair of a grid, and the best of them: the analysis
-    calibrates it.
+    Each point of a grid satisfies the balance of mean flows. The point whose free run has the smallest error
+    is the initial value of the calibration.
     """
     record = record[:estimation_samples]
     u, y = np.ascontiguousarray(record.u[:, 0]), record.y
     units = (record.input_units[0] or "1", record.output_unit or "1")
     level, pumped = max(float(np.mean(y)), 1e-6), max(abs(float(np.mean(u))), 1e-6)
-    starts = []
-    for slow in _SLOW * record.samples * record.dt:
-        for high in _HIGH:
-            k2 = given.get("k2", 2.0 * sqrt(level) / slow)
-            k1 = given.get("k1", k2 / sqrt(high))
+    candidates = []
+    for emptying_time in _EMPTYING_TIMES * record.samples * record.dt:
+        for ratio in _LEVEL_RATIOS:
+            k2 = given.get("k2", 2.0 * sqrt(level) / emptying_time)
+            k1 = given.get("k1", k2 / sqrt(ratio))
             k3 = given.get("k3", k2 * sqrt(level) / pumped)
-            start = max(float(y[0]), 0.0)
-            starts.append(CascadedTanksSimulator(k1, k2, k3, (start * high, start), units))
-    return min(starts, key=lambda simulator: float(np.mean((y - _free_run(simulator, u, record.dt)) ** 2)))
+            lower = max(float(y[0]), 0.0)
+            candidates.append(CascadedTanksSimulator(k1, k2, k3, (lower * ratio, lower), units))
+    return min(
+        candidates,
+        key=lambda simulator: float(np.mean((y - _simulate_nominal(simulator, u, record.dt)) ** 2)),
+    )
 
 
-def _free_run(simulator: CascadedTanksSimulator, u: Signal, dt: float) -> Signal:
+def _simulate_nominal(simulator: CascadedTanksSimulator, u: Signal, dt: float) -> Signal:
     context = SimulationContext(u, dt, {}, {}, 1.0, 1.0, *simulator.units, u.size * dt)
     values = np.array([parameter.nominal for parameter in simulator.parameters])
     return simulator.simulate(values, u, context, {}, ())

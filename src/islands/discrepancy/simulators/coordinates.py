@@ -1,4 +1,4 @@
-"""The coordinates of simulations without inertia, and of those that move."""
+"""Force coordinates of simulators without and with inertia."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from islands.discrepancy.interfaces.context import ForceCoordinate, Signal, Simu
 
 
 def input_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
-    """Return the input as the coordinate: forces add to the output at once."""
+    """Return the input as the coordinate, for simulators without inertia: forces are added to the output."""
     rate = float(np.std(np.diff(context.u))) / context.dt or 1.0
     return ForceCoordinate(
         context.input_unit, context.input_peak, rate, context.output_unit, peak_amplitude(output)
@@ -14,7 +14,7 @@ def input_coordinate(context: SimulationContext, output: Signal) -> ForceCoordin
 
 
 def output_coordinate(context: SimulationContext, output: Signal) -> ForceCoordinate:
-    """Return the output as the coordinate: forces act beside the input, and move it."""
+    """Return the output as the coordinate, for simulators with inertia: forces are added to the input."""
     rate = float(np.std(np.diff(output))) / context.dt or 1.0
     return ForceCoordinate(
         context.output_unit,
@@ -28,5 +28,5 @@ def output_coordinate(context: SimulationContext, output: Signal) -> ForceCoordi
 
 
 def peak_amplitude(signal: Signal) -> float:
-    """Return the largest absolute value."""
+    """Return the largest absolute value; 1 if the signal is zero."""
     return float(np.max(np.abs(signal))) or 1.0

@@ -1,4 +1,4 @@
-"""A simulation with effects in it: input maps, the core with its forces, output maps."""
+"""Simulator with effects: input maps, simulation with forces, output maps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,55 +12,57 @@ from islands.discrepancy.interfaces.effect import Effect, ForceLaw, Site
 from islands.discrepancy.interfaces.simulator import Forces, Simulator
 from islands.errors import SettingsError
 
-#: Outputs of the core that are remembered: derivatives ask for the same one again and again.
-_REMEMBERED = 4
+#: Cached outputs before the output maps: finite differences need the same one several times.
+_CACHE_SIZE = 4
 
 _NONE: Mapping[str, float] = MappingProxyType({})
 
-#: An output that is so many times its peak has exploded: its squares would soon be no numbers any more.
-_EXPLODED = 1e6
+#: A simulation diverges if its output exceeds its nominal peak by this factor; squares would overflow later.
+_DIVERGENCE_FACTOR = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExtendedSimulator:
-    """A core and the effects in it, one vector of values for all: the core's first, then each effect's.
+    """Simulator with effects. One vector has the values of the simulator, then those of each effect.
 
     Attributes
     ----------
     simulator : Simulator
     effects : tuple of Effect
-        In the order of the catalogue, which is the order in which maps act.
+        In the order of the catalogue, in which maps act.
     context : SimulationContext
+    parameters : tuple of Parameter
+        Parameters of the simulator, then those of each effect.
     """
 
     simulator: Simulator
     effects: tuple[Effect, ...]
     context: SimulationContext
     parameters: tuple[Parameter, ...] = field(init=False)
-    _parts: tuple[slice, ...] = field(init=False)
-    _inner: NDArray[np.bool_] = field(init=False)
-    _known: dict[bytes, Signal] = field(init=False, default_factory=dict)
+    _slices: tuple[slice, ...] = field(init=False)
+    _before_output: NDArray[np.bool_] = field(init=False)
+    _cache: dict[bytes, Signal] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        own = len(self.simulator.parameters)
-        parameters, parts, inner = list(self.simulator.parameters), [], [True] * own
+        parameters = list(self.simulator.parameters)
+        slices, before_output = [], [True] * len(parameters)
         for effect in self.effects:
             added = effect.parameters(self.context)
-            parts.append(slice(len(parameters), len(parameters) + len(added)))
+            slices.append(slice(len(parameters), len(parameters) + len(added)))
             parameters += added
-            inner += [effect.site != Site.OUTPUT] * len(added)
+            before_output += [effect.site != Site.OUTPUT] * len(added)
         object.__setattr__(self, "parameters", tuple(parameters))
-        object.__setattr__(self, "_parts", tuple(parts))
-        object.__setattr__(self, "_inner", np.array(inner, dtype=bool))
+        object.__setattr__(self, "_slices", tuple(slices))
+        object.__setattr__(self, "_before_output", np.array(before_output, dtype=bool))
 
     @property
     def nominal(self) -> Signal:
-        """Values of the core as it is, and of effects that do nothing."""
+        """Nominal values of the simulator and of the effects, at which effects vanish."""
         return np.array([parameter.nominal for parameter in self.parameters])
 
     @property
     def bounds(self) -> tuple[Signal, Signal]:
-        """Lower and upper bounds."""
+        """Lower and upper bounds of the values."""
         return (
             np.array([parameter.lower for parameter in self.parameters]),
             np.array([parameter.upper for parameter in self.parameters]),
@@ -68,74 +70,92 @@ class ExtendedSimulator:
 
     @property
     def scales(self) -> Signal:
-        """Changes that matter."""
+        """Typical changes of the values."""
         return np.array([parameter.scale for parameter in self.parameters])
 
     def get_slice(self, effect: Effect) -> slice:
-        """Return where an effect's values are."""
-        return self._parts[self.effects.index(effect)]
+        """Return the slice of the values that belongs to an effect."""
+        return self._slices[self.effects.index(effect)]
 
     def with_effects(self, effects: Sequence[Effect]) -> "ExtendedSimulator":
-        """Return the core with other effects in it."""
+        """Return the same simulator with other effects."""
         return replace(self, effects=tuple(effects))
 
-    def simulate(self, values: Signal, own: Mapping[str, float] = _NONE, forces: Forces = ()) -> Signal:
-        """Simulate the whole record, shape (samples,).
+    def simulate(
+        self, values: Signal, effect_parameters: Mapping[str, float] = _NONE, forces: Forces = ()
+    ) -> Signal:
+        """Simulate the whole record.
 
-        ``own`` and ``forces`` are more of what the core takes.
+        Parameters
+        ----------
+        values : ndarray, shape (parameters,)
+        effect_parameters, forces
+            Further arguments of `Simulator.simulate`, in addition to those of the effects.
 
-        Values that a search tries may make something explode: what comes back is not a number then.
+        Returns
+        -------
+        ndarray, shape (samples,)
+            NaN in every sample if the simulation diverges.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            more = bool(own or forces)
             y = (
-                self._simulate_core(values, own, forces)
-                if more
-                else self._simulate_without_output_maps(values)
+                self._simulate_core(values, effect_parameters, forces)
+                if effect_parameters or forces
+                else self._simulate_cached(values)
             )
-            for effect, part in zip(self.effects, self._parts, strict=True):
+            for effect, part in zip(self.effects, self._slices, strict=True):
                 if effect.site == Site.OUTPUT:
                     y = apply_map(effect, y, values[part], self.context)
-            exploded = not float(np.max(np.abs(y))) < _EXPLODED * self.context.output_peak
-        return np.full_like(y, np.nan) if exploded else y
+            diverged = not float(np.max(np.abs(y))) < _DIVERGENCE_FACTOR * self.context.output_peak
+        return np.full_like(y, np.nan) if diverged else y
 
-    def _simulate_without_output_maps(self, values: Signal) -> Signal:
-        key = values[self._inner].tobytes()
-        y = self._known.get(key)
+    def _simulate_cached(self, values: Signal) -> Signal:
+        """Simulate the output before the output maps, or return it from the cache."""
+        key = values[self._before_output].tobytes()
+        y = self._cache.get(key)
         if y is None:
             y = self._simulate_core(values, _NONE, ())
-            while len(self._known) >= _REMEMBERED:
-                del self._known[next(iter(self._known))]
-            self._known[key] = y
+            while len(self._cache) >= _CACHE_SIZE:
+                del self._cache[next(iter(self._cache))]
+            self._cache[key] = y
         return y
 
-    def _simulate_core(self, values: Signal, more: Mapping[str, float], further: Forces) -> Signal:
+    def _simulate_core(
+        self, values: Signal, effect_parameters: Mapping[str, float], further: Forces
+    ) -> Signal:
+        """Simulate the output before the output maps."""
         x, forces = self.context.u, list(further)
-        own = dict(more)
-        simulator = values[: len(self.simulator.parameters)].copy()
-        for effect, part in zip(self.effects, self._parts, strict=True):
+        parameters = dict(effect_parameters)
+        simulator_values = values[: len(self.simulator.parameters)].copy()
+        for effect, part in zip(self.effects, self._slices, strict=True):
             match effect.site:
                 case Site.INPUT:
                     x = apply_map(effect, x, values[part], self.context)
                 case Site.CORE:
-                    own |= {
+                    parameters |= {
                         parameter.name: float(value)
                         for parameter, value in zip(self.parameters[part], values[part], strict=True)
                     }
                 case Site.PARAMETER:
-                    simulator[self._apply_maps(effect)] *= 1.0 + values[part][0]
+                    simulator_values[self._get_parameter_index(effect)] *= 1.0 + values[part][0]
                 case Site.FORCE:
                     assert isinstance(effect.form, ForceLaw)
                     forces.append((effect.form, values[part]))
-        return self.simulator.simulate(simulator, x, self.context, own, forces)
+        return self.simulator.simulate(simulator_values, x, self.context, parameters, forces)
 
-    def _apply_maps(self, effect: Effect) -> int:
+    def _get_parameter_index(self, effect: Effect) -> int:
         _, _, name = effect.name.partition(":")
         return [parameter.name for parameter in self.simulator.parameters].index(name)
 
 
 def apply_map(effect: Effect, signal: Signal, values: Signal, context: SimulationContext) -> Signal:
-    """Return a signal behind the map of an effect."""
+    """Apply the map of an effect to a signal.
+
+    Raises
+    ------
+    SettingsError
+        The map raises an exception or changes the shape of the signal.
+    """
     assert callable(effect.form)
     try:
         out = np.asarray(effect.form(signal, values, context), dtype=np.float64)
@@ -147,8 +167,8 @@ def apply_map(effect: Effect, signal: Signal, values: Signal, context: Simulatio
 
 
 def invalid_effect_error(effect: Effect, why: str) -> SettingsError:
-    """Return the error of an entry of the catalogue that does not do what it says."""
+    """Return the error for an effect whose definition is invalid."""
     file = effect.parameters.__code__.co_filename
     return SettingsError(
-        f"the effect {effect.name} is broken: {why}; mend {file} or take it out of the catalogue"
+        f"the effect {effect.name} is broken: {why}; correct {file} or remove the effect from the catalogue"
     )

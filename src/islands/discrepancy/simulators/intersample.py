@@ -1,4 +1,4 @@
-"""A core in finer steps than the record's: what its input does between samples, and how well it is solved."""
+"""Simulation with a smaller step than the sampling time, and the input between samples."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ from islands.discrepancy.interfaces.simulator import Forces, Simulator
 
 
 class SimulatorWrapper:
-    """A core around another one; what it does not say itself, that one says."""
+    """Base class of wrappers of a simulator; forwards all declarations."""
 
     __slots__ = ()
 
@@ -21,50 +21,50 @@ class SimulatorWrapper:
 
     @property
     def name(self) -> str:
-        """As the core's."""
+        """Name of the wrapped simulator."""
         return self.simulator.name
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """As the core's."""
+        """Parameters of the wrapped simulator."""
         return self.simulator.parameters
 
     @property
     def sites(self) -> frozenset[Site]:
-        """As the core's."""
+        """Sites of the wrapped simulator."""
         return self.simulator.sites
 
     @property
     def supported_effects(self) -> frozenset[str]:
-        """As the core's."""
+        """Supported effects of the wrapped simulator."""
         return self.simulator.supported_effects
 
     @property
     def built_in_effects(self) -> frozenset[str]:
-        """As the core's."""
+        """Built-in effects of the wrapped simulator."""
         return self.simulator.built_in_effects
 
     @property
     def state_effects(self) -> tuple[Effect, ...]:
-        """As the core's."""
+        """State effects of the wrapped simulator."""
         return self.simulator.state_effects
 
     @property
     def is_continuous_time(self) -> bool:
-        """As the core's."""
+        """Whether the wrapped simulator integrates a differential equation."""
         return self.simulator.is_continuous_time
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the force coordinate of the wrapped simulator."""
         return self.simulator.make_force_coordinate(context, output)
 
 
-#: Inputs that are remembered between their samples.
-_REMEMBERED = 2
+#: Number of cached resampled inputs.
+_CACHE_SIZE = 2
 
 
 class InterSample(StrEnum):
-    """What an input does between two samples."""
+    """Behaviour of the input between samples: linear, constant, or band-limited interpolation."""
 
     FOH = "first-order"
     ZOH = "zero-order"
@@ -73,58 +73,64 @@ class InterSample(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResampledSimulator(SimulatorWrapper):
-    """A core that is simulated ``oversampling`` as often as it is recorded.
+    """Simulator with ``oversampling`` steps per sample.
 
     Attributes
     ----------
     simulator : Simulator
     intersample : InterSample
-        It runs straight from sample to sample, stays, or is the smoothest that passes through all samples.
     oversampling : int
+        Steps per sample.
     """
 
     simulator: Simulator
     intersample: InterSample = InterSample.FOH
     oversampling: int = 1
-    _known: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
+    _cache: dict[bytes, tuple[Signal, Signal]] = field(init=False, default_factory=dict)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        u, midway = self._finer(x)
-        finer = replace(context, u=u, dt=context.dt / self.oversampling, intersample_values=midway)
-        return self.simulator.simulate(values, u, finer, own, forces)[:: self.oversampling]
+        """Simulate the output; see `Simulator.simulate`."""
+        u, between = self._resample(x)
+        resampled = replace(context, u=u, dt=context.dt / self.oversampling, intersample_values=between)
+        return self.simulator.simulate(values, u, resampled, effect_parameters, forces)[:: self.oversampling]
 
-    def _finer(self, x: Signal) -> tuple[Signal, Signal]:
+    def _resample(self, x: Signal) -> tuple[Signal, Signal]:
         key = x.tobytes()
-        if key not in self._known:
-            while len(self._known) >= _REMEMBERED:
-                del self._known[next(iter(self._known))]
-            self._known[key] = resample_context(x, self.intersample, self.oversampling)
-        return self._known[key]
+        if key not in self._cache:
+            while len(self._cache) >= _CACHE_SIZE:
+                del self._cache[next(iter(self._cache))]
+            self._cache[key] = resample_input(x, self.intersample, self.oversampling)
+        return self._cache[key]
 
 
-def resample_context(x: Signal, hold: InterSample, times: int) -> tuple[Signal, Signal]:
-    """Return a signal ``times`` as often, and midway and at the end of each of its steps.
+def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tuple[Signal, Signal]:
+    """Resample an input ``oversampling`` times as fast, with its values within each step.
 
     Returns
     -------
-    ndarray, shape (times * samples,)
-        Every ``times``-th one is a sample.
-    ndarray, shape (2, times * samples)
+    ndarray, shape (oversampling * samples,)
+        Input at the start of each step; every ``oversampling``-th value is a sample.
+    ndarray, shape (2, oversampling * samples)
+        Input in the middle and at the end of each step, before a discontinuity.
     """
-    match hold:
+    match intersample:
         case InterSample.ZOH:
-            stays = np.repeat(x, times)
-            return stays, np.stack([stays, stays])
+            held = np.repeat(x, oversampling)
+            return held, np.stack([held, held])
         case InterSample.FOH:
-            at = np.arange(2 * times * x.size + 1) / (2 * times)
-            straight = np.interp(at, np.arange(x.size), x)
+            at = np.arange(2 * oversampling * x.size + 1) / (2 * oversampling)
+            fine = np.interp(at, np.arange(x.size), x)
         case InterSample.BAND_LIMITED:
-            # Its ends are led on by reflection: a filter that meets zeros rings.
+            # Both ends are extended by reflection: with zeros beyond the ends, the filter would ring.
             spare = min(64, x.size - 1)
             longer = np.concatenate([2 * x[0] - x[spare:0:-1], x, 2 * x[-1] - x[-2 : -spare - 2 : -1]])
-            smooth = scipy.signal.resample_poly(longer, 2 * times, 1, window=("kaiser", 8.0))
-            straight = smooth[2 * times * spare : 2 * times * (spare + x.size) + 1]
-    return straight[:-1:2].copy(), np.stack([straight[1::2], straight[2::2]])
+            smooth = scipy.signal.resample_poly(longer, 2 * oversampling, 1, window=("kaiser", 8.0))
+            fine = smooth[2 * oversampling * spare : 2 * oversampling * (spare + x.size) + 1]
+    return fine[:-1:2].copy(), np.stack([fine[1::2], fine[2::2]])

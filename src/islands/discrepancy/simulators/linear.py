@@ -1,4 +1,4 @@
-"""A linear model of some order, estimated here, with places for effects."""
+"""Linear model of any order, and its estimation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,25 +14,28 @@ from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import RecordError
 
-#: Rounds of Steiglitz and McBride.
-_ROUNDS = 12
+#: Iterations of the method of Steiglitz and McBride.
+_ITERATIONS = 12
 
-#: A change of a coefficient that matters, relative to the largest of its kind.
+#: Typical change of a coefficient: relative to the largest one in the numerator, absolute in the denominator.
 _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearSimulator:
-    """``A(q) (y - level) = B(q) u``, from a state of its own on: as many poles as zeros, delayed or not.
+    """``A(q) (y - level) = B(q) u``, with as many poles as zeros, an input delay and an initial state.
 
     Attributes
     ----------
     numerator, denominator : ndarray, shapes (order + 1,) and (order,)
-        Of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ..., both on the side of u.
+        Coefficients of u(k - delay), u(k - delay - 1), ... and of y(k-1), y(k-2), ..., both on the right-hand
+        side.
     level : float
         Output at rest.
     delay : int
-        Samples.
+        Input delay in samples.
+    unit : str
+        Unit of the output.
     """
 
     numerator: Signal
@@ -49,7 +52,7 @@ class LinearSimulator:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Coefficients, level, and the filter's state at the first sample."""
+        """Coefficients, level, and state of the filter at the first sample."""
         order = self.denominator.size
         gain = _SCALE * float(np.max(np.abs(self.numerator))) or _SCALE
         return (
@@ -60,31 +63,36 @@ class LinearSimulator:
         )
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the input as the coordinate."""
         return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, _own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        _effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         order = self.denominator.size
         numerator, denominator = values[: order + 1], values[order + 1 : 2 * order + 1]
-        late = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
+        delayed = np.concatenate([np.full(self.delay, x[0]), x[: x.size - self.delay]])
         level, state = values[2 * order + 1], values[2 * order + 2 :]
-        # As if the first input had been there for ever, but for the state.
+        # The input is constant before the first sample; the state is a deviation from that equilibrium.
         filtered, _ = scipy.signal.lfilter(
-            numerator, np.concatenate([[1.0], -denominator]), late - x[0], zi=state
+            numerator, np.concatenate([[1.0], -denominator]), delayed - x[0], zi=state
         )
         return level + filtered + add_output_forces(x, context, forces)
 
 
 def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
-    """Estimate a linear model by the method of Steiglitz and McBride (1965): least squares of its simulation.
+    """Estimate a linear model by the method of Steiglitz and McBride (1965): least simulation error.
 
     Raises
     ------
     RecordError
-        The record is shorter than ten times what is estimated.
+        The record has fewer than ten samples per estimated parameter.
     """
     u, y = record.u[:, 0], record.y
     if record.samples < 10 * (2 * order + 2) + delay:
@@ -92,32 +100,33 @@ def estimate_linear(order: int, delay: int, record: Dataset) -> LinearSimulator:
             f"{record.samples} samples are too few to estimate a linear model of order {order}: take a lower "
             "order or a longer record"
         )
-    late = np.concatenate([np.full(delay, u[0]), u[: u.size - delay]]) - u[0]
-    found, least = None, np.inf
+    delayed = np.concatenate([np.full(delay, u[0]), u[: u.size - delay]]) - u[0]
+    found, smallest = None, np.inf
     denominator = np.zeros(order)
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         prefilter = np.concatenate([[1.0], -denominator])
-        numerator, denominator, level = _least_squares(late, y, order, prefilter)
+        numerator, denominator, level = _least_squares(delayed, y, order, prefilter)
         if order and np.max(np.abs(np.roots(np.concatenate([[1.0], -denominator])))) >= 1.0:
             break
-        simulated = level + scipy.signal.lfilter(numerator, np.concatenate([[1.0], -denominator]), late)
-        missed = float(np.mean((y - simulated)[order + delay :] ** 2))
-        if missed < least:
-            found, least = (numerator, denominator, level), missed
-    if found is None:  # not stable: what does not move at all is
+        simulated = level + scipy.signal.lfilter(numerator, np.concatenate([[1.0], -denominator]), delayed)
+        mean_square = float(np.mean((y - simulated)[order + delay :] ** 2))
+        if mean_square < smallest:
+            found, smallest = (numerator, denominator, level), mean_square
+    if found is None:  # no iteration gave a stable model: use a static gain
         found = (np.append(np.ptp(y) / (np.ptp(u) or 1.0), np.zeros(order)), np.zeros(order), float(y.mean()))
     return LinearSimulator(*found, delay, record.output_unit or "1")
 
 
 def _least_squares(u: Signal, y: Signal, order: int, prefilter: Signal) -> tuple[Signal, Signal, float]:
-    past = scipy.signal.lfilter([1.0], prefilter, u)
-    seen = scipy.signal.lfilter([1.0], prefilter, y - y[0])
+    """Fit the coefficients and the level to prefiltered signals."""
+    filtered_u = scipy.signal.lfilter([1.0], prefilter, u)
+    filtered_y = scipy.signal.lfilter([1.0], prefilter, y - y[0])
     constant = scipy.signal.lfilter([1.0], prefilter, np.ones(y.size))
     rows = y.size - order
-    columns = [past[order - lag : order - lag + rows] for lag in range(order + 1)]
-    columns += [seen[order - lag : order - lag + rows] for lag in range(1, order + 1)]
+    columns = [filtered_u[order - lag : order - lag + rows] for lag in range(order + 1)]
+    columns += [filtered_y[order - lag : order - lag + rows] for lag in range(1, order + 1)]
     columns.append(constant[order:])
-    weights = np.linalg.lstsq(np.column_stack(columns), seen[order:], rcond=None)[0]
+    weights = np.linalg.lstsq(np.column_stack(columns), filtered_y[order:], rcond=None)[0]
     numerator, denominator = weights[: order + 1], weights[order + 1 : 2 * order + 1]
     at_rest = float(weights[-1]) / (1.0 - float(denominator.sum()) or 1.0)
     return numerator, denominator, float(y[0]) + at_rest

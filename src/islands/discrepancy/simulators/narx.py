@@ -1,4 +1,4 @@
-"""An identified model in free run, with places for effects."""
+"""Identified model in free run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,24 +17,24 @@ from islands.model.model import Model, make_model
 from islands.model.regressor import Regressor
 from islands.simulation.linked import LinkedModel
 
-#: A change of a parameter that matters, relative to it.
+#: Typical change of a parameter, relative to its value.
 _SCALE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NarxSimulator:
-    """A model's free run from the first measured samples on; its parameters are calibrated.
+    """Free run of a model, started from the first measured samples; its parameters are calibrated.
 
-    Parameters that a constraint ties to each other stay as they are, so that the constraint holds: of the
-    linear terms of the output none moves. An effect on the output acts behind the model: within it, a model
-    whose output's coefficients sum to one would integrate it.
+    Parameters of terms that are linear in the output alone are fixed, so that a constraint on them, such as a
+    sum of one, remains satisfied. An effect on the output is added after the model; inside a model whose
+    coefficients of the output sum to one, it would be integrated.
 
     Attributes
     ----------
     model : Model
     name : str
     start : ndarray, shape (maximum lag,)
-        Measured outputs that the free run begins with.
+        Measured outputs from which the free run starts.
     """
 
     model: Model
@@ -45,39 +45,42 @@ class NarxSimulator:
     built_in_effects: frozenset[str] = frozenset()
     state_effects: tuple[Effect, ...] = field(init=False)
     is_continuous_time: bool = False
-    _moving: NDArray[np.int64] = field(init=False, repr=False)
+    _calibrated: NDArray[np.int64] = field(init=False, repr=False)
     _theta: Signal = field(init=False, repr=False)
     _linked: LinkedModel = field(init=False, repr=False)
     _missing: tuple[MissingTerm, ...] = field(init=False, repr=False)
-    _wider: LinkedModel = field(init=False, repr=False)
+    _extended: LinkedModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.model.inputs != 1:
             raise ModelError(
                 f"{self.name} has {self.model.inputs} inputs: a diagnosis takes models of one input"
             )
-        moving = [place for place, item in enumerate(self.model.regressors) if not _linear_in_output(item)]
-        object.__setattr__(self, "_moving", np.array(moving, dtype=np.int64))
+        calibrated = [
+            place for place, item in enumerate(self.model.regressors) if not _is_linear_in_output(item)
+        ]
+        object.__setattr__(self, "_calibrated", np.array(calibrated, dtype=np.int64))
         object.__setattr__(self, "_theta", np.array(self.model.parameters))
         object.__setattr__(self, "_linked", LinkedModel(self.model.regressors))
-        lacking = missing_terms(self.model, moving)
-        further = tuple(term.regressor for term in lacking)
-        object.__setattr__(self, "_missing", lacking)
-        object.__setattr__(self, "_wider", LinkedModel((*self.model.regressors, *further)))
-        object.__setattr__(self, "state_effects", (model_form(self, self.model, lacking),) if lacking else ())
+        missing = missing_terms(self.model, calibrated)
+        further = tuple(term.regressor for term in missing)
+        object.__setattr__(self, "_missing", missing)
+        object.__setattr__(self, "_extended", LinkedModel((*self.model.regressors, *further)))
+        object.__setattr__(self, "state_effects", (model_form(self, self.model, missing),) if missing else ())
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those of the terms that are not linear in the output alone, and the mean that the run begins with.
+        """Parameters of the terms that are not linear in the output alone, and mean of the initial outputs.
 
-        It begins with measured samples, and what their noise adds to it a model that holds still keeps.
+        The initial outputs are measured. A model that holds its output at a constant input would keep their
+        noise as an offset.
         """
         theta = self.model.parameters
         start = self.start[: self._linked.warm_up]
         return (
             *(
                 Parameter(f"theta{place + 1}", "", theta[place], _SCALE * abs(theta[place]) or _SCALE)
-                for place in self._moving
+                for place in self._calibrated
             ),
             Parameter(
                 "initial output",
@@ -89,22 +92,22 @@ class NarxSimulator:
         )
 
     def with_values(self, values: Signal) -> Model:
-        """Return the model with values of its calibrated parameters."""
+        """Return the model with the given values of its calibrated parameters."""
         theta = list(self.model.parameters)
-        for place, value in zip(self._moving, values[:-1], strict=True):
+        for place, value in zip(self._calibrated, values[:-1], strict=True):
             theta[place] = float(value)
         return replace(self.model, theta=tuple(theta))
 
     def with_shape(self, values: Signal, shape: Mapping[str, float]) -> Model:
-        """Return the same with terms that the model lacks, their coefficients and slope by name."""
+        """Return the model with given values, and missing terms with the coefficients in ``shape``."""
         model = self.with_values(values)
-        own = zip(model.regressors, model.parameters, strict=True)
-        terms = [(item.expression, parameter) for item, parameter in own]
-        terms += [(term.at(shape[SLOPE]), shape[term.name]) for term in self._missing]
+        known = zip(model.regressors, model.parameters, strict=True)
+        terms = [(item.expression, parameter) for item, parameter in known]
+        terms += [(term.with_slope(shape[SLOPE]), shape[term.name]) for term in self._missing]
         return make_model(terms, model.input_names, model.output_name, model.dt)
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the input as the coordinate."""
         return input_coordinate(context, output)
 
     def simulate(
@@ -112,30 +115,30 @@ class NarxSimulator:
         values: Signal,
         x: Signal,
         context: SimulationContext,
-        own: Mapping[str, float],
+        effect_parameters: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         theta = self._theta.copy()
-        theta[self._moving] = values[:-1]
+        theta[self._calibrated] = values[:-1]
         warm_up = self._linked.warm_up
         start = self.start[:warm_up] + (values[-1] - self.start[:warm_up].mean())
-        if SLOPE in own:
-            theta = np.append(theta, [own.get(term.name, 0.0) for term in self._missing])
-            simulated = self._run_wider(theta, x, start, own[SLOPE])
+        if SLOPE in effect_parameters:
+            theta = np.append(theta, [effect_parameters.get(term.name, 0.0) for term in self._missing])
+            simulated = self._run_extended(theta, x, start, effect_parameters[SLOPE])
         else:
             simulated = self._linked.free_run(theta, x[:, None], start)
         simulated[:warm_up] = start
         return simulated + add_output_forces(x, context, forces) if forces else simulated
 
-    def _run_wider(self, theta: Signal, x: Signal, start: Signal, slope: float) -> Signal:
-        """Run with the terms that the model lacks: before the first sample all stood still."""
-        before = self._wider.warm_up - start.size
+    def _run_extended(self, theta: Signal, x: Signal, start: Signal, slope: float) -> Signal:
+        """Run the model with the missing terms; signals are constant before the first sample."""
+        before = self._extended.warm_up - start.size
         channels = np.empty((x.size + before, 2))
         channels[:before, 0], channels[before:, 0], channels[:, 1] = x[0], x, slope
-        begun = np.concatenate([np.full(before, start[0] if start.size else 0.0), start])
-        return self._wider.free_run(theta, channels, begun)[before:]
+        initial = np.concatenate([np.full(before, start[0] if start.size else 0.0), start])
+        return self._extended.free_run(theta, channels, initial)[before:]
 
 
-def _linear_in_output(item: Regressor) -> bool:
+def _is_linear_in_output(item: Regressor) -> bool:
     return item.lags != frozenset() and {channel for channel, _ in item.lags} == {0} and item.degree == 1

@@ -1,4 +1,4 @@
-"""A simulation of the user's own: a Python function of the input and the sampling time."""
+"""User-defined simulator: a Python function of the input and the sampling time."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -14,21 +14,24 @@ from islands.discrepancy.interfaces.simulator import Forces
 from islands.discrepancy.simulators.coordinates import input_coordinate
 from islands.errors import RecordError, SettingsError
 
-#: A change of a parameter that matters, relative to it, and how far one may go.
-_SCALE, _FAR = 0.01, 10.0
+#: Typical change of a parameter, relative to its value.
+_SCALE = 0.01
+
+#: Largest change of a parameter, relative to its value.
+_MAX_CHANGE = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PythonFunctionSimulator:
-    """``function(u, dt, **parameters) -> y``; what has a number for its default is a parameter.
+    """``function(u, dt, **parameters) -> y``; arguments with a numeric default are parameters.
 
     Attributes
     ----------
     function : callable
     source : str
-        FILE.py:FUNCTION.
+        ``FILE.py:FUNCTION``, or the name of the function.
     given : mapping
-        Nominal values of its parameters, by name; who is not named has the function's own.
+        Nominal values of parameters by name; the default of the function for the others.
     """
 
     function: Callable[..., Signal]
@@ -42,54 +45,61 @@ class PythonFunctionSimulator:
 
     def __post_init__(self) -> None:
         try:
-            known = list(inspect.signature(self.function).parameters.values())
-        except ValueError as error:  # one that is not written in Python
-            raise SettingsError(f"nobody knows what {self.name} takes: write a function around it") from error
-        given = {each.name: each.default for each in known[2:]}
-        if unknown := self.given.keys() - given.keys():
+            arguments = list(inspect.signature(self.function).parameters.values())
+        except ValueError as error:  # a built-in function without a signature
+            raise SettingsError(
+                f"the arguments of {self.name} are unknown: wrap it in a Python function"
+            ) from error
+        defaults = {each.name: each.default for each in arguments[2:]}
+        if unknown := self.given.keys() - defaults.keys():
             raise SettingsError(f"{self.name} has no parameter {', '.join(sorted(unknown))}")
-        for name, value in given.items():
+        for name, value in defaults.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
                 raise SettingsError(
                     f"{self.name}: the parameter {name} needs a number for its default, like {name}=1.0"
                 )
-        if len(known) < 2:
+        if len(arguments) < 2:
             raise SettingsError(f"{self.name} has to take (u, dt), and parameters with numbers for defaults")
         object.__setattr__(
-            self, "given", {name: float(value) for name, value in {**given, **self.given}.items()}
+            self, "given", {name: float(value) for name, value in {**defaults, **self.given}.items()}
         )
 
     @property
     def name(self) -> str:
-        """FILE.py:FUNCTION, without the folder."""
+        """Source without the folder."""
         return self.source.replace("\\", "/").rpartition("/")[2]
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Its keywords."""
+        """Arguments with numeric defaults."""
         return tuple(
             Parameter(
                 name,
                 "",
                 value,
                 _SCALE * abs(value) or _SCALE,
-                *((value - _FAR * abs(value), value + _FAR * abs(value)) if value else ()),
+                *((value - _MAX_CHANGE * abs(value), value + _MAX_CHANGE * abs(value)) if value else ()),
             )
             for name, value in self.given.items()
         )
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the input as the coordinate."""
         return input_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, _own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        _effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        chosen = {name: float(value) for name, value in zip(self.given, values, strict=True)}
-        # Its own copy: a function that writes into what it is given would spoil the record.
+        """Simulate the output; see `Simulator.simulate`."""
+        keywords = {name: float(value) for name, value in zip(self.given, values, strict=True)}
+        # A copy, since the function could write into its argument.
         try:
-            y = np.asarray(self.function(x.copy(), context.dt, **chosen))
+            y = np.asarray(self.function(x.copy(), context.dt, **keywords))
             if np.iscomplexobj(y):
                 raise TypeError("its output is complex")
             y = np.asarray(y, dtype=np.float64)
@@ -97,7 +107,7 @@ class PythonFunctionSimulator:
             raise RecordError(f"{self.name} fails: {type(error).__name__}: {error}") from error
         if y.shape != x.shape:
             raise RecordError(
-                f"{self.name} gave an output of shape {y.shape} for an input of {x.shape}: it has to give "
-                "one value a sample"
+                f"{self.name} gave an output of shape {y.shape} for an input of {x.shape}: it has to return "
+                "one value per sample"
             )
         return y + add_output_forces(x, context, forces)

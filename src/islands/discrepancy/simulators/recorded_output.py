@@ -1,4 +1,4 @@
-"""A column of the record: somebody else's simulation, of which only the output is known."""
+"""Recorded output of an external simulation: a column of the record."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,15 +14,17 @@ from islands.discrepancy.simulators.coordinates import input_coordinate
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedOutput:
-    """An output as it was simulated elsewhere.
+    """Output of an external simulation.
 
-    What acts on its input or in its equation cannot be simulated anew: effects on the output, and forces of
-    the input as it was recorded, are all that can be looked for.
+    The simulation cannot be repeated with a different input or equation. Only effects on the output and
+    forces on the recorded input can be searched for.
 
     Attributes
     ----------
     column : str
+        Name of the column.
     simulated : ndarray, shape (samples,)
+        Simulated output.
     """
 
     column: str
@@ -36,11 +38,11 @@ class RecordedOutput:
 
     @property
     def name(self) -> str:
-        """How it is asked for."""
+        """Name in reports."""
         return f"column {self.column}"
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the input as the coordinate."""
         return input_coordinate(context, output)
 
     def simulate(
@@ -48,8 +50,8 @@ class RecordedOutput:
         _values: Signal,
         x: Signal,
         context: SimulationContext,
-        _own: Mapping[str, float],
+        _effect_parameters: Mapping[str, float],
         forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         return np.asarray(self.simulated) + add_output_forces(x, context, forces)

@@ -1,4 +1,4 @@
-"""A rigid axis with friction: its force is given, its position is measured; with places for effects."""
+"""Rigid axis with friction: the input is a force, the output a position."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,39 +19,46 @@ from islands.discrepancy.simulators.coordinates import output_coordinate
 from islands.errors import RecordError
 from islands.systems.mechanics import integrate_motion
 
-#: What its state is called.
+#: Name of the state in effects.
 FORCE = "force"
 
-#: Seconds of a shot, samples of one at least, and samples over which the measured position is smoothed.
-SHOT, LEAST, SMOOTHED = 0.5, 20, 9
+#: Duration of a shooting interval in seconds.
+SHOT_SECONDS = 0.5
 
-#: Part of the usual rate within which dry friction turns, nominally.
-_SHARP = 0.01
+#: Smallest number of samples in a shooting interval.
+MIN_SHOT_SAMPLES = 20
+
+#: Window of the Savitzky-Golay filter that smooths the measured position, in samples.
+SMOOTHING_WINDOW = 9
+
+#: Nominal rate vs of dry friction, relative to the typical rate.
+_RELATIVE_VS = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidAxisSimulator:
-    """``m x'' + c x' + F tanh(x' / vs) = u + forces``, by multiple shooting; the coordinate is the output.
+    """``m x'' + c x' + F tanh(x' / vs) = u + forces`` by multiple shooting; the coordinate is the output.
 
-    Nothing pulls an axis back, so that a free run drifts away: it starts anew every half second, from a
-    position and a rate that are fitted to what is measured (Bock's multiple shooting, its states eliminated).
+    An axis has no restoring force, so that a free run drifts. The simulation restarts every half second, from
+    a position and a rate that are fitted to the measured output (multiple shooting after Bock, with the
+    states eliminated).
 
     Attributes
     ----------
-    mass, damping, dry, turns : float
-        Nominal parameters.
+    mass, damping, dry, smoothing_rate : float
+        Nominal parameters m, c, F and vs.
     measured, rate : ndarray, shape (samples,)
-        The output, and its smoothed rate.
+        Measured output, and its smoothed rate.
     shot : int
-        Samples between two starts.
+        Samples per shooting interval.
     units : tuple of str
-        Of input and output.
+        Units of input and output.
     """
 
     mass: float
     damping: float
     dry: float
-    turns: float
+    smoothing_rate: float
     measured: Signal
     rate: Signal
     shot: int
@@ -65,93 +72,113 @@ class RigidAxisSimulator:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Mass, damping, dry friction, and the rate at which that turns."""
+        """Mass, damping, dry friction, and the rate within which dry friction changes its sign."""
         force, length = self.units
-        usual = float(np.std(self.rate)) or 1.0
-        moved = abs(self.dry) + abs(self.damping) * usual + abs(self.mass) * usual / (SHOT / 5)
+        vs = self.smoothing_rate
+        typical_rate = float(np.std(self.rate)) or 1.0
+        typical_force = (
+            abs(self.dry)
+            + abs(self.damping) * typical_rate
+            + abs(self.mass) * typical_rate / (SHOT_SECONDS / 5)
+        )
         return (
             Parameter(
                 "m", f"{force} s^2/{length}", self.mass, 0.01 * self.mass, 0.05 * self.mass, 20 * self.mass
             ),
             Parameter(
-                "c", f"{force} s/{length}", self.damping, 0.01 * moved / usual, 0.0, 20 * moved / usual
+                "c",
+                f"{force} s/{length}",
+                self.damping,
+                0.01 * typical_force / typical_rate,
+                0.0,
+                20 * typical_force / typical_rate,
             ),
-            Parameter("F", force, self.dry, 0.01 * moved, 0.0, 20 * moved),
-            # How sharply friction turns is its own business: a wrong width looks like play.
-            Parameter("vs", f"{length}/s", self.turns, 0.3 * self.turns, 0.01 * self.turns, 20 * self.turns),
+            Parameter("F", force, self.dry, 0.01 * typical_force, 0.0, 20 * typical_force),
+            # Calibrated as well: the response to a wrong value looks like backlash.
+            Parameter("vs", f"{length}/s", vs, 0.3 * vs, 0.01 * vs, 20 * vs),
         )
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        return replace(output_coordinate(context, output), friction_smoothing=_SHARP)
+        """Return the output as the coordinate."""
+        return replace(output_coordinate(context, output), friction_smoothing=_RELATIVE_VS)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
-        mass, damping, dry, turns = map(float, values)
-        gain, offset = gain_over_time(own, context), own.get(f"input-offset:{FORCE}", 0.0)
+        """Simulate the output; see `Simulator.simulate`."""
+        mass, damping, dry, vs = map(float, values)
+        gain, offset = (
+            gain_over_time(effect_parameters, context),
+            effect_parameters.get(f"input-offset:{FORCE}", 0.0),
+        )
         dry_friction = friction.COULOMB_FRICTION.form
         assert isinstance(dry_friction, ForceLaw)
-        elements = pack_force_laws([*forces, (dry_friction, np.array([dry, turns]))], context, balance=True)
-        times = x.size // self.measured.size
+        elements = pack_force_laws([*forces, (dry_friction, np.array([dry, vs]))], context, balance=True)
+        oversampling = x.size // self.measured.size
         starts = np.zeros(x.size, dtype=bool)
-        starts[:: self.shot * times] = True
+        starts[:: self.shot * oversampling] = True
 
-        def shots(position: Signal, rate: Signal) -> Signal:
+        def run_shots(position: Signal, rate: Signal) -> Signal:
             y = np.empty(x.size)
             integrate_motion(
                 *(x * gain + offset, context.get_intersample_values(x) * gain + offset),
                 *(context.dt, mass, damping, 0.0, elements),
-                *(starts, np.repeat(position, times), np.repeat(rate, times), y),
+                *(starts, np.repeat(position, oversampling), np.repeat(rate, oversampling), y),
             )
-            return y[::times]
+            return y[::oversampling]
 
-        return np.repeat(self._freed(shots, context.force_coordinate), times)
+        return np.repeat(self._fit_initial_states(run_shots, context.force_coordinate), oversampling)
 
-    def _freed(self, shots: Callable[[Signal, Signal], Signal], frame: ForceCoordinate) -> Signal:
-        """Return the shots with their states as free as can be: by Newton and Gauss, from what is measured.
+    def _fit_initial_states(
+        self, run_shots: Callable[[Signal, Signal], Signal], coordinate: ForceCoordinate
+    ) -> Signal:
+        """Fit the initial state of every shooting interval by Gauss-Newton, and return the output.
 
-        All shots are fitted side by side: a state moves its own alone.
+        All intervals are fitted at once, since the state of one interval does not affect the others.
         """
         position, rate = self.measured, self.rate
-        y = shots(position, rate)
-        moved = (1e-4 * frame.peak, 1e-4 * frame.rate)
+        y = run_shots(position, rate)
+        delta = (1e-4 * coordinate.peak, 1e-4 * coordinate.rate)
         responses = (
-            (shots(position + moved[0], rate) - y) / moved[0],
-            (shots(position, rate + moved[1]) - y) / moved[1],
+            (run_shots(position + delta[0], rate) - y) / delta[0],
+            (run_shots(position, rate + delta[1]) - y) / delta[1],
         )
-        which = np.arange(y.size) // self.shot
+        interval = np.arange(y.size) // self.shot
         for _ in range(2):
-            steps = self._steps(self.measured - y, responses, which)
-            there = shots(position + steps[0], rate + steps[1])
-            squares = [np.bincount(which, weights=(self.measured - each) ** 2) for each in (y, there)]
-            # A shot that sticks may leap over its best state.
-            closer = (squares[1] < squares[0])[which]
+            steps = self._solve_steps(self.measured - y, responses, interval)
+            trial = run_shots(position + steps[0], rate + steps[1])
+            squares = [np.bincount(interval, weights=(self.measured - each) ** 2) for each in (y, trial)]
+            # During sticking the response is nonlinear, and a full step may increase the error.
+            closer = (squares[1] < squares[0])[interval]
             position = np.where(closer, position + steps[0], position)
             rate = np.where(closer, rate + steps[1], rate)
-            y = np.where(closer, there, y)
+            y = np.where(closer, trial, y)
         return y
 
     @staticmethod
-    def _steps(
-        missed: Signal, responses: tuple[Signal, Signal], which: NDArray[np.int64]
+    def _solve_steps(
+        error: Signal, responses: tuple[Signal, Signal], interval: NDArray[np.int64]
     ) -> tuple[Signal, Signal]:
-        """Solve every shot's two equations; return the steps of its state at each of its samples."""
+        """Solve the normal equations of every interval; return the steps of position and rate per sample."""
 
         def inner(one: Signal, other: Signal) -> Signal:
-            return np.asarray(np.bincount(which, weights=one * other), dtype=np.float64)
+            return np.asarray(np.bincount(interval, weights=one * other), dtype=np.float64)
 
         first, second = responses
         a, b, d = inner(first, first), inner(first, second), inner(second, second)
-        p, q = inner(first, missed), inner(second, missed)
+        p, q = inner(first, error), inner(second, error)
         determinant = a * d - b * b
-        # A shot of one sample tells its position alone.
-        sure = determinant > 1e-12 * a * d
-        determinant = np.where(sure, determinant, 1.0)
-        position = np.where(sure, (d * p - b * q) / determinant, p / np.maximum(a, 1e-300))
-        rate = np.where(sure, (a * q - b * p) / determinant, 0.0)
-        return position[which], rate[which]
+        # An interval of one sample determines its position only.
+        regular = determinant > 1e-12 * a * d
+        determinant = np.where(regular, determinant, 1.0)
+        position = np.where(regular, (d * p - b * q) / determinant, p / np.maximum(a, 1e-300))
+        rate = np.where(regular, (a * q - b * p) / determinant, 0.0)
+        return position[interval], rate[interval]
 
 
 def make_rigid_axis(
@@ -159,26 +186,33 @@ def make_rigid_axis(
 ) -> RigidAxisSimulator:
     """Make a simulator; estimate the parameters that are not given from the estimation part of a record.
 
-    The estimate is that of the inverse dynamics: least squares of the force on smoothed acceleration, rate
-    and direction (Olsen and Petersen 2001).
+    The estimate uses the inverse dynamics: least squares of the force on smoothed acceleration, rate and
+    direction (Olsen and Petersen 2001).
+
+    Raises
+    ------
+    RecordError
+        The record is shorter than four shooting intervals of the smallest size.
     """
-    if record.samples < 4 * LEAST:
-        raise RecordError(f"an axis needs {4 * LEAST} samples, the record has {record.samples}")
+    if record.samples < 4 * MIN_SHOT_SAMPLES:
+        raise RecordError(f"an axis needs {4 * MIN_SHOT_SAMPLES} samples, the record has {record.samples}")
     y, dt = record.y, record.dt
     rate, acceleration = (
-        scipy.signal.savgol_filter(y, SMOOTHED, 3, deriv=order, delta=dt) for order in (1, 2)
+        scipy.signal.savgol_filter(y, SMOOTHING_WINDOW, 3, deriv=order, delta=dt) for order in (1, 2)
     )
-    usual = float(np.std(rate)) or 1.0
-    columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * usual))])[:estimation_samples]
+    typical_rate = float(np.std(rate)) or 1.0
+    columns = np.column_stack([acceleration, rate, np.tanh(rate / (0.02 * typical_rate))])[
+        :estimation_samples
+    ]
     names = ("m", "c", "F")
     free = [place for place, name in enumerate(names) if name not in given]
     known = np.array([given.get(name, 0.0) for name in names])
-    force = scipy.signal.savgol_filter(record.u[:, 0], SMOOTHED, 3)[:estimation_samples]
+    force = scipy.signal.savgol_filter(record.u[:, 0], SMOOTHING_WINDOW, 3)[:estimation_samples]
     known[free] = scipy.optimize.lsq_linear(
         columns[:, free], force - columns @ known, bounds=(1e-12, np.inf)
     ).x
     mass, damping, dry = map(float, known)
-    turns = given.get("vs", _SHARP * usual)
-    shot = max(LEAST, round(SHOT / dt))
+    vs = given.get("vs", _RELATIVE_VS * typical_rate)
+    shot = max(MIN_SHOT_SAMPLES, round(SHOT_SECONDS / dt))
     units = (record.input_units[0] or "1", record.output_unit or "1")
-    return RigidAxisSimulator(mass, damping, dry, turns, np.asarray(y), rate, shot, units)
+    return RigidAxisSimulator(mass, damping, dry, vs, np.asarray(y), rate, shot, units)

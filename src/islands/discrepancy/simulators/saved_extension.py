@@ -1,4 +1,4 @@
-"""A simulation with effects in it as a simulation of its own: it is simulated, and can be diagnosed again."""
+"""Extended simulation that was saved: it can be simulated, and diagnosed again."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -14,17 +14,18 @@ from islands.discrepancy.simulators.intersample import SimulatorWrapper
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedExtension(SimulatorWrapper):
-    """A core and effects in it, with the values that were found.
+    """Simulator with effects and their calibrated values.
 
     Attributes
     ----------
     simulator : Simulator
-        Solved as the record asked for.
+        Simulator without the effects, with the intersample behaviour that the record required.
     added : tuple of Effect
     values : ndarray, shape (parameters,)
-        Of the effects, one after the other: their nominal values from now on.
+        Nominal values of the parameters of the effects.
     scales : SimulationContext
-        Of the record that they were found in: some strengths are parts of its peaks, or of its duration.
+        Scales of the record in which the effects were found; some strengths are relative to its peaks or its
+        duration.
     """
 
     simulator: Simulator
@@ -34,12 +35,12 @@ class SavedExtension(SimulatorWrapper):
 
     @property
     def name(self) -> str:
-        """The core's, and those of the effects."""
+        """Names of the simulator and of the effects."""
         return " + ".join([self.simulator.name, *(effect.name for effect in self.added)])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The core's, and those of each effect with the effect's name before them."""
+        """Parameters of the simulator, then those of each effect, prefixed with the name of the effect."""
         found, at = list(self.simulator.parameters), 0
         for effect in self.added:
             for parameter in effect.parameters(self.scales):
@@ -50,18 +51,23 @@ class SavedExtension(SimulatorWrapper):
 
     @property
     def is_continuous_time(self) -> bool:
-        """It is solved already as its record asked for."""
+        """False: the intersample behaviour is already selected."""
         return False
 
     @property
     def built_in_effects(self) -> frozenset[str]:
-        """What the core has, and what was added."""
+        """Built-in effects of the simulator, and the added effects."""
         return self.simulator.built_in_effects | {effect.name for effect in self.added}
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         scales = self.scales
         inner = replace(
             context,
@@ -72,4 +78,6 @@ class SavedExtension(SimulatorWrapper):
             reference_duration=scales.duration,
             force_coordinate=scales.force_coordinate,
         )
-        return ExtendedSimulator(self.simulator, self.added, inner).simulate(values, own, forces)
+        return ExtendedSimulator(self.simulator, self.added, inner).simulate(
+            values, effect_parameters, forces
+        )

@@ -1,4 +1,4 @@
-"""A mass on a spring and a damper, with places for effects."""
+"""Mass on a spring and a damper."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from islands.discrepancy.simulators.coordinates import output_coordinate
 from islands.systems.mechanics import integrate_motion
 from islands.systems.second_order import SecondOrder, estimate_second_order
 
-#: What its state is called.
+#: Name of the state in effects.
 FORCE = "force"
 
 
@@ -29,9 +29,9 @@ class SecondOrderSimulator:
     system : SecondOrder
         Nominal parameters.
     units : tuple of str
-        Of input and output.
+        Units of input and output.
     size : float
-        Of the output.
+        Standard deviation of the output.
     """
 
     system: SecondOrder
@@ -48,11 +48,11 @@ class SecondOrderSimulator:
     def parameters(self) -> tuple[Parameter, ...]:
         """Mass, damping, stiffness, and the state at the first sample."""
         system, (force, length) = self.system, self.units
-        usual = abs(system.stiffness / system.mass) ** 0.5
-        # As much as a spring of critical damping: a nominal damping may be next to nothing.
-        critical = 2.0 * usual * system.mass
+        natural_frequency = abs(system.stiffness / system.mass) ** 0.5
+        # Scale and bounds are relative to critical damping, since the nominal damping may be close to zero.
+        critical = 2.0 * natural_frequency * system.mass
         return (
-            _about("m", f"{force} s^2/{length}", system.mass, 0.01),
+            _make_parameter("m", f"{force} s^2/{length}", system.mass, 0.01),
             Parameter(
                 "c",
                 f"{force} s/{length}",
@@ -61,21 +61,31 @@ class SecondOrderSimulator:
                 min(0.0, 10.0 * critical),
                 max(0.0, 10.0 * critical),
             ),
-            _about("k", f"{force}/{length}", system.stiffness, 0.01),
+            _make_parameter("k", f"{force}/{length}", system.stiffness, 0.01),
             Parameter("initial position", length, system.position, 0.02 * self.size, initial=True),
-            Parameter("initial rate", f"{length}/s", system.rate, 0.02 * self.size * usual, initial=True),
+            Parameter(
+                "initial rate", f"{length}/s", system.rate, 0.02 * self.size * natural_frequency, initial=True
+            ),
         )
 
     def make_force_coordinate(self, context: SimulationContext, output: Signal) -> ForceCoordinate:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Return the output as the coordinate."""
         return output_coordinate(context, output)
 
     def simulate(
-        self, values: Signal, x: Signal, context: SimulationContext, own: Mapping[str, float], forces: Forces
+        self,
+        values: Signal,
+        x: Signal,
+        context: SimulationContext,
+        effect_parameters: Mapping[str, float],
+        forces: Forces,
     ) -> Signal:
-        """See `islands.discrepancy.interfaces.simulator.Simulator`."""
+        """Simulate the output; see `Simulator.simulate`."""
         mass, damping, stiffness, position, rate = map(float, values)
-        gain, offset = gain_over_time(own, context), own.get(f"input-offset:{FORCE}", 0.0)
+        gain, offset = (
+            gain_over_time(effect_parameters, context),
+            effect_parameters.get(f"input-offset:{FORCE}", 0.0),
+        )
         begins = np.zeros(x.size, dtype=bool)
         begins[0] = True
         y = np.empty(x.size)
@@ -98,6 +108,6 @@ def make_second_order(
     return SecondOrderSimulator(found, units, float(np.std(record.y)))
 
 
-def _about(name: str, unit: str, nominal: float, part: float) -> Parameter:
+def _make_parameter(name: str, unit: str, nominal: float, relative_scale: float) -> Parameter:
     ends = (0.05 * nominal, 20.0 * nominal)
-    return Parameter(name, unit, nominal, part * abs(nominal), min(ends), max(ends))
+    return Parameter(name, unit, nominal, relative_scale * abs(nominal), min(ends), max(ends))

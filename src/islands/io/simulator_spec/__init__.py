@@ -1,1 +1,1 @@
-"""Specifications of simulators: schema, factory, extended simulations as JSON. Read `schema` first."""
+"""Specifications of simulators: table, factory, extended simulations as JSON. Read `specification` first."""

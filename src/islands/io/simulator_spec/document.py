@@ -1,4 +1,4 @@
-"""Extended simulations as documents: ``extended.json``, which is read as a simulation again."""
+"""Extended simulations as documents: ``extended.json``, which can be used as a simulation."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -30,22 +30,22 @@ from islands.io.simulator_spec.specification import (
 
 
 def extended_json(fit: CalibrationResult, record: Dataset) -> str:
-    """Write a simulation with its effects, and the values of both."""
+    """Return ``extended.json``: a simulator with its effects and the values of both."""
     return json.dumps(extended_document(fit, record), indent=2, allow_nan=False) + "\n"
 
 
 def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]:
-    """Describe a simulation with its effects, and the values of both.
+    """Return a simulator with its effects and the values of both as a JSON document.
 
-    A parameter that was found to be wrong is put right, and terms that a model lacks are written into it:
-    they are no effects any more.
+    Wrong parameters are corrected and missing terms of a model are added to it, so that they are no longer
+    effects.
     """
     simulation, values = fit.simulation, fit.values.copy()
     names = [parameter.name for parameter in simulation.simulator.parameters]
     for effect in simulation.effects:
         if effect.site == Site.PARAMETER:
-            place = names.index(effect.name.partition(":")[2])
-            values[place] *= 1.0 + values[simulation.get_slice(effect)][0]
+            index = names.index(effect.name.partition(":")[2])
+            values[index] *= 1.0 + values[simulation.get_slice(effect)][0]
     parts = [(effect, simulation.get_slice(effect)) for effect in simulation.effects]
     shape = {
         parameter.name: float(value)
@@ -54,13 +54,13 @@ def extended_document(fit: CalibrationResult, record: Dataset) -> dict[str, Any]
         for parameter, value in zip(simulation.parameters[part], values[part], strict=True)
     }
     found = [
-        _effect(effect, simulation.parameters[part], values[part])
+        _make_effect_spec(effect, simulation.parameters[part], values[part])
         for effect, part in parts
         if effect.site != Site.PARAMETER and effect.name != model_form.CORE_SHAPE
     ]
-    names_of = (record.input_names, record.output_name)
-    return _extended(
-        simulation.simulator, values[: len(names)], found, simulation.context, *names_of, shape
+    signals = (record.input_names, record.output_name)
+    return _make_extended_spec(
+        simulation.simulator, values[: len(names)], found, simulation.context, *signals, shape
     ).model_dump(mode="json", by_alias=True)
 
 
@@ -71,9 +71,18 @@ def describe_extension(
     output: str,
     shape: Mapping[str, float] | None = None,
 ) -> LocalSpec:
-    """Say how a core with values is asked for; ``shape`` is what an identified model in it lacks.
+    """Return the specification of a simulator with given values.
 
-    What belongs to a record, the state at its first sample, is not said: another record begins elsewhere.
+    Initial states are left out, since they belong to one record.
+
+    Parameters
+    ----------
+    simulator : Simulator
+    values : ndarray, shape (parameters,)
+    inputs, output
+        Names of the signals.
+    shape : mapping, optional
+        Coefficients and slope of the terms that an identified model lacks, by name.
     """
     named = {
         parameter.name: float(value)
@@ -82,14 +91,14 @@ def describe_extension(
     }
     match simulator:
         case SavedExtension():
-            own, found, at = len(simulator.simulator.parameters), [], 0
+            inner_size = start = len(simulator.simulator.parameters)
+            found = []
             for effect in simulator.added:
                 parameters = effect.parameters(simulator.scales)
-                here = slice(own + at, own + at + len(parameters))
-                found.append(_effect(effect, parameters, values[here]))
-                at += len(parameters)
-            return _extended(
-                simulator.simulator, values[:own], found, simulator.scales, inputs, output, shape
+                found.append(_make_effect_spec(effect, parameters, values[start : start + len(parameters)]))
+                start += len(parameters)
+            return _make_extended_spec(
+                simulator.simulator, values[:inner_size], found, simulator.scales, inputs, output, shape
             )
         case NarxSimulator():
             model = simulator.with_shape(values, shape) if shape else simulator.with_values(values)
@@ -113,7 +122,7 @@ def describe_extension(
     return PhysicalSpec(kind=simulator.name, parameters=named)
 
 
-def _extended(
+def _make_extended_spec(
     simulator: Simulator,
     values: Signal,
     effects: Sequence[EffectSpec],
@@ -122,15 +131,16 @@ def _extended(
     output: str,
     shape: Mapping[str, float] | None = None,
 ) -> LocalExtendedSpec:
-    hold, times, inner = InterSample.FOH, 1, simulator
+    intersample, oversampling, inner = InterSample.FOH, 1, simulator
     if isinstance(simulator, ResampledSimulator):
-        hold, times, inner = simulator.intersample, simulator.oversampling, simulator.simulator
+        intersample, oversampling = simulator.intersample, simulator.oversampling
+        inner = simulator.simulator
     return LocalExtendedSpec(
         inputs=inputs,
         output=output,
         core=describe_extension(inner, values, inputs, output, shape),
-        hold=hold.value,
-        times=times,
+        hold=intersample.value,
+        times=oversampling,
         effects=tuple(effects),
         scales=ScalesSpec(
             dt=scales.dt,
@@ -138,12 +148,12 @@ def _extended(
             output_peak=scales.output_peak,
             fitted_s=scales.fit_end_time,
             duration_s=scales.duration,
-            frame=_frame(scales.force_coordinate),
+            frame=_make_frame_spec(scales.force_coordinate),
         ),
     )
 
 
-def _frame(coordinate: ForceCoordinate) -> FrameSpec:
+def _make_frame_spec(coordinate: ForceCoordinate) -> FrameSpec:
     return FrameSpec(
         unit=coordinate.unit,
         peak=coordinate.peak,
@@ -156,7 +166,7 @@ def _frame(coordinate: ForceCoordinate) -> FrameSpec:
     )
 
 
-def _effect(effect: Effect, parameters: Sequence[Parameter], values: Signal) -> EffectSpec:
+def _make_effect_spec(effect: Effect, parameters: Sequence[Parameter], values: Signal) -> EffectSpec:
     return EffectSpec(
         name=effect.name,
         site=str(effect.site),

@@ -1,4 +1,4 @@
-"""Simulations made of what is asked for."""
+"""Factory of simulators: a specification and a record become a `Simulator`."""
 
 import json
 import runpy
@@ -40,34 +40,36 @@ from islands.io.simulator_spec.specification import (
     parse_spec,
 )
 
-#: The fewest samples that where a motion begins, and constants, are estimated from.
-FEWEST = 20
+#: Smallest number of samples from which parameters and the initial state are estimated.
+MIN_SAMPLES = 20
 
 
 def make_simulator(
-    asked: str | SimulationSpec | LocalSpec,
+    spec: str | SimulationSpec | LocalSpec,
     record: Dataset,
     columns: Mapping[str, Any] | None = None,
 ) -> Simulator:
-    """Return the simulation that is asked for.
+    """Make a simulator from its specification.
 
     Parameters
     ----------
-    asked : str or spec
-        As on the command line, or as over REST.
+    spec : str or spec
+        Text as on the command line, or a specification as over REST.
     record : Dataset
-        What it will be held against.
+        Record that the simulation will be compared with.
     columns : mapping, optional
-        Columns of the record's file that a simulation may be, by name: ``(samples,)`` each.
+        Columns of the file of the record by name, each of shape (samples,); a column can be a simulation.
 
     Raises
     ------
     SettingsError, ModelError
-        It asks for nothing that there is.
+        The specification is invalid.
+    RecordError
+        The record is not suitable for the simulator.
     """
-    spec = parse_spec(asked) if isinstance(asked, str) else asked
+    spec = parse_spec(spec) if isinstance(spec, str) else spec
     if isinstance(spec, ExtendedSpec):
-        return _extension(spec, record, columns or {})
+        return _make_saved_extension(spec, record, columns or {})
     entry = SIMULATORS[spec.kind]
     factory = resolve_name(entry.factory)
     simulator: Simulator
@@ -82,48 +84,48 @@ def make_simulator(
 
 
 def simulate_spec(
-    asked: str | Mapping[str, Any] | SimulationSpec | LocalSpec,
+    spec: str | Mapping[str, Any] | SimulationSpec | LocalSpec,
     record: Dataset,
     columns: Mapping[str, Any] | None = None,
 ) -> NDArray[np.float64]:
-    """Simulate a record with what is asked for; an extended simulation may be given as its document.
+    """Simulate the output of a record; an extended simulation can be given as its document.
 
-    What a simulation does not say, such as the state at the first sample, is taken from the record's output.
+    Initial states are fitted to the measured output of the record.
 
     Returns
     -------
     ndarray, shape (samples,)
     """
-    if isinstance(asked, Mapping):
-        asked = LocalExtendedSpec.model_validate(asked)
-    simulator = make_simulator(asked, record, columns)
+    if isinstance(spec, Mapping):
+        spec = LocalExtendedSpec.model_validate(spec)
+    simulator = make_simulator(spec, record, columns)
     alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
-    begins = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
-    if not begins:
+    initial = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
+    if not initial:
         return alone.simulate(alone.nominal)
-    # The state at the first sample belongs to this record: it is fitted, and nothing else.
-    scales = alone.scales[begins]
+    # Initial states belong to this record. All other parameters keep their values.
+    scales = alone.scales[initial]
 
-    def at(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    def simulate(steps: NDArray[np.float64]) -> NDArray[np.float64]:
         values = alone.nominal
-        values[begins] += scales * steps
+        values[initial] += scales * steps
         return alone.simulate(np.clip(values, *alone.bounds))
 
     size = float(np.std(record.y)) or 1.0
     best = scipy.optimize.least_squares(
-        lambda steps: np.nan_to_num((at(steps) - record.y) / size, nan=1e6),
-        np.zeros(len(begins)),
+        lambda steps: np.nan_to_num((simulate(steps) - record.y) / size, nan=1e6),
+        np.zeros(len(initial)),
         method="lm",
         diff_step=1e-4,
     )
-    return at(best.x)
+    return simulate(best.x)
 
 
-def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
+def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
     simulator = make_simulator(document.core, record, columns)
-    solved: Simulator = simulator
+    inner: Simulator = simulator
     if (document.hold, document.times) != ("first-order", 1):
-        solved = ResampledSimulator(simulator, InterSample(document.hold), document.times)
+        inner = ResampledSimulator(simulator, InterSample(document.hold), document.times)
     known = {**CATALOGUE, **{effect.name: effect for effect in simulator.state_effects}}
     given, frame = document.scales, document.scales.frame
     scales = SimulationContext(
@@ -153,7 +155,7 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
     for each in document.effects:
         if each.name not in known:
             raise ModelError(
-                f"this version of islands knows no effect {each.name!r} of {simulator.name}: diagnose again"
+                f"this version of islands has no effect {each.name!r} of {simulator.name}: diagnose again"
             )
         effect = known[each.name]
         names = [parameter.name for parameter in effect.parameters(scales)]
@@ -161,7 +163,7 @@ def _extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, An
             raise ModelError(f"effect {each.name} has no value for {', '.join(missing)}: diagnose again")
         added.append(effect)
         values += [each.parameters[name].value for name in names]
-    return SavedExtension(solved, tuple(added), np.array(values), scales)
+    return SavedExtension(inner, tuple(added), np.array(values), scales)
 
 
 def make_linear(spec: LinearSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
@@ -207,7 +209,7 @@ def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[st
     if model.dt is not None and abs(model.dt - record.dt) > 1e-3 * record.dt:
         raise SettingsError(
             f"{name} was identified at {model.dt:g} s, the record is sampled at {record.dt:g} s: give a "
-            "model and a record of one sampling time"
+            "model and a record with the same sampling time"
         )
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
@@ -223,15 +225,15 @@ def _check_parameters(entry: SimulatorEntry, given: Mapping[str, float]) -> None
         if allowed == ParameterRange.REAL or value > 0.0:
             continue
         if value < 0.0 or allowed == ParameterRange.POSITIVE:
-            raise SettingsError(f"{name} = {value:g} is no such system's: give a positive value")
+            raise SettingsError(f"{name} = {value:g} is not possible for {entry.name}: give a positive value")
 
 
 def _check_estimable(record: Dataset) -> None:
     """Raise `RecordError` if a record is too short for an estimate, or has gaps."""
-    if record.samples < FEWEST:
+    if record.samples < MIN_SAMPLES:
         raise RecordError(
-            f"the record has {record.samples} samples, and a simulation that begins where it does takes "
-            f"{FEWEST} at least: give a longer one"
+            f"the record has {record.samples} samples, and an estimate of the parameters requires "
+            f"{MIN_SAMPLES} at least: give a longer one"
         )
     if np.isnan(record.y).any():
         raise RecordError("the measured output has gaps: repair them, or select rows without any")

@@ -280,5 +280,5 @@ def _read_object(path: str, failure: type[ModelError] | type[SettingsError]) -> 
     except (OSError, ValueError) as error:
         raise failure(f"{path} cannot be read as JSON ({error}): give a file with an object") from error
     if not isinstance(found, dict):
-        raise failure(f"{path} holds no JSON object: write one like {{...}}")
+        raise failure(f"{path} does not hold a JSON object: write one like {{...}}")
     return found

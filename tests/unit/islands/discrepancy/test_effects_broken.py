@@ -57,7 +57,7 @@ def test_error_names_the_invalid_effect(record: Dataset, case: str) -> None:
     effect, message = INVALID[case]
     with pytest.raises(SettingsError, match=f"the effect {effect.name} is broken: {message}") as raised:
         diagnose(record, BoucWenPiezoSimulator(), catalogue=(effect, CATALOGUE["jump"]))
-    assert str(raised.value).endswith(".py or take it out of the catalogue")
+    assert str(raised.value).endswith(".py or remove the effect from the catalogue")
 
 
 def test_effect_without_starting_points_is_skipped(record: Dataset) -> None:

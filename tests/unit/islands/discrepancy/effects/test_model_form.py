@@ -1,4 +1,4 @@
-"""Terms that an identified model lacks: which they are, what they do, and the model with them in it."""
+"""Missing terms of an identified model: names, response, and the model that contains them."""
 
 import json
 
@@ -20,24 +20,24 @@ from islands.performance.trials.injection.measurement import FaultyRecord, injec
 
 
 @pytest.fixture(scope="module")
-def hiding() -> FaultyRecord:
+def faulty() -> FaultyRecord:
     return inject([], np.random.default_rng(804), 20.0)
 
 
 @pytest.fixture(scope="module")
-def extended(hiding: FaultyRecord) -> ExtendedSimulator:
-    """Return an identified model with the terms that it lacks."""
-    core = CORES["narx"].made(hiding)
-    scene = make_context(hiding.record, core, 1500)
-    return ExtendedSimulator(core, core.state_effects, scene)
+def extended(faulty: FaultyRecord) -> ExtendedSimulator:
+    """Return an identified model with its missing terms as an effect."""
+    simulator = CORES["narx"].made(faulty)
+    context = make_context(faulty.record, simulator, 1500)
+    return ExtendedSimulator(simulator, simulator.state_effects, context)
 
 
-def started(extended: ExtendedSimulator, hiding: FaultyRecord) -> np.ndarray:
-    """Return where a search for the terms begins."""
+def get_starting_values(extended: ExtendedSimulator, faulty: FaultyRecord) -> np.ndarray:
+    """Return the first starting point of the calibration of the terms."""
     (effect,) = extended.effects
     values = extended.nominal
     at_rest = extended.with_effects(()).simulate(values[: extended.get_slice(effect).start])
-    values[extended.get_slice(effect)] = effect.starting_points(extended.context, hiding.record.y - at_rest)[
+    values[extended.get_slice(effect)] = effect.starting_points(extended.context, faulty.record.y - at_rest)[
         0
     ]
     return values
@@ -48,13 +48,13 @@ def model(**terms: str) -> Model:
     return make_model([(parse(text), float(parameter)) for parameter, text in split])
 
 
-def test_terms_that_are_missing_do_nothing_until_they_have_coefficients(extended: ExtendedSimulator) -> None:
+def test_missing_terms_with_zero_coefficients_have_no_response(extended: ExtendedSimulator) -> None:
     alone = extended.with_effects(())
     with_slope = extended.simulate(extended.nominal)
     assert with_slope == pytest.approx(alone.simulate(alone.nominal), abs=1e-9)
 
 
-def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: ExtendedSimulator) -> None:
+def test_missing_terms_have_unique_names_and_are_not_in_the_model(extended: ExtendedSimulator) -> None:
     assert isinstance(extended.simulator, NarxSimulator)
     names = [parameter.name for parameter in extended.parameters]
     assert len(set(names)) == len(names)
@@ -63,37 +63,40 @@ def test_each_has_a_name_of_its_own_and_none_is_the_model_s(extended: ExtendedSi
     assert names[-1] == SLOPE
 
 
-def test_what_is_found_is_closer_to_the_record(extended: ExtendedSimulator, hiding: FaultyRecord) -> None:
-    alone = extended.with_effects(())
-    target = Target(hiding.record.y, np.arange(2000) < 1500, None, {})
-    before = calibrate(alone, target, alone.nominal)
-    after = calibrate(extended, target, started(extended, hiding))
-    assert before.mean_square > 1.2 * hiding.sigma**2
-    assert after.mean_square < 1.05 * hiding.sigma**2
-
-
-def test_where_the_search_begins_no_locked_sample_tells(extended: ExtendedSimulator) -> None:
-    (effect,) = extended.effects
-    seen = np.random.default_rng(1).standard_normal(2000)
-    locked = np.where(np.arange(2000) < 1500, seen, 9.0)
-    assert effect.starting_points(extended.context, seen) == effect.starting_points(extended.context, locked)
-
-
-def test_what_holds_still_at_a_constant_input_still_does(
-    extended: ExtendedSimulator, hiding: FaultyRecord
+def test_calibrated_missing_terms_reduce_the_error_to_the_noise(
+    extended: ExtendedSimulator, faulty: FaultyRecord
 ) -> None:
-    values = started(extended, hiding)
+    alone = extended.with_effects(())
+    target = Target(faulty.record.y, np.arange(2000) < 1500, None, {})
+    before = calibrate(alone, target, alone.nominal)
+    after = calibrate(extended, target, get_starting_values(extended, faulty))
+    assert before.mean_square > 1.2 * faulty.sigma**2
+    assert after.mean_square < 1.05 * faulty.sigma**2
+
+
+def test_starting_points_do_not_depend_on_hold_out_samples(extended: ExtendedSimulator) -> None:
+    (effect,) = extended.effects
+    residual = np.random.default_rng(1).standard_normal(2000)
+    changed = np.where(np.arange(2000) < 1500, residual, 9.0)
+    assert effect.starting_points(extended.context, residual) == effect.starting_points(
+        extended.context, changed
+    )
+
+
+def test_missing_terms_keep_the_output_constant_at_a_constant_input(
+    extended: ExtendedSimulator, faulty: FaultyRecord
+) -> None:
+    values = get_starting_values(extended, faulty)
     resting = np.where(np.arange(2000) < 1000, extended.context.u, extended.context.u[999])
-    core = extended.simulator
     own = {each.name: value for each, value in zip(extended.parameters[8:], values[8:], strict=True)}
-    y = core.simulate(values[:8], resting, extended.context, own, ())
+    y = extended.simulator.simulate(values[:8], resting, extended.context, own, ())
     assert np.ptp(y[1010:]) == 0.0
 
 
-def test_a_model_is_extended_by_writing_the_terms_into_it(
-    extended: ExtendedSimulator, hiding: FaultyRecord
+def test_an_extended_model_contains_the_missing_terms(
+    extended: ExtendedSimulator, faulty: FaultyRecord
 ) -> None:
-    record, values = hiding.record, started(extended, hiding)
+    record, values = faulty.record, get_starting_values(extended, faulty)
     target = Target(record.y, np.arange(record.samples) < 1500, None, {})
     fit = evaluate_fit(extended, target, values)
     document = extended_document(fit, record)
@@ -101,12 +104,12 @@ def test_a_model_is_extended_by_writing_the_terms_into_it(
     written = model_from_json(json.dumps(document["core"]["model"]), "extended")
     assert isinstance(extended.simulator, NarxSimulator)
     assert written.size == extended.simulator.model.size + len(extended.parameters) - 8 - 1
-    # It begins a sample later, with what was measured there.
+    # The maximum lag is one larger: the free run starts one sample later, from the measured output.
     again = simulate_spec(document, record)
-    assert np.std((again - fit.output)[200:]) < 0.3 * hiding.sigma
+    assert np.std((again - fit.output)[200:]) < 0.3 * faulty.sigma
 
 
-def test_a_model_of_one_delay_or_of_levels_alone_has_its_terms_too() -> None:
+def test_small_models_have_missing_terms_only_if_they_read_the_input() -> None:
     start = np.zeros(3)
     of_levels = NarxSimulator(model(a="0.5 * y(k-1)", b="0.4 * u(k-1)"), "levels", start)
     (effect,) = of_levels.state_effects
