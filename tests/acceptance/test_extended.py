@@ -60,7 +60,7 @@ def test_extended_simulation_reproduces_the_record(folder: Path) -> None:
 def test_extended_simulation_is_shown_as_text(folder: Path) -> None:
     printed = succeed("show", folder / "extended.json", "--format", "plain")
     assert "y_um from u_V: bouc-wen-piezo" in printed
-    assert "cubic-stiffness (coordinate and rate): An odd part of the characteristic: + k x^3" in printed
+    assert "cubic-stiffness (coordinate and rate): Odd term of the characteristic: + k x^3" in printed
     assert "k = 3e-05 um/V^3" in printed
 
 

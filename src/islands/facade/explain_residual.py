@@ -1,4 +1,4 @@
-"""Propose: a formula for what is left over where no name explains it, evolved by the islands."""
+"""`explain_residual`: search for a formula of the part of a residual that no effect explains."""
 
 import re
 from collections.abc import Mapping
@@ -15,51 +15,62 @@ from islands.facade.identify import identify
 from islands.model.equations import equation
 from islands.simulation.predictors import free_run
 
-#: The search: small and simple, since a formula is for reading.
+#: Settings of the search: few terms, so that the formula is readable.
 SEARCH: Mapping[str, Any] = MappingProxyType(
     {"population": 200, "generations": 40, "islands": 2, "max_terms": 5, "initial_terms": (1, 5)}
 )
 
-#: Share of the remainder, on samples that nothing has seen, from which on a formula is worth telling.
-WORTH = 0.1
+#: Fraction of the residual, on the hold-out part, that a formula has to exceed by `MIN_IMPROVEMENT`.
+MIN_EXPLAINED_FRACTION = 0.1
 
-#: What the residual, and the output that is simulated, are called in it.
-LEFT, SIMULATED = "residual", "simulated"
+#: Increase of that fraction for which a model replaces one with a smaller validation error.
+MIN_IMPROVEMENT = 0.02
+
+#: Name of the residual in a formula.
+RESIDUAL = "residual"
+
+#: Name of the simulated output in a formula.
+SIMULATED = "simulated"
 
 
 def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> ResidualFormula | None:
-    """Look for a formula of what has no name; None where nothing is left, or none is worth it.
+    """Search for a formula of the residual of the best simulation of a diagnosis.
 
-    The islands search on the samples that the analysis was fitted to. The locked ones say what it is worth.
+    The search uses the estimation part of the record; the hold-out part decides which formula is returned.
+
+    Returns
+    -------
+    ResidualFormula or None
+        None if the verdict leaves no unexplained residual, or if no formula explains enough of it.
     """
     if found.verdict not in (Verdict.UNKNOWN, Verdict.REMAINDER):
         return None
     record = found.record
-    left = record.y - found.best.output
-    remainder = Dataset(
+    residual = record.y - found.best.output
+    dataset = Dataset(
         u=np.column_stack([record.u[:, 0], found.best.output]),
-        y=left,
+        y=residual,
         dt=record.dt,
         input_names=(record.input_names[0], SIMULATED),
         input_units=(record.input_units[0], record.output_unit),
-        output_name=LEFT,
+        output_name=RESIDUAL,
         output_unit=record.output_unit,
     )
     result = identify(
-        remainder[: found.estimation_samples], 0.25, preset="narx", seed=seed, engine=engine, **SEARCH
+        dataset[: found.estimation_samples], 0.25, preset="narx", seed=seed, engine=engine, **SEARCH
     )
-    best, explains = None, WORTH
+    best, explained = None, MIN_EXPLAINED_FRACTION
     for each in result.models:
-        run = free_run(each.model, remainder)
-        missed = np.where(np.isfinite(run.y), left - run.y, left)[found.estimation_samples :]
-        size = float(np.sum(left[found.estimation_samples :] ** 2))
-        share = 1.0 - float(np.sum(missed**2)) / size if size else 0.0
-        # The shortest one that is nearly as good: every term more has to be worth it.
-        if share > explains + 0.02:
-            best, explains = each.model, share
+        run = free_run(each.model, dataset)
+        error = np.where(np.isfinite(run.y), residual - run.y, residual)[found.estimation_samples :]
+        total = float(np.sum(residual[found.estimation_samples :] ** 2))
+        fraction = 1.0 - float(np.sum(error**2)) / total if total else 0.0
+        # Models are in the order of their validation error: a later one has to explain clearly more.
+        if fraction > explained + MIN_IMPROVEMENT:
+            best, explained = each.model, fraction
     if best is None:
         return None
-    names = {"u1": record.input_names[0], "u2": SIMULATED, "y": LEFT}
+    names = {"u1": record.input_names[0], "u2": SIMULATED, "y": RESIDUAL}
     return ResidualFormula(
-        re.sub(r"\b(u1|u2|y)(?=\()", lambda name: names[name[1]], equation(best)), explains
+        re.sub(r"\b(u1|u2|y)(?=\()", lambda name: names[name[1]], equation(best)), explained
     )

@@ -1,4 +1,4 @@
-"""A diagnosis as a document: ``discrepancy.json``, and the extended simulation."""
+"""Diagnosis as a JSON document: ``discrepancy.json``."""
 
 import json
 from dataclasses import asdict
@@ -18,26 +18,26 @@ def diagnosis_document(
     tested: SelfTest | None = None,
     proposal: ResidualFormula | None = None,
 ) -> dict[str, Any]:
-    """Describe a diagnosis.
+    """Return a diagnosis as a JSON document.
 
     Parameters
     ----------
     wall_s : float, optional
-        Seconds that it took; the core knows no clock.
+        Wall-clock time of the diagnosis in seconds, measured by the caller.
     tested : SelfTest, optional
-        What the analysis can do on this record.
+        Detection limits and false-alarm rate on this record.
     proposal : ResidualFormula, optional
-        A formula for what has no name.
+        Formula of the unexplained residual.
     """
     return {
         "schema": SCHEMA,
         "record": record_document(diagnosis.record),
         "simulation": diagnosis.base.simulation.simulator.name,
         "verdict": str(diagnosis.verdict),
-        "effects": [_effect(finding) for finding in diagnosis.effects],
+        "effects": [_describe_finding(finding) for finding in diagnosis.effects],
         "gain": None if diagnosis.gain is None else asdict(diagnosis.gain),
         "decisive_experiment": diagnosis.suggested_experiment or None,
-        "candidates": [_candidate(each) for each in diagnosis.candidates],
+        "candidates": [_describe_candidate(each) for each in diagnosis.candidates],
         "remainder": dict(diagnosis.residual_structure),
         "proposal": None if proposal is None else asdict(proposal),
         "as_given_rmse": diagnosis.nominal_rmse,
@@ -45,26 +45,27 @@ def diagnosis_document(
         "noise_floor_is": "measured by repeated periods"
         if diagnosis.is_noise_floor_measured
         else "an upper bound",
-        "calibrated": _values(diagnosis),
-        **_self_test(tested),
+        "calibrated": _get_calibrated_values(diagnosis),
+        **_describe_self_test(tested),
         "extended_model": None if diagnosis.gain is None else "extended.json",
         "wall_s": wall_s,
     }
 
 
 def as_json(document: dict[str, Any]) -> str:
-    """Write ``discrepancy.json``."""
+    """Return the text of ``discrepancy.json``."""
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def _values(diagnosis: Diagnosis) -> dict[str, float]:
+def _get_calibrated_values(diagnosis: Diagnosis) -> dict[str, float]:
     fit = diagnosis.best
-    own = fit.simulation.simulator.parameters
-    return {parameter.name: float(value) for parameter, value in zip(own, fit.values, strict=False)}
+    parameters = fit.simulation.simulator.parameters
+    # The values of the effects follow those of the simulator.
+    return {each.name: float(value) for each, value in zip(parameters, fit.values, strict=False)}
 
 
-def _self_test(tested: SelfTest | None) -> dict[str, Any]:
-    """Describe a self-test; without one its names are there, and nothing in them."""
+def _describe_self_test(tested: SelfTest | None) -> dict[str, Any]:
+    """Return the entries of a self-test; without one, all of them are None."""
     if tested is None:
         return dict.fromkeys(("detection_limits", "false_alarm_rate", "p_value", "confusion"))
     alarms = tested.false_alarm_rate
@@ -84,7 +85,7 @@ def _self_test(tested: SelfTest | None) -> dict[str, Any]:
     }
 
 
-def _effect(finding: Finding) -> dict[str, Any]:
+def _describe_finding(finding: Finding) -> dict[str, Any]:
     return {
         "name": finding.name,
         "family": finding.family,
@@ -103,5 +104,5 @@ def _effect(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _candidate(candidate: Candidate) -> dict[str, Any]:
+def _describe_candidate(candidate: Candidate) -> dict[str, Any]:
     return {"name": candidate.name, "score": candidate.score, "eta": candidate.explained_fraction}

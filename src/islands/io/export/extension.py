@@ -1,4 +1,4 @@
-"""Extended simulations as text: in words, as JSON, and as a program that runs them."""
+"""Export of extended simulations: plain text, JSON, Python program."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -9,14 +9,14 @@ from islands.errors import lookup
 from islands.io.simulator_spec.specification import LocalExtendedSpec
 
 
-def in_words(asked: LocalExtendedSpec) -> str:
-    """Say what is simulated, and every effect with its form and its values."""
-    simulator = asked.core.model_dump(mode="json", exclude_defaults=True)
+def as_text(spec: LocalExtendedSpec) -> str:
+    """Describe the simulator, and every effect with its equation and its values."""
+    simulator = spec.core.model_dump(mode="json", exclude_defaults=True)
     kind = simulator.pop("kind", "extended")
-    lines = [f"{asked.output} from {', '.join(asked.inputs)}: {kind} {json.dumps(simulator)}"]
-    if asked.times > 1 or asked.hold != "first-order":
-        lines.append(f"solved in {asked.times} steps a sample; the input between samples: {asked.hold}")
-    for effect in asked.effects:
+    lines = [f"{spec.output} from {', '.join(spec.inputs)}: {kind} {json.dumps(simulator)}"]
+    if spec.times > 1 or spec.hold != "first-order":
+        lines.append(f"solved with {spec.times} steps per sample; input between samples: {spec.hold}")
+    for effect in spec.effects:
         values = ", ".join(
             f"{name} = {each.value:.6g} {each.unit}" for name, each in effect.parameters.items()
         )
@@ -25,16 +25,16 @@ def in_words(asked: LocalExtendedSpec) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_json(asked: LocalExtendedSpec) -> str:
-    """Write the file that it was read from."""
-    return json.dumps(asked.model_dump(mode="json", by_alias=True), indent=2, allow_nan=False) + "\n"
+def as_json(spec: LocalExtendedSpec) -> str:
+    """Return the text of ``extended.json``."""
+    return json.dumps(spec.model_dump(mode="json", by_alias=True), indent=2, allow_nan=False) + "\n"
 
 
-def as_program(asked: LocalExtendedSpec) -> str:
-    """Write a Python program that simulates a record; it needs the package ``islands``."""
-    quoted = as_json(asked).replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
-    inputs = ", ".join(map(repr, asked.inputs))
-    return f'''"""Simulates a record with what a diagnosis found: python FILE.py record.csv simulated.csv"""
+def as_program(spec: LocalExtendedSpec) -> str:
+    """Return a Python program that simulates a record; it requires the package ``islands``."""
+    quoted = as_json(spec).replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
+    inputs = ", ".join(map(repr, spec.inputs))
+    return f'''"""Simulate a record with the result of a diagnosis: python FILE.py record.csv simulated.csv"""
 
 import json
 import sys
@@ -45,24 +45,25 @@ EXTENDED = json.loads("""
 {quoted}""")
 
 if __name__ == "__main__":
-    record = islands.read_record(sys.argv[1], inputs=[{inputs}], output={asked.output!r})
+    record = islands.read_record(sys.argv[1], inputs=[{inputs}], output={spec.output!r})
     y = islands.simulate(EXTENDED, record).y
     with open(sys.argv[2], "w") as file:
         file.write("y_sim\\n" + "\\n".join(repr(float(value)) for value in y) + "\\n")
 '''
 
 
+#: Export formats of an extended simulation by name.
 EXTENDED_EXPORTS: Mapping[str, Callable[[LocalExtendedSpec], str]] = MappingProxyType(
-    {"plain": in_words, "python": as_program, "json": as_json}
+    {"plain": as_text, "python": as_program, "json": as_json}
 )
 
 
-def export_extended(asked: LocalExtendedSpec, kind: str) -> str:
-    """Return an extended simulation as text of a kind in ``EXTENDED_EXPORTS``.
+def export_extended(spec: LocalExtendedSpec, kind: str) -> str:
+    """Return an extended simulation in a format of ``EXTENDED_EXPORTS``.
 
     Raises
     ------
     SettingsError
-        There is no such kind.
+        There is no such format.
     """
-    return lookup(EXTENDED_EXPORTS, kind, "format of an extended simulation")(asked)
+    return lookup(EXTENDED_EXPORTS, kind, "format of an extended simulation")(spec)
