@@ -24,7 +24,7 @@ def diagnose(
     effects: Sequence[Effect] = EFFECTS,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
-    spread: ParallelMap = map,
+    parallel_map: ParallelMap = map,
 ) -> Diagnosis:
     """Find which effects explain the difference between a simulation and a record, and how much they explain.
 
@@ -48,7 +48,7 @@ def diagnose(
         bit.
     progress : callable
         Called with a message, and with the completed fraction if it is known.
-    spread : ParallelMap
+    parallel_map : ParallelMap
         Function like `map` that calibrates the effects, possibly in parallel. It does not affect the result.
 
     Raises
@@ -59,10 +59,10 @@ def diagnose(
         There is no such simulation, a tolerance belongs to no parameter, two effects have the same name, or
         an effect is invalid.
     """
-    # A specification has a kind, a simulator has not.
+    # A specification has the attribute `kind`; a simulator does not.
     is_spec = isinstance(simulation, str) or hasattr(simulation, "kind")
     simulator = make_simulator(simulation, record, columns) if is_spec else simulation  # type: ignore[arg-type]
-    return diagnose_simulator(record, simulator, tolerance, seed, progress, spread, effects)  # type: ignore[arg-type]
+    return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)  # type: ignore[arg-type]
 
 
 def function_simulator(function: Callable[..., Signal], **nominal: float) -> Simulator:
