@@ -1,4 +1,4 @@
-"""Find the equation behind measured data.
+"""Identify models from measured data, and diagnose what simulations of the data get wrong.
 
 >>> import islands
 >>> record = islands.read_record("piezo.csv", inputs=["u_V"], output="y_um")  # doctest: +SKIP
@@ -10,8 +10,8 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Any
 
-#: Public names by the module that defines them. Modules are imported on first use: a command that lists names
-#: does not need the kernels, whose compiler takes half a second to import. `__init__.pyi` is made from this.
+#: Public names by defining module. A module is imported on first use, because the compiler of the kernels
+#: takes half a second to import. `__init__.pyi` is generated from this table.
 _PUBLIC = {
     "data.dataset": ("Dataset", "join"),
     "data.split": ("Split", "split"),
@@ -54,6 +54,6 @@ def __dir__() -> list[str]:
 
 
 def _make_stub() -> str:
-    """Return the text of ``__init__.pyi``, which gives editors and type checkers the public names."""
+    """Return the text of ``__init__.pyi``, which declares the public names for editors and type checkers."""
     lines = [f"from islands.{module} import {name} as {name}" for name, module in _MODULES.items()]
     return "\n".join(["# Made by islands._make_stub().", *sorted(lines), "", "__version__: str", ""])

@@ -10,7 +10,7 @@ import pytest
 from islands.evolution.generation.evaluation import Evaluator, Limits
 from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import DEPTH
-from islands.evolution.island import _bar, _bars, first_generation, step
+from islands.evolution.island import _abandon_threshold, _thresholds_by_size, first_generation, step
 from islands.evolution.problem import problem
 from islands.simulation.outcome import Status
 from support.searches import SMALL, exactly, islands_of, record
@@ -92,7 +92,7 @@ def test_whoever_is_abandoned_is_less_fit_than_the_island_s_bar_and_settles_to_t
     fresh = Evaluator(record(), setting, Limits(pairs=1 << 16), abandon=False)
     for island in course:
         given_up = abandoned(island)
-        settled = seasoned.settled(given_up)
+        settled = seasoned.evaluate_abandoned(given_up)
         exact, _ = fresh.evaluate([(Individual(each.genes), False) for each in given_up])
         assert repr(settled) == repr(exact)
         assert all(each.fitness > island.abandon_threshold for each in settled)
@@ -106,7 +106,7 @@ def test_what_an_evaluator_has_seen_does_not_change_who_is_abandoned(setting, co
     """Not even that it knows an individual's fitness already."""
     seasoned = Evaluator(record(), setting)
     for island in course:
-        seasoned.settled([Individual(each.genes) for each in island.population])
+        seasoned.evaluate_abandoned([Individual(each.genes) for each in island.population])
     islands_of(seasoned, 3, seed=99)
     forgetful = Evaluator(record(), setting, Limits(pairs=0, genes=0, structures=0))
     for evaluator in (seasoned, forgetful):
@@ -140,16 +140,16 @@ def test_with_a_library_s_genes_it_is_the_same():
 def test_the_bar_follows_from_the_island_before_the_step(setting, course):
     assert course[0].abandon_threshold == inf
     for before, after in pairwise(course):
-        assert after.abandon_threshold == _bar(before, setting)
+        assert after.abandon_threshold == _abandon_threshold(before, setting)
     assert course[-1].abandon_threshold < inf
 
 
 def test_the_bar_lets_pass_whoever_may_enter_the_elite_or_the_hall(setting, course):
     for island in course:
-        bar = _bar(island, setting)
+        bar = _abandon_threshold(island, setting)
         full = len(island.elite) == setting.elites
         assert bar >= (island.elite[-1].fitness if full else inf)
-        bars = _bars(island.hall_of_fame, bar, setting.max_terms)
+        bars = _thresholds_by_size(island.hall_of_fame, bar, setting.max_terms)
         assert len(bars) == setting.max_terms + 1
         for size, allowed in enumerate(bars):
             known = [entry.fitness for entry in island.hall_of_fame.entries if entry.size == size]
@@ -160,7 +160,7 @@ def test_four_of_five_parents_are_better_than_the_bar_where_as_many_are_known():
     (bred,) = islands_of(Evaluator(record(), SMALL), 0)
     parents = sorted(each.fitness for each in (*bred.elite, *bred.population))
     known = sum(fitness < inf for fitness in parents)
-    bar = _bar(bred, SMALL)
+    bar = _abandon_threshold(bred, SMALL)
     expected = parents[min(int(0.8 * len(parents)), known - 1)]
     assert bar == max(expected, bred.elite[-1].fitness)
 
@@ -170,7 +170,7 @@ def test_where_most_parents_are_copies_of_the_best_the_whole_elite_is_within_the
     island = islands_of(Evaluator(record(), setting), 5)[-1]
     alike = replace(island, population=island.elite[:1] * setting.population)
     assert alike.elite[-1].fitness > alike.elite[0].fitness
-    assert _bar(alike, setting) == alike.elite[-1].fitness
+    assert _abandon_threshold(alike, setting) == alike.elite[-1].fitness
     elites = []
     for abandon in (True, False):
         following, _ = step(alike, Evaluator(record(), setting, abandon=abandon))

@@ -142,7 +142,7 @@ def test_who_is_abandoned_has_an_exact_fitness_above_its_bar_and_can_be_settled(
         if each.outcome.verdict is Status.ABANDONED
     ]
     assert bars is not None or not abandoned
-    settled = evaluator.settled([each for each, _ in abandoned])
+    settled = evaluator.evaluate_abandoned([each for each, _ in abandoned])
     for (each, key), exact in zip(abandoned, settled, strict=True):
         assert (each.fitness, each.theta) == (inf, ())
         assert exact.fitness > bars[each.size]

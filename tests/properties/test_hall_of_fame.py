@@ -127,8 +127,8 @@ def test_one_as_fit_as_the_last_of_a_full_size_takes_its_place_by_its_text():
 
 @given(halls)
 def test_the_places_are_counted_within_a_size(hall):
-    counted = [(place, each.size) for place, each in hall.places()]
-    assert [each for _, each in hall.places()] == list(hall.entries)
+    counted = [(place, each.size) for place, each in hall.ranked()]
+    assert [each for _, each in hall.ranked()] == list(hall.entries)
     assert counted == [
         (place, size)
         for size in sorted({each.size for each in hall.entries})

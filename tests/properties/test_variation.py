@@ -10,11 +10,11 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import (
     high_level_crossover,
     inner_mutation,
-    legal,
     low_level_crossover,
     outer_mutation,
     random_gene,
     random_genes,
+    repair_genes,
     with_linear_output,
 )
 from islands.evolution.gp.gene_structure import phi
@@ -189,9 +189,9 @@ def test_children_of_an_outer_mutation_are_legal_with_a_pool_and_without(drawn, 
 def test_what_is_legal_is_left_as_it_is(drawn, seed):
     """So a step mends what is new alone: mending everybody again would change nobody."""
     setting, inputs, (genes,) = drawn
-    assert legal(genes, setting) == with_linear_output(genes, setting) == genes
+    assert repair_genes(genes, setting) == with_linear_output(genes, setting) == genes
     child = with_linear_output(outer_mutation(genes, setting, inputs, stream(seed), ()), setting)
-    assert legal(child, setting) == child
+    assert repair_genes(child, setting) == child
 
 
 @given(parents(2), seeds)
@@ -201,7 +201,7 @@ def test_genes_from_elsewhere_are_made_legal(drawn, seed):
     for structure in ("phi", "increment"):
         for genes in individuals:
             asked = replace(setting, structure=structure, constraints="hysteresis")
-            assert faults(legal(genes, asked), asked, inputs) == []
+            assert faults(repair_genes(genes, asked), asked, inputs) == []
 
 
 @given(setting_values(), st.integers(1, 2), seeds)

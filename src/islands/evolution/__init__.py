@@ -1,1 +1,4 @@
-"""Multi-gene genetic programming with forward orthogonal regression: islands that evolve NARX models."""
+"""Multi-gene genetic programming with forward orthogonal regression (MGGP/FROE) on islands.
+
+Read `island` first, then `epoch`, `engine` and `search_state`.
+"""

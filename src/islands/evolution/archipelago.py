@@ -1,4 +1,4 @@
-"""The archipelago: all islands at one generation. A checkpoint is this value, and nothing else."""
+"""Archipelago: the state of all islands at one generation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ class Archipelago:
     Attributes
     ----------
     islands : sequence of Island
-        In the order of their index.
+        In ascending order of their index.
     """
 
     islands: Sequence[Island] = ()
 
     @property
     def generation(self) -> int:
-        """Steps that every island has taken; -1 before the first population."""
+        """Generations completed by every island; -1 before the first population."""
         return self.islands[0].generation if self.islands else -1
 
     @property
     def hall_of_fame(self) -> HallOfFame:
-        """The halls of fame of all islands, gathered."""
+        """Merged halls of fame of all islands."""
         return merge(*(island.hall_of_fame for island in self.islands))
 
 
 def empty_archipelago(islands: int, seed: int) -> Archipelago:
-    """Return islands that nobody lives on yet."""
+    """Return an archipelago of empty islands (generation -1)."""
     return Archipelago(tuple(Island(index, seed, -1, (), (), HallOfFame()) for index in range(islands)))

@@ -1,4 +1,4 @@
-"""Engines: how epochs are carried out. Every engine yields the same archipelagos, bit for bit."""
+"""Engines: they run the epochs of a search. All engines yield the same archipelagos, bit for bit."""
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
@@ -11,24 +11,24 @@ from islands.evolution.island import StepInfo
 from islands.evolution.migration.topology import Topology, topology
 from islands.evolution.problem import Problem
 
-#: Answers with true once the search is to end.
+#: Returns true if the search must end.
 Stop = Callable[[], bool]
 
-#: Bytes that every cache takes, and its limit.
+#: Bytes in use and byte limit of each cache, by name.
 Caches = Mapping[str, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
 class ArchipelagoEpoch:
-    """An archipelago, and what its islands did to get there.
+    """Archipelago at the end of an epoch, with the statistics of the epoch.
 
     Attributes
     ----------
     archipelago : Archipelago
     steps : tuple of tuple of StepInfo
-        For every island its generations since the epoch before.
+        For every island, one entry per generation since the previous epoch.
     caches : mapping
-        Of all evaluators together.
+        Memory of the caches, summed over all evaluators.
     """
 
     archipelago: Archipelago
@@ -37,10 +37,10 @@ class ArchipelagoEpoch:
 
 
 class Engine(Protocol):
-    """Carries a search from one epoch to the next.
+    """Interface of engines, which run the epochs of a search.
 
-    Law: the archipelagos depend on the problem and the archipelago given alone; an engine that starts from
-    any archipelago that it yielded goes on as if it had never stopped.
+    Contract: the archipelagos depend only on the problem and on the first archipelago. An engine that starts
+    from an archipelago that it yielded earlier continues with the same archipelagos.
     """
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
@@ -49,18 +49,18 @@ class Engine(Protocol):
         Parameters
         ----------
         start : Archipelago
-            Its islands are those that go on: `founded` ones begin.
+            Archipelago to continue from; `empty_archipelago` starts a new search.
         stop : callable
-            Asked all the time; once it answers with true, no further epoch is yielded.
+            Called frequently. Once it returns true, no further epoch is yielded.
         """
         ...
 
 
 class SerialEngine:
-    """Runs the islands one after the other in this process, on one evaluator."""
+    """Engine that runs the islands one after the other in this process, with one evaluator."""
 
     def run(self, problem: Problem, start: Archipelago, stop: Stop) -> Generator[ArchipelagoEpoch]:
-        """See `Engine`."""
+        """Yield every epoch after ``start``."""
         evaluator = Evaluator(problem.record, problem.settings)
         sources = make_topology(problem, start).sources
         archipelago = start
@@ -79,6 +79,6 @@ class SerialEngine:
 
 
 def make_topology(problem: Problem, archipelago: Archipelago) -> Topology:
-    """Return the topology of an archipelago; it follows from its islands' number and seed."""
+    """Return the topology for the number of islands and the seed of an archipelago."""
     islands = archipelago.islands
     return topology(problem.settings.topology, len(islands), islands[0].seed)

@@ -1,7 +1,7 @@
-"""An island's epoch: who arrives, the steps to the next stop of the schedule, who leaves.
+"""Epoch of one island: immigration, generations up to the next migration, emigration.
 
-Migration happens at the beginning of an epoch, from the values that the islands had at the end of the one
-before. So an island waits for those that it receives from, and for nobody else.
+Immigrants enter at the beginning of an epoch. They are the emigrants that the source islands selected at the
+end of the previous epoch, so an island waits only for its sources.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,15 +20,15 @@ from islands.simulation.outcome import Status
 
 @dataclass(frozen=True, slots=True)
 class IslandEpoch:
-    """What an island brings back from an epoch.
+    """Result of an epoch of one island.
 
     Attributes
     ----------
     island : Island
     emigrants : tuple of Individual
-        Copies of those who leave it for the next epoch of its neighbours.
+        Copies of individuals that its neighbours receive at the beginning of the next epoch.
     steps : tuple of StepInfo
-        One for every generation of the epoch.
+        One entry per generation of the epoch.
     """
 
     island: Island
@@ -43,19 +43,19 @@ def run_epoch(
     problem: Problem,
     stop: Callable[[], bool],
 ) -> IslandEpoch | None:
-    """Carry an island to the next stop.
+    """Run an island up to the next migration.
 
     Parameters
     ----------
     arriving : sequence of populations
-        The `select_migrants` of every source, in the order of the sources' index.
+        Emigrants of each source, in ascending order of the sources' index; see `select_migrants`.
     stop : callable
-        Asked before every generation.
+        Called before every generation.
 
     Returns
     -------
     IslandEpoch or None
-        None where it was told to stop: what has been done of the epoch is lost.
+        None if ``stop`` returned true. The generations of the unfinished epoch are discarded.
     """
     settings = problem.settings_of(island.index)
     last = next_stop(island.generation, settings)
@@ -73,38 +73,38 @@ def run_epoch(
 
 
 def next_stop(generation: int, settings: Settings) -> int:
-    """Return where the epoch ends that begins at a generation; the first population is one of its own."""
+    """Return the end of the epoch that begins at a generation; the first population is a separate epoch."""
     return 0 if generation < 0 else min(settings.generations, settings.stops.next_stop(generation))
 
 
 def select_migrants(island: Island, settings: Settings) -> Population:
-    """Return copies of those who leave an island; nobody does but at a stop of the schedule.
+    """Return copies of the emigrants of an island; none if no migration is scheduled at its generation.
 
-    All have a fitness that is known: whoever was abandoned stays.
+    Every emigrant has a known fitness: abandoned individuals are not selected.
     """
     if not settings.stops.stops_at(island.generation):
         return ()
     count = settings.leaving.at(island.generation)
-    draw = Stream(island.seed, island.index, island.generation, Purpose.EMIGRATION)
-    return SELECTION_POLICIES[settings.emigrants](island.elite, count, draw)
+    rng = Stream(island.seed, island.index, island.generation, Purpose.EMIGRATION)
+    return SELECTION_POLICIES[settings.emigrants](island.elite, count, rng)
 
 
 def receive_migrants(
     island: Island, arriving: Sequence[Population], evaluator: Evaluator, settings: Settings
 ) -> Island:
-    """Return the island after an arrival; its population keeps its size, and the elite never shrinks.
+    """Return the island after immigration.
 
-    Who arrives takes somebody's place in the population, and contends for the elite. A model that the elite
-    has already does not arrive again.
+    Immigrants replace individuals chosen by the replacement policy and compete for the elite. The population
+    keeps its size, and the elite never shrinks. Models that are already in the elite are ignored.
     """
     known = {each.key for each in island.elite}
-    fresh = [each for each in unique_structures(chain(*arriving)) if each.key not in known]
-    immigrants = fresh[: len(island.population)]
+    candidates = [each for each in unique_structures(chain(*arriving)) if each.key not in known]
+    immigrants = candidates[: len(island.population)]
     if not immigrants:
         return island
-    draw = Stream(island.seed, island.index, island.generation, Purpose.IMMIGRATION)
+    rng = Stream(island.seed, island.index, island.generation, Purpose.IMMIGRATION)
     places = REPLACEMENT_POLICIES[settings.replaced](
-        len(island.population), lambda: _fitness(island.population, evaluator), len(immigrants), draw
+        len(island.population), lambda: _fitness(island.population, evaluator), len(immigrants), rng
     )
     population = list(island.population)
     for place, each in zip(places, immigrants, strict=True):
@@ -114,9 +114,10 @@ def receive_migrants(
 
 
 def _fitness(population: Population, evaluator: Evaluator) -> list[float]:
-    """Return everybody's fitness; who was abandoned is evaluated to the end."""
+    """Return the fitness of each individual; abandoned individuals are evaluated completely."""
     fitness = [each.fitness for each in population]
     places = [place for place, each in enumerate(population) if each.outcome.verdict is Status.ABANDONED]
-    for place, each in zip(places, evaluator.settled([population[place] for place in places]), strict=True):
+    evaluated = evaluator.evaluate_abandoned([population[place] for place in places])
+    for place, each in zip(places, evaluated, strict=True):
         fitness[place] = each.fitness
     return fitness

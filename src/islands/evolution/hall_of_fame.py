@@ -1,6 +1,6 @@
-"""The hall of fame: the best models of every size that a search has seen.
+"""Hall of fame: the best models of every size found by a search.
 
-Merging is associative, commutative and idempotent, so halls may be gathered from islands in any order.
+Merging is associative, commutative and idempotent, so halls of islands can be merged in any order.
 """
 
 from collections import Counter
@@ -10,58 +10,61 @@ from math import inf, isfinite
 
 from islands.evolution.gp.individual import Individual
 
-#: Models that are kept of every size: validation chooses among them.
+#: Models kept for every size; validation selects among them.
 DEPTH = 8
 
 
 @dataclass(frozen=True, slots=True)
 class HallOfFame:
-    """Individuals, by size and within a size best first; each structure once."""
+    """Individuals ordered by size, then by fitness; each structure occurs once."""
 
     entries: tuple[Individual, ...] = ()
 
-    def places(self) -> Iterator[tuple[int, Individual]]:
-        """Yield the individuals, each with its place among those of its size, from 1 on."""
-        places: Counter[int] = Counter()
+    def ranked(self) -> Iterator[tuple[int, Individual]]:
+        """Yield each individual with its rank among those of its size, starting at 1."""
+        ranks: Counter[int] = Counter()
         for entry in self.entries:
-            places[entry.size] += 1
-            yield places[entry.size], entry
+            ranks[entry.size] += 1
+            yield ranks[entry.size], entry
 
-    def last(self) -> dict[int, float]:
-        """Return, for every size that is full, the fitness of its last individual: nobody worse enters."""
-        return {entry.size: entry.fitness for place, entry in self.places() if place == DEPTH}
+    def entry_thresholds(self) -> dict[int, float]:
+        """Return the fitness of the last individual of every full size.
+
+        Individuals with a higher fitness of that size cannot enter.
+        """
+        return {entry.size: entry.fitness for rank, entry in self.ranked() if rank == DEPTH}
 
     def best(self) -> dict[int, Individual]:
         """Return the best individual of every size."""
-        found: dict[int, Individual] = {}
+        best: dict[int, Individual] = {}
         for entry in self.entries:
-            found.setdefault(entry.size, entry)
-        return found
+            best.setdefault(entry.size, entry)
+        return best
 
 
 def with_entries(hall: HallOfFame, individuals: Iterable[Individual]) -> HallOfFame:
-    """Return the hall with individuals added; a fitness that is not finite never enters."""
-    last = hall.last()
+    """Return the hall with individuals added; individuals without a finite fitness are ignored."""
+    thresholds = hall.entry_thresholds()
     found: dict[tuple[str, ...], Individual] = {}
     for entry in (*hall.entries, *individuals):
-        if not isfinite(entry.fitness) or entry.fitness > last.get(entry.size, inf):
+        if not isfinite(entry.fitness) or entry.fitness > thresholds.get(entry.size, inf):
             continue
         known = found.get(entry.key)
         if known is None or _order(entry) < _order(known):
             found[entry.key] = entry
     ordered = HallOfFame(tuple(sorted(found.values(), key=_order)))
-    # Genes in canonical form: which of two ways to write a model came first must not matter.
+    # Store genes in canonical form, so that the result does not depend on which notation came first.
     return HallOfFame(
         tuple(
             replace(entry, genes=tuple(item.expression for item in entry.regressors))
-            for place, entry in ordered.places()
-            if place <= DEPTH
+            for rank, entry in ordered.ranked()
+            if rank <= DEPTH
         )
     )
 
 
 def pareto_front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
-    """Return the Pareto front of error and size: the best of every size that no smaller one beats."""
+    """Return the Pareto front of error and size, smallest first."""
     found: list[Individual] = []
     for each in sorted(individuals, key=lambda each: (each.size, each.fitness)):
         if not found or each.fitness < found[-1].fitness:
@@ -70,7 +73,7 @@ def pareto_front(individuals: Iterable[Individual]) -> tuple[Individual, ...]:
 
 
 def merge(*halls: HallOfFame) -> HallOfFame:
-    """Gather halls of fame."""
+    """Merge halls of fame."""
     return with_entries(HallOfFame(), (entry for hall in halls for entry in hall.entries))
 
 

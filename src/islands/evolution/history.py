@@ -1,4 +1,4 @@
-"""History of a search: the least fitness by generation."""
+"""History of a search: the best fitness by generation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class HistoryPoint:
-    """One point of a search's course.
+    """Best fitness at one generation.
 
     Attributes
     ----------
     generation : int
     evaluations : int
-        Until then.
+        Individuals evaluated up to this generation.
     best : mapping
-        The least fitness (mean squared shooting error) of every size.
+        Best fitness (mean squared shooting error) of every model size.
     islands : tuple of float
-        The least fitness of every island; infinite where it has no model yet.
+        Best fitness of every island; infinite if the island has no model yet.
     """
 
     generation: int

@@ -1,4 +1,4 @@
-"""The table of presets: data, not code. `paper-*` are the paper's; `hysteresis` and `narx` are ours."""
+"""Table of presets. The presets `paper-*` are those of the paper."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -8,10 +8,10 @@ from typing import Any
 from islands.errors import lookup
 from islands.evolution.settings import Settings
 
-#: Section 6.1, the theoretical piezo: shooting over 500 steps, tolerance 1e-5.
+#: Section 6.1, theoretical piezo: shooting over 500 steps, tolerance 1e-5.
 _PAPER = Settings()
 
-#: Appendix A: one-step-ahead error, multiplication alone, no constraint; its second system is allowed more.
+#: Appendix A, first system: one-step-ahead error, multiplication only, no constraint.
 _APPENDIX = Settings(
     population=200,
     generations=50,
@@ -24,8 +24,8 @@ _APPENDIX = Settings(
     fitness="one-step",
 )
 
-#: Small populations that begin at the forward selection, mutate whole genes, and are refined.
-_OURS = Settings(
+#: Small populations, seeded by forward selection; mostly outer mutation; refined parameters.
+_SEEDED = Settings(
     elite=0.2,
     crossover=0.4,
     mutation=1.0,
@@ -47,7 +47,7 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
         "paper-appendix": _APPENDIX,
         "paper-appendix-s2": replace(_APPENDIX, max_height=5, max_terms=30, initial_terms=(1, 30)),
         "hysteresis": replace(
-            _OURS,
+            _SEEDED,
             population=300,
             generations=80,
             shooting=1000,
@@ -56,7 +56,7 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
             structure="increment",
         ),
         "narx": replace(
-            _OURS,
+            _SEEDED,
             population=200,
             generations=60,
             shooting=100,
@@ -73,7 +73,7 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
     }
 )
 
-#: What each preset is for.
+#: Summary of each preset.
 PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
     {
         "paper-case1": "Section 6.1 of the paper: theoretical piezo, no seeding",
@@ -87,12 +87,12 @@ PRESET_SUMMARIES: Mapping[str, str] = MappingProxyType(
 
 
 def resolve_settings(preset: str, changes: Mapping[str, Any]) -> Settings:
-    """Return a preset's settings with changes.
+    """Return the settings of a preset with changes.
 
     Raises
     ------
     SettingsError
-        The preset or a setting is unknown, or out of range.
+        The preset or a setting is unknown, or a setting is out of range.
     """
     base = lookup(PRESETS, preset, "preset")
     for name in changes:

@@ -1,4 +1,4 @@
-"""A problem: the record, the settings and what follows from them for every island."""
+"""Search problem: the record, the settings, the seeds and the gene pool."""
 
 from dataclasses import dataclass, replace
 
@@ -15,17 +15,17 @@ from islands.simulation.outcome import EvaluationOutcome
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """What islands search for, and where.
+    """Search problem, shared by all islands.
 
     Attributes
     ----------
     record : Dataset
-        The estimation data, complete.
+        Estimation data without missing values.
     settings : Settings
     seeds : tuple of genes
-        Individuals that every first population begins with: the forward selection over the settings' library.
+        Individuals in every first population, from forward selection over the library of the settings.
     pool : tuple of Expression
-        Genes that an outer mutation may take whole: that library.
+        Genes of that library, which an outer mutation may insert.
     """
 
     record: Dataset
@@ -34,34 +34,32 @@ class Problem:
     pool: tuple[Expression, ...] = ()
 
     def settings_of(self, island: int) -> Settings:
-        """Return the settings with what is different about an island; characters are given out in turn."""
-        characters = self.settings.characters
-        return (
-            replace(self.settings, **ISLAND_PROFILES[characters[island % len(characters)]])
-            if characters
-            else self.settings
-        )
+        """Return the settings of an island; profiles are assigned to the islands in turn."""
+        profiles = self.settings.characters
+        if not profiles:
+            return self.settings
+        return replace(self.settings, **ISLAND_PROFILES[profiles[island % len(profiles)]])
 
 
 def problem(record: Dataset, settings: Settings) -> Problem:
-    """Pose a problem; with a library in the settings its forward selection is done here, once.
+    """Make a search problem; run the forward selection if the settings have a library.
 
-    Regressors of the library that are higher than a gene may be are left out.
+    Regressors of the library that exceed the maximum height of a gene are left out.
 
     Raises
     ------
     SettingsError
-        The library would have too many candidates.
+        The library has too many candidates.
     RecordError
-        Its forward selection finds the record incomplete, or shorter than the library's deepest lag.
+        The record is incomplete, or not longer than the largest lag of the library.
     """
     if not settings.library:
         return Problem(record, settings)
-    every = candidates(settings.library, settings.library_degree, settings.library_lags, record.inputs)
-    genes = {item: with_phi(item.expression) for item in every}
-    library = [item for item in every if height(genes[item]) <= settings.max_height]
-    found = forward_selection(library, record, settings.constraints, settings.max_terms)
-    structures = () if isinstance(found, EvaluationOutcome) else found
+    regressors = candidates(settings.library, settings.library_degree, settings.library_lags, record.inputs)
+    genes = {item: with_phi(item.expression) for item in regressors}
+    library = [item for item in regressors if height(genes[item]) <= settings.max_height]
+    selected = forward_selection(library, record, settings.constraints, settings.max_terms)
+    structures = () if isinstance(selected, EvaluationOutcome) else selected
     return Problem(
         record,
         settings,

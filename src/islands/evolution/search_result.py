@@ -1,4 +1,4 @@
-"""What a search found: assessed models, the best first, and what it took to find them."""
+"""Result of a search: ranked models and statistics."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ from islands.validation.assessment import Assessment
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedModel:
-    """A model and what is known of it."""
+    """Model with its assessment."""
 
     model: Model
     assessment: Assessment
@@ -25,7 +25,7 @@ class RankedModel:
 
 @dataclass(frozen=True, slots=True)
 class SearchStatistics:
-    """What a search did.
+    """Statistics of a search.
 
     Attributes
     ----------
@@ -34,19 +34,23 @@ class SearchStatistics:
     outcomes : mapping
         Number of models by outcome: ``{"ok": 9, "singular": 1}``.
     full_set : mapping
-        ``candidates`` of the full polynomial set for the lags and degree searched, equation (5), and the
-        ``bytes`` of its regressor matrix, which was never made.
+        Size of the full polynomial set, equation (5), for the lags and degree searched: number of
+        ``candidates``, and ``bytes`` that its regressor matrix would need.
     wall_s : float or None
-        Seconds it took, from whoever has a clock.
-    generations, duplicates, feasible_share
-        Of an evolution: generations done, individuals whose structure was that of a parent or a sibling, and
-        the share of individuals that got parameters; None for other searches.
+        Duration in seconds; None if the search was not timed.
+    generations : int or None
+        Completed generations; None if the search is not an evolution.
+    duplicates : int or None
+        Individuals whose structure occurs among the parents or earlier in their generation; None if the
+        search is not an evolution.
+    feasible_share : float or None
+        Fraction of individuals with estimated parameters; None if the search is not an evolution.
     history : tuple of HistoryPoint
-        The course of an evolution, oldest first.
+        Best fitness by generation, oldest first; empty if the search is not an evolution.
     caches : mapping
-        Bytes that every cache of an evolution takes at its end, and its limit.
+        Bytes in use at the end of an evolution and byte limit of each cache, by name.
     ended_by : str or None
-        The budget that an evolution used up, or ``stopped``.
+        Budget that an evolution used up, or ``stopped``; None if the search is not an evolution.
     """
 
     evaluations: int
@@ -62,26 +66,26 @@ class SearchStatistics:
 
     @property
     def evaluations_per_second(self) -> float | None:
-        """None where nobody looked at a clock."""
+        """Evaluations per second; None if the search was not timed."""
         return self.evaluations / self.wall_s if self.wall_s else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchResult:
-    """All that a result says.
+    """Complete result of a search.
 
     Attributes
     ----------
     record : Dataset
-        As it was given.
+        Record as passed by the caller.
     split : Split
-        The data that estimated, and the data that validated.
+        Estimation data and validation data.
     seed : int
     settings : mapping
-        Everything that determines the result, besides the record and the seed.
+        Settings that determine the result, together with the record and the seed.
     search : SearchStatistics
     models : tuple of RankedModel
-        Best first, as `rank_models` orders them.
+        Models, best first; see `rank_models`.
     """
 
     record: Dataset
@@ -93,16 +97,16 @@ class SearchResult:
 
 
 def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:
-    """Order models by their free-run error on the validation data, the least first.
+    """Sort models by the RMSE of their free run on the validation data, best first.
 
-    Those that diverged there come last, by their one-step-ahead error, and behind them those that diverged
-    even one step ahead; ties go to the smaller model, then to the text. Validation selects the model, so its
-    error is no test of it.
+    Models whose free run diverged come last, sorted by one-step-ahead RMSE; an infinite one comes at the end.
+    Ties are broken by size, then by the text of the equation. The validation data select the model, so the
+    validation error is not an unbiased test error.
     """
-    return tuple(sorted(models, key=_key))
+    return tuple(sorted(models, key=_ranking_key))
 
 
-def _key(entry: RankedModel) -> tuple[bool, float, int, str]:
+def _ranking_key(entry: RankedModel) -> tuple[bool, float, int, str]:
     errors = entry.assessment.metrics["validation"]
     diverged = bool(np.isnan(errors["free_run"].rmse))
     rmse = errors["one_step_ahead" if diverged else "free_run"].rmse

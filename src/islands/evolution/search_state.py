@@ -1,4 +1,4 @@
-"""Where a search stands: the archipelago, and what was counted on the way to it."""
+"""State of a search: the archipelago and the statistics since its beginning."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -13,20 +13,22 @@ from islands.evolution.settings import Settings
 
 @dataclass(frozen=True, slots=True)
 class SearchState:
-    """Where a search stands: what a watcher sees, and all that a checkpoint needs.
+    """State of a search. Callbacks receive it, and a checkpoint stores it.
 
     Attributes
     ----------
     archipelago : Archipelago
-    evaluations, duplicates : int
-        Since the beginning.
+    evaluations : int
+        Individuals evaluated.
+    duplicates : int
+        Individuals whose structure occurs among the parents or earlier in their generation.
     outcomes : mapping
         Number of individuals by outcome.
     history : tuple of HistoryPoint
-        The first and the last point of every stretch in which nothing got better: a thousand islands go on
-        for a hundred thousand generations.
+        Best fitness by generation. Of consecutive points with equal fitness only the first and the last are
+        kept, so that the history of a long run stays short.
     caches : mapping
-        Bytes that every cache takes, and its limit.
+        Bytes in use and byte limit of each cache, by name.
     """
 
     archipelago: Archipelago
@@ -38,7 +40,7 @@ class SearchState:
 
 
 def advance(state: SearchState, epoch: ArchipelagoEpoch) -> SearchState:
-    """Return the state after one more epoch."""
+    """Return the state after an epoch."""
     evaluations, duplicates = state.evaluations, state.duplicates
     outcomes, history = Counter(state.outcomes), list(state.history)
     for generation in zip(*epoch.steps, strict=True):
@@ -51,7 +53,7 @@ def advance(state: SearchState, epoch: ArchipelagoEpoch) -> SearchState:
                 best[size] = min(fitness, best.get(size, inf))
         least = tuple(min(info.best.values(), default=inf) for info in generation)
         point = HistoryPoint(generation[0].generation, evaluations, dict(sorted(best.items())), least)
-        if all(_alike(point, before) for before in history[-2:]) and len(history) > 1:
+        if all(_has_equal_fitness(point, before) for before in history[-2:]) and len(history) > 1:
             history.pop()
         history.append(point)
     return SearchState(
@@ -59,12 +61,12 @@ def advance(state: SearchState, epoch: ArchipelagoEpoch) -> SearchState:
     )
 
 
-def _alike(one: HistoryPoint, other: HistoryPoint) -> bool:
+def _has_equal_fitness(one: HistoryPoint, other: HistoryPoint) -> bool:
     return one.best == other.best and one.islands == other.islands
 
 
 def stop_reason(state: SearchState, settings: Settings) -> str:
-    """Return the budget that a search has used up, "" where it has to go on."""
+    """Return the budget that a search has used up; empty if none."""
     reached = state.history[-1].generation if state.history else state.archipelago.generation
     if reached >= settings.generations:
         return "generations"

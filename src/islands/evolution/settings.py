@@ -1,4 +1,4 @@
-"""Everything that determines a run of evolution, besides the record and the seed."""
+"""Settings of an evolution. With the record and the seed they determine its result."""
 
 from dataclasses import dataclass, field
 from math import inf
@@ -15,7 +15,7 @@ from islands.evolution.migration.topology import TOPOLOGIES, topology
 from islands.model.candidate_library import library_named
 from islands.model.primitives import PRIMITIVES
 
-#: More islands than this would not fit into any coordinator.
+#: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000
 
 T = TypeVar("T")
@@ -40,14 +40,14 @@ def _option(default: T, help_text: str | None = None, name: str | None = None, a
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The parameters of the paper's section 5, and what it leaves open.
+    """Settings of an evolution: the parameters of section 5 of the paper, and those it leaves open.
 
     Attributes
     ----------
     population, generations : int
-        Offspring of every generation, and how many generations.
+        Offspring of each generation; number of generations.
     elite : float
-        Share of the population that is kept as elite.
+        Fraction of the population that is kept as elite.
     crossover : float
         CXPB, probability that a pair recombines.
     mutation : float
@@ -55,63 +55,64 @@ class Settings:
     prune : float
         PRPB, probability that an evaluated individual is pruned by FROE.
     tolerance : float
-        Smallest error reduction ratio that survives pruning.
+        Smallest error reduction ratio of a term that pruning keeps.
     max_terms, max_height : int
-        Genes of an individual; edges from a gene's root to its deepest leaf, back-shifts included.
+        Largest number of genes of an individual; largest number of edges from the root of a gene to a leaf,
+        including back-shifts.
     shifts : tuple of int
-        The back-shift operators q1, q2, ... that may stand in a gene.
+        Back-shift operators q1, q2, ... that genes may contain.
     primitives : tuple of str
-        Functions that may stand in a gene.
+        Functions that genes may contain.
     structure : str
-        An entry of ``STRUCTURES``: what a gene must look like.
+        An entry of ``STRUCTURES``: constraint on the form of genes.
     constraints : str
         An entry of the parameter constraints, ``hysteresis`` or ``none``.
     fitness : str
         An entry of ``FITNESSES``.
     shooting : int
-        Samples of an interval of multiple shooting.
+        Samples of each interval of multiple shooting.
     tournament : int
-        Contestants of a tournament. The paper is silent; 3 is the usual choice of its toolbox.
+        Contestants of a tournament. The paper does not give it; 3 is the usual choice of its toolbox.
     high_level : float
-        Probability that a crossover exchanges whole genes rather than subtrees; the paper is silent.
+        Probability that a crossover exchanges whole genes, not subtrees; not given in the paper.
     outer : float
-        Probability that a mutation replaces a whole gene rather than a subtree; the paper is silent.
+        Probability that a mutation replaces a whole gene, not a subtree; not given in the paper.
     initial_terms : tuple of int
-        Fewest and most genes of a first individual; the paper is silent.
+        Fewest and most genes of individuals in the first population; not given in the paper.
     initial_height : int
-        Greatest height of a first gene, and of a subtree that mutation grows, at most ``max_height``; the
-        paper is silent.
+        Largest height of genes in the first population and of random subtrees, at most ``max_height``; not
+        given in the paper.
     library : str
-        A library whose constrained forward selection seeds the first population, and whose regressors an
-        outer mutation may take; "" for none.
+        Candidate library. Its constrained forward selection seeds the first population, and outer mutation
+        may insert its regressors. Empty for no library.
     library_degree, library_lags : int
-        Of that library.
+        Degree and lags of the library.
     from_library : float
-        Probability that an outer mutation takes a regressor of the library; 0 without one.
+        Probability that an outer mutation uses the library; no effect without a library.
     distinct : bool
-        Keep one copy of a model in the elite.
+        Whether the elite contains each structure only once.
     refine : bool
-        Polish the hall of fame's parameters on the shooting error.
+        Whether to refine the parameters of the hall of fame by minimising the shooting error.
     islands : int
-        Islands that evolve beside each other, each with a population of its own.
+        Number of islands, each with a separate population.
     topology : str
         Which islands send to which: an entry of ``TOPOLOGIES`` or a list of edges, ``0>1,1>2``. Isolated
-        ones were the safest for the paper's settings (decision 0008).
+        islands were the most reliable choice with the paper's settings (decision 0008).
     migrate_every : int or str
-        Generations of an epoch, at whose end individuals migrate: a number, or one that changes over the run,
+        Generations of an epoch, at the end of which individuals migrate: a number or a schedule,
         ``5,100:20`` for 5, and 20 from generation 100 on.
     migrants : int or str
-        How many leave an island for each of its neighbours, as a number or a schedule.
+        Number of emigrants per neighbour and epoch: a number or a schedule.
     emigrants, replaced : str
-        Which individuals leave and which are replaced: entries of ``SELECTION_POLICIES`` and of
-        ``REPLACEMENT_POLICIES``.
+        Selection of emigrants and of individuals that immigrants replace: entries of ``SELECTION_POLICIES``
+        and of ``REPLACEMENT_POLICIES``.
     characters : tuple of str
-        Entries of ``ISLAND_PROFILES``, given to the islands in turn; none: all are alike.
+        Entries of ``ISLAND_PROFILES``, assigned to the islands in turn; empty if all islands are equal.
     max_evaluations : int
-        The run ends with the first epoch at which so many individuals have been evaluated; 0: no limit.
+        The run ends after the first epoch with at least this number of evaluated individuals; 0 for no limit.
     target_error : float
-        The run ends with the first epoch at which an island has an individual whose RMSE, in the output's
-        unit, is not above this; 0: none.
+        The run ends after the first epoch in which an individual has at most this RMSE, in the unit of the
+        output; 0 for no target.
     """
 
     population: int = _option(500)
@@ -215,19 +216,19 @@ class Settings:
 
     @property
     def stops(self) -> Schedule:
-        """The generations at which epochs end and individuals migrate."""
+        """Schedule of the intervals between migrations, in generations."""
         return schedule(self.migrate_every, 1, "migrate_every")
 
     @property
     def leaving(self) -> Schedule:
-        """How many leave an island for each of its neighbours."""
+        """Schedule of the number of emigrants per neighbour."""
         return schedule(self.migrants, 0, "migrants")
 
     @property
     def maximum_lag(self) -> int:
-        """The deepest lag that a gene can reach: a leaf's own, and a back-shift on every edge above it.
+        """Largest lag that a gene can have: the lag of a leaf plus a back-shift on every edge above it.
 
-        A leaf that comes from a library has a lag of the library, and variation may put it at any depth.
+        A leaf from a library has a lag of the library, and variation can insert it at any depth.
         """
         leaf = self.library_lags if self.library else 1
         return leaf + self.max_height * max(self.shifts, default=0)

@@ -1,4 +1,4 @@
-"""Fit: forward selection over a library, (constrained) least squares, assessment. The classical answer."""
+"""Forward selection over a candidate library, (constrained) least squares, assessment."""
 
 from collections import Counter
 
@@ -16,7 +16,7 @@ from islands.model.candidate_library import candidates, full_set, library_named
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 
-#: Samples of a shooting interval, the paper's case 1; a short record takes a tenth of its own.
+#: Samples of a shooting interval (case 1 of the paper); at most a tenth of a short record.
 SHOOTING = 500
 
 
@@ -38,28 +38,28 @@ def fit(
     Parameters
     ----------
     record : Dataset
-        Complete.
+        Record without missing values.
     validation : Dataset or float
-        A record of its own, or the share of the record's end that validates.
+        Data that rank the models: a separate record, or the fraction at the end of ``record``.
     library : str
-        An entry of ``LIBRARIES``: ``phi-polynomial`` for hysteresis, ``polynomial`` for anything smooth.
+        An entry of ``LIBRARIES``: ``phi-polynomial`` for hysteresis, ``polynomial`` for smooth systems.
     degree, lags : int, optional
-        Of the library; None takes what suits it.
+        Degree and lags of the library; None takes the defaults of the library.
     max_terms : int
         Size of the largest model.
     constraints : str, optional
-        ``hysteresis`` or ``none``; None takes what suits the library.
+        ``hysteresis`` or ``none``; None takes the default of the library.
     shooting : int, optional
-        Samples of an interval of multiple shooting.
+        Samples of each interval of multiple shooting.
     seed : int
-        Kept in the result; forward selection draws nothing at random.
+        Stored in the result; forward selection is deterministic.
     progress : callable, optional
-        Called with a text and the share that is done.
+        Called with a message and the completed fraction.
 
     Returns
     -------
     Result
-        ``result.best.equation``, ``result.best.metrics``, ``result.save(folder)``, ...
+        Models of increasing size, best first: ``result.best.equation``, ``result.best.metrics``, ...
 
     Raises
     ------

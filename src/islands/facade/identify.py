@@ -1,4 +1,4 @@
-"""Identify: evolution by MGGP/FROE, refinement, validation. Nobody has to guess the terms."""
+"""Identification by evolution (MGGP/FROE), refinement and validation."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -30,13 +30,13 @@ from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands.validation.metrics import metrics
 
-#: Outcomes of individuals that have a model.
-FEASIBLE = ("ok", "abandoned")
+#: Outcomes of individuals with estimated parameters.
+FEASIBLE_OUTCOMES = ("ok", "abandoned")
 
-#: Predictions on the validation data that a test of the residual takes.
-_RESIDUALS = 3
+#: Smallest number of predictions on the validation data that the residual tests need.
+_MIN_RESIDUALS = 3
 
-#: Takes the state of a search after every epoch, and its settings.
+#: Receives the state of a search after every epoch, and its settings.
 SearchCallback = Callable[[SearchState, Settings], None]
 
 
@@ -52,35 +52,40 @@ def identify(
     engine: Engine | None = None,
     **changes: Any,
 ) -> Result:
-    """Identify a record by evolution.
+    """Identify a model of a record by evolution.
 
     Parameters
     ----------
     record : Dataset
-        Complete.
+        Record without missing values.
     validation : Dataset or float
-        A record of its own, or the share of the record's end, that selects among the hall of fame.
+        Data that select among the hall of fame: a separate record, or the fraction at the end of ``record``.
     preset : str
         An entry of ``PRESETS``.
     seed : int
-        The same seed gives the same result, bit for bit.
+        Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
         Called with the `SearchState` and the `Settings` after every epoch.
     stop : callable, optional
-        Asked all the time; once it answers with true the search ends, and the result is the best so far.
+        Called frequently. Once it returns true, the search ends with the best models so far.
     start : SearchState, optional
-        Go on from here, as if never stopped.
+        State to continue from; the result equals that of an uninterrupted run.
     engine : Engine, optional
-        Carries out the epochs; the serial one by default.
+        Engine that runs the epochs; `SerialEngine` by default.
     **changes
-        Settings that differ from the preset's: ``generations=100, islands=4``.
+        Settings that differ from the preset: ``generations=100, islands=4``.
+
+    Returns
+    -------
+    Result
+        Best model of every size, best first.
 
     Raises
     ------
     SettingsError
         A setting is unknown or out of range, or no model was found.
     RecordError
-        The record is too short or incomplete, or the validation data does not fit it.
+        The record is too short or incomplete, or the validation data do not match it.
     """
     settings = resolve_settings(
         preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
@@ -88,53 +93,58 @@ def identify(
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
     split = split_data(record, validation)
-    _refuse_short(split.validation, settings)
-    posed = problem(split.estimation, settings)
+    _check_validation_length(split.validation, settings)
+    search_problem = problem(split.estimation, settings)
     stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
         (index, seed) for index in range(settings.islands)
     ]:
-        raise SettingsError("the start has other islands than the settings, or another seed: give its own")
-    with closing((engine or SerialEngine()).run(posed, state.archipelago, stop)) as epochs:
-        # What an engine has done beyond the epoch that ends a run is never asked for: it can't change it.
+        raise SettingsError(
+            "the start state has other islands or another seed: pass the settings and the seed of its run"
+        )
+    with closing((engine or SerialEngine()).run(search_problem, state.archipelago, stop)) as epochs:
+        # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
         while not (stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
             state = advance(state, epoch)
             if progress is not None:
                 progress(state, settings)
     if state.archipelago.generation < 0:
         raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
-    models = final_models(state.archipelago.hall_of_fame, posed, split)
+    models = select_final_models(state.archipelago.hall_of_fame, search_problem, split)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
             "record"
         )
-    described = {"method": "identify", "preset": preset, **asdict(settings)}
-    described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
-    return Result(SearchResult(record, split, seed, described, _search(state, posed), models))
+    settings_document = {"method": "identify", "preset": preset, **asdict(settings)}
+    settings_document["validation"] = (
+        record_document(validation) if isinstance(validation, Dataset) else validation
+    )
+    statistics = _make_statistics(state, search_problem)
+    return Result(SearchResult(record, split, seed, settings_document, statistics, models))
 
 
-def _refuse_short(validation: Dataset, settings: Settings) -> None:
-    # Before the search: nobody wants to learn it after an hour.
-    needed = settings.maximum_lag + _RESIDUALS
+def _check_validation_length(validation: Dataset, settings: Settings) -> None:
+    # Check before the search starts, not after it.
+    needed = settings.maximum_lag + _MIN_RESIDUALS
     if max(validation.segments) < needed:
         raise RecordError(
-            f"the longest recording of the validation data has {max(validation.segments)} samples: with lags "
-            f"down to {settings.maximum_lag} it takes {needed}; give more, or a smaller max_height"
+            f"the longest recording of the validation data has {max(validation.segments)} samples: lags up "
+            f"to {settings.maximum_lag} need {needed}; give more data or a smaller max_height"
         )
 
 
-def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[RankedModel, ...]:
+def select_final_models(hall_of_fame: HallOfFame, problem: Problem, split: Split) -> tuple[RankedModel, ...]:
     """Validate the hall of fame and return the best model of every size, best first.
 
-    Candidates are the hall's models as they were estimated, the same refined, and the structures that seeded
-    the search: an evolution never returns worse than its seed. Under a constraint a model has to have
-    Property 1; where none of a size has, the size is left out.
+    Candidates are the models of the hall of fame with estimated and with refined parameters, and the
+    structures that seeded the search, so that the result is never worse than the seeds. If the parameters are
+    constrained, a model must have Property 1; a size without such a model is left out.
     """
-    settings = posed.settings
+    settings = problem.settings
     found: dict[int, list[tuple[float, Model]]] = {}
-    for model in _candidates(hall, posed):
+    for model in _estimate_candidates(hall_of_fame, problem):
         simulated = free_run(model, split.validation, settings.maximum_lag)
         if simulated.outcome:
             rmse = metrics(split.validation.y, simulated.y).rmse
@@ -150,13 +160,13 @@ def final_models(hall: HallOfFame, posed: Problem, split: Split) -> tuple[Ranked
     return rank_models(kept)
 
 
-def _candidates(hall: HallOfFame, posed: Problem) -> list[Model]:
-    record, settings = posed.record, posed.settings
+def _estimate_candidates(hall_of_fame: HallOfFame, problem: Problem) -> list[Model]:
+    record, settings = problem.record, problem.settings
     interval = FITNESSES[settings.fitness](settings.shooting)
-    structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall.entries}
-    for genes in posed.seeds:
-        found = (item for gene in genes if (item := make_regressor(gene)))
-        structures.setdefault(tuple(canonical_order(found)))
+    structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall_of_fame.entries}
+    for genes in problem.seeds:
+        regressors = (item for gene in genes if (item := make_regressor(gene)))
+        structures.setdefault(tuple(canonical_order(regressors)))
     models = []
     for structure in structures:
         estimated = estimate(structure, record, settings.constraints, settings.maximum_lag)
@@ -170,27 +180,27 @@ def _candidates(hall: HallOfFame, posed: Problem) -> list[Model]:
     return models
 
 
-def _search(state: SearchState, posed: Problem) -> SearchStatistics:
-    deepest, degree = _reach(state.archipelago.hall_of_fame)
-    inputs = posed.record.inputs
-    count = full_set(degree, deepest, deepest, inputs)
-    rows = sum(max(0, length - posed.settings.maximum_lag) for length in posed.record.segments)
+def _make_statistics(state: SearchState, problem: Problem) -> SearchStatistics:
+    maximum_lag, degree = _maximum_lag_and_degree(state.archipelago.hall_of_fame)
+    inputs = problem.record.inputs
+    count = full_set(degree, maximum_lag, maximum_lag, inputs)
+    rows = sum(max(0, length - problem.settings.maximum_lag) for length in problem.record.segments)
     return SearchStatistics(
         state.evaluations,
         dict(state.outcomes),
-        {"candidates": count, "bytes": 8 * count * rows, "degree": degree, "lags": deepest},
+        {"candidates": count, "bytes": 8 * count * rows, "degree": degree, "lags": maximum_lag},
         None,
         state.archipelago.generation,
         state.duplicates,
-        sum(state.outcomes.get(name, 0) for name in FEASIBLE) / max(1, state.evaluations),
+        sum(state.outcomes.get(name, 0) for name in FEASIBLE_OUTCOMES) / max(1, state.evaluations),
         state.history,
         state.caches,
-        stop_reason(state, posed.settings) or "stopped",
+        stop_reason(state, problem.settings) or "stopped",
     )
 
 
-def _reach(hall: HallOfFame) -> tuple[int, int]:
-    """Return the deepest lag and the highest number of factors that the hall's models use."""
-    regressors = [item for entry in hall.entries for item in entry.regressors]
-    deepest = max((item.maximum_lag for item in regressors), default=1)
-    return max(1, deepest), max((item.degree for item in regressors), default=1)
+def _maximum_lag_and_degree(hall_of_fame: HallOfFame) -> tuple[int, int]:
+    """Return the largest lag and the largest degree of a regressor in the hall of fame."""
+    regressors = [item for entry in hall_of_fame.entries for item in entry.regressors]
+    maximum_lag = max((item.maximum_lag for item in regressors), default=1)
+    return max(1, maximum_lag), max((item.degree for item in regressors), default=1)

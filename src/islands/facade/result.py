@@ -1,4 +1,4 @@
-"""Result objects: what a user holds after a fit, with the verbs that belong to it."""
+"""Result objects of `fit` and `identify`, and `simulate`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 
-#: How a model may be simulated, by the names of the command line.
-SIMULATIONS = ("one-step", "shooting", "free-run")
+#: Simulation modes, by the names of the command line.
+SIMULATION_MODES = ("one-step", "shooting", "free-run")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,11 +36,11 @@ class FittedModel:
     Attributes
     ----------
     rank : int
-        1 is the best.
+        Rank of the model; 1 is the best.
     ranked_model : RankedModel
-        The model, and its errors, residual tests and physics.
+        Model with its errors, residual tests and physics checks.
     search_result : SearchResult
-        The result that it belongs to.
+        Result that the model belongs to.
     """
 
     rank: int
@@ -49,32 +49,32 @@ class FittedModel:
 
     @property
     def model(self) -> Model:
-        """The model itself: regressors, parameters, standard errors."""
+        """Model: regressors, parameters, standard errors."""
         return self.ranked_model.model
 
     @property
     def equation(self) -> str:
-        """The equation as plain text."""
+        """Equation as plain text."""
         return equation(self.model)
 
     @property
     def latex(self) -> str:
-        """The equation in LaTeX."""
+        """Equation in LaTeX."""
         return latex_equation(self.model)
 
     @property
     def metrics(self) -> Mapping[str, Mapping[str, Metrics]]:
-        """``metrics["validation"]["free_run"].mape``, and so on."""
+        """Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``."""
         return self.ranked_model.assessment.metrics
 
     @property
     def physics(self) -> PhysicsChecks:
-        """Cluster sums, holds, minor loops, other amplitudes and rates."""
+        """Physics checks: cluster sums, holds, minor loops, other amplitudes and rates."""
         return self.ranked_model.assessment.physics
 
     @property
     def residual_tests(self) -> ResidualTests:
-        """The correlation tests of the one-step-ahead residual."""
+        """Correlation tests of the one-step-ahead residual."""
         return self.ranked_model.assessment.residual_tests
 
     def simulate(self, record: Dataset, mode: str = "free-run") -> Simulation:
@@ -82,8 +82,8 @@ class FittedModel:
         return simulate(self.model, record, mode, int(self.search_result.settings["shooting"]))
 
     def plot(self, kind: str = "free-run") -> "Figure":
-        """Draw a figure of the model on the validation data: one of ``islands.figures.registry.FIGURES``."""
-        # Drawing takes half a second to import, and every process of a cluster would wait for it.
+        """Draw a figure of the model; ``kind`` is a key of ``islands.figures.registry.FIGURES``."""
+        # matplotlib takes half a second to import, which every process of a cluster would pay.
         from islands.figures.registry import FIGURES  # noqa: PLC0415
 
         return lookup(FIGURES, kind, "figure")(self.ranked_model, self.search_result.split)
@@ -98,7 +98,7 @@ class FittedModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """What a search found; models come best first."""
+    """Result of a search."""
 
     search_result: SearchResult
 
@@ -112,11 +112,11 @@ class Result:
 
     @property
     def best(self) -> FittedModel:
-        """The model with the least free-run error on the validation data."""
+        """Model with the smallest free-run error on the validation data."""
         return self.models[0]
 
     def with_wall_time(self, seconds: float) -> "Result":
-        """Return the result with the time that the search took, for whoever has a clock."""
+        """Return a copy of the result with the duration of the search in seconds."""
         return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
 
     def save(self, folder: str | Path) -> Path:
@@ -150,15 +150,15 @@ def simulate(
     Parameters
     ----------
     model : Model, str, mapping or spec
-        A model, or a simulator: its name as on the command line (``second-order``), its specification, or
+        A model; or a simulator, as its name on the command line (``second-order``), its specification, or
         the document of an extended simulation.
     record : Dataset
-        Inputs, and the output that initial states are taken from.
+        Inputs, and the output from which initial states are taken.
     mode : str
         ``one-step``, ``shooting`` (intervals of ``shooting`` samples) or ``free-run``; a simulator has
         ``free-run`` only.
     shooting : int
-        Samples of an interval.
+        Samples of each interval.
     columns : mapping, optional
         Recorded simulations by name for the simulator ``column:NAME``, each of shape (samples,).
 
@@ -167,13 +167,13 @@ def simulate(
     SettingsError
         The mode or the simulator is unknown.
     """
-    intervals = dict(zip(SIMULATIONS, (1, shooting, None), strict=True))
+    intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
     interval = lookup(intervals, mode, "mode")
     if isinstance(model, Model):
         return multiple_shooting(model, record, interval)
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
-    # The simulators of the discrepancy analysis: most users of a model do not need them.
+    # Import the simulators of the discrepancy analysis only if they are used.
     from islands.io.simulator_spec.factory import simulate_spec  # noqa: PLC0415
 
     y = simulate_spec(model, record, columns)

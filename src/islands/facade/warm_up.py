@@ -1,4 +1,4 @@
-"""Warm-up: compile every kernel before anybody waits for a result."""
+"""Compilation of all kernels before the first use."""
 
 from collections.abc import Callable
 
@@ -10,24 +10,24 @@ from islands.kernels.jit_cache import ready
 from islands.systems.catalogue import make_record
 
 
-def warm_up(tell: Callable[[str], None] = print) -> bool:
-    """Make sure that the kernels are compiled: once for a version and a processor, into the user's cache.
+def warm_up(report: Callable[[str], None] = print) -> bool:
+    """Compile the kernels into the cache of the user, once per version and processor.
 
     Parameters
     ----------
-    tell : callable
-        Takes a line for the user before anything that takes long.
+    report : callable
+        Receives a line for the user before a long step.
 
     Returns
     -------
     bool
-        Whether they had to be compiled here.
+        Whether kernels had to be compiled.
     """
-    return ready(_use_all, tell)
+    return ready(_use_all_kernels, report)
 
 
-def _use_all() -> None:
-    """Use every kernel once, with the types that it is used with."""
+def _use_all_kernels() -> None:
+    """Call every kernel once with each of its argument types."""
     whole = make_record("bouc-wen-piezo", "authors", "estimation")
     record = Dataset(whole.u[:1200], whole.y[:1200], whole.dt)
     fit(record, max_terms=3)

@@ -1,1 +1,1 @@
-"""Steps of one generation: selection, variation and evaluation."""
+"""Steps of one generation: selection, variation, evaluation. Read `evaluation` first."""

@@ -1,7 +1,7 @@
 """Evaluation of individuals (the paper, section 5.2): prune, estimate under constraints, simulate.
 
-An evaluator holds the record as the kernels want it, and caches. What it returns depends on the individuals,
-the pruning decisions and the bars alone, never on what it has seen before.
+An evaluator holds the record in the layout of the kernels, and caches. Its results depend only on the
+individuals, the pruning decisions and the abandon thresholds, never on earlier calls.
 """
 
 from collections.abc import Sequence
@@ -27,34 +27,35 @@ from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound
 
-#: y(k) is the first term of every vocabulary.
+#: Index of y(k), the first term of every gene index.
 _TARGET = 0
 
-_ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error passed what the island keeps")
-
-_DIVERGED = EvaluationOutcome(Status.DIVERGED, "an interval left the bound")
+_ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error exceeds the abandon threshold of the island")
+_DIVERGED = EvaluationOutcome(Status.DIVERGED, "the simulation left the divergence bound in an interval")
 
 _OUTCOMES = {
     kernel.OK: OK,
     kernel.DIVERGED: _DIVERGED,
     kernel.ABANDONED: _ABANDONED,
-    kernel.DEPENDENT: EvaluationOutcome(Status.SINGULAR, "the free directions depend on each other"),
+    kernel.DEPENDENT: EvaluationOutcome(
+        Status.SINGULAR, "the regressors are linearly dependent in the null space of the constraints"
+    ),
     kernel.NO_TERMS: EvaluationOutcome(Status.INFEASIBLE, "no gene is left"),
     kernel.OVERFLOW: EvaluationOutcome(Status.DIVERGED, "a regressor overflows on the record"),
-    kernel.TOO_FEW_ROWS: EvaluationOutcome(Status.TOO_FEW_ROWS, "there are as many parameters as rows"),
+    kernel.TOO_FEW_ROWS: EvaluationOutcome(Status.TOO_FEW_ROWS, "there are not more rows than parameters"),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bytes that the caches of an evaluator may take; a full one is emptied.
+    """Byte limits of the caches of an evaluator. A cache is emptied when it exceeds its limit.
 
     Attributes
     ----------
     pairs : int
-        Inner products of pairs of regressors; the table has at least room for an individual's.
+        Inner products of pairs of regressors. The table always has room for those of one individual.
     genes, structures : int
-        Genes and their regressors, and evaluations that are remembered; what they take is estimated.
+        Genes with their regressors, and cached evaluations; their size is estimated.
     """
 
     pairs: int = 1 << 25
@@ -62,7 +63,7 @@ class Limits:
     structures: int = 1 << 27
 
 
-#: Bytes that a remembered evaluation takes, about.
+#: Approximate size of a cached evaluation, in bytes.
 _STRUCTURE_BYTES = 1_500
 
 _Key = tuple[frozenset[int], bool]
@@ -70,16 +71,16 @@ _Key = tuple[frozenset[int], bool]
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What is known of a structure.
+    """Cached evaluation of a structure.
 
     Attributes
     ----------
     numbers, regressors : tuple
-        The terms that pruning and constraints have left, in the order of their content.
+        Terms that remain after pruning and constraints, ordered by content.
     theta : tuple of float
-        Their parameters; empty after a failure.
+        Parameters of the terms; empty after a failure.
     fitness : float
-        Of an abandoned one all that is known is that it is larger.
+        Mean squared error; a lower bound if the evaluation was abandoned.
     outcome : EvaluationOutcome
     """
 
@@ -89,12 +90,12 @@ class Evaluation:
     fitness: float
     outcome: EvaluationOutcome
 
-    def settles(self, allowed: NDArray[np.float64]) -> bool:
-        """Tell whether this is all that needs to be known under these bars."""
+    def is_sufficient(self, allowed: NDArray[np.float64]) -> bool:
+        """Return whether this evaluation answers a request with these thresholds by size."""
         return self.outcome is not _ABANDONED or self.fitness >= allowed[len(self.numbers)]
 
-    def beyond(self, allowed: NDArray[np.float64]) -> bool:
-        """Tell whether the error is beyond the bar; that of a divergence always is where there is one."""
+    def exceeds(self, allowed: NDArray[np.float64]) -> bool:
+        """Return whether the error exceeds the threshold of its size, as after divergence if it is finite."""
         if self.outcome is _ABANDONED:
             return True
         simulated = self.outcome is OK or self.outcome is _DIVERGED
@@ -102,7 +103,7 @@ class Evaluation:
 
 
 class Evaluator:
-    """Evaluates individuals on one record.
+    """Evaluator of individuals on one record.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ class Evaluator:
     settings : Settings
     limits : Limits, optional
     abandon : bool
-        Whether bars are heeded. It changes how long a search takes, never whom it finds.
+        Whether evaluations stop at their threshold. Affects the speed of a search, never its result.
     """
 
     def __init__(
@@ -128,127 +129,130 @@ class Evaluator:
             kernel.INFEASIBLE: EvaluationOutcome(Status.INFEASIBLE, self._constraint.lacking),
         }
         self._pairs = pair_table(self.limits.pairs)
-        self._seen: dict[_Key, Evaluation] = {}
-        self._vocabulary = self._empty()
+        self._evaluations: dict[_Key, Evaluation] = {}
+        self._gene_index = self._make_gene_index()
 
-    def _empty(self) -> GeneIndex:
+    def _make_gene_index(self) -> GeneIndex:
         return GeneIndex(self._constraint, [Lagged(0, 0)])
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
-        """Bytes that every cache has in use, and its limit."""
+        """Bytes in use and byte limit of each cache, by name."""
         return {
             "pairs": (PLACE_BYTES * int(self._pairs.taken[0]), self.limits.pairs),
-            "genes": (self._vocabulary.bytes, self.limits.genes),
-            "structures": (_STRUCTURE_BYTES * len(self._seen), self.limits.structures),
+            "genes": (self._gene_index.bytes, self.limits.genes),
+            "structures": (_STRUCTURE_BYTES * len(self._evaluations), self.limits.structures),
         }
 
     def clear_caches(self) -> None:
         """Empty all caches."""
         clear(self._pairs)
-        self._seen.clear()
-        self._vocabulary = self._empty()
+        self._evaluations.clear()
+        self._gene_index = self._make_gene_index()
 
     def evaluate(
-        self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
+        self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None
     ) -> tuple[tuple[Individual, ...], int]:
-        """Evaluate individuals, each with the decision whether it is pruned.
+        """Evaluate individuals, each with the decision whether to prune it.
 
         Parameters
         ----------
-        bars : sequence of float, optional
-            For every size of a model, from 0 on, the fitness above which nobody needs to know it: the
-            individual is then `Status.ABANDONED`, its simulation stopped as soon as it passes the bar, or
-            diverges. One that is larger than all of these is never abandoned.
+        population : sequence of (Individual, bool)
+            Individuals, and whether to prune each.
+        thresholds : sequence of float, optional
+            Abandon threshold of every model size, from 0. A simulation stops as soon as it diverges or its
+            error exceeds the threshold; the outcome is `Status.ABANDONED`. Larger models are not abandoned.
 
         Returns
         -------
         individuals : tuple of Individual
-            In the same order; genes that did not survive are gone.
+            The evaluated individuals in the same order, without the genes that were removed.
         duplicates : int
-            How many have the structure of another one or of one seen before.
+            Number of individuals whose structure occurs earlier in the population or in the cache.
         """
-        self._make_room()
-        number = self._vocabulary.index_of
+        self._enforce_limits()
+        index_of = self._gene_index.index_of
         genes: list[dict[int, Expression]] = []
         keys: list[_Key] = []
         for individual, pruned in population:
-            found: dict[int, Expression] = {}
+            by_number: dict[int, Expression] = {}
             for gene in individual.genes:
-                found.setdefault(number(gene), gene)
-            found.pop(ZERO, None)
-            genes.append(found)
-            keys.append((frozenset(found), pruned))
-        self._refuse_unreadable()
+                by_number.setdefault(index_of(gene), gene)
+            by_number.pop(ZERO, None)
+            genes.append(by_number)
+            keys.append((frozenset(by_number), pruned))
+        self._check_lags()
         largest = max(map(len, genes), default=0)
-        allowed = np.full(max(largest + 1, len(bars or ())), inf)
-        if bars is not None and self.abandon:
-            allowed[: len(bars)] = bars
-        seen = self._seen
-        fresh = dict.fromkeys(key for key in keys if key not in seen or not seen[key].settles(allowed))
-        seen.update(zip(fresh, self._evaluated(list(fresh), allowed), strict=True))
-        evaluated = tuple(
-            _with(individual, found, seen[key], allowed)
-            for (individual, _), found, key in zip(population, genes, keys, strict=True)
+        allowed = np.full(max(largest + 1, len(thresholds or ())), inf)
+        if thresholds is not None and self.abandon:
+            allowed[: len(thresholds)] = thresholds
+        cache = self._evaluations
+        missing = dict.fromkeys(
+            key for key in keys if key not in cache or not cache[key].is_sufficient(allowed)
         )
-        return evaluated, len(keys) - len(fresh)
+        cache.update(zip(missing, self._evaluate_structures(list(missing), allowed), strict=True))
+        evaluated = tuple(
+            _make_evaluated(individual, by_number, cache[key], allowed)
+            for (individual, _), by_number, key in zip(population, genes, keys, strict=True)
+        )
+        return evaluated, len(keys) - len(missing)
 
-    def _refuse_unreadable(self) -> None:
-        # The kernels do not check: they would read another signal's samples, or none of the record's.
-        channel, lag = max(self._vocabulary.deepest), max(self._vocabulary.deepest.values())
+    def _check_lags(self) -> None:
+        # The kernels do not check bounds: they would read samples of another signal or outside the record.
+        channel, lag = max(self._gene_index.deepest), max(self._gene_index.deepest.values())
         if channel > self.record.inputs or lag > self.warm_up:
             self.clear_caches()
             if channel > self.record.inputs:
-                raise RecordError(f"the genes read input {channel}, the record has {self.record.inputs}")
-            raise SettingsError(
-                f"the genes read {lag} samples back, the settings let them read {self.warm_up}"
-            )
+                raise RecordError(f"the genes use input {channel}, the record has {self.record.inputs}")
+            raise SettingsError(f"the genes have lags up to {lag}, the settings allow {self.warm_up}")
 
-    def _make_room(self) -> None:
-        if self._vocabulary.bytes > self.limits.genes:
+    def _enforce_limits(self) -> None:
+        if self._gene_index.bytes > self.limits.genes:
             self.clear_caches()
-        if _STRUCTURE_BYTES * len(self._seen) > self.limits.structures:
-            self._seen.clear()
+        if _STRUCTURE_BYTES * len(self._evaluations) > self.limits.structures:
+            self._evaluations.clear()
 
-    def settled(self, abandoned: Sequence[Individual]) -> tuple[Individual, ...]:
-        """Return individuals as if they had not been abandoned."""
+    def evaluate_abandoned(self, abandoned: Sequence[Individual]) -> tuple[Individual, ...]:
+        """Evaluate abandoned individuals completely."""
         return self.evaluate([(each, False) for each in abandoned])[0]
 
-    def _evaluated(self, keys: list[_Key], allowed: NDArray[np.float64]) -> list[Evaluation]:
-        """Evaluate structures, as many in one call as the table of pairs has room for."""
-        structures = [sorted(numbers, key=self._vocabulary.content) for numbers, _ in keys]
-        most = max(map(len, structures), default=0)
-        pairs = (most + 1) * (most + 2) // 2
+    def _evaluate_structures(self, keys: list[_Key], allowed: NDArray[np.float64]) -> list[Evaluation]:
+        """Evaluate structures in batches that fit into the table of pairs."""
+        structures = [sorted(numbers, key=self._gene_index.content) for numbers, _ in keys]
+        largest = max(map(len, structures), default=0)
+        pairs = (largest + 1) * (largest + 2) // 2
         if 2 * pairs > len(self._pairs.keys):
-            # Whatever the limit: a single individual has to find room.
+            # The table must have room for one individual, even if that exceeds the limit.
             self._pairs = pair_table(4 * pairs * PLACE_BYTES)
         places = len(self._pairs.keys)
-        at_once = max(1, places // 2 // pairs)
-        found: list[Evaluation] = []
-        for begin in range(0, len(keys), at_once):
-            part = slice(begin, begin + at_once)
+        batch = max(1, places // 2 // pairs)
+        evaluations: list[Evaluation] = []
+        for begin in range(0, len(keys), batch):
+            part = slice(begin, begin + batch)
             if int(self._pairs.taken[0]) + pairs * len(keys[part]) > places * 3 // 4:
                 clear(self._pairs)
-            found += self._call(structures[part], [pruned for _, pruned in keys[part]], allowed, most)
-        return found
+            evaluations += self._call_kernel(
+                structures[part], [pruned for _, pruned in keys[part]], allowed, largest
+            )
+        return evaluations
 
-    def _call(
-        self, structures: list[list[int]], pruned: list[bool], allowed: NDArray[np.float64], most: int
+    def _call_kernel(
+        self, structures: list[list[int]], pruned: list[bool], allowed: NDArray[np.float64], largest: int
     ) -> list[Evaluation]:
         count = len(structures)
-        numbers = np.zeros((count, most), np.int64)
+        numbers = np.zeros((count, largest), np.int64)
         for row, structure in zip(numbers, structures, strict=True):
             row[: len(structure)] = structure
-        kept, lengths = np.empty((count, most), np.int64), np.empty(count, np.int64)
-        theta, error, ending = np.empty((count, most)), np.empty(count), np.empty(count, np.int64)
+        kept, lengths = np.empty((count, largest), np.int64), np.empty(count, np.int64)
+        theta, error, ending = np.empty((count, largest)), np.empty(count), np.empty(count, np.int64)
         kernel.evaluate(
             numbers,
             np.array([len(structure) for structure in structures], np.int64),
             np.array(pruned, np.bool_),
             _TARGET,
             self.settings.tolerance,
-            self._vocabulary.nodes,
-            self._vocabulary.groups,
+            self._gene_index.nodes,
+            self._gene_index.groups,
             self._pairs,
             self._rows,
             self._layout,
@@ -260,7 +264,7 @@ class Evaluator:
             error,
             ending,
         )
-        found = []
+        evaluations = []
         for structure, positions, length, parameters, squares, code in zip(
             structures,
             kept.tolist(),
@@ -270,24 +274,25 @@ class Evaluator:
             ending.tolist(),
             strict=True,
         ):
-            left = tuple([structure[position] for position in positions[:length]])
+            remaining = tuple([structure[position] for position in positions[:length]])
             outcome = self._outcomes[code]
-            found.append(
+            evaluations.append(
                 Evaluation(
-                    left,
-                    tuple([self._vocabulary.regressor(number) for number in left]),
+                    remaining,
+                    tuple([self._gene_index.regressor(number) for number in remaining]),
                     tuple(parameters[:length]) if outcome is OK else (),
                     float(allowed[length]) if outcome is _ABANDONED else squares / self._predicted,
                     outcome,
                 )
             )
-        return found
+        return evaluations
 
 
-def _with(
-    individual: Individual, genes: dict[int, Expression], found: Evaluation, allowed: NDArray[np.float64]
+def _make_evaluated(
+    individual: Individual, genes: dict[int, Expression], evaluation: Evaluation, allowed: NDArray[np.float64]
 ) -> Individual:
-    left = tuple([gene for number, gene in genes.items() if number in found.numbers])
-    if found.beyond(allowed):
-        return Individual(left, found.regressors, (), inf, _ABANDONED)
-    return Individual(left or individual.genes, found.regressors, found.theta, found.fitness, found.outcome)
+    kept = tuple([gene for number, gene in genes.items() if number in evaluation.numbers])
+    if evaluation.exceeds(allowed):
+        return Individual(kept, evaluation.regressors, (), inf, _ABANDONED)
+    terms, theta = evaluation.regressors, evaluation.theta
+    return Individual(kept or individual.genes, terms, theta, evaluation.fitness, evaluation.outcome)

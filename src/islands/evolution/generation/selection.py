@@ -6,34 +6,47 @@ from islands.evolution.gp.individual import Individual
 from islands.evolution.gp.rng import Stream
 from islands.simulation.outcome import Status
 
-#: Tells what is not known of abandoned individuals.
-Settle = Callable[[Sequence[Individual]], Sequence[Individual]]
+#: Evaluates abandoned individuals completely.
+EvaluateAbandoned = Callable[[Sequence[Individual]], Sequence[Individual]]
 
 
-def tournaments(
-    pool: Sequence[Individual], count: int, contestants: int, draw: Stream, bar: float, settle: Settle
+def run_tournaments(
+    pool: Sequence[Individual],
+    count: int,
+    contestants: int,
+    rng: Stream,
+    abandon_threshold: float,
+    evaluate_abandoned: EvaluateAbandoned,
 ) -> list[Individual]:
-    """Draw contestants with replacement; return the fittest of each tournament, of equals the first drawn.
+    """Run tournaments among contestants drawn with replacement and return the winners.
+
+    The fittest contestant wins; the first drawn wins a tie.
 
     Parameters
     ----------
-    bar : float
-        An abandoned individual is less fit than this.
-    settle : callable
-        Evaluates abandoned individuals. It is asked for those alone that might win, so every tournament ends
-        as if nobody had been abandoned.
+    pool : sequence of Individual
+    count : int
+        Number of tournaments.
+    contestants : int
+        Contestants of each tournament.
+    abandon_threshold : float
+        Lower bound on the fitness of abandoned individuals.
+    evaluate_abandoned : callable
+        Evaluates abandoned individuals completely. It is called only for those that may win, so the winners
+        do not depend on which individuals were abandoned.
     """
-    drawn = [[draw.randrange(len(pool)) for _ in range(contestants)] for _ in range(count)]
+    drawn = [[rng.randrange(len(pool)) for _ in range(contestants)] for _ in range(count)]
     fitness = [each.fitness for each in pool]
     abandoned = {place for place, each in enumerate(pool) if each.outcome.verdict is Status.ABANDONED}
-    open_ = sorted(
+    undecided = sorted(
         {
             place
             for places in drawn
-            if min(fitness[place] for place in places) > bar
+            if min(fitness[place] for place in places) > abandon_threshold
             for place in abandoned.intersection(places)
         }
     )
-    for place, settled in zip(open_, settle([pool[place] for place in open_]), strict=True):
-        fitness[place] = settled.fitness
+    evaluated = evaluate_abandoned([pool[place] for place in undecided])
+    for place, each in zip(undecided, evaluated, strict=True):
+        fitness[place] = each.fitness
     return [pool[min(places, key=fitness.__getitem__)] for places in drawn]

@@ -1,10 +1,10 @@
-"""The table of fitnesses: what evolution minimises. NaN never wins."""
+"""Table of fitness functions, which evolution minimises."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-#: Samples of a shooting interval for a fitness, from those of the settings; None is the free run.
-Interval = Callable[[int], int | None]
+#: Returns the samples of a shooting interval, given the setting ``shooting``; None means a free run.
+ShootingInterval = Callable[[int], int | None]
 
 
 def _one_step_ahead(_shooting: int) -> int | None:
@@ -22,6 +22,6 @@ def _free_run(_shooting: int) -> int | None:
     return None
 
 
-FITNESSES: Mapping[str, Interval] = MappingProxyType(
+FITNESSES: Mapping[str, ShootingInterval] = MappingProxyType(
     {"one-step": _one_step_ahead, "shooting": _shooting, "free-run": _free_run}
 )

@@ -1,4 +1,4 @@
-"""The vocabulary of a search: every gene that it has met, as the number of its regressor."""
+"""Index of the genes of a search: it maps every gene to the number of its regressor."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,23 +12,26 @@ from islands.model.expression import Expression
 from islands.model.regressor import Regressor
 from islands.program.term_pool import Term, TermPool
 
-#: Bytes that a gene takes, and a regressor with its nodes, about.
-_GENE_BYTES, _REGRESSOR_BYTES = 700, 1_600
+#: Approximate size of a gene in the index, in bytes.
+_GENE_BYTES = 700
 
-#: The number of a gene that is identically zero.
+#: Approximate size of a regressor with its nodes, in bytes.
+_REGRESSOR_BYTES = 1_600
+
+#: Number of a gene that is identically zero.
 ZERO = -1
 
 
 class GeneIndex:
-    """Genes, their regressors, and what a constraint says of each.
+    """Genes, their regressors, and the constraint group and weight of each regressor.
 
-    The numbers follow the order of arrival: nothing that is a result may depend on them.
+    Numbers are assigned in the order of insertion, so results must not depend on them.
 
     Parameters
     ----------
     constraint : Constraint
-    targets : sequence of terms
-        What has the first numbers.
+    targets : sequence of Term
+        Terms that receive the first numbers.
     """
 
     def __init__(self, constraint: Constraint, targets: Sequence[Term]) -> None:
@@ -36,9 +39,9 @@ class GeneIndex:
         self._store = TermPool()
         self._known: dict[Expression, int] = {}
         self._regressors: dict[int, Regressor] = {}
-        # Groups that a structure has to have come first.
+        # The groups that every structure must contain come first.
         self._groups = {state: number for number, state in enumerate(constraint.sums)}
-        self._wanted = list(constraint.sums.values())
+        self._group_sums = list(constraint.sums.values())
         self._group, self._weight = np.full(64, -1), np.zeros(64)
         self._arrays: Groups | None = None
         for target in targets:
@@ -46,43 +49,43 @@ class GeneIndex:
 
     @property
     def bytes(self) -> int:
-        """What it takes, about."""
+        """Approximate memory of the index, in bytes."""
         return len(self._known) * _GENE_BYTES + len(self._regressors) * _REGRESSOR_BYTES
 
     @property
     def deepest(self) -> Mapping[int, int]:
-        """The deepest lag of every channel that a regressor reads."""
+        """Largest lag of every channel in the regressors."""
         return self._store.deepest
 
     @property
     def nodes(self) -> Nodes:
-        """The regressors as the kernels read them."""
+        """Regressors in the layout of the kernels."""
         return self._store.nodes
 
     @property
     def groups(self) -> Groups:
-        """The constraint as the kernels read it."""
+        """Constraint in the layout of the kernels."""
         if self._arrays is None:
-            wanted = np.array(self._wanted, np.float64)
-            self._arrays = Groups(self._group, self._weight, wanted, len(self._constraint.sums))
+            sums = np.array(self._group_sums, np.float64)
+            self._arrays = Groups(self._group, self._weight, sums, len(self._constraint.sums))
         return self._arrays
 
     def index_of(self, gene: Expression) -> int:
-        """Return the number of a gene's regressor, or `ZERO`."""
+        """Return the number of a gene's regressor, or `ZERO`; add the gene if it is new."""
         known = self._known.get(gene)
         if known is None:
-            known = self._known[gene] = self._learnt(gene)
+            known = self._known[gene] = self._add(gene)
         return known
 
     def regressor(self, number: int) -> Regressor:
-        """Return the regressor of a number."""
+        """Return the regressor with a number."""
         return self._regressors[number]
 
     def content(self, number: int) -> tuple[object, ...]:
-        """Return the key that orders regressors."""
+        """Return the sort key of the regressor with a number."""
         return self._regressors[number].content
 
-    def _learnt(self, gene: Expression) -> int:
+    def _add(self, gene: Expression) -> int:
         regressor = make_regressor(gene)
         if regressor is None:
             return ZERO
@@ -99,7 +102,7 @@ class GeneIndex:
         weight, state = self._constraint.group(regressor)
         if weight:
             if state not in self._groups:
-                self._groups[state] = len(self._wanted)
-                self._wanted.append(0.0)
+                self._groups[state] = len(self._group_sums)
+                self._group_sums.append(0.0)
             self._group[number], self._weight[number] = self._groups[state], weight
         self._arrays = None

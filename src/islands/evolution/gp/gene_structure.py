@@ -1,4 +1,4 @@
-"""The table of structural constraints: what a gene must look like, and how one that does not is mended."""
+"""Table of gene structures: constraints on the form of genes, and the repair of other genes."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -11,26 +11,26 @@ Structure = Callable[[Expression], Expression]
 #: Functions whose arguments are lags of one input (the paper, sections 3 and 5.2).
 PHI = ("phi1", "phi2")
 
-#: y(k-1): at rest it is y, so its parameter can hold the sum of its cluster at one.
+#: y(k-1). Its steady-state value is y, so its parameter can make the sum of its cluster equal to 1.
 LINEAR_OUTPUT = Lagged(0, 1)
 
 
 def free(expression: Expression) -> Expression:
-    """Leave a gene as it is."""
+    """Return a gene unchanged."""
     return expression
 
 
 def phi(expression: Expression) -> Expression:
-    """Mend phi functions (Figure 3): what is no input under an argument's back-shifts becomes u(k-1).
+    """Repair phi functions (Figure 3): replace arguments that are not lags of an input by such lags.
 
-    The back-shifts stay: ``phi1(q1(y(k-1)), q4(u(k-1)*y(k-1)))`` becomes ``phi1(q1(u(k-1)), q4(u(k-1)))``, as
-    in the figure. Both arguments are lags of the same input, that of the first one, or of the second where
-    the first has none.
+    The back-shifts are kept: ``phi1(q1(y(k-1)), q4(u(k-1)*y(k-1)))`` becomes
+    ``phi1(q1(u(k-1)), q4(u(k-1)))``, as in the figure. Both arguments become lags of the same input: the
+    input of the first argument, else of the second, else the first input.
     """
     match expression:
         case Apply(primitive, (first, second)) if primitive.name in PHI:
-            channel = _input_of(first) or _input_of(second) or 1
-            return Apply(primitive, (_lag_of(channel, first), _lag_of(channel, second)))
+            channel = _get_input(first) or _get_input(second) or 1
+            return Apply(primitive, (_replace_by_lag(channel, first), _replace_by_lag(channel, second)))
         case Apply(primitive, arguments):
             return Apply(primitive, tuple(phi(argument) for argument in arguments))
         case Shift(samples, argument):
@@ -39,20 +39,20 @@ def phi(expression: Expression) -> Expression:
             return expression
 
 
-def _lag_of(channel: int, argument: Expression) -> Expression:
-    """Put an input in the place of whatever else stands under an argument's back-shifts."""
+def _replace_by_lag(channel: int, argument: Expression) -> Expression:
+    """Replace the expression under the back-shifts of an argument by an input."""
     match argument:
         case Shift(samples, inner):
-            return Shift(samples, _lag_of(channel, inner))
-        case Lagged(own, _) if own == channel:
+            return Shift(samples, _replace_by_lag(channel, inner))
+        case Lagged(found, _) if found == channel:
             return argument
     return Lagged(channel)
 
 
 def with_phi(expression: Expression) -> Expression:
-    """Write differences of two lags of one input, and their signs, as phi1 and phi2.
+    """Replace differences of two lags of one input by phi1, and the signs of such differences by phi2.
 
-    Canonical form writes them ``sub`` and ``sign``, which variation would open to any argument.
+    The canonical form uses ``sub`` and ``sign``, whose arguments variation could replace by any expression.
     """
     if not isinstance(expression, Apply):
         return expression
@@ -66,28 +66,28 @@ def with_phi(expression: Expression) -> Expression:
 
 
 def increment(expression: Expression) -> Expression:
-    """Mend phi functions, and let y(k-1) be the only linear output.
+    """Repair phi functions, and replace linear output genes by y(k-1).
 
-    With y(k-4) in its place the parameters' sum is met as well, but four interleaved solutions run beside
-    each other: the error between them is never damped, and a free run falls apart.
+    Another lag, such as y(k-4), also satisfies the constraint on the sum of the parameters. But the model
+    then consists of four interleaved solutions whose differences are not damped, and the free run diverges.
     """
     return LINEAR_OUTPUT if is_linear_output(expression) else phi(expression)
 
 
 def is_linear_output(expression: Expression) -> bool:
-    """Tell whether an expression is the output under back-shifts alone."""
+    """Return whether an expression is a lag of the output."""
     while isinstance(expression, Shift):
         expression = expression.argument
     return isinstance(expression, Lagged) and expression.channel == 0
 
 
 def _same_input(first: Expression, second: Expression) -> bool:
-    """Tell whether two expressions are lags of one input."""
-    return _input_of(first) == _input_of(second) > 0
+    """Return whether two expressions are lags of the same input."""
+    return _get_input(first) == _get_input(second) > 0
 
 
-def _input_of(expression: Expression) -> int:
-    """Return the input that an expression is a lag of, 0 where it is anything else."""
+def _get_input(expression: Expression) -> int:
+    """Return the channel of the input that an expression is a lag of; 0 for any other expression."""
     while isinstance(expression, Shift):
         expression = expression.argument
     return expression.channel if isinstance(expression, Lagged) else 0

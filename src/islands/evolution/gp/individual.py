@@ -1,4 +1,4 @@
-"""An individual: a vector of trees (genes), each the basis function of one term (equation (10))."""
+"""Individual: a vector of trees (genes), each the basis function of one term (equation (10))."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from islands.simulation.outcome import OK, EvaluationOutcome
 
 @dataclass(frozen=True, slots=True)
 class Individual:
-    """Genes, and what became of them.
+    """Genes and their evaluation.
 
     Attributes
     ----------
     genes : tuple of Expression
-        As evolution wrote them, back-shifts and all; after evaluation those that are left.
+        Trees with their back-shifts; after evaluation, only the genes that remain.
     regressors : tuple of Regressor
-        The terms of the model, in the order of their content; empty before evaluation.
+        Terms of the model, ordered by content; empty before evaluation.
     theta : tuple of float
-        Their parameters; empty where the outcome is a failure.
+        Parameters of the terms; empty if the outcome is a failure.
     fitness : float
-        Lower is better; infinite before evaluation and after a failure, and where NaN is given: NaN compares
-        with nothing, and would win where it came first.
+        Lower is better. Infinite before evaluation and after a failure. NaN is replaced by infinity, because
+        NaN compares as false and would win if it came first.
     outcome : EvaluationOutcome
     """
 
@@ -45,7 +45,7 @@ class Individual:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The model's structure as text: two individuals with one key are one model."""
+        """Structure of the model as text; equal keys mean equal structures."""
         return tuple(item.text for item in self.regressors)
 
 
@@ -61,7 +61,7 @@ def unique_structures(individuals: Iterable[Individual]) -> Population:
 
 
 def make_regressor(gene: Expression) -> Regressor | None:
-    """Return a gene's regressor, None where it is identically zero or its numbers overflow."""
+    """Return the regressor of a gene; None if it is identically zero or a coefficient overflows."""
     try:
         return regressor(gene)[1]
     except ModelError:

@@ -1,7 +1,7 @@
-"""Characters: islands that breed in different ways. A new one is an entry of ``ISLAND_PROFILES``.
+"""Island profiles: settings of variation and selection that differ between islands.
 
-A character may change how an island breeds and selects, never what an individual means or how it is judged:
-fitness, constraints, tolerance and sizes are one for all, so that who migrates is worth the same anywhere.
+A profile is an entry of ``ISLAND_PROFILES``. It must not change fitness, constraints, tolerance or sizes:
+they are equal on all islands, so that the fitness of a migrant is comparable on every island.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Random numbers that are derived, never stored: the same place in a run always draws the same ones."""
+"""Derived random streams: seed, island, generation and purpose determine every random number."""
 
 from collections.abc import Sequence
 from enum import IntEnum
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class Purpose(IntEnum):
-    """What a stream is for. The numbers are part of every result: append, never reorder."""
+    """Purpose of a stream. The numbers affect every result: append new ones, never reorder them."""
 
     INITIAL = 0
     SELECTION = 1
@@ -23,9 +23,9 @@ class Purpose(IntEnum):
 
 
 class Stream:
-    """A stream of draws for one purpose of one generation of one island.
+    """Random stream for one purpose, generation and island.
 
-    Only ``Random.random`` is used underneath: its sequence is guaranteed from one Python to the next.
+    All draws use ``Random.random``, whose sequence is guaranteed to be equal in all Python versions.
     """
 
     __slots__ = ("_uniform",)
@@ -35,13 +35,13 @@ class Stream:
         self._uniform = Random(int.from_bytes(words.tobytes(), "little")).random
 
     def chance(self, probability: float) -> bool:
-        """Draw true with a probability."""
+        """Return true with a probability."""
         return self._uniform() < probability
 
     def randrange(self, bound: int) -> int:
-        """Draw a whole number from 0 to ``bound - 1``."""
+        """Return a random integer from 0 to ``bound - 1``."""
         return int(self._uniform() * bound)
 
     def choice(self, items: Sequence[T]) -> T:
-        """Draw one of the items."""
+        """Return a random element of a sequence."""
         return items[int(self._uniform() * len(items))]

@@ -1,1 +1,1 @@
-"""Migration between islands: topology, selection and replacement policies, schedule."""
+"""Migration between islands: topology, policies, schedule. Read `topology` first."""

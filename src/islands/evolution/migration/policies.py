@@ -1,6 +1,6 @@
-"""Migration policies: who leaves an island, and whose place they take on another.
+"""Migration policies: selection of emigrants, and replacement by immigrants.
 
-A new one is an entry of ``SELECTION_POLICIES`` or of ``REPLACEMENT_POLICIES``.
+A policy is an entry of ``SELECTION_POLICIES`` or of ``REPLACEMENT_POLICIES``.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,48 +15,50 @@ from islands.evolution.hall_of_fame import pareto_front
 T = TypeVar("T")
 
 
-def _best(elite: Population, count: int, _draw: Stream) -> Population:
-    """Take the first of the elite, each structure once."""
-    return _structures(elite)[:count]
+def _best(elite: Population, count: int, _rng: Stream) -> Population:
+    """Select the best of the elite, each structure once."""
+    return _unique_structures(elite)[:count]
 
 
-def _random(elite: Population, count: int, draw: Stream) -> Population:
-    """Take anyone of the elite, each structure once."""
-    return _drawn(_structures(elite), count, draw)
+def _random(elite: Population, count: int, rng: Stream) -> Population:
+    """Select from the elite at random, each structure once."""
+    return _sample(_unique_structures(elite), count, rng)
 
 
-def _front(elite: Population, count: int, draw: Stream) -> Population:
-    """Take anyone of the elite's Pareto front of error and size: small models travel too."""
-    return _drawn(pareto_front(_structures(elite)), count, draw)
+def _front(elite: Population, count: int, rng: Stream) -> Population:
+    """Select at random from the Pareto front of error and size, so that small models migrate, too."""
+    return _sample(pareto_front(_unique_structures(elite)), count, rng)
 
 
-def _structures(elite: Population) -> Population:
+def _unique_structures(elite: Population) -> Population:
     return unique_structures(each for each in elite if isfinite(each.fitness))
 
 
-def _worst(_size: int, fitness: Callable[[], Sequence[float]], count: int, _draw: Stream) -> tuple[int, ...]:
-    """Take the least fit; of equals the first."""
+def _worst(_size: int, fitness: Callable[[], Sequence[float]], count: int, _rng: Stream) -> tuple[int, ...]:
+    """Replace the individuals with the worst fitness, the first ones if equal."""
     known = fitness()
     return tuple(sorted(range(len(known)), key=lambda place: -known[place])[:count])
 
 
-def _anyone(size: int, _fitness: Callable[[], Sequence[float]], count: int, draw: Stream) -> tuple[int, ...]:
-    """Take anyone."""
-    return _drawn(range(size), count, draw)
+def _random_places(
+    size: int, _fitness: Callable[[], Sequence[float]], count: int, rng: Stream
+) -> tuple[int, ...]:
+    """Replace random individuals."""
+    return _sample(range(size), count, rng)
 
 
-def _drawn(pool: Sequence[T], count: int, draw: Stream) -> tuple[T, ...]:
-    left = list(pool)
-    return tuple(left.pop(draw.randrange(len(left))) for _ in range(min(count, len(left))))
+def _sample(pool: Sequence[T], count: int, rng: Stream) -> tuple[T, ...]:
+    remaining = list(pool)
+    return tuple(remaining.pop(rng.randrange(len(remaining))) for _ in range(min(count, len(remaining))))
 
 
-#: From the elite, how many at the most, and draws: those of whom copies leave.
+#: Selects emigrants from: the elite, the maximum number, the random stream.
 SELECTION_POLICIES: Mapping[str, Callable[[Population, int, Stream], Population]] = MappingProxyType(
     {"best": _best, "random": _random, "front": _front}
 )
 
-#: From the population's size, its fitness for whoever asks (it takes evaluations), how many, and draws: the
-#: places that are taken.
+#: Selects positions to replace from: the population's size, a function that computes its fitness (expensive,
+#: called only if needed), the number of positions, the random stream.
 REPLACEMENT_POLICIES: Mapping[
     str, Callable[[int, Callable[[], Sequence[float]], int, Stream], tuple[int, ...]]
-] = MappingProxyType({"worst": _worst, "random": _anyone})
+] = MappingProxyType({"worst": _worst, "random": _random_places})

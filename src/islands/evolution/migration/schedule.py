@@ -1,4 +1,4 @@
-"""Schedules: whole numbers that change over the generations of a run, as text: ``10`` or ``5,100:20``."""
+"""Schedules: integers that change over the generations of a run, written as ``10`` or ``5,100:20``."""
 
 import re
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from islands.errors import SettingsError
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """A number for every generation.
+    """Piecewise constant integer over the generations.
 
     Attributes
     ----------
     pieces : tuple of (generation, value)
-        From that generation on the value holds; the first piece begins at 0.
+        Each value applies from its generation on; the first piece begins at 0.
     """
 
     pieces: tuple[tuple[int, int], ...]
@@ -25,37 +25,37 @@ class Schedule:
         return next(value for begin, value in reversed(self.pieces) if begin <= generation)
 
     def next_stop(self, generation: int) -> int:
-        """Return the first stop after a generation, where the values are intervals between stops.
+        """Return the first stop after a generation; the values are intervals between stops.
 
-        The generation at which a piece begins is a stop, and the piece counts from there. The stops of a run
-        do not depend on where it was interrupted.
+        Every generation at which a piece begins is a stop, and intervals are counted from there. Stops do not
+        depend on where a run was interrupted.
         """
         begin, every = next(piece for piece in reversed(self.pieces) if piece[0] <= generation)
         stop = begin + ((generation - begin) // every + 1) * every
         return min([stop, *(other for other, _ in self.pieces if other > generation)])
 
     def stops_at(self, generation: int) -> bool:
-        """Tell whether a generation is a stop; the first is not."""
+        """Return whether a generation is a stop; generation 0 is not."""
         return generation > 0 and self.next_stop(generation - 1) == generation
 
 
 @lru_cache(typed=True)
 def schedule(text: int | str, least: int, what: str) -> Schedule:
-    """Read a schedule.
+    """Parse a schedule.
 
     Parameters
     ----------
     text : int or str
-        ``10``: always. ``5,100:20``: 5, and from generation 100 on 20.
+        ``10`` is constant. ``5,100:20`` is 5, and 20 from generation 100 on.
     least : int
-        The smallest value that makes sense.
+        Smallest valid value.
     what : str
-        What a message calls it.
+        Name of the schedule in error messages.
 
     Raises
     ------
     SettingsError
-        It cannot be read, its generations do not ascend, or a value is too small.
+        The text cannot be parsed, its generations do not ascend, or a value is too small.
     """
     first, *others = str(text).split(",")
     pieces = [("0", first), *(part.partition(":")[::2] for part in others)]

@@ -1,6 +1,6 @@
-"""Topologies: from whom an island receives. A new one is an entry of ``TOPOLOGIES``.
+"""Topologies: which islands send emigrants to which. A topology is an entry of ``TOPOLOGIES``.
 
-The words are those of Cantu-Paz, Efficient and Accurate Parallel Genetic Algorithms (2000), chapter 6.
+The terms are those of Cantu-Paz, Efficient and Accurate Parallel Genetic Algorithms (2000), chapter 6.
 """
 
 import re
@@ -13,56 +13,58 @@ from types import MappingProxyType
 from islands.errors import SettingsError, lookup
 from islands.evolution.gp.rng import Purpose, Stream
 
-#: In-neighbours of every island, any order.
+#: In-neighbours of every island.
 Sources = list[set[int]]
 
-#: Islands that may all be connected with each other: the edges are as many as their square.
-_FULLY = 1_000
+#: Maximum number of fully connected islands; the number of edges grows with its square.
+_MAX_FULLY_CONNECTED = 1_000
 
-#: Edges of all islands together that may be drawn: each takes microseconds.
-_RANDOM = 50_000
+#: Maximum number of edges of a random graph; each takes microseconds to rng.
+_MAX_RANDOM_EDGES = 50_000
 
-#: Edges that are switched to make a regular graph random, for each edge that it has.
-_SWITCHES = 5
+#: Attempted edge switches per edge, which make a regular graph random.
+_SWITCHES_PER_EDGE = 5
 
-#: Of a random topology that does not say.
-_DEGREE = 2
+#: Degree of a random topology without a given degree.
+_DEFAULT_DEGREE = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """Who receives from whom.
+    """Sources of every island.
 
     Attributes
     ----------
     sources : tuple of tuple of int
-        For every island the islands it receives from, ascending; never itself.
+        For every island, the islands that it receives from, in ascending order, without itself.
     """
 
     sources: tuple[tuple[int, ...], ...]
 
     @property
     def in_degree(self) -> int:
-        """The most islands that one receives from."""
+        """Largest number of sources of an island."""
         return max(map(len, self.sources), default=0)
 
 
 @lru_cache
 def topology(text: str, islands: int, seed: int) -> Topology:
-    """Lay out a topology.
+    """Build a topology.
 
     Parameters
     ----------
     text : str
-        An entry of ``TOPOLOGIES``, with a degree where it takes one (``random-regular:4``), or a list of
-        edges: ``0>1,1>2`` sends from island 0 to 1 and from 1 to 2.
+        An entry of ``TOPOLOGIES``, with an optional degree (``random-regular:4``), or a list of edges:
+        ``0>1,1>2`` sends from island 0 to 1 and from 1 to 2.
+    islands : int
+        Number of islands.
     seed : int
-        Of the run; the random ones differ with it.
+        Seed of the run, for random topologies.
 
     Raises
     ------
     SettingsError
-        There is none of that name, or it cannot be laid out over so many islands.
+        The topology is unknown, or not possible for this number of islands.
     """
     if ">" in text:
         sources = _edges(text, islands)
@@ -71,7 +73,7 @@ def topology(text: str, islands: int, seed: int) -> Topology:
         build = lookup(TOPOLOGIES, name, "topology")
         if colon and (name not in WITH_DEGREE or not re.fullmatch(r"[1-9]\d?", degree)):
             raise SettingsError(f"topology {text!r}: a degree from 1 to 99 goes with {WITH_DEGREE[0]} alone")
-        sources = build(islands, int(degree or _DEGREE), Stream(seed, 0, 0, Purpose.TOPOLOGY))
+        sources = build(islands, int(degree or _DEFAULT_DEGREE), Stream(seed, 0, 0, Purpose.TOPOLOGY))
     return Topology(tuple(tuple(sorted(each - {island})) for island, each in enumerate(sources)))
 
 
@@ -90,23 +92,23 @@ def _edges(text: str, islands: int) -> Sources:
     return sources
 
 
-def _isolated(islands: int, _degree: int, _draw: Stream) -> Sources:
+def _isolated(islands: int, _degree: int, _rng: Stream) -> Sources:
     """Connect no islands."""
     return [set() for _ in range(islands)]
 
 
-def _ring(islands: int, _degree: int, _draw: Stream) -> Sources:
-    """Let each island send to the next one."""
+def _ring(islands: int, _degree: int, _rng: Stream) -> Sources:
+    """Each island sends to the next one."""
     return [{(island - 1) % islands} for island in range(islands)]
 
 
-def _bidirectional_ring(islands: int, _degree: int, _draw: Stream) -> Sources:
-    """Let each island send to the next one and to the previous one."""
+def _bidirectional_ring(islands: int, _degree: int, _rng: Stream) -> Sources:
+    """Each island sends to the next and to the previous one."""
     return [{(island - 1) % islands, (island + 1) % islands} for island in range(islands)]
 
 
-def _torus(islands: int, _degree: int, _draw: Stream) -> Sources:
-    """Have four neighbours on the grid nearest to a square; a prime number of islands is a ring."""
+def _torus(islands: int, _degree: int, _rng: Stream) -> Sources:
+    """Each island has four neighbours on the most square grid; a prime number of islands is a ring."""
     rows = next(rows for rows in range(isqrt(islands), 0, -1) if islands % rows == 0)
     columns = islands // rows
     return [
@@ -119,50 +121,52 @@ def _torus(islands: int, _degree: int, _draw: Stream) -> Sources:
     ]
 
 
-def _fully_connected(islands: int, _degree: int, _draw: Stream) -> Sources:
-    """Let each island send to all others."""
-    if islands > _FULLY:
-        raise SettingsError(f"at most {_FULLY} islands are fully connected, got {islands}: take a torus")
+def _fully_connected(islands: int, _degree: int, _rng: Stream) -> Sources:
+    """Each island sends to all others."""
+    if islands > _MAX_FULLY_CONNECTED:
+        raise SettingsError(
+            f"at most {_MAX_FULLY_CONNECTED} islands are fully connected, got {islands}: take a torus"
+        )
     return [set(range(islands)) for _ in range(islands)]
 
 
-def _star(islands: int, _degree: int, _draw: Stream) -> Sources:
-    """Let island 0 give to all and receive from all."""
+def _star(islands: int, _degree: int, _rng: Stream) -> Sources:
+    """Island 0 sends to all others and receives from all others."""
     return [set(range(1, islands)), *({0} for _ in range(islands - 1))]
 
 
-def _random_regular(islands: int, degree: int, draw: Stream) -> Sources:
-    """Let every island receive from ``degree`` others and give to as many.
+def _random_regular(islands: int, degree: int, rng: Stream) -> Sources:
+    """Each island receives from ``degree`` random others and sends to as many.
 
-    It begins as a circulant graph, whose edges a>b, c>d are switched to a>d, c>b at random, and goes on
-    until every island can reach every other one.
+    The graph starts as a circulant graph. Random pairs of edges a>b, c>d are switched to a>d, c>b until the
+    graph is strongly connected.
     """
     if degree >= islands:
         raise SettingsError(f"random-regular:{degree} takes more than {degree} islands, got {islands}")
-    if islands * degree > _RANDOM:
+    if islands * degree > _MAX_RANDOM_EDGES:
         raise SettingsError(
-            f"{islands} islands of degree {degree} have more than {_RANDOM} edges to draw: take a smaller one"
+            f"{islands} islands of degree {degree} have more than {_MAX_RANDOM_EDGES} edges: reduce it"
         )
     sources = [{(island - offset - 1) % islands for offset in range(degree)} for island in range(islands)]
     if degree == 1 or degree == islands - 1:
         return sources
     while True:
-        for _ in range(_SWITCHES * islands * degree):
-            one, other = draw.randrange(islands), draw.randrange(islands)
-            gift, counter = draw.choice(sorted(sources[one])), draw.choice(sorted(sources[other]))
-            if gift not in {other, *sources[other]} and counter not in {one, *sources[one]}:
-                sources[one] = sources[one] - {gift} | {counter}
-                sources[other] = sources[other] - {counter} | {gift}
+        for _ in range(_SWITCHES_PER_EDGE * islands * degree):
+            one, other = rng.randrange(islands), rng.randrange(islands)
+            from_one, from_other = rng.choice(sorted(sources[one])), rng.choice(sorted(sources[other]))
+            if from_one not in {other, *sources[other]} and from_other not in {one, *sources[one]}:
+                sources[one] = sources[one] - {from_one} | {from_other}
+                sources[other] = sources[other] - {from_other} | {from_one}
         if _connected(sources):
             return sources
 
 
 def _connected(sources: Sources) -> bool:
-    """Tell whether all can be reached; in a graph as regular as this one direction implies the other."""
-    reached, edge = {0}, {0}
-    while edge:
-        edge = set[int]().union(*(sources[island] for island in edge)) - reached
-        reached |= edge
+    """Return whether all islands are reachable; in a regular graph this implies strong connectivity."""
+    reached, frontier = {0}, {0}
+    while frontier:
+        frontier = set[int]().union(*(sources[island] for island in frontier)) - reached
+        reached |= frontier
     return len(reached) == len(sources)
 
 
@@ -178,5 +182,5 @@ TOPOLOGIES: Mapping[str, Callable[[int, int, Stream], Sources]] = MappingProxyTy
     }
 )
 
-#: Those that take a degree.
+#: Topologies that take a degree.
 WITH_DEGREE = ("random-regular",)

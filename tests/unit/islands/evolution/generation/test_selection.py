@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.evolution.generation.selection import tournaments
+from islands.evolution.generation.selection import run_tournaments
 from islands.evolution.gp.individual import Individual
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.model.expression import Lagged
@@ -32,7 +32,7 @@ def nobody(individuals):
 
 
 def winners(among, count, contestants, draw):
-    return tournaments(among, count, contestants, draw, inf, nobody)
+    return run_tournaments(among, count, contestants, draw, inf, nobody)
 
 
 def test_the_fittest_of_many_contestants_wins():
@@ -122,7 +122,7 @@ def test_every_tournament_ends_as_if_nobody_had_been_abandoned(drawn, count, con
         asked.extend(places[each.genes] for each in individuals)
         return [known[places[each.genes]] for each in individuals]
 
-    found = tournaments(among, count, contestants, stream(seed), bar, settle)
+    found = run_tournaments(among, count, contestants, stream(seed), bar, settle)
     expected = winners(known, count, contestants, stream(seed))
     assert [each.genes for each in found] == [each.genes for each in expected]
 
@@ -137,10 +137,10 @@ def test_every_tournament_ends_as_if_nobody_had_been_abandoned(drawn, count, con
 
 def test_a_known_contestant_at_the_bar_beats_whoever_was_abandoned_unasked():
     among = [*pool(2.0), Individual((Lagged(1),), outcome=ABANDONED)]
-    found = tournaments(among, 20, 60, stream(), 2.0, nobody)
+    found = run_tournaments(among, 20, 60, stream(), 2.0, nobody)
     assert {each.fitness for each in found} == {2.0}
 
 
 def test_a_failure_that_is_known_is_never_settled():
     failed = Individual((Lagged(0),), outcome=EvaluationOutcome(Status.SINGULAR, "dependent"))
-    assert tournaments([failed], 3, 2, stream(), 1.0, nobody) == [failed] * 3
+    assert run_tournaments([failed], 3, 2, stream(), 1.0, nobody) == [failed] * 3

@@ -8,11 +8,11 @@ import pytest
 from islands.evolution.generation.variation import (
     high_level_crossover,
     inner_mutation,
-    legal,
     low_level_crossover,
     outer_mutation,
     random_gene,
     random_genes,
+    repair_genes,
 )
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.settings import Settings
@@ -192,19 +192,19 @@ def test_where_the_structure_is_free_a_phi_function_takes_anything():
     found = {plain(random_gene(setting, 1, stream(seed))) for seed in range(500)}
     assert "phi1(y(k-1), u(k-1))" in found
     assert any("phi1(phi1(" in text for text in found)
-    assert legal((parse("phi1(y(k-1), u(k-1))"),), setting) == (parse("phi1(y(k-1), u(k-1))"),)
+    assert repair_genes((parse("phi1(y(k-1), u(k-1))"),), setting) == (parse("phi1(y(k-1), u(k-1))"),)
 
 
 def test_mending_adds_a_linear_y_in_front_where_the_constraint_needs_one():
     constrained = replace(SETTINGS, constraints="hysteresis", structure="phi")
-    assert texts(legal(NUMBERS, constrained)) == ("y(k-1)", "u(k-1)", "u(k-2)")
-    assert legal(genes("u(k-1)", "q3(y(k-1))"), constrained) == genes("u(k-1)", "q3(y(k-1))")
+    assert texts(repair_genes(NUMBERS, constrained)) == ("y(k-1)", "u(k-1)", "u(k-2)")
+    assert repair_genes(genes("u(k-1)", "q3(y(k-1))"), constrained) == genes("u(k-1)", "q3(y(k-1))")
     full = genes(*(f"u(k-{lag})" for lag in range(1, 7)))
-    assert legal(full, constrained) == (Lagged(0), *full[:5])
-    assert legal(NUMBERS, replace(constrained, constraints="none")) == NUMBERS
+    assert repair_genes(full, constrained) == (Lagged(0), *full[:5])
+    assert repair_genes(NUMBERS, replace(constrained, constraints="none")) == NUMBERS
 
 
 def test_mending_makes_y_of_one_sample_back_of_every_linear_output_where_steps_are_asked_for():
     stepwise = replace(SETTINGS, constraints="hysteresis", structure="increment")
-    mended = legal(genes("q3(q1(y(k-1)))", "q2(y(k-1)*u(k-1))", "phi1(y(k-1), q1(u(k-1)))"), stepwise)
+    mended = repair_genes(genes("q3(q1(y(k-1)))", "q2(y(k-1)*u(k-1))", "phi1(y(k-1), q1(u(k-1)))"), stepwise)
     assert texts(mended) == ("y(k-1)", "q2(y(k-1)*u(k-1))", "phi1(u(k-1), q1(u(k-1)))")
