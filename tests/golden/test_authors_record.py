@@ -1,8 +1,8 @@
-"""The record of case study 1, rebuilt from the authors' published notebook by a recipe of its own.
+"""Record of case study 1, computed from a separate transcription of the authors' published notebook.
 
-Source: the notebook that accompanies the paper, section 6.1. The transcription below shares no line with the
-package: it keeps the notebook's time axis, its slope array that is one sample late in the estimation part,
-and its explicit Runge-Kutta steps.
+Source: the notebook that accompanies the paper, section 6.1. The transcription is independent of the package.
+It keeps the time axis of the notebook, the slope array that is one sample late in the estimation part, and
+the explicit Runge-Kutta steps.
 """
 
 import numpy as np
@@ -13,12 +13,12 @@ from islands.systems.bouc_wen import BoucWenPiezo, authors_estimation, authors_v
 
 
 def rates(v, h):
-    """Equation (11)'s first line with the paper's numbers."""
+    """Return the right-hand side of the first line of equation (11) with the parameters of the paper."""
     return 0.9 * v - 0.008 * abs(v) * h - 0.008 * v * abs(h)
 
 
 def displacement(volts, slopes):
-    """The notebook's loop: step k to k + 1 with slopes[k], in plain floats."""
+    """Integrate as the notebook does: step k to k + 1 with slopes[k], in plain floats."""
     h, out = 0.0, []
     for volt, v in zip(volts.tolist(), slopes.tolist(), strict=True):
         out.append(1.6 * volt - h)
@@ -32,7 +32,7 @@ def displacement(volts, slopes):
 
 @pytest.fixture(scope="module")
 def notebook():
-    """Voltage and displacement of both parts, before the first estimation row is dropped."""
+    """Return voltage and displacement of both parts, with the first estimation row."""
     t = np.arange(0, 101, 0.001)
     x = np.random.RandomState(93862723).normal(0, 450, len(t))
     x[:1000] = x[-1000:] = 0
@@ -55,19 +55,19 @@ def validation():
     return authors_validation()
 
 
-def test_the_estimation_record_is_the_notebooks(notebook, estimation):
+def test_estimation_record_equals_that_of_the_notebook(notebook, estimation):
     volts, displaced, _, _ = notebook
     np.testing.assert_allclose(estimation.u[:, 0], volts[1:], rtol=0, atol=1e-12)
     np.testing.assert_allclose(estimation.y, displaced[1:], rtol=0, atol=1e-12)
 
 
-def test_the_validation_record_is_the_notebooks(notebook, validation):
+def test_validation_record_equals_that_of_the_notebook(notebook, validation):
     _, _, volts, displaced = notebook
     np.testing.assert_allclose(validation.u[:, 0], volts, rtol=0, atol=1e-12)
     np.testing.assert_allclose(validation.y, displaced, rtol=0, atol=1e-12)
 
 
-def test_counts_times_and_peak_are_those_on_paper(estimation, validation):
+def test_sample_counts_times_and_peaks_equal_those_of_the_paper(estimation, validation):
     assert (estimation.samples, validation.samples) == (99_999, 100_000)
     assert (estimation.dt, validation.dt) == (1e-3, 1e-3)
     assert estimation.time[0] == pytest.approx(1.001, abs=1e-12)
@@ -76,9 +76,9 @@ def test_counts_times_and_peak_are_those_on_paper(estimation, validation):
     assert np.abs(validation.u).max() == pytest.approx(40.0, abs=1e-9)
 
 
-def test_values_pinned_when_the_record_was_first_rebuilt(estimation, validation):
-    # Free of this repository's filter and of the transcription above: a changed SciPy shows. The notebook's
-    # filter, of order five at 0.002 of Nyquist, amplifies the last bit of the linear algebra to 2.5e-4,
+def test_record_has_golden_values(estimation, validation):
+    # Independent of the package and of the transcription, so that a change in SciPy is detected. The filter
+    # of the notebook (order five, 0.002 of Nyquist) amplifies the last bit of the linear algebra to 2.5e-4,
     # and that bit differs between processors.
     assert estimation.u[0, 0] == pytest.approx(-6.6788, abs=1e-3)
     assert estimation.y[0] == pytest.approx(-10.7255, abs=1e-3)
@@ -87,14 +87,14 @@ def test_values_pinned_when_the_record_was_first_rebuilt(estimation, validation)
     assert validation.y[250] == pytest.approx(37.41019885244359, abs=1e-8)
 
 
-def test_the_dropped_row_would_have_jumped(estimation):
-    # The notebook sets the output to zero in the row before.
+def test_dropped_first_row_has_an_output_step(estimation):
+    # In the dropped row the notebook sets the output to zero.
     assert abs(estimation.y[0] - 0.0) == pytest.approx(10.7, abs=0.05)
 
 
-def test_the_slope_lags_in_the_estimation_record_and_not_in_the_validation_record(estimation, validation):
+def test_slope_is_one_sample_late_only_in_the_estimation_record(estimation, validation):
     def misfit(record, lag):
-        """Largest error in um of the record against the actuator driven by slopes ``lag`` samples late."""
+        """Return the largest error in um against a simulation whose slopes are ``lag`` samples late."""
         u = record.u[:, 0]
         slope = np.diff(u)[1 - lag : len(u) - 1 - lag] / record.dt
         h0 = 1.6 * u[1] - record.y[1]

@@ -1,7 +1,7 @@
 """Table 1 of the paper: models (12) and (13) on the authors' record, free run over all 100 s.
 
 The paper prints MAPE 0.32874 / 0.33374 and 0.31189 / 0.25250, R2 0.99940 / 0.99984 and 0.99940 / 0.99990.
-Its parameters are rounded to three digits; with those the record gives 0.3310 / 0.3388 and 0.2914 / 0.3377.
+The printed parameters are rounded to three digits and give 0.3310 / 0.3388 and 0.2914 / 0.3377.
 """
 
 import pytest
@@ -31,14 +31,14 @@ def errors(model, records) -> tuple[Metrics, Metrics]:
         ("13", (0.2914, 0.3377), (0.99946, 0.99988)),
     ],
 )
-def test_the_printed_parameters_reproduce_table_1(records, number, mape, r2):
+def test_printed_parameters_reproduce_table_1(records, number, mape, r2):
     found = errors(published(number).model, records)
     assert [part.mape for part in found] == pytest.approx(mape, rel=0.02)
     assert [part.r2 for part in found] == pytest.approx(r2, abs=6e-6)
 
 
-def test_estimated_again_under_the_constraints_model_13_is_the_paper_s(records):
-    """With all digits the estimation error is Table 1's 0.31189: structure and record are the paper's."""
+def test_re_estimated_model_13_has_the_error_of_table_1(records):
+    """The estimation error is 0.31189 as in Table 1, so structure and record are those of the paper."""
     estimated = estimate(published("13").model.regressors, records[0], "hysteresis")
     assert isinstance(estimated, FittedStructure)
     estimation, validation = errors(estimated.model, records)
@@ -48,7 +48,7 @@ def test_estimated_again_under_the_constraints_model_13_is_the_paper_s(records):
 
 
 @pytest.mark.parametrize("number", ["12", "13", "14"])
-def test_every_published_cluster_sum_meets_its_target(number):
+def test_published_cluster_sums_meet_their_targets(number):
     sums = {entry.cluster: (entry.sum, entry.target) for entry in cluster_sums(published(number).model)}
     expected = {"12": {"y"}, "13": {"y"}, "14": {"y", "u", "y*u"}}[number]
     assert set(sums) == expected
@@ -56,12 +56,12 @@ def test_every_published_cluster_sum_meets_its_target(number):
 
 
 @pytest.mark.parametrize("number", ["12", "13"])
-def test_property_1_holds_for_the_published_models(records, number):
+def test_published_models_have_property_1(records, number):
     checked = check_physics(published(number).model, records[0])
     assert checked.property_1
     assert len(checked.holds) == 10
     assert checked.hold_drift_percent < 1e-9
 
 
-def test_the_catalogue_holds_what_the_paper_prints():
+def test_catalogue_has_the_models_of_the_paper():
     assert {number: entry.model.size for number, entry in PUBLISHED.items()} == {"12": 6, "13": 9, "14": 9}

@@ -1,11 +1,11 @@
-"""A record that identifications search in less than a second, the settings for it, and what they tell."""
+"""A record and settings with which an identification takes less than a second, and recording helpers."""
 
 import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.engine import SerialEngine
 
-#: What presets are tuned in is set here: their numbers may change.
+#: All tuned settings of the presets are set here, so that tests do not depend on their values.
 BUDGET = {
     "population": 30,
     "generations": 4,
@@ -28,7 +28,7 @@ BUDGET = {
 
 
 def record(samples=3000, seed=0, noise=2e-3, **changes):
-    """Hysteresis under three sines: no library term by term, but close to some."""
+    """Return a record of hysteresis under three sines that no library contains exactly."""
     rng = np.random.default_rng(seed)
     time = np.arange(samples) * 1e-2
     u = sum(
@@ -41,26 +41,26 @@ def record(samples=3000, seed=0, noise=2e-3, **changes):
     return Dataset(u, y + noise * rng.normal(size=samples), 1e-2, **changes)
 
 
-def into(states):
-    """Return a watcher that keeps what it sees; its answer has no effect."""
+def record_states(states):
+    """Return a callback that records states; its return value must have no effect."""
 
-    def watch(state, settings):
+    def callback(state, settings):
         assert settings.population == BUDGET["population"]
         states.append(state)
         return True
 
-    return watch
+    return callback
 
 
 def parameters(result):
     return [(fitted.model.regressors, fitted.model.parameters) for fitted in result.models]
 
 
-class Telling(SerialEngine):
-    """An engine that keeps what it yields, and whether it was left."""
+class RecordingEngine(SerialEngine):
+    """Engine that records its epochs and whether its generator was closed."""
 
     def __init__(self):
-        self.epochs, self.left = [], False
+        self.epochs, self.closed = [], False
 
     def run(self, problem, start, stop):
         try:
@@ -68,7 +68,7 @@ class Telling(SerialEngine):
                 self.epochs.append(epoch)
                 yield epoch
         finally:
-            self.left = True
+            self.closed = True
 
 
 def two_inputs(seed):

@@ -1,1 +1,1 @@
-"""Figures of results, one file per family: functions that return a matplotlib figure and show nothing."""
+"""Figures of results: functions that return a matplotlib figure. Read `registry` and `style` first."""

@@ -1,4 +1,4 @@
-"""The confusion matrix of blind trials: what was hidden, and what it was called."""
+"""Confusion matrix of blind fault-injection trials: injected faults against named effects."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,40 +10,50 @@ from matplotlib.patches import Rectangle
 
 from islands.figures.style import FRAME, RESIDUAL, SHADE, SIMULATED, WIDTH, blank, finish, house_style
 
-#: What "" stands for, and what was noticed without a name.
-NOTHING, UNKNOWN = "nothing", "unknown"
+#: Label of "": no fault injected, or no effect found.
+NOTHING = "nothing"
 
-#: Inches of a name in the margin, and of a cell at the most.
-_MARGIN, _CELL = 1.35, 0.26
+#: Label of a deviation that was detected but not named.
+UNKNOWN = "unknown"
 
-#: Points of names and numbers in a cell of an inch, and at the most.
-_TEXT, _LARGEST = 46.0, 8.0
+#: Margin for the names, in inches.
+_MARGIN = 1.35
 
-#: The palest tint of a cell that holds anything.
-_PALE = 0.25
+#: Largest width of a cell, in inches.
+_CELL = 0.26
+
+#: Font size of names and numbers per inch of cell width, in points.
+_FONT_SIZE_PER_INCH = 46.0
+
+#: Largest font size of names and numbers, in points.
+_MAX_FONT_SIZE = 8.0
+
+#: Smallest tint of a cell that is not empty.
+_MIN_TINT = 0.25
 
 
 @house_style()
 def draw_confusion(counts: Mapping[tuple[str, str], int], names: Sequence[str], title: str = "") -> Figure:
-    """Draw how often what was hidden was called what.
+    """Draw the confusion matrix of blind trials.
 
-    A row is what was hidden, a column what it was called. A row's colours are shares of its trials: blue
-    where the name is right, red where it is another one, grey where there is none.
+    Rows are injected faults, columns are named effects. The intensity of a colour is the fraction of the
+    trials of its row. Blue cells are correct, orange cells wrong; grey cells have no name.
 
     Parameters
     ----------
     counts : mapping of (str, str) to int
-        (hidden, called) to how often; "" is nothing, hidden or found, "unknown" is noticed without a name.
+        Number of trials by (injected, named). "" means no fault or no effect; "unknown" means detected but
+        not named.
     names : sequence of str
-        The catalogue's, in the order in which they are drawn. What was hidden beside them has no name: to
-        call it unknown is right.
+        Names of the catalogue, in the order in which they are drawn. For injected faults that are not in the
+        catalogue, "unknown" is correct.
     title : str
     """
     rows, columns = _order(counts, names)
     cell = min(_CELL, (WIDTH - _MARGIN - 0.1) / max(len(columns), 1))
     height = cell * max(len(rows), 1) + _MARGIN + (0.35 if title else 0.1)
     figure = blank(height, title)
-    figure.set_layout_engine("none")  # cells are squares of a size that is known
+    figure.set_layout_engine("none")  # cells are squares of a fixed size
     axes = figure.add_axes(
         (
             _MARGIN / WIDTH,
@@ -52,14 +62,14 @@ def draw_confusion(counts: Mapping[tuple[str, str], int], names: Sequence[str], 
             cell * max(len(rows), 1) / height,
         )
     )
-    size = min(_LARGEST, _TEXT * cell)
+    size = min(_MAX_FONT_SIZE, _FONT_SIZE_PER_INCH * cell)
     for down, hidden in enumerate(rows):
         total = sum(counts.get((hidden, called), 0) for called in columns)
         for across, called in enumerate(columns):
-            _cell(
+            _draw_cell(
                 axes, (across, down), counts.get((hidden, called), 0), total, _colour(hidden, called, names)
             )
-    _frame(axes, rows, columns, size)
+    _draw_frame(axes, rows, columns, size)
     for text in axes.texts:
         text.set_fontsize(size * (0.85 if len(text.get_text()) < 3 else 0.65))
     return finish(figure)
@@ -68,14 +78,14 @@ def draw_confusion(counts: Mapping[tuple[str, str], int], names: Sequence[str], 
 def _order(
     counts: Mapping[tuple[str, str], int], names: Sequence[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return what stands in the rows and in the columns: what occurs, and for every row its own column."""
+    """Return the names of the rows and of the columns; every row of the catalogue has a column."""
     hidden = {each for each, _ in counts}
     known = [name for name in names if name in hidden]
     other = sorted(hidden - {*names, ""})
     rows = (*known, *other, *([""] if "" in hidden else []))
     called = {each for _, each in counts} | set(known)
-    beside = sorted(called - {*names, "", UNKNOWN})
-    return rows, (*(name for name in names if name in called), *beside, UNKNOWN, "")
+    uncatalogued = sorted(called - {*names, "", UNKNOWN})
+    return rows, (*(name for name in names if name in called), *uncatalogued, UNKNOWN, "")
 
 
 def _colour(hidden: str, called: str, names: Sequence[str]) -> str:
@@ -85,11 +95,11 @@ def _colour(hidden: str, called: str, names: Sequence[str]) -> str:
     return FRAME if called in ("", UNKNOWN) else SIMULATED
 
 
-def _cell(axes: Axes, place: tuple[int, int], count: int, total: int, colour: str) -> None:
+def _draw_cell(axes: Axes, place: tuple[int, int], count: int, total: int, colour: str) -> None:
     if not count:
         return
     share = count / total
-    tint = _PALE + (1.0 - _PALE) * share
+    tint = _MIN_TINT + (1.0 - _MIN_TINT) * share
     mixed = tuple(1.0 - tint * (1.0 - part) for part in to_rgb(colour))
     axes.add_patch(Rectangle(place, 1, 1, facecolor=mixed, edgecolor="none", zorder=1.5))
     axes.text(
@@ -102,7 +112,7 @@ def _cell(axes: Axes, place: tuple[int, int], count: int, total: int, colour: st
     )
 
 
-def _frame(axes: Axes, rows: Sequence[str], columns: Sequence[str], size: float) -> None:
+def _draw_frame(axes: Axes, rows: Sequence[str], columns: Sequence[str], size: float) -> None:
     axes.set(xlim=(0, len(columns)), ylim=(max(len(rows), 1), 0))
     axes.set_xticks(np.arange(len(columns)) + 0.5, [each or NOTHING for each in columns], rotation=90)
     axes.set_yticks(np.arange(len(rows)) + 0.5, [each or NOTHING for each in rows])
@@ -110,7 +120,7 @@ def _frame(axes: Axes, rows: Sequence[str], columns: Sequence[str], size: float)
     axes.grid(visible=False)
     axes.hlines(np.arange(1, len(rows)), 0, len(columns), color=SHADE, lw=0.4, zorder=1)
     axes.vlines(np.arange(1, len(columns)), 0, len(rows), color=SHADE, lw=0.4, zorder=1)
-    # What has no name stands apart.
+    # Separate the columns without a name.
     axes.axvline(len(columns) - 2, color=FRAME, lw=0.8)
     for side in axes.spines.values():
         side.set_visible(True)

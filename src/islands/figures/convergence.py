@@ -1,4 +1,4 @@
-"""The course of a search, and what size buys: error against generations, and error against terms."""
+"""Convergence of a search: error against generations, and error against the number of terms."""
 
 from math import ceil
 
@@ -11,64 +11,64 @@ from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 from islands.evolution.search_result import SearchResult
 from islands.figures.style import MEASURED, SIMULATED, blank, finish, house_style
 
-#: Sizes in a column of a legend that is as high as its figure.
-_COLUMN = 15
+#: Entries of a legend column.
+_LEGEND_ROWS = 15
 
 
 @house_style()
-def draw_convergence(found: SearchResult) -> Figure:
-    """Draw the least error of every size over the generations."""
+def draw_convergence(result: SearchResult) -> Figure:
+    """Draw the best error of every model size over the generations."""
     figure = blank(3.4)
     axes = figure.subplots()
-    history = found.search.history
+    history = result.search.history
     sizes = sorted({size for point in history for size in point.best})
     for position, size in enumerate(sizes):
         points = [(point.generation, point.best[size]) for point in history if size in point.best]
         generations, errors = zip(*points, strict=True)
         shade = colormaps["viridis"](0.9 * position / max(1, len(sizes) - 1))
-        # A line of one generation is a point.
+        # A line through one point is invisible, so draw a marker.
         (line,) = axes.step(generations, np.sqrt(errors), where="post", color=shade, label=str(size))
         line.set(marker="o" if len(points) == 1 else "", markersize=3)
-    _against_generations(axes)
-    columns = ceil(len(sizes) / _COLUMN)
+    _set_generation_axes(axes)
+    columns = ceil(len(sizes) / _LEGEND_ROWS)
     axes.legend(title="terms", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, ncols=columns)
     return finish(figure)
 
 
 @house_style()
-def draw_islands(found: SearchResult) -> Figure:
-    """Draw the least error of every island over the generations, and the best of all."""
+def draw_islands(result: SearchResult) -> Figure:
+    """Draw the best error of every island and of all islands over the generations."""
     figure = blank(3.4)
     axes = figure.subplots()
-    history = found.search.history
+    history = result.search.history
     generations = [point.generation for point in history]
     errors = np.sqrt([point.islands for point in history])
     errors[np.isinf(errors)] = np.nan
-    # A hundred lines are a cloud: it says how far islands are apart, and none of them needs a name.
+    # The lines show only the spread of the islands, so one legend entry is enough for all.
     name = iter(["one island"])
     for course in errors.T:
         axes.step(
             generations, course, where="post", color=MEASURED, lw=0.8, alpha=0.6, label=next(name, None)
         )
     best = np.fmin.reduce(errors, axis=1)
-    axes.step(generations, best, where="post", color=SIMULATED, lw=1.6, label="the best of all")
-    _against_generations(axes)
+    axes.step(generations, best, where="post", color=SIMULATED, lw=1.6, label="best island")
+    _set_generation_axes(axes)
     axes.legend(frameon=False)
     return finish(figure)
 
 
 @house_style()
-def draw_front(found: SearchResult) -> Figure:
+def draw_front(result: SearchResult) -> Figure:
     """Draw the free-run error of every model against its number of terms."""
     figure = blank(3.2)
     axes = figure.subplots()
     for part, colour, marker in (("estimation", MEASURED, "o"), ("validation", SIMULATED, "s")):
         points = sorted(
-            (entry.model.size, entry.assessment.metrics[part]["free_run"].mape) for entry in found.models
+            (entry.model.size, entry.assessment.metrics[part]["free_run"].mape) for entry in result.models
         )
         sizes, errors = zip(*points, strict=True)
         axes.plot(sizes, errors, marker=marker, color=colour, label=part)
-    _logarithmic(axes)
+    _set_log_scale(axes)
     axes.set_xlabel("terms")
     axes.set_ylabel("free-run MAPE (% of the range)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
@@ -76,23 +76,23 @@ def draw_front(found: SearchResult) -> Figure:
     return finish(figure)
 
 
-def _against_generations(axes: Axes) -> None:
-    _logarithmic(axes)
+def _set_generation_axes(axes: Axes) -> None:
+    _set_log_scale(axes)
     axes.set_xlabel("generation")
     axes.set_ylabel("RMSE of multiple shooting")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
 
 
-def _logarithmic(axes: Axes) -> None:
-    """Scale the errors by decades, labelled with plain numbers."""
+def _set_log_scale(axes: Axes) -> None:
+    """Set a logarithmic error axis with plain numbers."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
-    # Within a decade there may be no power of ten: then numbers between them are written.
-    axes.yaxis.set_minor_formatter(_Between(minor_thresholds=(1.0, 0.5)))
+    # A range within one decade may contain no power of ten, so label minor ticks, too.
+    axes.yaxis.set_minor_formatter(_PlainLogFormatter(minor_thresholds=(1.0, 0.5)))
 
 
-class _Between(LogFormatter):
-    """Writes a number where matplotlib would, and plainly."""
+class _PlainLogFormatter(LogFormatter):
+    """Labels the same ticks as `LogFormatter`, with plain numbers."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         return f"{x:g}" if super().__call__(x, pos) else ""

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: where a simulation errs, before and after, and the ladder of causes."""
+"""Figures of a diagnosis: simulation and residual before and after extension, and screened effects."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.interfaces.context import Signal
-from islands.figures.downsampling import VERTICES, thin
+from islands.figures.downsampling import VERTICES, downsample
 from islands.figures.style import (
     FRAME,
     MEASURED,
@@ -29,61 +29,72 @@ from islands.figures.style import (
 )
 from islands.figures.windows import last_loops, representative_window
 
-#: Colour of the simulation as it was, where both are drawn.
+#: Colour of the simulation before extension.
 BEFORE = "#e69f00"
 
-#: Rungs of the ladder that are shown, cells of a map, lags of an autocorrelation, windows of a spectrum.
-_RUNGS, _CELLS, _LAGS, _WINDOWS = 12, 40, 50, 4
+#: Number of screened effects shown.
+_MAX_EFFECTS = 12
 
-#: Vertices of a line that is shown as a whole above and in part below.
-_WHOLE = 800
+#: Cells of a residual map.
+_CELLS = 40
+
+#: Largest lag of the autocorrelation, in samples.
+_LAGS = 50
+
+#: Length of the record divided by the length of a window of the spectrum.
+_WINDOWS = 4
+
+#: Vertices of a line in an overview panel above a section.
+_OVERVIEW_VERTICES = 800
 
 
 @house_style()
 def draw_over_time(diagnosis: Diagnosis) -> Figure:
-    """Draw measured and simulated output over time, and the residuals before and after below.
+    """Draw measured and simulated output over time, and below them the residuals before and after.
 
-    A record of many loops is shown as a whole and, below, in a stretch whose residual is the median of all
-    such stretches: as a whole it is a band.
+    A record with many loops is shown completely and, below, in a section whose residual is the median of all
+    sections, because the loops of the complete record cannot be distinguished.
     """
     record = diagnosis.record
-    stretch = representative_window(record, record.y - diagnosis.base.output)
-    if stretch is None:
+    section = representative_window(record, record.y - diagnosis.base.output)
+    if section is None:
         figure = blank(4.6, "Measured and simulated output")
         axes = figure.subplots(2, 1, height_ratios=(2, 1.3))
-        _over_time(axes[0], axes[1], diagnosis, slice(0, record.samples))
+        _draw_over_time_panels(axes[0], axes[1], diagnosis, slice(0, record.samples))
     else:
         figure = blank(7.4, "Measured and simulated output")
         axes = figure.subplots(4, 1, height_ratios=(1.6, 1.1, 2.2, 1.3))
-        _over_time(axes[0], axes[1], diagnosis, slice(0, record.samples), 0.6)
-        _over_time(axes[2], axes[3], diagnosis, stretch)
-        here = record.time[stretch]
+        _draw_over_time_panels(axes[0], axes[1], diagnosis, slice(0, record.samples), 0.6)
+        _draw_over_time_panels(axes[2], axes[3], diagnosis, section)
+        here = record.time[section]
         for whole in axes[:2]:
             whole.axvspan(float(here[0]), float(here[-1]), facecolor="none", edgecolor=FRAME, lw=0.8)
-        axes[2].set_title("The framed stretch: its residual before is of median size", fontsize=8.0)
+        axes[2].set_title(
+            "Framed section; its residual before extension is the median of all sections", fontsize=8.0
+        )
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
     axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
-    axes[-1].set_xlabel("time (s); shaded: locked away until the end")
+    axes[-1].set_xlabel("time (s); shaded: hold-out data")
     figure.align_ylabels()
     return finish(figure)
 
 
 @house_style()
 def draw_loops(diagnosis: Diagnosis) -> Figure:
-    """Draw the last loops of output over input, and of the residual before and after."""
+    """Draw the last loops of the output, and of the residual before and after, over the input."""
     record = diagnosis.record
     figure = blank(3.4, "Loops")
     left, right = figure.subplots(1, 2)
     u, loops = record.u[:, 0], last_loops(record)
-    left.plot(*thin(u[loops], record.y[loops]), color=MEASURED, lw=MEASURED_WIDTH, label="measured")
+    left.plot(*downsample(u[loops], record.y[loops]), color=MEASURED, lw=MEASURED_WIDTH, label="measured")
     for name, colour, output in _outputs(diagnosis):
-        left.plot(*thin(u[loops], output[loops]), color=colour, lw=SIMULATED_WIDTH, label=name)
+        left.plot(*downsample(u[loops], output[loops]), color=colour, lw=SIMULATED_WIDTH, label=name)
     left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, columnspacing=1.0)
     for name, colour, residual in _residuals(diagnosis):
-        right.plot(*thin(u[loops], residual[loops]), color=colour, lw=SIMULATED_WIDTH, label=name)
+        right.plot(*downsample(u[loops], residual[loops]), color=colour, lw=SIMULATED_WIDTH, label=name)
     right.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
-    left.set(xlabel=_input(diagnosis), ylabel=label(record.output_name, record.output_unit))
-    right.set(xlabel=_input(diagnosis), ylabel=label("residual", record.output_unit))
+    left.set(xlabel=_input_label(diagnosis), ylabel=label(record.output_name, record.output_unit))
+    right.set(xlabel=_input_label(diagnosis), ylabel=label("residual", record.output_unit))
     for axes in (left, right):
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
     return finish(figure)
@@ -91,28 +102,28 @@ def draw_loops(diagnosis: Diagnosis) -> Figure:
 
 @house_style()
 def draw_residual(diagnosis: Diagnosis) -> Figure:
-    """Draw the residual against what it should not know.
+    """Draw the structure of the residual before and after.
 
-    Those are the input, also by its direction, its rate and the simulated output; then its spectrum and its
-    autocorrelation.
+    The panels show the residual over the input, over the input by direction, over the rate of the input and
+    over the simulated output; its amplitude spectrum; its autocorrelation.
     """
     record = diagnosis.record
     u = record.u[:, 0]
     rate = np.gradient(u, record.dt)
-    figure = blank(7.0, "What the residual still knows: means of equally full cells, and their spread")
+    figure = blank(7.0, "Residual structure: mean and standard deviation in cells of equal sample count")
     axes = figure.subplots(3, 2)
     axes[0, 1].sharey(axes[0, 0])
     unit = record.input_units[0]
     for panel, signal, name in (
-        (axes[0, 0], u, _input(diagnosis)),
+        (axes[0, 0], u, _input_label(diagnosis)),
         (axes[1, 0], rate, label("rate of the input", f"{unit}/s" if unit else "")),
         (axes[1, 1], diagnosis.best.output, label("simulated output", record.output_unit)),
     ):
-        _cells(panel, signal, diagnosis)
+        _draw_cells(panel, signal, diagnosis)
         panel.set(xlabel=name, ylabel=label("residual", record.output_unit))
-    _directions(axes[0, 1], u, rate, diagnosis)
-    _spectrum(axes[2, 0], diagnosis)
-    _autocorrelation(axes[2, 1], diagnosis)
+    _draw_directions(axes[0, 1], u, rate, diagnosis)
+    _draw_spectrum(axes[2, 0], diagnosis)
+    _draw_autocorrelation(axes[2, 1], diagnosis)
     for panel in axes[:2].flat:
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=STEPS))
     axes[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
@@ -121,10 +132,10 @@ def draw_residual(diagnosis: Diagnosis) -> Figure:
 
 @house_style()
 def draw_screening(diagnosis: Diagnosis) -> Figure:
-    """Draw what each effect alone would gain, and the share of the misfit that it explains."""
-    shown = diagnosis.candidates[:_RUNGS][::-1]
+    """Draw the score of each screened effect, and the fraction of the misfit that it explains."""
+    shown = diagnosis.candidates[:_MAX_EFFECTS][::-1]
     named = {finding.name for finding in diagnosis.effects}
-    figure = blank(0.9 + 0.26 * len(shown), "The ladder: each effect alone beside the calibrated simulation")
+    figure = blank(0.9 + 0.26 * len(shown), "Screened effects, each added alone to the calibrated simulation")
     axes = figure.subplots()
     places = np.arange(len(shown))
     gains = [candidate.score for candidate in shown]
@@ -144,18 +155,16 @@ def draw_screening(diagnosis: Diagnosis) -> Figure:
     axes.margins(x=0.12)
     axes.set_xlim(left=1.05 * min(0.0, *gains))
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel(
-        "gain in minus twice the log-likelihood, values paid for; percent: of the misfit; coloured: named"
-    )
+    axes.set_xlabel("decrease of -2 log-likelihood after penalty; percent: explained misfit; coloured: named")
     return finish(figure)
 
 
-def _input(diagnosis: Diagnosis) -> str:
+def _input_label(diagnosis: Diagnosis) -> str:
     return label(diagnosis.record.input_names[0], diagnosis.record.input_units[0])
 
 
 def _outputs(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
-    """Return what is simulated, each with its name and its colour."""
+    """Return name, colour and values of each simulated output."""
     before = [("simulated", BEFORE, diagnosis.base.output)]
     if diagnosis.best is diagnosis.base:
         return before
@@ -163,7 +172,7 @@ def _outputs(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
 
 
 def _residuals(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
-    """Return what each of these leaves over."""
+    """Return name, colour and values of the residual of each simulated output."""
     outputs = _outputs(diagnosis)
     names = (("residual", BEFORE),) if len(outputs) == 1 else (("before", BEFORE), ("after", RESIDUAL))
     return [
@@ -172,15 +181,17 @@ def _residuals(diagnosis: Diagnosis) -> list[tuple[str, str, Signal]]:
     ]
 
 
-def _over_time(above: Axes, below: Axes, diagnosis: Diagnosis, part: slice, weight: float = 1.0) -> None:
+def _draw_over_time_panels(
+    above: Axes, below: Axes, diagnosis: Diagnosis, part: slice, weight: float = 1.0
+) -> None:
     record = diagnosis.record
     time = record.time[part]
-    most = VERTICES if weight == 1.0 else _WHOLE
-    measured = thin(time, record.y[part], most)
+    vertices = VERTICES if weight == 1.0 else _OVERVIEW_VERTICES
+    measured = downsample(time, record.y[part], vertices)
     above.plot(*measured, color=MEASURED, lw=weight * MEASURED_WIDTH, label="measured")
     for panel, lines in ((above, _outputs(diagnosis)), (below, _residuals(diagnosis))):
         for name, colour, line in lines:
-            drawn = thin(time, line[part], most)
+            drawn = downsample(time, line[part], vertices)
             panel.plot(*drawn, color=colour, lw=weight * SIMULATED_WIDTH, label=name)
         first = max(float(record.time[diagnosis.estimation_samples]), float(time[0]))
         if first < time[-1]:
@@ -192,8 +203,8 @@ def _over_time(above: Axes, below: Axes, diagnosis: Diagnosis, part: slice, weig
     below.set_ylabel(label("residual", record.output_unit))
 
 
-def _cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
-    middle, cell, count = _equally_full(signal)
+def _draw_cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
+    middle, cell, count = _sort_into_cells(signal)
     for name, colour, residual in _residuals(diagnosis):
         mean = np.bincount(cell, weights=residual) / count
         spread = np.sqrt(np.maximum(np.bincount(cell, weights=residual**2) / count - mean**2, 0.0))
@@ -202,26 +213,26 @@ def _cells(axes: Axes, signal: Signal, diagnosis: Diagnosis) -> None:
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
 
 
-def _directions(axes: Axes, u: Signal, rate: Signal, diagnosis: Diagnosis) -> None:
-    """Draw the means while the input rises and while it falls: where they differ something remembers."""
+def _draw_directions(axes: Axes, u: Signal, rate: Signal, diagnosis: Diagnosis) -> None:
+    """Draw the mean while the input rises and while it falls; a difference indicates hysteresis."""
     for way, rises, line in (("rising", True, "-"), ("falling", False, (0, (3, 1.5)))):
         chosen = (rate > 0.0) == rises
         if not chosen.any():
             continue
-        middle, cell, count = _equally_full(u[chosen])
+        middle, cell, count = _sort_into_cells(u[chosen])
         for _, colour, residual in _residuals(diagnosis):
             mean = np.bincount(cell, weights=residual[chosen]) / count
             axes.plot(middle, mean, color=colour, lw=1.2, ls=line)
         axes.plot([], [], color=FRAME, lw=1.2, ls=line, label=way)
     axes.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
-    axes.set(xlabel=_input(diagnosis), ylabel=label("residual", diagnosis.record.output_unit))
+    axes.set(xlabel=_input_label(diagnosis), ylabel=label("residual", diagnosis.record.output_unit))
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
 
 
-def _equally_full(signal: Signal) -> tuple[Signal, NDArray[np.int64], NDArray[np.int64]]:
-    """Sort samples into cells; return each cell's mean, the cell of each sample, and how many are in one.
+def _sort_into_cells(signal: Signal) -> tuple[Signal, NDArray[np.int64], NDArray[np.int64]]:
+    """Sort samples into cells; return the mean of each cell, the cell of each sample, and the counts.
 
-    Of a signal with few levels there are fewer cells: none is empty.
+    A signal with few levels has fewer cells, so that no cell is empty.
     """
     edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, _CELLS + 1)[1:-1]))
     _, cell = np.unique(np.searchsorted(edges, signal, side="right"), return_inverse=True)
@@ -229,8 +240,8 @@ def _equally_full(signal: Signal) -> tuple[Signal, NDArray[np.int64], NDArray[np
     return np.bincount(cell, weights=signal) / count, cell, count
 
 
-def _spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
-    """Draw the residual's spectral densities: Welch's, with windows of a quarter of the record."""
+def _draw_spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
+    """Draw amplitude spectral densities of the residuals (Welch, windows of a quarter of the record)."""
     record = diagnosis.record
     for _, colour, residual in _residuals(diagnosis):
         frequency, density = scipy.signal.welch(
@@ -241,7 +252,7 @@ def _spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         low, high = axis.get_view_interval()
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        # Powers of ten alone would be one label or none.
+        # Label minor ticks, too, if powers of ten give at most one label.
         if high < 100.0 * low:
             subs = (2.0, 5.0) if high > 10.0 * low else (2.0, 3.0, 5.0, 7.0)
             axis.set_minor_locator(LogLocator(subs=subs))
@@ -249,7 +260,7 @@ def _spectrum(axes: Axes, diagnosis: Diagnosis) -> None:
     axes.set_ylabel(label("residual", f"{record.output_unit or '1'}/Hz^0.5"))
 
 
-def _autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
+def _draw_autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
     for name, colour, residual in _residuals(diagnosis):
         centred = residual - residual.mean()
         lags = np.arange(1, min(_LAGS, residual.size - 1) + 1)
@@ -261,7 +272,7 @@ def _autocorrelation(axes: Axes, diagnosis: Diagnosis) -> None:
     axes.set(xlabel="lag (samples)", ylabel="autocorrelation")
 
 
-#: Name to drawing, in the order of a report.
+#: Figures by name, in the order of a report.
 DISCREPANCY_FIGURES: Mapping[str, Callable[[Diagnosis], Figure]] = MappingProxyType(
     {"over-time": draw_over_time, "loops": draw_loops, "residual": draw_residual, "ladder": draw_screening}
 )

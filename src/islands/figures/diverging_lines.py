@@ -1,4 +1,4 @@
-"""The lines of a record: what of a simulation can be drawn, how far an axis follows it, and its words."""
+"""Lines of simulations that may diverge: finite part, axis limits and annotations."""
 
 from collections.abc import Sequence
 
@@ -12,17 +12,17 @@ from islands.errors import SettingsError
 from islands.figures.style import REMARK, SIMULATED
 from islands.simulation.predictors import divergence_bound
 
-#: Two remarks on one axis stand at least this share of its width apart.
-_APART = 0.12
+#: Smallest distance between two annotations, as a fraction of the axis width.
+_MIN_DISTANCE = 0.12
 
 
 def finite_part(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a simulation with NaN in place of what is infinite or beyond the bound of a divergence.
+    """Return a simulation in which infinite values and values beyond the divergence bound are NaN.
 
     Raises
     ------
     SettingsError
-        It has not one value for every sample.
+        The simulation does not have one value per sample.
     """
     values = np.array(simulated, dtype=np.float64)
     if values.shape != (record.samples,):
@@ -35,12 +35,12 @@ def finite_part(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.f
 
 
 def break_line(record: Dataset, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values of every sample with a NaN between segments: no line leads from one to the next."""
+    """Return the values with a NaN between segments, so that no line connects segments."""
     return np.insert(values, [end for _, end in record.bounds[:-1]], np.nan)
 
 
 def within_reach(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values clipped to one range beyond the measured output: so far an axis follows a divergence."""
+    """Return values clipped to one output range beyond the measured output, for axis limits."""
     known = record.y[~np.isnan(record.y)]
     if not known.size:
         return simulated
@@ -49,7 +49,7 @@ def within_reach(record: Dataset, simulated: NDArray[np.float64]) -> NDArray[np.
 
 
 def limits(*lines: NDArray[np.float64]) -> tuple[float, float]:
-    """Return axis limits around all values that are there."""
+    """Return axis limits around all values that are not NaN."""
     values = np.concatenate(lines)
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
@@ -60,41 +60,41 @@ def limits(*lines: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def divergence(record: Dataset, simulated: NDArray[np.float64]) -> list[tuple[slice, int]]:
-    """Return every segment whose simulation ends before it does, and the last sample simulated there."""
-    found = []
+    """Return every segment whose simulation ends early, with its last simulated sample."""
+    diverged = []
     for begin, end in record.bounds:
-        there = np.flatnonzero(~np.isnan(simulated[begin:end]))
-        if there.size and begin + there[-1] < end - 1:
-            found.append((slice(begin, end), begin + int(there[-1])))
-    return found
+        known = np.flatnonzero(~np.isnan(simulated[begin:end]))
+        if known.size and begin + known[-1] < end - 1:
+            diverged.append((slice(begin, end), begin + int(known[-1])))
+    return diverged
 
 
 def annotate_divergence(axes: Axes, lines: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None:
-    """Write where each diverging line leaves the axes, once where several do.
+    """Mark where each diverging line leaves the axes; annotate neighbouring marks once.
 
     Parameters
     ----------
     axes : Axes
-        With its limits set.
+        Axes whose limits are set.
     lines : sequence of (x, y)
-        Each without NaN, up to its last sample, in the order of ``x``; one without samples is left out.
+        Lines without NaN up to their last sample, ordered by ``x``; empty lines are ignored.
     """
     low, high = axes.get_ylim()
     left, right = axes.get_xlim()
-    said: list[tuple[float, float]] = []
+    annotated: list[tuple[float, float]] = []
     for x, y in (line for line in lines if len(line[0])):
         inside = np.flatnonzero((y >= low) & (y <= high))
         at = min(int(inside[-1]) + 1, len(y) - 1) if inside.size else 0
         end = float(x[at]), float(np.clip(y[at], low, high))
         axes.plot(*end, "x", color=SIMULATED, markersize=5, clip_on=False, zorder=4)
-        if any(abs(end[0] - other[0]) < _APART * (right - left) for other in said):
+        if any(abs(end[0] - other[0]) < _MIN_DISTANCE * (right - left) for other in annotated):
             continue
-        said.append(end)
-        _write(axes, end, end[0] > left + 0.8 * (right - left), end[1] > (low + high) / 2)
+        annotated.append(end)
+        _annotate(axes, end, end[0] > left + 0.8 * (right - left), end[1] > (low + high) / 2)
 
 
-def _write(axes: Axes, end: tuple[float, float], to_the_left: bool, below: bool) -> None:
-    words = axes.annotate(
+def _annotate(axes: Axes, end: tuple[float, float], to_the_left: bool, below: bool) -> None:
+    text = axes.annotate(
         "diverged",
         end,
         xytext=(-6 if to_the_left else 6, -7 if below else 7),
@@ -105,5 +105,5 @@ def _write(axes: Axes, end: tuple[float, float], to_the_left: bool, below: bool)
         color=SIMULATED,
         zorder=5,
     )
-    # A thin white rim, not a box: what lies under the word stays visible around it.
-    words.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+    # Use a thin white outline instead of a box, so that lines below the text stay visible.
+    text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])

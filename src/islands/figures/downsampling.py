@@ -1,32 +1,32 @@
-"""Draws no more vertices than a column of print can show, and loses no peak."""
+"""Downsampling of lines that keeps their peaks (M4)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Vertices of a thinned line, about four for each 0.3 mm of a column 7 inches wide.
+#: Vertices of a downsampled line, about four for each 0.3 mm of a column 7 inches wide.
 VERTICES = 2000
 
 Line = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
-def thin(x: NDArray[np.float64], y: NDArray[np.float64], vertices: int = VERTICES) -> Line:
-    """Keep of every block of samples those where ``x`` or ``y`` is extreme, and where a gap begins and ends.
+def downsample(x: NDArray[np.float64], y: NDArray[np.float64], vertices: int = VERTICES) -> Line:
+    """Keep of each block the samples at which ``x`` or ``y`` is extreme or a gap begins or ends.
 
-    Over a time axis that is first, last, least and largest of each pixel column (M4: Jugel, Jerzak,
-    Hackenbroich & Markl, Proc. VLDB Endowment 7 (2014) 797-808); of a loop it keeps the tips as well.
+    For a time axis these are the first, last, smallest and largest sample of each pixel column (M4: Jugel,
+    Jerzak, Hackenbroich & Markl, Proc. VLDB Endowment 7 (2014) 797-808). For loops the tips are kept, too.
 
     Parameters
     ----------
     x, y : ndarray, shape (samples,)
-        A line; NaN is a gap.
+        Coordinates of the line; NaN is a gap.
     vertices : int
-        A line of no more samples is returned as it is; of a longer one at most this many are kept, and two
-        more for each block that has a gap.
+        A line with at most this number of samples is returned unchanged. Of a longer line at most this number
+        is kept, plus two for each block with a gap.
 
     Returns
     -------
     x, y : ndarray, shape (kept,)
-        Samples of the line in their order.
+        Samples that are kept, in their order.
     """
     if len(x) <= vertices:
         return x, y
@@ -40,8 +40,8 @@ def thin(x: NDArray[np.float64], y: NDArray[np.float64], vertices: int = VERTICE
         low = np.pad(np.where(gap, np.inf, values), padding, constant_values=np.inf)
         kept.append(first + low.reshape(blocks, size).argmin(axis=1))
     gaps = np.pad(gap, padding).reshape(blocks, size)
-    torn = gaps.any(axis=1)
-    kept.append((first + gaps.argmax(axis=1))[torn])
-    kept.append((first + size - 1 - gaps[:, ::-1].argmax(axis=1))[torn])
+    has_gap = gaps.any(axis=1)
+    kept.append((first + gaps.argmax(axis=1))[has_gap])
+    kept.append((first + size - 1 - gaps[:, ::-1].argmax(axis=1))[has_gap])
     order = np.unique(np.concatenate(kept))
     return x[order], y[order]

@@ -1,4 +1,4 @@
-"""The output while the input rests: what Property 1 of the paper (section 3) asks a hysteresis model for."""
+"""Output under constant input, as in Property 1 of the paper (section 3)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.figures.diverging_lines import annotate_divergence, limits, within_reach
-from islands.figures.downsampling import thin
+from islands.figures.downsampling import downsample
 from islands.figures.style import FRAME, blank, finish, house_style, label
 from islands.model.model import Model
 from islands.validation.physics import LEVELS, hold_response, percent_of_range
 
-#: From the lowest level to the highest, darker to lighter: apart for colour-blind eyes and in grey print.
+#: Colours of the levels from lowest to highest, distinguishable for colour-blind readers and in grey print.
 _COLOURS = ("#440154", "#3b528b", "#21918c", "#4cb04f", "#c2a500")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Held:
-    """One hold: time from its first sample in seconds, input as a share of its amplitude, output."""
+class _Hold:
+    """One hold: time from its first sample in seconds, input as a fraction of its amplitude, output."""
 
     time: NDArray[np.float64]
     input: NDArray[np.float64]
@@ -30,7 +30,7 @@ class _Held:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Where there is an output: all of it, or all up to a divergence."""
+        """Whether each sample has an output; false after a divergence."""
         return ~np.isnan(self.output)
 
 
@@ -38,27 +38,27 @@ class _Held:
 def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
     """Draw the output while the input is held at five levels, reached while loading and while unloading.
 
-    Time counts from the first sample at rest; before it stands the approach. Each side says its largest
-    drift, as `Hold` defines it, in per cent of the record's output range, and how many holds diverged. The
-    axis follows a diverging output one range beyond the record's.
+    Time 0 is the first sample of the hold; negative times show the approach. The title of each side gives
+    the largest drift, as in `HoldTest`, in percent of the output range of the record, and the number of
+    diverged holds. The axis limits follow a diverging output up to one output range beyond the record.
 
     Parameters
     ----------
     model : Model
-        With parameters.
+        Model with parameters.
     record : Dataset
-        Complete; it gives ranges, rate, bound, and an output to start from.
+        Record without missing values; defines ranges, sampling rate, divergence bound and initial output.
     title : str
 
     Returns
     -------
     Figure
-        Four axes: the input while loading and unloading, the output under each.
+        Four axes: input and output, during loading above and unloading below.
     """
     figure = blank(5.0, title)
     axes = figure.subplots(2, 2, width_ratios=(1, 2.6), sharex="col", sharey="col")
     sides = {
-        words: [_held(model, record, level, loading) for level in LEVELS]
+        words: [_simulate_hold(model, record, level, loading) for level in LEVELS]
         for loading, words in ((True, "loading"), (False, "unloading"))
     }
     outputs = [
@@ -70,26 +70,26 @@ def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
     axes[0, 0].set_xlim(begin, -begin / 2)
     axes[0, 1].set(xlim=(begin, end), ylim=limits(*outputs))
     for (words, side), (left, right) in zip(sides.items(), axes, strict=True):
-        _draw(left, right, side)
+        _draw_side(left, right, side)
         left.set_title(f"input, {words}")
-        right.set_title(_drift(f"after {words}", side))
+        right.set_title(_describe_drift(f"after {words}", side))
         right.set_ylabel(label(record.output_name, record.output_unit))
-        _name_inputs(left, record)
+        _label_input_axis(left, record)
     for panel in axes[1]:
         panel.set_xlabel("time from the start of the hold (s)")
     return finish(figure)
 
 
-def _held(model: Model, record: Dataset, level: float, loading: bool) -> _Held:
+def _simulate_hold(model: Model, record: Dataset, level: float, loading: bool) -> _Hold:
     u, y = hold_response(model, record, level, loading)
     begin = int(np.flatnonzero(u != u[-1])[-1]) + 1
-    # As the physics check: from where every lag of the input has its level.
+    # As in the physics check, start when every lag of the input has reached the level.
     drift = percent_of_range(y[-1] - y[begin + model.maximum_lag], record.output_range)
     time = record.dt * np.arange(-begin, len(u) - begin, dtype=np.float64)
-    return _Held(time, u, y, drift)
+    return _Hold(time, u, y, drift)
 
 
-def _drift(words: str, side: Sequence[_Held]) -> str:
+def _describe_drift(words: str, side: Sequence[_Hold]) -> str:
     drifts = [held.drift_percent for held in side if held.known.all()]
     lost = f"{words}: {len(side) - len(drifts)} of {len(side)} diverged"
     if not drifts:
@@ -102,20 +102,20 @@ def _drift(words: str, side: Sequence[_Held]) -> str:
     return f"{lost},\nlargest drift of the others {drift}"
 
 
-def _draw(left: Axes, right: Axes, side: Sequence[_Held]) -> None:
+def _draw_side(left: Axes, right: Axes, side: Sequence[_Hold]) -> None:
     for held, colour in zip(side, _COLOURS, strict=True):
-        left.plot(*thin(held.time, held.input), color=colour, lw=1.0)
+        left.plot(*downsample(held.time, held.input), color=colour, lw=1.0)
         at_rest = held.time >= 0
         for part, shade, width in ((~at_rest, FRAME, 0.5), (at_rest, colour, 1.4)):
-            right.plot(*thin(held.time[part], held.output[part]), color=shade, lw=width)
+            right.plot(*downsample(held.time[part], held.output[part]), color=shade, lw=width)
     for axes in (left, right):
         axes.axvline(0.0, color=FRAME, lw=0.6)
     lost = [held for held in side if not held.known.all()]
     annotate_divergence(right, [(held.time[held.known], held.output[held.known]) for held in lost])
 
 
-def _name_inputs(axes: Axes, record: Dataset) -> None:
-    """Put the five levels on the input's axis: in its unit, or as shares where several inputs move."""
+def _label_input_axis(axes: Axes, record: Dataset) -> None:
+    """Label the five levels on the input axis, in its unit or, for several inputs, as fractions."""
     middle, amplitude = (record.u.max(axis=0) + record.u.min(axis=0)) / 2, np.ptp(record.u, axis=0) / 2
     axes.set_ylim(-1.1, 1.1)
     if record.inputs == 1:

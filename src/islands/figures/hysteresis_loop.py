@@ -1,4 +1,4 @@
-"""Hysteresis loops: the output against the inputs, as the paper's Figures 5 and 7 show them."""
+"""Hysteresis loops: output against inputs, as in Figures 5 and 7 of the paper."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.figures.diverging_lines import break_line, divergence, finite_part, limits, within_reach
-from islands.figures.downsampling import thin
+from islands.figures.downsampling import downsample
 from islands.figures.style import (
     MEASURED,
     MEASURED_WIDTH,
@@ -20,7 +20,7 @@ from islands.figures.style import (
 )
 from islands.figures.windows import LOOPS, last_loops, loop_starts
 
-#: Panels side by side.
+#: Largest number of panels in a row.
 _COLUMNS = 3
 
 
@@ -28,24 +28,24 @@ _COLUMNS = 3
 def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") -> Figure:
     """Draw the measured and the simulated output against every input.
 
-    Of a record with more loops the last five are shown.
+    Only the last five loops of a longer record are shown.
 
     Parameters
     ----------
     record : Dataset
     simulated : ndarray, shape (samples,)
-        NaN where there is no prediction; in the unit of the output.
+        Simulated output, in the unit of the output; NaN if there is no prediction.
     title : str
 
     Returns
     -------
     Figure
-        One axes for each input.
+        One axes per input.
 
     Raises
     ------
     SettingsError
-        The simulation has not one value for every sample.
+        The simulation does not have one value per sample.
     """
     yhat = finite_part(record, simulated)
     rows = last_loops(record)
@@ -56,7 +56,7 @@ def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") 
     panels = figure.subplots(height, columns, squeeze=False, sharey=True).flat
     for channel, axes in zip(range(height * columns), panels, strict=True):
         if channel < record.inputs:
-            _loop(axes, shown, shown_yhat, channel)
+            _draw_loop(axes, shown, shown_yhat, channel)
         else:
             axes.remove()
     first = figure.axes[0]
@@ -64,18 +64,18 @@ def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") 
     first.set_ylim(limits(shown.y, within_reach(record, shown_yhat) if diverged else shown_yhat))
     figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     part = f"the last {LOOPS} of {len(loop_starts(record))} loops" if shown.samples < record.samples else ""
-    lost = "no simulated value" if np.isnan(yhat).all() else "the simulation diverged" if diverged else ""
-    first.set_title("; ".join(filter(None, (part, lost))), fontsize=8.0)
+    remark = "no simulated value" if np.isnan(yhat).all() else "the simulation diverged" if diverged else ""
+    first.set_title("; ".join(filter(None, (part, remark))), fontsize=8.0)
     return finish(figure)
 
 
-def _loop(axes: Axes, record: Dataset, yhat: NDArray[np.float64], channel: int) -> None:
+def _draw_loop(axes: Axes, record: Dataset, yhat: NDArray[np.float64], channel: int) -> None:
     u = break_line(record, record.u[:, channel])
     for values, colour, width, name in (
         (record.y, MEASURED, 0.8 * MEASURED_WIDTH, "measured"),
         (yhat, SIMULATED, SIMULATED_WIDTH, "simulated"),
     ):
-        axes.plot(*thin(u, break_line(record, values)), color=colour, lw=width, label=name)
+        axes.plot(*downsample(u, break_line(record, values)), color=colour, lw=width, label=name)
     axes.set_xlabel(label(record.input_names[channel], record.input_units[channel]))
     if channel % _COLUMNS == 0:
         axes.set_ylabel(label(record.output_name, record.output_unit))

@@ -1,4 +1,4 @@
-"""The table of figures that a result shows: each draws an assessed model on the data that it belongs to."""
+"""Tables of the figures of a model and of the figures of a search."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -17,21 +17,21 @@ from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
 from islands.simulation.predictors import free_run
 
-FigureOf = Callable[[RankedModel, Split], Figure]
+ModelFigure = Callable[[RankedModel, Split], Figure]
 
 
 def _free_run(entry: RankedModel, split: Split) -> Figure:
     """Draw the measured output, the free run and the residual over time."""
-    return draw_free_run(split.validation, _simulated(entry, split))
+    return draw_free_run(split.validation, _simulate(entry, split))
 
 
 def _loop(entry: RankedModel, split: Split) -> Figure:
     """Draw the measured output and the free run against every input."""
-    return draw_loop(split.validation, _simulated(entry, split))
+    return draw_loop(split.validation, _simulate(entry, split))
 
 
-def _simulated(entry: RankedModel, split: Split) -> NDArray[np.float64]:
-    """Return the free run that the model's metrics are of."""
+def _simulate(entry: RankedModel, split: Split) -> NDArray[np.float64]:
+    """Return the free run on the validation data, with the warm-up of the metrics."""
     return free_run(entry.model, split.validation, entry.assessment.warm_up).y
 
 
@@ -45,27 +45,27 @@ def _residuals(entry: RankedModel, _split: Split) -> Figure:
     return draw_residual_correlations(entry.assessment.residual_tests)
 
 
-FIGURES: Mapping[str, FigureOf] = MappingProxyType(
+FIGURES: Mapping[str, ModelFigure] = MappingProxyType(
     {"free-run": _free_run, "loop": _loop, "hold": _hold, "residuals": _residuals}
 )
 
 
-def _record(found: SearchResult) -> Figure:
+def _record(result: SearchResult) -> Figure:
     """Draw every input and the output of the estimation data."""
-    return draw_record(found.split.estimation)
+    return draw_record(result.split.estimation)
 
 
-#: Figures of a whole search; those of its course need a history.
+#: Figures of a search; those of its convergence need a history.
 SEARCH_FIGURES: Mapping[str, Callable[[SearchResult], Figure]] = MappingProxyType(
     {"record": _record, "front": draw_front, "convergence": draw_convergence, "islands": draw_islands}
 )
 
-#: Islands whose course a search needs for a figure of it.
-_ISLANDS = {"convergence": 1, "islands": 2}
+#: Smallest number of islands in the history that a figure needs.
+_MIN_ISLANDS = {"convergence": 1, "islands": 2}
 
 
-def search_figures(found: SearchResult) -> tuple[str, ...]:
-    """Return the names of the search figures that these findings have."""
-    history = found.search.history
+def search_figures(result: SearchResult) -> tuple[str, ...]:
+    """Return the names of the search figures that can be drawn for a result."""
+    history = result.search.history
     islands = len(history[-1].islands) if history else 0
-    return tuple(name for name in SEARCH_FIGURES if islands >= _ISLANDS.get(name, 0))
+    return tuple(name for name in SEARCH_FIGURES if islands >= _MIN_ISLANDS.get(name, 0))

@@ -1,4 +1,4 @@
-"""The correlation tests of a residual, as Billings & Voon (1986) draw them."""
+"""Correlation tests of a residual, as drawn by Billings & Voon (1986)."""
 
 from textwrap import fill
 
@@ -21,35 +21,35 @@ from islands.figures.style import (
 )
 from islands.validation.residual_tests import CorrelationTest, ResidualTests
 
-#: Tests of one input: a row of panels.
-_ROW = 4
+#: Tests per input, which are the panels of a row.
+_COLUMNS = 4
 
 
 @house_style()
 def draw_residual_correlations(tests: ResidualTests, title: str = "") -> Figure:
-    """Draw every correlation function of a residual with its 95 % band and the limit that decides.
+    """Draw every correlation function of a residual with its 95 % band and its test limit.
 
-    The residual's own correlation has the first row for itself, the four tests of each input a row below.
-    Each panel has a scale of its own; lag 0 of the first, 1 for every residual, runs out of it.
+    The first row is the autocorrelation of the residual; each following row has the four tests of an input.
+    Every panel has a separate scale; that of the first ignores lag 0, whose value is always 1.
 
     Parameters
     ----------
     tests : ResidualTests
     title : str
-        Stands before the verdict.
+        Text before the result of the tests.
 
     Returns
     -------
     Figure
-        One axes for each test, in their order.
+        One axes per test, in the order of the tests.
     """
-    rows = 1 + len(tests.tests[1:]) // _ROW
+    rows = 1 + len(tests.tests[1:]) // _COLUMNS
     figure = blank(0.8 + 1.5 * rows, "\n".join(filter(None, (title, _verdict(tests)))))
-    grid = figure.add_gridspec(rows, _ROW)
+    grid = figure.add_gridspec(rows, _COLUMNS)
     for position, test in enumerate(tests.tests):
-        row, column = divmod(position + _ROW - 1, _ROW)
+        row, column = divmod(position + _COLUMNS - 1, _COLUMNS)
         axes = figure.add_subplot(grid[0, :] if position == 0 else grid[row, column])
-        _draw(axes, test)
+        _draw_test(axes, test)
         if position == 0 or row == rows - 1:
             axes.set_xlabel("lag (samples)")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
@@ -66,9 +66,9 @@ def _verdict(tests: ResidualTests) -> str:
     )
 
 
-def _draw(axes: Axes, test: CorrelationTest) -> None:
+def _draw_test(axes: Axes, test: CorrelationTest) -> None:
     axes.axhspan(-test.band, test.band, facecolor=SHADE, label="95 % band of a single lag", zorder=0.5)
-    axes.axhline(test.limit, color=FRAME, lw=0.9, ls="--", label="limit that decides")
+    axes.axhline(test.limit, color=FRAME, lw=0.9, ls="--", label="limit of the test")
     axes.axhline(-test.limit, color=FRAME, lw=0.9, ls="--")
     axes.vlines(test.lags, 0.0, test.values, color=RESIDUAL, lw=0.8, label="correlation")
     axes.axhline(0.0, color=FRAME, lw=0.6)
@@ -85,7 +85,7 @@ def _draw(axes: Axes, test: CorrelationTest) -> None:
         color=MEASURED if test.passed else SIMULATED,
     )
     if test.note:
-        # On white, since there is no correlation that it could hide.
+        # A white box hides nothing, because there is no correlation.
         box = {"facecolor": "white", "edgecolor": "none", "pad": 2.0}
         note = axes.text(0.5, 0.5, fill(test.note, 22), ha="center", va="center", fontsize=REMARK, bbox=box)
         note.set_transform(axes.transAxes)

@@ -1,7 +1,7 @@
-"""The house style of figures, and how one is written to a file.
+"""Style of figures, and writing of SVG files.
 
-The same content gives the same bytes: whatever a user's matplotlibrc says is left aside, and the file holds
-no date and no identifier made by chance.
+Equal content gives equal bytes: the matplotlibrc of the user is ignored, and files have no date and no random
+identifiers.
 """
 
 from collections.abc import Iterator
@@ -13,26 +13,39 @@ from typing import IO, Any
 import matplotlib
 from matplotlib.figure import Figure
 
-#: Width in inches: an article's text column. Sizes below are points at this width.
+#: Width of figures in inches (text column of an article). Font sizes below are points at this width.
 WIDTH = 7.0
 
-#: Colours that stay apart for colour-blind eyes and in grey print (Okabe & Ito, 2008).
-MEASURED, SIMULATED, RESIDUAL = "#3a3a3a", "#d55e00", "#0072b2"
+#: Colour of measured data. It and the next two are distinguishable for colour-blind readers and in grey print
+#: (Okabe & Ito, 2008).
+MEASURED = "#3a3a3a"
 
-#: Of what frames the data: segment boundaries, bands, remarks.
-FRAME, SHADE = "#8c8c8c", "#e4e4e4"
+#: Colour of simulations.
+SIMULATED = "#d55e00"
 
-#: A measured line is broad and lies under the thin simulated one, so that both are seen where they agree.
-MEASURED_WIDTH, SIMULATED_WIDTH = 2.2, 0.8
+#: Colour of residuals.
+RESIDUAL = "#0072b2"
 
-#: Points of a remark inside a figure.
+#: Colour of boundaries and frames.
+FRAME = "#8c8c8c"
+
+#: Colour of shaded areas.
+SHADE = "#e4e4e4"
+
+#: Width of measured lines in points. They lie under thinner simulated lines, so that both are visible.
+MEASURED_WIDTH = 2.2
+
+#: Width of simulated lines in points.
+SIMULATED_WIDTH = 0.8
+
+#: Font size of annotations in points.
 REMARK = 7.5
 
-#: Ticks of a low panel fall on multiples of these.
+#: Tick steps of low panels, times powers of ten.
 STEPS = (1, 2, 2.5, 5, 10)
 
-#: Characters of a title's line.
-_TITLE = 80
+#: Characters per line of a title.
+_TITLE_CHARACTERS = 80
 
 _STYLE = {
     "axes.axisbelow": True,
@@ -46,17 +59,17 @@ _STYLE = {
     "axes.titlesize": 8.5,
     "figure.constrained_layout.use": True,
     "figure.titlesize": 10.0,
-    "font.family": ["DejaVu Sans"],  # the one font that matplotlib brings along
+    "font.family": ["DejaVu Sans"],  # the font that matplotlib includes
     "font.size": 8.5,
     "grid.color": "#ececec",
     "grid.linewidth": 0.6,
     "legend.fontsize": 8.0,
     "legend.frameon": False,
     "lines.solid_capstyle": "round",
-    "lines.solid_joinstyle": "round",  # a mitred peak would reach beyond its sample
-    "svg.fonttype": "path",  # looks the same where the font is missing
+    "lines.solid_joinstyle": "round",  # a mitred peak extends beyond its sample
+    "svg.fonttype": "path",  # independent of installed fonts
     "svg.hashsalt": "islands",
-    "text.parse_math": False,  # a $ or _ of a column's name is no formula
+    "text.parse_math": False,  # a $ or _ in a column name is not mathematics
     "xtick.labelsize": 8.0,
     "xtick.major.width": 0.7,
     "ytick.labelsize": 8.0,
@@ -66,7 +79,7 @@ _STYLE = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Draw in the house style; as a decorator or in a ``with``. What was set before holds again after it."""
+    """Apply the style of figures, as a decorator or context manager, and restore the settings afterwards."""
     settings: dict[Any, Any] = {**matplotlib.rcParamsDefault, **_STYLE}
     settings.pop("backend", None)
     with matplotlib.rc_context(settings):
@@ -74,23 +87,23 @@ def house_style() -> Iterator[None]:
 
 
 def blank(height: float, title: str = "") -> Figure:
-    """Return an empty figure of the house's width and a height in inches, its title at the left."""
+    """Return an empty figure of width `WIDTH` and a height in inches, with a left-aligned title."""
     figure = Figure(figsize=(WIDTH, height))
     if title:
-        lines = (fill(line, _TITLE) for line in title.splitlines())
+        lines = (fill(line, _TITLE_CHARACTERS) for line in title.splitlines())
         figure.suptitle("\n".join(lines), x=0.01, ha="left")
     return figure
 
 
 def finish(figure: Figure) -> Figure:
-    """Return a finished figure laid out for good: each new layout would move it by part of a point."""
+    """Lay out a figure and freeze the layout, because each new layout moves parts slightly."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     return figure
 
 
 def label(name: str, unit: str) -> str:
-    """Return a column as an axis shows it: ``y (um)`` for ``y_um`` or ``y [um]`` in um."""
+    """Return the axis label of a column: ``y (um)`` for ``y_um`` or ``y [um]`` with the unit um."""
     if not unit:
         return name
     for suffix in (f"_{unit}", f"[{unit}]", f"({unit})"):
@@ -101,14 +114,14 @@ def label(name: str, unit: str) -> str:
 
 
 def save(figure: Figure, path: str | Path | IO[bytes]) -> None:
-    """Write a figure as SVG; the same content gives the same bytes.
+    """Write a figure as SVG; equal content gives equal bytes.
 
     Parameters
     ----------
     figure : Figure
-        Made by one of the house's functions.
+        Figure made by a function of this package.
     path : str, Path or stream
-        The file, whose folder exists, or where else its bytes go.
+        File in an existing folder, or binary stream.
     """
     with house_style():
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "islands"})

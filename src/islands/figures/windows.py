@@ -1,25 +1,25 @@
-"""Which part of a long record a figure shows: its last loops, or a stretch that stands for the whole."""
+"""Parts of long records that figures show: the last loops, or a representative section."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 
-#: Loops that can be told apart in one panel.
+#: Loops that are distinguishable in one panel.
 LOOPS = 5
 
-#: A record of more loops than this is shown as a whole and in part.
+#: A record with more loops than this is shown completely and in a section.
 MANY_LOOPS = 20
 
-#: A stretch has at least this many samples: fewer can be read beside many others as well.
-_SHORTEST = 60
+#: Smallest number of samples of a section; shorter sections are readable in the complete record.
+_MIN_SAMPLES = 60
 
 
 def loop_starts(record: Dataset) -> NDArray[np.int64]:
-    """Return the samples where the first input that varies rises through its mean: a loop each.
+    """Return the samples at which loops start: the first varying input rises through its mean.
 
-    A rise counts when it leads from a quarter of the standard deviation below the mean to as much above it,
-    so that noise on a slow input makes no loops.
+    A rise must lead from a quarter of the standard deviation below the mean to a quarter above it, so that
+    noise on a slow input does not create loops.
     """
     u = record.u[:, int(np.argmax(np.ptp(record.u, axis=0) > 0))]
     u = u - u.mean()
@@ -29,7 +29,7 @@ def loop_starts(record: Dataset) -> NDArray[np.int64]:
 
 
 def last_loops(record: Dataset) -> slice:
-    """Return the last `LOOPS` whole loops of a record, or all of it where there are no more."""
+    """Return the last `LOOPS` complete loops of a record, or the record if it does not have more."""
     starts = loop_starts(record)
     if len(starts) <= LOOPS + 1:
         return slice(0, record.samples)
@@ -37,26 +37,30 @@ def last_loops(record: Dataset) -> slice:
 
 
 def representative_window(record: Dataset, residual: NDArray[np.float64]) -> slice | None:
-    """Return `LOOPS` loops whose mean absolute residual is the median of all such stretches.
+    """Return a section of about `LOOPS` loops whose mean absolute residual is the median of all sections.
 
-    None where the record can be read as a whole. Stretches in which a residual is missing do not count;
-    where no other is left it is the first, in which the simulation begins.
+    Sections with missing residuals are ignored; if all have missing residuals, the first section is returned.
 
     Parameters
     ----------
     residual : ndarray, shape (samples,)
+
+    Returns
+    -------
+    slice or None
+        None if the record is short enough to be shown completely.
     """
     loops = len(loop_starts(record))
     if loops <= MANY_LOOPS:
         return None
-    length = max(_SHORTEST, record.samples * LOOPS // loops)
+    length = max(_MIN_SAMPLES, record.samples * LOOPS // loops)
     if record.samples < 4 * length:
         return None
-    stretches = [
+    sections = [
         slice(first, first + length)
         for begin, end in record.bounds
         for first in range(begin, end - length + 1, length)
     ] or [slice(first, first + length) for first in range(0, record.samples - length + 1, length)]
-    errors = np.array([np.abs(residual[stretch]).mean() for stretch in stretches])
+    errors = np.array([np.abs(residual[section]).mean() for section in sections])
     ranked = np.argsort(errors, kind="stable")[: np.count_nonzero(~np.isnan(errors))]
-    return stretches[ranked[len(ranked) // 2] if ranked.size else 0]
+    return sections[ranked[len(ranked) // 2] if ranked.size else 0]

@@ -1,4 +1,4 @@
-"""The public names of the package, and what its docstring says."""
+"""Public names of the package and its docstring."""
 
 from importlib.metadata import version
 
@@ -8,33 +8,33 @@ from islands.facade.identify import identify
 from support.repository import ROOT
 
 
-def test_every_public_name_is_documented():
+def test_public_names_are_documented():
     reference = "".join(page.read_text() for page in (ROOT / "docs").rglob("*.md"))
     assert islands.__all__ == sorted(islands.__all__, key=lambda name: (not name.isupper(), name))
     for name in islands.__all__:
         entry = getattr(islands, name)
         if callable(entry):
-            # A dataclass without a docstring gets its signature for one.
+            # The default docstring of a dataclass is its signature.
             assert entry.__doc__, name
             assert not entry.__doc__.startswith(f"{name}("), name
         else:
             assert name in reference, name
 
 
-def test_the_stub_file_lists_the_public_names():
+def test_stub_file_lists_the_public_names():
     stub = (ROOT / "src" / "islands" / "__init__.pyi").read_text()
     assert stub == islands._make_stub()
 
 
-def test_the_package_docstring_shows_its_use():
+def test_package_docstring_shows_an_example():
     assert "islands.read_record(" in islands.__doc__
     assert "islands.fit(" in islands.__doc__
 
 
-def test_the_facades_are_among_the_public_names():
+def test_facade_functions_are_public():
     assert islands.identify is identify
     assert islands.fit is fit
 
 
-def test_the_version_is_that_of_the_distribution():
+def test_version_equals_that_of_the_distribution():
     assert islands.__version__ == version("islands")

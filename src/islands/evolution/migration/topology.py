@@ -145,7 +145,8 @@ def _random_regular(islands: int, degree: int, rng: Stream) -> Sources:
         raise SettingsError(f"random-regular:{degree} takes more than {degree} islands, got {islands}")
     if islands * degree > _MAX_RANDOM_EDGES:
         raise SettingsError(
-            f"{islands} islands of degree {degree} have more than {_MAX_RANDOM_EDGES} edges: reduce it"
+            f"{islands} islands of degree {degree} have more than {_MAX_RANDOM_EDGES} edges: take a smaller "
+            "degree"
         )
     sources = [{(island - offset - 1) % islands for offset in range(degree)} for island in range(islands)]
     if degree == 1 or degree == islands - 1:

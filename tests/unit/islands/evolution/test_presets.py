@@ -1,4 +1,4 @@
-"""The paper's presets hold the paper's numbers: its own lists, read here once more."""
+"""Presets: the settings of the paper, parsed from its printed lists."""
 
 from dataclasses import asdict
 
@@ -25,7 +25,7 @@ APPENDIX = (
 APPENDIX_S1 = APPENDIX + "maximum GP height = 3; maximum MGGP terms = 10"
 APPENDIX_S2 = APPENDIX + "maximum GP height = 5; maximum MGGP terms = 30"
 
-#: How the paper calls a setting, and how its words are read. Its subtraction and sign are phi1 and phi2.
+#: Names of the settings in the paper, and parsers of their values. Subtraction and sign are phi1 and phi2.
 READ = {
     "population size": ("population", int),
     "generations": ("generations", int),
@@ -57,7 +57,7 @@ READ = {
         ("paper-appendix-s2", APPENDIX_S2),
     ],
 )
-def test_a_preset_of_the_paper_holds_exactly_its_numbers(preset, printed):
+def test_paper_presets_have_the_printed_numbers(preset, printed):
     made = asdict(PRESETS[preset])
     entries = [entry.split("=") for entry in printed.split(";") if entry.strip()]
     assert len(entries) >= 10
@@ -67,20 +67,20 @@ def test_a_preset_of_the_paper_holds_exactly_its_numbers(preset, printed):
 
 
 @pytest.mark.parametrize("preset", ["paper-case1", "paper-case2"])
-def test_the_paper_s_cases_are_constrained_and_seeded_by_nothing(preset):
+def test_paper_cases_are_constrained_and_not_seeded(preset):
     made = PRESETS[preset]
     assert (made.structure, made.constraints, made.fitness) == ("phi", "hysteresis", "shooting")
     assert (made.library, made.from_library, made.distinct, made.refine) == ("", 0.0, False, False)
 
 
 @pytest.mark.parametrize("preset", ["paper-appendix", "paper-appendix-s2"])
-def test_the_paper_s_appendix_minimises_the_prediction_error_of_free_polynomials(preset):
+def test_paper_appendix_minimises_the_one_step_error_of_polynomials(preset):
     made = PRESETS[preset]
     assert (made.structure, made.constraints, made.fitness) == ("free", "none", "one-step")
     assert (made.library, made.from_library, made.distinct, made.refine) == ("", 0.0, False, False)
 
 
-def test_the_paper_s_cases_and_systems_differ_in_nothing_else():
+def test_paper_presets_differ_only_in_the_printed_settings():
     def difference(one, other):
         here, there = asdict(PRESETS[one]), asdict(PRESETS[other])
         return {name for name in here if here[name] != there[name]}
@@ -90,12 +90,12 @@ def test_the_paper_s_cases_and_systems_differ_in_nothing_else():
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_every_preset_is_a_legal_setting_that_can_be_stored(preset):
+def test_presets_are_valid_settings(preset):
     assert Settings(**asdict(PRESETS[preset])) == PRESETS[preset]
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_the_constraint_of_a_preset_can_be_met_by_what_may_stand_in_a_gene(preset):
+def test_presets_with_a_constraint_have_primitives_that_meet_it(preset):
     made = PRESETS[preset]
     if made.constraints == "hysteresis":
         assert made.structure != "free"
@@ -103,19 +103,19 @@ def test_the_constraint_of_a_preset_can_be_met_by_what_may_stand_in_a_gene(prese
         assert not {"sub", "sign"} & set(made.primitives)
 
 
-def test_there_are_the_paper_s_presets_and_ours():
+def test_all_documented_presets_exist():
     assert {"paper-case1", "paper-case2", "paper-appendix", "hysteresis", "narx"} <= set(PRESETS)
 
 
-def test_a_preset_cannot_be_changed():
+def test_presets_are_immutable():
     with pytest.raises(TypeError):
         PRESETS["paper-case1"] = Settings()
     with pytest.raises(AttributeError):
         PRESETS["paper-case1"].population = 3
 
 
-def test_phi_functions_are_single_nodes_of_two_arguments():
-    """With that, and back-shifts counted, the paper's model (13) fits a height of 5 exactly."""
+def test_phi_functions_are_single_nodes_with_two_arguments():
+    """If back-shifts count, model (13) of the paper has a height of exactly 5."""
     assert PRIMITIVES["phi1"].arity == PRIMITIVES["phi2"].arity == 2
     gene = parse("phi2(q5(q5(q4(u(k-1)))), q5(q5(q1(u(k-1)))))")
     assert isinstance(gene, Apply)

@@ -1,4 +1,4 @@
-"""A problem: what a library gives to a search."""
+"""Search problem: seeds, pool and profiles of the islands."""
 
 from dataclasses import replace
 
@@ -32,21 +32,21 @@ def record(**changes):
     return Dataset(u, y + 1e-3 * rng.normal(size=400), 0.1, **changes)
 
 
-def test_without_a_library_there_is_neither_seed_nor_pool():
-    posed = problem(record(), Settings())
-    assert (posed.seeds, posed.pool) == ((), ())
+def test_problem_without_a_library_has_no_seeds_and_no_pool():
+    search_problem = problem(record(), Settings())
+    assert (search_problem.seeds, search_problem.pool) == ((), ())
 
 
-def test_the_pool_is_the_library_and_the_seeds_its_forward_selection():
-    posed = problem(record(), SETTINGS)
+def test_pool_is_the_library_and_seeds_are_its_forward_selection():
+    search_problem = problem(record(), SETTINGS)
     library = candidates("phi-polynomial", 3, 3, 1)
-    assert [make_regressor(gene) for gene in posed.pool] == list(library)
+    assert [make_regressor(gene) for gene in search_problem.pool] == list(library)
     expected = forward_selection(library, record(), "hysteresis", SETTINGS.max_terms)
-    assert [tuple(canonical_order(distinct_genes(genes))) for genes in posed.seeds] == list(expected)
+    assert [tuple(canonical_order(distinct_genes(genes))) for genes in search_problem.seeds] == list(expected)
 
 
-def test_a_library_s_genes_are_written_with_phi_functions():
-    """Variation would put anything into ``sub`` and ``sign``: constrained presets know no such node."""
+def test_library_genes_use_phi_functions():
+    """Constrained presets do not use ``sub`` and ``sign``, whose arguments variation may replace."""
     names = {
         node.primitive.name
         for gene in problem(record(), SETTINGS).pool
@@ -62,13 +62,13 @@ def test_a_library_s_genes_are_written_with_phi_functions():
         ("u(k-1) - u(k-2)", "phi1(u(k-1), u(k-2))"),
         ("y(k-1)*sign(u(k-1) - u(k-3))*u(k-2)", "y(k-1)*phi2(u(k-1), u(k-3))*u(k-2)"),
         ("tanh(u2(k-1) - u2(k-4))", "tanh(phi1(u2(k-1), u2(k-4)))"),
-        # Differences of other things are none.
+        # Other differences are not replaced.
         ("u1(k-1) - u2(k-1)", "u1(k-1) - u2(k-1)"),
         ("sign(y(k-1) - y(k-2))", "sign(y(k-1) - y(k-2))"),
         ("sign(u(k-1))", "sign(u(k-1))"),
     ],
 )
-def test_differences_of_one_input_become_phi_functions_and_mean_the_same(canonical, written):
+def test_with_phi_replaces_differences_of_one_input(canonical, written):
     assert with_phi(parse(canonical)) == parse(written)
     assert make_regressor(parse(written)) == make_regressor(parse(canonical))
 
@@ -76,34 +76,41 @@ def test_differences_of_one_input_become_phi_functions_and_mean_the_same(canonic
 @pytest.mark.parametrize(
     ("max_height", "pool"), [(0, ["y(k-1)"]), (1, ["y(k-1)", "phi1(u(k-1), u(k-2))", "phi1(u(k-2), u(k-3))"])]
 )
-def test_what_is_higher_than_a_gene_may_be_is_left_out_of_the_library(max_height, pool):
+def test_regressors_above_the_height_limit_are_left_out_of_the_library(max_height, pool):
     setting = replace(SETTINGS, max_height=max_height, initial_height=0)
-    posed = problem(record(), setting)
-    assert sorted(plain(gene) for gene in posed.pool) == sorted(pool)
-    assert all(height(gene) <= max_height for genes in posed.seeds for gene in genes)
+    search_problem = problem(record(), setting)
+    assert sorted(plain(gene) for gene in search_problem.pool) == sorted(pool)
+    assert all(height(gene) <= max_height for genes in search_problem.seeds for gene in genes)
 
 
-def test_seeds_have_no_more_terms_than_an_individual():
-    posed = problem(record(), replace(SETTINGS, max_terms=3, initial_terms=(1, 3)))
-    assert [len(genes) for genes in posed.seeds] == [1, 2, 3]
+def test_seeds_have_at_most_max_terms_genes():
+    search_problem = problem(record(), replace(SETTINGS, max_terms=3, initial_terms=(1, 3)))
+    assert [len(genes) for genes in search_problem.seeds] == [1, 2, 3]
 
 
-def test_characters_are_given_to_the_islands_in_turn():
-    posed = Problem(record(), Settings(islands=5, characters=("plain", "explorer", "pruner")))
+def test_profiles_are_assigned_to_the_islands_in_turn():
+    search_problem = Problem(record(), Settings(islands=5, characters=("plain", "explorer", "pruner")))
     plain_, explorer, pruner = (
-        replace(posed.settings, **ISLAND_PROFILES[name]) for name in posed.settings.characters
+        replace(search_problem.settings, **ISLAND_PROFILES[name])
+        for name in search_problem.settings.characters
     )
-    assert plain_ == posed.settings
-    assert [posed.settings_of(island) for island in range(5)] == [plain_, explorer, pruner, plain_, explorer]
+    assert plain_ == search_problem.settings
+    assert [search_problem.settings_of(island) for island in range(5)] == [
+        plain_,
+        explorer,
+        pruner,
+        plain_,
+        explorer,
+    ]
     assert len({plain_, explorer, pruner}) == 3
 
 
-def test_without_characters_all_islands_are_alike():
-    posed = Problem(record(), Settings(islands=3))
-    assert all(posed.settings_of(island) == posed.settings for island in range(3))
+def test_islands_without_profiles_have_equal_settings():
+    search_problem = Problem(record(), Settings(islands=3))
+    assert all(search_problem.settings_of(island) == search_problem.settings for island in range(3))
 
 
-def test_a_library_without_end_and_an_incomplete_record_are_refused():
+def test_too_large_library_and_incomplete_record_raise_an_error():
     with pytest.raises(SettingsError, match="more than a library may have"):
         problem(record(), replace(SETTINGS, library="polynomial", library_degree=5, library_lags=11))
     whole = record()

@@ -1,4 +1,4 @@
-"""Findings: which model comes first, and what a search says of itself."""
+"""Results of a search: ranking of models, and statistics."""
 
 import itertools
 from math import nan
@@ -12,7 +12,7 @@ from islands.validation.metrics import Metrics
 
 
 def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
-    """A model that is known by its errors on the validation data alone."""
+    """Return a ranked model with given errors on the validation data."""
     errors = {
         "estimation": {"one_step_ahead": Metrics(0, 0, 0, 0), "free_run": Metrics(0, 0, 0, 0)},
         "validation": {
@@ -24,41 +24,45 @@ def entry(free_run, one_step=0.1, terms=("y(k-1)",), theta=0.5):
     return RankedModel(model, Assessment(errors, {}, None, None, None, 0))
 
 
-def in_any_order(*expected):
+def assert_ranked_in_any_order(*expected):
     for order in itertools.permutations(expected):
         assert [id(item) for item in rank_models(order)] == [id(item) for item in expected]
 
 
-def test_the_least_free_run_error_on_the_validation_data_comes_first():
-    in_any_order(entry(0.1, one_step=9.0), entry(0.2, one_step=1.0), entry(30.0, one_step=0.0))
+def test_models_are_ranked_by_free_run_error_on_validation_data():
+    assert_ranked_in_any_order(entry(0.1, one_step=9.0), entry(0.2, one_step=1.0), entry(30.0, one_step=0.0))
 
 
-def test_models_that_diverged_come_last_by_their_one_step_ahead_error():
-    in_any_order(entry(1e9, one_step=5.0), entry(nan, one_step=0.1), entry(nan, one_step=0.2))
+def test_diverged_models_come_last_by_one_step_ahead_error():
+    assert_ranked_in_any_order(entry(1e9, one_step=5.0), entry(nan, one_step=0.1), entry(nan, one_step=0.2))
 
 
-def test_models_that_diverged_even_one_step_ahead_come_behind_those_that_did_not():
-    in_any_order(
+def test_models_that_diverged_one_step_ahead_come_after_all_others():
+    assert_ranked_in_any_order(
         entry(0.5), entry(nan, 0.2), entry(nan, 7.0), entry(nan, nan), entry(nan, nan, ("1", "y(k-1)"))
     )
 
 
-def test_ties_go_to_the_smaller_model_and_then_to_the_text():
+def test_ties_are_broken_by_size_and_then_by_text():
     small, large = ("y(k-1)",), ("u(k-1)", "u(k-2)")
-    in_any_order(entry(0.1, terms=small), entry(0.1, terms=large))
-    in_any_order(entry(0.1, terms=("u(k-1)",)), entry(0.1, terms=("u(k-2)",)), entry(0.1, terms=("y(k-1)",)))
-    in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))
+    assert_ranked_in_any_order(entry(0.1, terms=small), entry(0.1, terms=large))
+    assert_ranked_in_any_order(
+        entry(0.1, terms=("u(k-1)",)), entry(0.1, terms=("u(k-2)",)), entry(0.1, terms=("y(k-1)",))
+    )
+    assert_ranked_in_any_order(entry(nan, 0.3, small), entry(nan, 0.3, large))
 
 
-def test_a_tie_is_decided_by_the_last_digit_of_a_parameter():
-    in_any_order(entry(0.1, theta=0.1), entry(0.1, theta=0.1 + 2e-17), entry(0.1, theta=0.30000000000000004))
+def test_text_of_a_tie_includes_all_digits_of_the_parameters():
+    assert_ranked_in_any_order(
+        entry(0.1, theta=0.1), entry(0.1, theta=0.1 + 2e-17), entry(0.1, theta=0.30000000000000004)
+    )
 
 
-def test_of_no_model_none_is_first():
+def test_ranking_of_no_models_is_empty():
     assert rank_models(()) == ()
 
 
-def test_a_search_knows_its_speed_only_where_somebody_looked_at_a_clock():
+def test_evaluations_per_second_is_none_without_a_wall_time():
     search = SearchStatistics(8, {"ok": 8}, {"candidates": 10, "bytes": 800})
     assert search.evaluations_per_second is None
     timed = SearchStatistics(8, {"ok": 8}, {"candidates": 10, "bytes": 800}, wall_s=0.5)

@@ -1,4 +1,4 @@
-"""Where a search stands: what is counted, and a history without the stretches in which nothing happens."""
+"""State of a search: counts, and a history without repeated points."""
 
 from math import inf
 
@@ -10,9 +10,9 @@ from islands.evolution.engine import ArchipelagoEpoch
 from islands.evolution.island import StepInfo
 from islands.evolution.search_state import SearchState, advance
 
-#: Epochs of two islands: the best error of either at every generation; inf has no model yet.
+#: Best errors of two islands at every generation; infinite if an island has no model yet.
 ERRORS = st.sampled_from([1.0, 2.0, inf])
-COURSES = st.lists(st.lists(st.tuples(ERRORS, ERRORS), min_size=1, max_size=4), min_size=1, max_size=6)
+EPOCHS = st.lists(st.lists(st.tuples(ERRORS, ERRORS), min_size=1, max_size=4), min_size=1, max_size=6)
 
 
 def step(generation, error):
@@ -20,10 +20,10 @@ def step(generation, error):
     return StepInfo(generation, 10, 3, {"ok": 10}, best)
 
 
-def states(course):
-    """Yield the state after every epoch of a course."""
+def states(epochs):
+    """Yield the state after every epoch."""
     state, generation = SearchState(empty_archipelago(2, 0)), 0
-    for epoch in course:
+    for epoch in epochs:
         steps = tuple(
             tuple(step(generation + at, pair[island]) for at, pair in enumerate(epoch)) for island in (0, 1)
         )
@@ -32,44 +32,44 @@ def states(course):
         yield state
 
 
-def complete(course):
-    pairs = [pair for epoch in course for pair in epoch]
+def complete(epochs):
+    pairs = [pair for epoch in epochs for pair in epoch]
     return [(generation, 20 * (generation + 1), pair) for generation, pair in enumerate(pairs)]
 
 
-@given(COURSES)
-def test_a_history_keeps_the_first_and_the_last_of_every_stretch_in_which_nothing_changes(course):
-    whole = complete(course)
+@given(EPOCHS)
+def test_history_keeps_the_first_and_last_of_equal_consecutive_points(epochs):
+    whole = complete(epochs)
     kept = [
         point
         for at, point in enumerate(whole)
         if at in (0, len(whole) - 1) or not whole[at - 1][2] == point[2] == whole[at + 1][2]
     ]
-    *_, last = states(course)
+    *_, last = states(epochs)
     assert [(point.generation, point.evaluations, point.islands) for point in last.history] == kept
 
 
-@given(COURSES)
-def test_only_the_last_point_of_a_history_is_ever_replaced(course):
-    """A store may keep all the others for good."""
+@given(EPOCHS)
+def test_only_the_last_point_of_a_history_is_replaced(epochs):
+    """A store can append the other points once."""
     before = ()
-    for state in states(course):
+    for state in states(epochs):
         assert state.history[: len(before)] == before
         before = state.history[:-1]
 
 
-@given(COURSES)
-def test_everything_is_counted_whatever_is_kept_of_it(course):
-    generations = len(complete(course))
-    *_, last = states(course)
+@given(EPOCHS)
+def test_counts_include_points_that_are_not_kept(epochs):
+    generations = len(complete(epochs))
+    *_, last = states(epochs)
     assert last.evaluations == 20 * generations == last.history[-1].evaluations
     assert last.duplicates == 6 * generations
     assert last.outcomes == {"ok": 20 * generations}
     assert last.history[-1].generation == generations - 1
 
 
-@given(COURSES)
-def test_how_a_course_is_cut_into_epochs_makes_no_difference(course):
-    *_, cut = states(course)
-    *_, whole = states([[pair for epoch in course for pair in epoch]])
+@given(EPOCHS)
+def test_history_does_not_depend_on_the_division_into_epochs(epochs):
+    *_, cut = states(epochs)
+    *_, whole = states([[pair for epoch in epochs for pair in epoch]])
     assert cut.history == whole.history

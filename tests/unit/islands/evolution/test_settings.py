@@ -1,4 +1,4 @@
-"""Settings: every bad value is refused with a message that names it."""
+"""Settings: validation and derived values."""
 
 import pytest
 
@@ -57,14 +57,14 @@ from islands.evolution.settings import Settings
         ({"topology": "ring:2", "islands": 4}, "topology 'ring:2': a degree"),
         ({"topology": "ring:", "islands": 4}, "topology 'ring:': a degree from 1 to 99"),
         ({"topology": "random-regular:100", "islands": 400}, "a degree from 1 to 99"),
-        ({"topology": "random-regular:6", "islands": 10_000}, "more than 50000 edges to draw"),
+        ({"topology": "random-regular:6", "islands": 10_000}, "more than 50000 edges: take a smaller"),
         ({"topology": "1234567890>1", "islands": 4}, "cannot read the edge '1234567890>1'"),
         ({"topology": "random-regular:4", "islands": 4}, "takes more than 4 islands, got 4"),
         ({"topology": "0>1,1>2", "islands": 2}, "the edge 1>2 does not join two of the islands 0 to 1"),
         ({"topology": "fully-connected", "islands": 1001}, "at most 1000 islands are fully connected"),
     ],
 )
-def test_a_bad_value_is_refused_by_name(changes, message):
+def test_invalid_value_raises_settings_error_with_its_name(changes, message):
     with pytest.raises(SettingsError, match=message):
         Settings(**changes)
 
@@ -88,7 +88,7 @@ def test_a_bad_value_is_refused_by_name(changes, message):
         {"population": 12, "islands": 4, "topology": "fully-connected", "migrants": 4},
     ],
 )
-def test_the_edges_of_the_ranges_are_allowed(changes):
+def test_limits_of_the_ranges_are_valid(changes):
     made = Settings(**changes)
     assert all(getattr(made, name) == value for name, value in changes.items())
 
@@ -97,13 +97,13 @@ def test_the_edges_of_the_ranges_are_allowed(changes):
     ("topology", "islands", "migrants", "arriving"),
     [
         ("fully-connected", 4, 4, 12),
-        # What counts is the most that ever leave, and the island that most arrive on.
+        # The largest number of emigrants and the island with the most sources determine the limit.
         ("ring", 3, "1,20:12,40:2", 12),
         ("star", 7, 2, 12),
         ("0>1,2>1,3>1,4>1,1>0", 5, 3, 12),
     ],
 )
-def test_more_may_not_arrive_on_an_island_than_live_there(topology, islands, migrants, arriving):
+def test_immigrants_must_not_exceed_the_population(topology, islands, migrants, arriving):
     changes = {"topology": topology, "islands": islands, "migrants": migrants}
     Settings(population=arriving, **changes)
     message = f"{arriving} individuals would arrive on an island of {arriving - 1}: fewer migrants"
@@ -112,23 +112,23 @@ def test_more_may_not_arrive_on_an_island_than_live_there(topology, islands, mig
 
 
 @pytest.mark.parametrize(
-    ("changes", "deepest"),
+    ("changes", "maximum_lag"),
     [
         ({}, 1 + 5 * 5),
         ({"max_height": 3, "shifts": (1, 2, 3)}, 1 + 3 * 3),
         ({"shifts": ()}, 1),
         ({"max_height": 0, "initial_height": 0}, 1),
-        # A leaf of a library has a lag of its own, and variation puts it at any depth.
+        # A leaf of a library has a separate lag, and variation can insert it at any depth.
         ({"library": "polynomial", "library_lags": 4, "shifts": (2,)}, 4 + 5 * 2),
         ({"library": "polynomial", "library_lags": 4, "shifts": ()}, 4),
     ],
 )
-def test_the_deepest_lag_is_that_of_a_leaf_under_back_shifts_alone(changes, deepest):
-    assert Settings(**changes).maximum_lag == deepest
+def test_maximum_lag_is_that_of_a_leaf_under_back_shifts(changes, maximum_lag):
+    assert Settings(**changes).maximum_lag == maximum_lag
 
 
 @pytest.mark.parametrize(
     ("population", "elite", "elites"), [(500, 0.1, 50), (10, 0.0, 1), (3, 0.1, 1), (4, 1.0, 4)]
 )
-def test_the_elite_is_a_share_of_the_population_and_never_empty(population, elite, elites):
+def test_elite_is_a_fraction_of_the_population_and_never_empty(population, elite, elites):
     assert Settings(population=population, elite=elite).elites == elites

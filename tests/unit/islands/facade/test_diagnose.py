@@ -1,4 +1,4 @@
-"""`islands.diagnose`: effects of the user's own, and simulators from Python functions."""
+"""`islands.diagnose`: user-defined effects, and simulators from Python functions."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ ENCODER_ERROR = islands.Effect(
 
 @pytest.fixture(scope="module")
 def record() -> tuple[islands.Dataset, Signal]:
-    """A record of an encoder with a periodic error, and the simulation without it."""
+    """Record of an encoder with a periodic error, and the simulation without it."""
     rng = np.random.default_rng(3)
     time = 0.01 * np.arange(800)
     u = 6 * np.sin(2 * np.pi * 0.7 * time) * np.sin(2 * np.pi * 0.17 * time + 1)
@@ -46,7 +46,7 @@ def record() -> tuple[islands.Dataset, Signal]:
     return islands.Dataset(u, y, 0.01, ("u_V",), "y_um"), simulated
 
 
-def test_an_effect_of_the_user_is_named(record: tuple[islands.Dataset, Signal]) -> None:
+def test_user_defined_effect_is_named(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     found = islands.diagnose(
         data, "column:theirs", columns={"theirs": simulated}, effects=(*islands.EFFECTS, ENCODER_ERROR)
@@ -56,7 +56,7 @@ def test_an_effect_of_the_user_is_named(record: tuple[islands.Dataset, Signal]) 
     assert finding.parameters["a"].value == pytest.approx(0.15, rel=0.05)
 
 
-def test_the_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Dataset, Signal]) -> None:
+def test_catalogue_is_the_default_and_is_not_changed(record: tuple[islands.Dataset, Signal]) -> None:
     data, simulated = record
     found = islands.diagnose(data, "column:theirs", columns={"theirs": simulated})
     assert "encoder-error" not in {each.name for each in found.candidates}

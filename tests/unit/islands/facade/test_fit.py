@@ -1,4 +1,4 @@
-"""The facade of fitting: a record in, a result out, and every method of a result."""
+"""`islands.fit`, and the methods of its result."""
 
 import json
 from contextlib import nullcontext
@@ -21,7 +21,7 @@ def walk(samples, seed, inputs=1):
 
 
 def piezo(samples=600, seed=0, noise=0.002, **changes):
-    """Hysteresis out of the library phi-polynomial, a little noise on the measurement."""
+    """Return a record of hysteresis that the library phi-polynomial contains, with little noise."""
     u, y = walk(samples, seed), np.zeros(samples)
     for k in range(3, samples):
         new = u[k - 1, 0] - u[k - 2, 0]
@@ -34,7 +34,7 @@ TANK = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-1)^2": -0.2}
 
 
 def tank(samples=400, seed=0, size=1.0):
-    """A smooth system: y(k) = 0.6 y(k-1) + 0.5 u(k-1) - 0.2 u(k-1)^2 + e(k)."""
+    """Return a record of y(k) = 0.6 y(k-1) + 0.5 u(k-1) - 0.2 u(k-1)^2 + e(k)."""
     rng = np.random.default_rng(seed)
     u, y = size * rng.uniform(-1, 1, samples), np.zeros(samples)
     for k in range(1, samples):
@@ -51,10 +51,10 @@ def result():
     return islands.fit(piezo(), max_terms=5)
 
 
-# What a result says and does.
+# Attributes and methods of a result.
 
 
-def test_the_best_model_reads_as_in_the_readme(result):
+def test_best_model_has_the_documented_attributes(result):
     best = result.best
     assert best.equation.startswith("y(k) = 1*y(k-1) ")
     assert best.latex.startswith("y_{k} = 1 ")
@@ -66,7 +66,7 @@ def test_the_best_model_reads_as_in_the_readme(result):
     assert (best.model.input_names, best.model.output_name, best.model.dt) == (("u_V",), "y_um", 0.01)
 
 
-def test_models_come_best_first_and_know_their_rank(result):
+def test_models_are_ordered_by_error_and_have_ranks(result):
     assert [model.rank for model in result.models] == [1, 2, 3, 4, 5]
     assert result.best.model == result.models[0].model
     errors = [model.metrics["validation"]["free_run"].rmse for model in result.models]
@@ -75,7 +75,7 @@ def test_models_come_best_first_and_know_their_rank(result):
     assert str(result) == summary(result.search_result)
 
 
-def test_a_model_simulates_any_record_in_three_ways(result):
+def test_model_simulates_a_record_in_three_modes(result):
     record, model = piezo(200, seed=9), result.best.model
     shooting = result.search_result.settings["shooting"]
     assert shooting == 45
@@ -94,7 +94,7 @@ def test_a_model_simulates_any_record_in_three_ways(result):
         result.best.simulate(record, "backwards")
 
 
-def test_a_free_run_needs_outputs_in_its_warm_up_alone(result):
+def test_free_run_uses_measured_outputs_only_in_the_warm_up(result):
     record = piezo(200, seed=9)
     y = record.y.copy()
     y[result.best.model.maximum_lag :] = np.nan
@@ -106,30 +106,30 @@ KINDS = ("free-run", "loop", "hold", "residuals")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_model_draws_every_figure(result, kind):
+def test_model_draws_every_figure(result, kind):
     figure = result.best.plot(kind)
     assert figure.axes
     assert any(axes.get_lines() or axes.collections for axes in figure.axes)
 
 
-def test_an_unknown_figure_is_refused(result):
+def test_unknown_figure_raises_settings_error(result):
     with pytest.raises(SettingsError, match=r"unknown figure 'pie': take one of free-run, loop, "):
         result.best.plot("pie")
 
 
-def test_a_model_is_exported_and_read_back(result, tmp_path):
+def test_model_is_exported_and_read_back(result, tmp_path):
     assert result.best.export("plain") == result.best.equation
     assert result.best.export("latex") == result.best.latex
     namespace = {}
     exec(result.best.export(), namespace)
     record, lag = piezo(100, seed=9), result.best.model.maximum_lag
-    theirs = namespace["simulate"](record.u[:, 0].tolist(), record.y.tolist())
-    assert theirs[lag:] == result.best.simulate(record).y[lag:].tolist()
+    simulated = namespace["simulate"](record.u[:, 0].tolist(), record.y.tolist())
+    assert simulated[lag:] == result.best.simulate(record).y[lag:].tolist()
     (tmp_path / "model.json").write_text(result.best.export("json"))
     assert islands.read_model(tmp_path / "model.json") == result.best.model
 
 
-def test_a_result_is_saved_as_a_folder(result, tmp_path):
+def test_result_is_saved_as_a_folder(result, tmp_path):
     with undrawn_figures():
         folder = result.with_wall_time(2.0).save(tmp_path / "new" / "out")
     assert folder == tmp_path / "new" / "out"
@@ -142,10 +142,10 @@ def test_a_result_is_saved_as_a_folder(result, tmp_path):
     assert result.search_result.search.wall_s is None
 
 
-# What determines it.
+# Reproducibility and settings.
 
 
-def test_the_same_record_and_settings_give_the_same_result_bit_for_bit(result):
+def test_equal_arguments_give_equal_bits(result):
     again = islands.fit(piezo(), max_terms=5)
     assert result_json(again.search_result) == result_json(result.search_result)
     assert [model.export("json") for model in again.models] == [
@@ -153,13 +153,13 @@ def test_the_same_record_and_settings_give_the_same_result_bit_for_bit(result):
     ]
 
 
-def test_the_seed_is_kept_and_draws_nothing():
+def test_seed_is_stored_and_does_not_affect_the_models():
     first, second = (islands.fit(tank(), library="polynomial", max_terms=3, seed=seed) for seed in (1, 2))
     assert (first.search_result.seed, second.search_result.seed) == (1, 2)
     assert [model.model for model in first.models] == [model.model for model in second.models]
 
 
-def test_settings_say_what_was_chosen_where_nothing_was_asked():
+def test_result_has_the_values_of_default_settings():
     settings = dict(islands.fit(tank(), library="polynomial", max_terms=2).search_result.settings)
     assert settings == {
         "method": "fit",
@@ -183,7 +183,7 @@ def test_settings_say_what_was_chosen_where_nothing_was_asked():
     assert asked.search.full_set == {"candidates": 6, "bytes": 8 * 6 * 299}
 
 
-def test_settings_may_be_numpys_numbers(tmp_path):
+def test_settings_may_be_numpy_numbers(tmp_path):
     made = islands.fit(tank(), np.float64(0.5), library="polynomial", max_terms=np.int64(2), seed=np.int64(3))
     with undrawn_figures():
         made.save(tmp_path)
@@ -194,13 +194,13 @@ def test_settings_may_be_numpys_numbers(tmp_path):
 # Validation data.
 
 
-def test_a_fraction_of_the_records_end_validates():
+def test_fraction_at_the_end_of_the_record_validates():
     split = islands.fit(tank(), 0.1, library="polynomial", max_terms=2).search_result.split
     assert (split.estimation.samples, split.validation.samples) == (360, 40)
     assert np.array_equal(split.validation.y, tank().y[360:])
 
 
-def test_a_record_of_its_own_validates_and_estimates_nothing():
+def test_separate_validation_record_does_not_affect_the_estimation():
     whole = islands.fit(tank(), tank(150, seed=5), library="polynomial", max_terms=3)
     other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
     described = whole.search_result.settings["validation"]
@@ -214,7 +214,7 @@ def test_a_record_of_its_own_validates_and_estimates_nothing():
         assert errors[0] != errors[1]
 
 
-def test_validation_data_may_have_other_names_but_not_another_number_of_inputs_or_sampling_time():
+def test_validation_data_need_the_same_inputs_and_sampling_time():
     record, renamed = piezo(), piezo(200, seed=1, input_names=("u_val_V",), output_name="y_val_um")
     made = islands.fit(record, renamed, max_terms=2)
     assert made.best.model.input_names == ("u_V",)
@@ -233,7 +233,7 @@ def test_several_recordings_are_fitted_together():
     made = islands.fit(join(parts), library="polynomial", max_terms=4)
     assert made.search_result.record.segments == (100, 3, 160, 2, 140)
     assert made.search_result.split.estimation.segments == (100, 3, 160, 2, 39)
-    # Rows behind a warm-up of three samples in each.
+    # Each recording has a warm-up of three samples.
     assert made.search_result.search.full_set["bytes"] == 8 * 84 * (97 + 157 + 36)
     model = {m.model.size: m.model for m in made.models}[3]
     terms = {plain(item.expression): theta for item, theta in zip(model.regressors, model.theta, strict=True)}
@@ -251,12 +251,12 @@ def test_two_inputs_are_fitted_by_every_library():
     assert by_size[3].model.input_names == ("left_V", "right_V")
     assert by_size[3].physics.property_1 is True
     smooth = islands.fit(record, library="polynomial", degree=1, max_terms=5)
-    # Three lags of y and of both inputs, and the constant.
+    # Candidates are three lags of y and of both inputs, and the constant.
     assert smooth.search_result.search.full_set == {"candidates": 10, "bytes": 8 * 10 * 447}
     assert smooth.best.metrics["validation"]["free_run"].rmse < 1e-9
 
 
-def test_one_term_is_a_model():
+def test_model_of_one_term_is_fitted():
     made = islands.fit(piezo(), max_terms=1)
     assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
     assert islands.fit(tank(), library="polynomial", max_terms=1).best.model.size == 1
@@ -264,12 +264,12 @@ def test_one_term_is_a_model():
 
 @pytest.fixture(params=["undrawn", pytest.param("drawn", marks=pytest.mark.ci)])
 def drawing(request):
-    """A result's folder without the pictures in its figures, and at the level ci with them."""
+    """Skip the rendering of figures; render them at the level ci."""
     with undrawn_figures() if request.param == "undrawn" else nullcontext():
         yield
 
 
-def test_an_output_that_never_moves_is_its_own_model(tmp_path, drawing):
+def test_constant_output_gives_a_model_of_one_term(tmp_path, drawing):
     still = with_output(piezo(), np.full(600, 3.0))
     made = islands.fit(still)
     assert [model.equation for model in made.models] == ["y(k) = 1*y(k-1)"]
@@ -280,11 +280,11 @@ def test_an_output_that_never_moves_is_its_own_model(tmp_path, drawing):
 
 
 @pytest.mark.ci
-def test_a_model_that_diverges_even_one_step_ahead_spoils_no_fit(tmp_path, drawing):
+def test_models_that_diverge_one_step_ahead_are_ranked_last(tmp_path, drawing):
     calm, u = tank(), tank().u.copy()
     u[200] = 1e5
     made = islands.fit(calm, Dataset(u, calm.y, 1.0), library="polynomial", max_terms=6)
-    lost = [m for m in made.models if not m.assessed.assessment.outcomes["validation"]["one_step_ahead"]]
+    lost = [m for m in made.models if not m.ranked_model.assessment.outcomes["validation"]["one_step_ahead"]]
     assert 0 < len(lost) < len(made.models)
     assert [m.rank for m in lost] == list(range(len(made.models) - len(lost) + 1, len(made.models) + 1))
     assert not any(m.residual_tests.passed for m in lost)
@@ -293,8 +293,8 @@ def test_a_model_that_diverges_even_one_step_ahead_spoils_no_fit(tmp_path, drawi
     made.save(tmp_path)
 
 
-def test_structures_that_cannot_be_estimated_are_counted_with_their_reason():
-    # Nine samples estimate: six rows behind the warm-up, enough for five parameters.
+def test_structures_without_estimates_are_counted_by_outcome():
+    # Nine samples give six rows after the warm-up, which suffice for five parameters.
     made = islands.fit(tank(9), tank(100, seed=1), library="polynomial", max_terms=10)
     outcomes = made.search_result.search.outcomes
     assert set(outcomes) == {"ok", "too_few_rows"}
@@ -306,12 +306,12 @@ def test_structures_that_cannot_be_estimated_are_counted_with_their_reason():
 
 
 @pytest.mark.parametrize("samples", [9, 400])
-def test_progress_only_ever_goes_on(samples):
-    told = []
+def test_progress_fractions_are_monotonic(samples):
+    reports = []
     islands.fit(
-        tank(samples), tank(100, seed=1), library="polynomial", progress=lambda *news: told.append(news)
+        tank(samples), tank(100, seed=1), library="polynomial", progress=lambda *news: reports.append(news)
     )
-    texts, shares = zip(*told, strict=True)
+    texts, shares = zip(*reports, strict=True)
     assert texts[0] == "inner products of 84 candidates"
     assert texts[1] == "model of 1 terms"
     assert shares[0] == 0.0
@@ -320,7 +320,7 @@ def test_progress_only_ever_goes_on(samples):
     assert samples == 9 or shares[-1] == 1.0
 
 
-# What is refused.
+# Errors.
 
 
 @pytest.mark.parametrize(
@@ -340,7 +340,7 @@ def test_progress_only_ever_goes_on(samples):
         ({"validation": 0.0001}, "leaves a part empty"),
     ],
 )
-def test_a_setting_out_of_range_is_refused(settings, message):
+def test_setting_out_of_range_raises_settings_error(settings, message):
     with pytest.raises(SettingsError) as caught:
         islands.fit(piezo(), **settings)
     assert message in str(caught.value)
@@ -360,13 +360,13 @@ def test_a_setting_out_of_range_is_refused(settings, message):
         (20, RecordError, "has 5 samples, of which the warm-up takes 3: testing the residual takes 3 more"),
     ],
 )
-def test_a_record_that_is_too_short_is_refused_with_advice(samples, error, message):
+def test_too_short_record_raises_an_error_with_advice(samples, error, message):
     with pytest.raises(error) as caught:
         islands.fit(tank(samples), library="polynomial")
     assert message in str(caught.value)
 
 
-def test_the_shortest_record_that_can_be_fitted_is_fitted():
+def test_shortest_possible_record_is_fitted():
     assert islands.fit(tank(24), library="polynomial").models
 
 
@@ -377,7 +377,7 @@ def test_the_shortest_record_that_can_be_fitted_is_fitted():
         (500, "the output is missing at sample 50, where a simulation starts from it"),
     ],
 )
-def test_an_incomplete_record_is_refused(sample, message):
+def test_incomplete_record_raises_record_error(sample, message):
     y = piezo().y.copy()
     y[sample] = np.nan
     with pytest.raises(RecordError) as caught:
@@ -385,7 +385,7 @@ def test_an_incomplete_record_is_refused(sample, message):
     assert message in str(caught.value)
 
 
-def test_an_output_of_zeros_leaves_nothing_to_explain():
+def test_output_of_zeros_raises_settings_error():
     zeros = with_output(tank(), np.zeros(400))
     with pytest.raises(SettingsError, match=r"no model could be estimated: \{\}; take another library"):
         islands.fit(zeros, library="polynomial")

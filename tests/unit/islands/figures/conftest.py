@@ -1,12 +1,12 @@
-"""What the tests of figures share."""
+"""Fixtures of the tests of figures."""
 
 import pytest
 
 
 @pytest.fixture
 def without_layout(monkeypatch):
-    """Leave out the layout of figures, which takes most of the time of making one.
+    """Skip the layout of figures, which takes most of the time of a test.
 
-    It is for tests that look at what a figure holds; where it stands is a matter of `test_style_legibility`.
+    For tests of the content of figures. `test_style_legibility` checks their layout.
     """
     monkeypatch.setattr("matplotlib.figure.Figure.draw_without_rendering", lambda _figure: None)

@@ -1,4 +1,4 @@
-"""The confusion matrix: what stands where, in which colour, and that it can be read."""
+"""Confusion matrix: positions, colours and legibility."""
 
 from collections.abc import Mapping
 from io import BytesIO
@@ -40,12 +40,12 @@ def figure() -> "Figure":
     return draw_confusion(COUNTS, NAMES, "a title")
 
 
-def test_names_stand_in_their_order_and_what_has_none_at_the_end(figure: "Figure") -> None:
+def test_names_follow_the_catalogue_with_unnamed_entries_last(figure: "Figure") -> None:
     assert rows(figure) == ["offset", "delay", "ripple", "nothing"]
     assert columns(figure) == ["offset", "delay", "unknown", "nothing"]
 
 
-def test_every_count_stands_in_its_cell(figure: "Figure") -> None:
+def test_counts_are_written_in_their_cells(figure: "Figure") -> None:
     cells = {
         (
             rows(figure)[int(text.get_position()[1])],
@@ -54,7 +54,7 @@ def test_every_count_stands_in_its_cell(figure: "Figure") -> None:
         for text in figure.axes[0].texts
     }
     assert cells == {
-        (hidden or "nothing", called or "nothing"): str(n) for (hidden, called), n in COUNTS.items()
+        (injected or "nothing", named or "nothing"): str(n) for (injected, named), n in COUNTS.items()
     }
 
 
@@ -69,7 +69,7 @@ def test_every_count_stands_in_its_cell(figure: "Figure") -> None:
         (("nothing", "nothing"), RESIDUAL, 1.0),
     ],
 )
-def test_colours_say_right_wrong_or_nothing(
+def test_colours_distinguish_right_wrong_and_unnamed(
     figure: "Figure", cell: tuple[str, str], colour: str, share: float
 ) -> None:
     from matplotlib.colors import to_rgb
@@ -82,8 +82,8 @@ def test_colours_say_right_wrong_or_nothing(
     assert patches[cell] == pytest.approx(1 - tint * (1 - np.array(to_rgb(colour))))
 
 
-def test_a_catalogue_of_names_can_be_read() -> None:
-    """No name is cut off, none runs into its neighbour, and no number leaves its cell."""
+def test_labels_of_a_full_catalogue_are_legible() -> None:
+    """Names are neither cut off nor overlapping, and numbers fit into their cells."""
     names = [*PIEZO.known, *(f"another-effect-{number}" for number in range(5))]
     every = {(name, name): 100 for name in names} | {("", ""): 300, ("ripple", "unknown"): 50}
     figure = draw_confusion(every, names, "every name of the catalogue")
@@ -100,18 +100,18 @@ def test_a_catalogue_of_names_can_be_read() -> None:
     assert min(label.get_fontsize() for label in axes.get_yticklabels()) >= 6.0
 
 
-def test_the_title_does_not_touch_the_names(figure: "Figure") -> None:
+def test_title_does_not_touch_the_names(figure: "Figure") -> None:
     figure.draw_without_rendering()
     title = figure._suptitle.get_window_extent()
     assert all(label.get_window_extent().y1 < title.y0 for label in figure.axes[0].get_xticklabels())
 
 
-def test_the_same_counts_give_the_same_file() -> None:
-    first, again = BytesIO(), BytesIO()
-    for stream in (first, again):
+def test_equal_counts_give_equal_files() -> None:
+    first, second = BytesIO(), BytesIO()
+    for stream in (first, second):
         save(draw_confusion(COUNTS, NAMES), stream)
-    assert first.getvalue() == again.getvalue()
+    assert first.getvalue() == second.getvalue()
 
 
-def test_nothing_counted_is_an_empty_matrix() -> None:
+def test_empty_counts_give_an_empty_matrix() -> None:
     assert rows(draw_confusion({}, NAMES)) == []

@@ -1,4 +1,4 @@
-"""The figures of a diagnosis: what is in each, and what none may show."""
+"""Figures of a diagnosis: panels, lines and sizes."""
 
 from functools import cache
 
@@ -16,7 +16,7 @@ DT = 0.01
 
 @cache
 def diagnosis(friction: float = 0.3, levels: int = 0, samples: int = 900):
-    """Return a diagnosis of a column that lacks dry friction; its input may be a staircase."""
+    """Return a diagnosis of a recorded simulation without dry friction; the input may be quantised."""
     rng = np.random.default_rng(5)
     time = DT * np.arange(samples)
     u = 4 * np.sin(3 * time) * np.sin(0.8 * time + 0.5)
@@ -31,20 +31,20 @@ def diagnosis(friction: float = 0.3, levels: int = 0, samples: int = 900):
 
 
 @cache
-def of_the_residual():
+def residual_figure():
     """Return the figure of the residual before and after."""
     return draw_residual(diagnosis())
 
 
 @cache
-def long():
-    """Return the figures of a diagnosis of a long record, by name."""
+def figures_of_long_record():
+    """Return the figures of a diagnosis of a figures_of_long_record record, by name."""
     found = diagnosis(samples=6000)
     return {name: draw(found) for name, draw in DISCREPANCY_FIGURES.items()}
 
 
-def test_the_residual_is_shown_against_all_that_it_should_not_know() -> None:
-    axes = of_the_residual().axes
+def test_residual_figure_has_a_panel_per_signal() -> None:
+    axes = residual_figure().axes
     assert [panel.get_xlabel() for panel in axes] == [
         "u (V)",
         "u (V)",
@@ -53,15 +53,15 @@ def test_the_residual_is_shown_against_all_that_it_should_not_know() -> None:
         "frequency (Hz)",
         "lag (samples)",
     ]
-    # Before and after, and nothing that is not a number.
+    # Both residuals are drawn, and all values are finite.
     for panel in axes:
         coloured = {line.get_color() for line in panel.lines}
         assert {"#e69f00", "#0072b2"} <= coloured
         assert all(np.isfinite(line.get_xydata()).all() for line in panel.lines)
 
 
-def test_dry_friction_is_a_difference_between_the_directions_before_and_none_after() -> None:
-    lines = of_the_residual().axes[1].lines[:-1]
+def test_dry_friction_separates_the_directions_only_before_extension() -> None:
+    lines = residual_figure().axes[1].lines[:-1]
     mean = {
         (line.get_color(), line.get_linestyle()): np.mean(line.get_ydata())
         for line in lines
@@ -73,31 +73,31 @@ def test_dry_friction_is_a_difference_between_the_directions_before_and_none_aft
     assert after == pytest.approx(0.0, abs=0.05)
 
 
-def test_the_spectrum_holds_the_residuals_mean_square() -> None:
+def test_spectrum_integrates_to_the_variance_of_the_residual() -> None:
     found = diagnosis()
-    before = of_the_residual().axes[4].lines[0]
+    before = residual_figure().axes[4].lines[0]
     frequency, density = before.get_xydata().T
     residual = found.record.y - found.base.output
     assert np.trapezoid(density**2, frequency) == pytest.approx(np.var(residual), rel=0.25)
 
 
-def test_an_input_of_few_levels_has_as_many_cells_and_no_empty_one() -> None:
-    """An empty cell has no mean: drawn as zero it would look like a residual that vanishes."""
+def test_input_with_few_levels_has_no_empty_cells() -> None:
+    """An empty cell has no mean; zero would look like a residual that vanishes."""
     found = diagnosis(levels=2)
     over_input = draw_residual(found).axes[0].lines[0]
     assert set(over_input.get_xdata()) <= set(np.unique(found.record.u))
 
 
 @pytest.mark.ci
-def test_a_long_record_is_shown_as_a_whole_and_in_part() -> None:
-    shown = long()["over-time"].axes
+def test_long_record_is_shown_completely_and_in_a_section() -> None:
+    shown = figures_of_long_record()["over-time"].axes
     whole, part = (np.ptp(shown[place].get_xlim()) for place in (0, 2))
     assert len(shown) == 4
     assert part < whole / 4
     assert len(DISCREPANCY_FIGURES["over-time"](diagnosis()).axes) == 2
 
 
-def test_where_nothing_was_found_there_is_no_after() -> None:
+def test_diagnosis_without_effects_has_no_lines_after_extension() -> None:
     clean = diagnosis(friction=0.0)
     assert clean.best is clean.base
     for draw in DISCREPANCY_FIGURES.values():
@@ -105,7 +105,7 @@ def test_where_nothing_was_found_there_is_no_after() -> None:
         assert not texts & {"before", "after", "extended"}
 
 
-def test_the_ladder_is_coloured_where_something_is_named() -> None:
+def test_screening_figure_colours_the_named_effects() -> None:
     found = diagnosis()
     axes = draw_screening(found).axes[0]
     names = [text.get_text() for text in axes.get_yticklabels()]
@@ -116,9 +116,9 @@ def test_the_ladder_is_coloured_where_something_is_named() -> None:
 
 @pytest.mark.ci
 @pytest.mark.parametrize("name", DISCREPANCY_FIGURES)
-def test_a_figure_is_small_enough_for_a_page(name: str, tmp_path) -> None:
+def test_figure_files_are_smaller_than_300_kilobytes(name: str, tmp_path) -> None:
     path = tmp_path / "figure.svg"
-    save(long()[name], path)
+    save(figures_of_long_record()[name], path)
     assert path.stat().st_size < 300_000
 
 

@@ -1,4 +1,4 @@
-"""A free run's figure: measured and simulated with units, the residual below, nothing lost or invented."""
+"""Figure of a free run: measured and simulated output with units, and the residual below."""
 
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,7 @@ def noise(seed: int) -> np.ndarray:
 
 
 def curve(axes: "Axes", colour: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the one line of the axes that has a colour and more than two vertices."""
+    """Return the line of the axes with a colour and more than two vertices."""
     from matplotlib.colors import to_hex
 
     (line,) = (
@@ -49,11 +49,11 @@ def labels(figure: "Figure") -> list[tuple[str, str]]:
     return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
 
 
-def words(axes: "Axes") -> list[str]:
+def annotations(axes: "Axes") -> list[str]:
     return [text.get_text() for text in axes.texts]
 
 
-def test_a_short_record_has_the_output_and_its_residual():
+def test_short_record_has_an_output_and_a_residual_panel():
     record = sine(3)
     figure = draw_free_run(record, 0.9 * record.y, "three periods")
     assert labels(figure) == [("", "y (um)"), ("time (s)", "residual (um)")]
@@ -68,31 +68,31 @@ def test_a_short_record_has_the_output_and_its_residual():
         np.testing.assert_array_equal(y, values)
 
 
-def test_the_legend_names_both_lines():
+def test_legend_names_both_lines():
     record = sine(3)
     legend = draw_free_run(record, record.y).axes[0].get_legend()
     assert [text.get_text() for text in legend.get_texts()] == ["measured", "simulated"]
 
 
-def test_without_units_a_name_stands_as_it_is():
+def test_label_without_a_unit_is_the_column_name():
     record = sine(3, input_units=("",), output_unit="")
     assert labels(draw_free_run(record, record.y)) == [("", "y_um"), ("time (s)", "residual")]
 
 
-def test_the_residual_has_a_scale_of_its_own():
+def test_residual_has_a_separate_scale():
     record = sine(3)
     above, below = draw_free_run(record, 0.99 * record.y).axes
     assert np.ptp(above.get_ylim()) == pytest.approx(6.6, rel=0.01)
     assert np.ptp(below.get_ylim()) == pytest.approx(0.066, rel=0.01)
 
 
-def test_the_errors_are_said_beside_the_residual():
+def test_title_of_the_residual_panel_has_the_errors():
     record = sine(3)
     below = draw_free_run(record, record.y + 0.06).axes[1]
     assert below.get_title(loc="right") == "MAPE 1.00 % of the range, RMSE 0.0600 um"
 
 
-def test_a_record_of_many_loops_is_shown_as_a_whole_and_in_part():
+def test_record_of_many_loops_is_shown_completely_and_in_a_section():
     record = sine(40, 4000)
     figure = draw_free_run(record, 0.9 * record.y)
     assert labels(figure) == 2 * [("", "y (um)"), ("time (s)", "residual (um)")]
@@ -117,7 +117,7 @@ def test_segments_are_separated_and_not_joined():
     np.testing.assert_array_equal(np.delete(y, 150), record.y)
 
 
-def test_a_missing_output_stays_open_and_the_simulation_runs_through():
+def test_missing_output_is_a_gap_and_the_simulation_is_complete():
     whole = sine(3)
     y = whole.y.copy()
     y[100:120] = np.nan
@@ -128,7 +128,7 @@ def test_a_missing_output_stays_open_and_the_simulation_runs_through():
 
 
 @pytest.mark.parametrize("spike", [0, 21_337, LONG - 1])
-def test_a_spike_of_a_single_sample_is_drawn_in_a_long_record(spike):
+def test_spike_of_a_single_sample_is_drawn_in_a_long_record(spike):
     y = 0.1 * noise(0)
     y[spike] = 9.0
     record = Dataset(noise(1), y, 1e-3)
@@ -138,8 +138,8 @@ def test_a_spike_of_a_single_sample_is_drawn_in_a_long_record(spike):
     assert drawn.max() == 9.0
 
 
-def test_a_long_record_makes_a_small_file(tmp_path):
-    # White noise is the worst there is: no vertex lies on the line between its neighbours.
+def test_long_record_makes_a_small_file(tmp_path):
+    # White noise is the worst case, because no vertex is on the line between its neighbours.
     record = Dataset(noise(1), noise(2), 1e-3, segments=(LONG // 2, LONG // 2))
     save(draw_free_run(record, noise(3)), tmp_path / "noise.svg")
     assert 50_000 < (tmp_path / "noise.svg").stat().st_size < 400_000
@@ -150,11 +150,11 @@ def diverging(record: Dataset, at: int) -> np.ndarray:
     return np.where(k < at, np.exp(0.1 * np.minimum(k, at)) - 1.0, np.nan)
 
 
-def test_a_divergence_is_said_where_it_leaves_and_does_not_flatten_the_rest(tmp_path):
+def test_divergence_is_annotated_and_does_not_flatten_other_lines(tmp_path):
     record = sine(3)
     figure = draw_free_run(record, diverging(record, 120))
     above, below = figure.axes
-    assert words(above) == ["diverged"]
+    assert annotations(above) == ["diverged"]
     low, high = above.get_ylim()
     assert (low, high) == pytest.approx((-3.6, 9.6), abs=0.05)
     assert below.get_title(loc="right") == ""
@@ -166,25 +166,25 @@ def test_a_divergence_is_said_where_it_leaves_and_does_not_flatten_the_rest(tmp_
     save(figure, tmp_path / "diverged.svg")
 
 
-def test_only_the_segment_that_diverged_says_so():
+def test_annotation_is_only_in_the_diverged_segment():
     record = sine(3, segments=(200, 200))
     simulated = np.where(np.arange(400) < 200, record.y, np.nan)
     simulated[200:260] = 0.5
     above = draw_free_run(record, simulated).axes[0]
-    assert words(above) == ["diverged"]
+    assert annotations(above) == ["diverged"]
     assert above.lines[-1].get_xdata()[0] == pytest.approx(2.59)
 
 
-def test_a_bounded_simulation_is_followed_however_wrong_it_is():
+def test_axes_follow_a_bounded_simulation_with_large_errors():
     record = sine(3)
     figure = draw_free_run(record, record.y + 60.0)
     assert figure.axes[0].get_ylim()[1] > 63.0
     assert figure.axes[1].get_ylim()[0] < -60.0
-    assert words(figure.axes[0]) == []
+    assert annotations(figure.axes[0]) == []
 
 
 @pytest.mark.parametrize(("periods", "value"), [(3, np.nan), (3, np.inf), (3, 1e300), (40, np.nan)])
-def test_a_simulation_of_nothing_is_drawn_and_said(periods, value, tmp_path):
+def test_simulation_without_values_is_announced_in_the_title(periods, value, tmp_path):
     record = sine(periods, 4000)
     figure = draw_free_run(record, np.full(4000, value))
     assert figure.axes[0].get_title(loc="left") == "no simulated value"
@@ -192,25 +192,25 @@ def test_a_simulation_of_nothing_is_drawn_and_said(periods, value, tmp_path):
     save(figure, tmp_path / "nothing.svg")
 
 
-def test_a_divergence_in_a_long_record_shows_the_stretch_in_which_it_happened():
+def test_section_of_a_diverged_long_record_contains_the_divergence():
     record = sine(40, 4000)
     figure = draw_free_run(record, diverging(record, 120))
-    assert figure.axes[2].get_title(loc="left") == "the shaded stretch"
+    assert figure.axes[2].get_title(loc="left") == "shaded section"
     assert figure.axes[2].get_xlim()[0] == 0.0
-    assert words(figure.axes[2]) == ["diverged"]
+    assert annotations(figure.axes[2]) == ["diverged"]
 
 
 @pytest.mark.parametrize("y", [np.full(50, np.nan), np.zeros(50)])
-def test_a_record_without_an_output_or_with_a_constant_one_is_drawn(y, tmp_path):
+def test_record_with_missing_or_constant_output_is_drawn(y, tmp_path):
     record = Dataset(np.arange(50.0), y, 1.0)
     save(draw_free_run(record, np.arange(50.0)), tmp_path / "odd.svg")
     save(draw_free_run(record, np.full(50, np.nan)), tmp_path / "odd.svg")
 
 
-def test_a_record_of_one_sample_is_drawn(tmp_path):
+def test_record_of_one_sample_is_drawn(tmp_path):
     save(draw_free_run(Dataset(np.ones(1), np.ones(1), 1.0), np.ones(1)), tmp_path / "one.svg")
 
 
-def test_a_simulation_of_another_length_is_refused():
+def test_simulation_of_another_length_raises_settings_error():
     with pytest.raises(SettingsError, match="one value for each of the record's 400 samples"):
         draw_free_run(sine(3), np.zeros(399))

@@ -1,4 +1,4 @@
-"""The holds' figure: what stays is flat, what drifts is seen to drift, what diverges is said to."""
+"""Figure of holds: levels, drift and divergence."""
 
 from typing import TYPE_CHECKING
 
@@ -31,20 +31,20 @@ def record() -> Dataset:
 
 
 def model(**terms: float) -> Model:
-    """A model with parameters of y(k-1), of an increment, and of u(k-1)."""
+    """Return a model with parameters of y(k-1), of an increment, and of u(k-1)."""
     texts = {"y": "y(k-1)", "du": "phi1(u(k-1), u(k-2))", "u": "u(k-1)"}
     return make_model([(parse(texts[name]), value) for name, value in terms.items()], ("u_V",), "y_um", 0.01)
 
 
-STILL = model(y=1.0, du=0.15)
+STATIONARY = model(y=1.0, du=0.15)
 LEAKING = model(y=0.99, du=0.15)
 BURSTING = model(y=1.01, du=0.15)
 
 
 @pytest.fixture(scope="module")
-def still(record: Dataset) -> "Figure":
-    """The figure of a model that stays where it is; no test changes it."""
-    return draw_holds(STILL, record, "still")
+def stationary(record: Dataset) -> "Figure":
+    """Figure of a model with a continuum of equilibria. Tests do not modify it."""
+    return draw_holds(STATIONARY, record, "stationary")
 
 
 @pytest.fixture(scope="module")
@@ -53,26 +53,26 @@ def bursting(record: Dataset) -> "Figure":
 
 
 def held(axes: "Axes") -> "list[Line2D]":
-    """Return the lines of the output at rest, one for each level."""
+    """Return the lines of the output during the hold, one per level."""
     lines = [line for line in axes.lines if len(line.get_xdata()) > 2 and line.get_xdata()[0] >= 0]
     assert len(lines) == len(LEVELS)
     return lines
 
 
-def test_axes_are_the_input_and_the_output_while_loading_and_unloading(still):
-    assert len(still.axes) == 4
-    assert [axes.get_ylabel() for axes in still.axes] == ["u (V)", "y (um)", "u (V)", "y (um)"]
-    assert [axes.get_xlabel() for axes in still.axes[2:]] == 2 * ["time from the start of the hold (s)"]
-    assert still.get_suptitle() == "still"
+def test_axes_are_input_and_output_during_loading_and_unloading(stationary):
+    assert len(stationary.axes) == 4
+    assert [axes.get_ylabel() for axes in stationary.axes] == ["u (V)", "y (um)", "u (V)", "y (um)"]
+    assert [axes.get_xlabel() for axes in stationary.axes[2:]] == 2 * ["time from the start of the hold (s)"]
+    assert stationary.get_suptitle() == "stationary"
 
 
-def test_the_inputs_levels_stand_on_its_axis_in_its_unit(still):
-    left = still.axes[0]
+def test_input_axis_has_the_levels_in_the_unit_of_the_input(stationary):
+    left = stationary.axes[0]
     assert [text.get_text() for text in left.get_yticklabels()] == ["−6", "2", "10", "18", "26"]
 
 
-def test_time_is_in_seconds_from_the_first_sample_at_rest(still):
-    left, right, *_ = still.axes
+def test_time_is_in_seconds_from_the_start_of_the_hold(stationary):
+    left, right, *_ = stationary.axes
     for line, level in zip(left.lines[:5], LEVELS, strict=True):
         time, u = line.get_data()
         assert (u[time >= 0] == level).all()
@@ -82,16 +82,16 @@ def test_time_is_in_seconds_from_the_first_sample_at_rest(still):
     assert right.get_xlim()[0] == pytest.approx(-2.9, abs=0.1)
 
 
-def test_a_continuum_of_equilibria_is_flat(still):
-    for axes, words in ((still.axes[1], "after loading"), (still.axes[3], "after unloading")):
+def test_model_with_a_continuum_of_equilibria_has_no_drift(stationary):
+    for axes, words in ((stationary.axes[1], "after loading"), (stationary.axes[3], "after unloading")):
         assert axes.get_title(loc="left") == f"{words}: largest drift below 0.01 % of the output range"
         for line in held(axes):
             assert np.ptp(line.get_ydata()[2:]) < 1e-9
-    ends = [line.get_ydata()[-1] for line in held(still.axes[1])]
+    ends = [line.get_ydata()[-1] for line in held(stationary.axes[1])]
     assert np.diff(ends) == pytest.approx(4 * [0.15 * 8.0], rel=0.01)
 
 
-def test_a_leaking_model_is_seen_to_drift_by_what_the_physics_check_says(record):
+def test_drift_of_a_leaking_model_equals_that_of_the_physics_check(record):
     figure = draw_holds(LEAKING, record)
     largest = check_physics(LEAKING, record).hold_drift_percent
     said = [axes.get_title(loc="left") for axes in (figure.axes[1], figure.axes[3])]
@@ -102,7 +102,7 @@ def test_a_leaking_model_is_seen_to_drift_by_what_the_physics_check_says(record)
     assert moved > 0.1 * (high - low)
 
 
-def test_a_small_drift_is_said_with_its_digits(record):
+def test_small_drift_has_two_decimal_places(record):
     title = draw_holds(model(y=0.99999, du=0.15), record).axes[1].get_title(loc="left")
     largest = float(title.split()[4])
     assert 0.01 < largest < 10
@@ -110,7 +110,7 @@ def test_a_small_drift_is_said_with_its_digits(record):
 
 
 @pytest.mark.parametrize("diverging", [BURSTING, model(y=1e8, du=0.15, u=1.0)])
-def test_a_divergence_is_said_in_the_title_and_at_the_lines_end(diverging, record, tmp_path):
+def test_divergence_is_in_the_title_and_does_not_affect_the_axis(diverging, record, tmp_path):
     figure = draw_holds(diverging, record)
     for axes in (figure.axes[1], figure.axes[3]):
         assert axes.get_title(loc="left").endswith("5 of 5 diverged")
@@ -118,7 +118,7 @@ def test_a_divergence_is_said_in_the_title_and_at_the_lines_end(diverging, recor
     save(figure, tmp_path / "diverged.svg")
 
 
-def test_the_word_diverged_stands_where_a_line_ends(bursting):
+def test_diverged_lines_are_marked_at_their_end(bursting):
     right = bursting.axes[1]
     assert {text.get_text() for text in right.texts} == {"diverged"}
     assert len(right.texts) < 5
@@ -126,7 +126,7 @@ def test_the_word_diverged_stands_where_a_line_ends(bursting):
     assert len(marks) == 5
 
 
-def test_where_some_levels_diverge_the_drift_of_the_others_is_said(record, tmp_path):
+def test_title_has_the_drift_of_the_levels_that_did_not_diverge(record, tmp_path):
     # Above 12 V in the mean the pole is outside the unit circle.
     unstable = make_model(
         [(parse("y(k-1)"), 0.88), (parse("y(k-1)*u(k-1)"), 0.01), (parse("u(k-1)"), 0.01)],
@@ -140,7 +140,7 @@ def test_where_some_levels_diverge_the_drift_of_the_others_is_said(record, tmp_p
     save(figure, tmp_path / "some.svg")
 
 
-def test_several_inputs_move_together_as_shares_of_their_amplitude(record):
+def test_several_inputs_are_shown_as_fractions_of_their_amplitude(record):
     both = Dataset(
         np.column_stack([record.u, 2 * record.u]), record.y, 0.01, ("u_V", "T_K"), "y_um", ("V", "K"), "um"
     )

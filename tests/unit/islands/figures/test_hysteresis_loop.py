@@ -1,4 +1,4 @@
-"""Hysteresis loops: one panel for each input, few enough loops to be read."""
+"""Figure of hysteresis loops: panels, number of loops, divergence and file size."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def loops(periods: int, inputs: int = 1, length: int = 200, **changes: object) -
 
 
 @pytest.mark.parametrize("inputs", [1, 2, 3, 4])
-def test_every_input_has_a_panel_with_its_name_and_unit(inputs):
+def test_inputs_have_one_panel_each_with_name_and_unit(inputs):
     from matplotlib.colors import to_hex
 
     record = loops(3, inputs)
@@ -35,14 +35,14 @@ def test_every_input_has_a_panel_with_its_name_and_unit(inputs):
         np.testing.assert_array_equal(simulated.get_ydata(), 0.9 * record.y)
 
 
-def test_panels_share_the_outputs_scale():
+def test_panels_share_the_scale_of_the_output():
     record = loops(3, 4)
     figure = draw_loop(record, 2.0 * record.y)
     for axes in figure.axes:
         assert axes.get_ylim() == pytest.approx((-2.2, 2.2), abs=0.01)
 
 
-def test_of_many_loops_the_last_five_are_drawn_and_it_is_said():
+def test_last_five_of_many_loops_are_drawn():
     record = loops(40)
     (axes,) = draw_loop(record, record.y).axes
     assert axes.get_title(loc="left") == "the last 5 of 40 loops"
@@ -53,7 +53,7 @@ def test_of_many_loops_the_last_five_are_drawn_and_it_is_said():
     np.testing.assert_array_equal(u, record.u[first : first + 5 * 200 + 1, 0])
 
 
-def test_few_loops_are_drawn_as_they_are():
+def test_few_loops_are_drawn_completely():
     record = loops(5)
     (axes,) = draw_loop(record, record.y).axes
     assert axes.get_title(loc="left") == ""
@@ -68,12 +68,12 @@ def test_segments_are_not_joined():
         assert np.isnan(line.get_ydata()[250])
 
 
-def test_the_legend_names_both_lines():
+def test_legend_names_both_lines():
     (legend,) = draw_loop(loops(3), loops(3).y).legends
     assert [text.get_text() for text in legend.get_texts()] == ["measured", "simulated"]
 
 
-def test_a_long_loop_makes_a_small_file_and_keeps_its_tips(tmp_path):
+def test_long_loop_makes_a_small_file_and_keeps_its_tips(tmp_path):
     record = loops(4, length=25_000)
     figure = draw_loop(record, record.y)
     x, y = figure.axes[0].lines[0].get_data()
@@ -84,7 +84,7 @@ def test_a_long_loop_makes_a_small_file_and_keeps_its_tips(tmp_path):
     assert (tmp_path / "long.svg").stat().st_size < 400_000
 
 
-def test_noise_without_end_makes_a_small_file(tmp_path):
+def test_long_noise_makes_a_small_file(tmp_path):
     rng = np.random.default_rng(0)
     record = Dataset(np.linspace(0, 1, 100_000), rng.standard_normal(100_000), 1e-3)
     save(draw_loop(record, rng.standard_normal(100_000)), tmp_path / "noise.svg")
@@ -92,7 +92,7 @@ def test_noise_without_end_makes_a_small_file(tmp_path):
 
 
 @pytest.mark.parametrize(("periods", "part"), [(3, ""), (40, "the last 5 of 40 loops; ")])
-def test_a_divergence_is_said_and_does_not_flatten_the_loops(periods, part, tmp_path):
+def test_divergence_is_in_the_title_and_does_not_flatten_the_loops(periods, part, tmp_path):
     record = loops(periods)
     k = np.arange(record.samples)
     figure = draw_loop(record, np.where(k < 120, np.exp(0.1 * np.minimum(k, 120)), np.nan))
@@ -101,12 +101,12 @@ def test_a_divergence_is_said_and_does_not_flatten_the_loops(periods, part, tmp_
     save(figure, tmp_path / "diverged.svg")
 
 
-def test_a_simulation_of_nothing_is_drawn_and_said(tmp_path):
+def test_simulation_without_values_is_announced_in_the_title(tmp_path):
     figure = draw_loop(loops(3), np.full(600, np.nan))
     assert figure.axes[0].get_title(loc="left") == "no simulated value"
     save(figure, tmp_path / "nothing.svg")
 
 
-def test_a_simulation_of_another_length_is_refused():
+def test_simulation_of_another_shape_raises_settings_error():
     with pytest.raises(SettingsError, match=r"got shape \(3, 2\)"):
         draw_loop(loops(3), np.zeros((3, 2)))

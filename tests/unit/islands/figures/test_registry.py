@@ -1,4 +1,4 @@
-"""The gallery draws what the metrics beside it are of."""
+"""Figures of the registry agree with the metrics of the model."""
 
 import re
 
@@ -12,12 +12,12 @@ from islands.model.parsing import parse
 from islands.validation.assessment import assess
 from support.searches import record
 
-#: Slow to forget how it began: where a free run begins shows in its error.
+#: The initial state decays slowly, so the error of the free run depends on where the run begins.
 MODEL = make_model([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 
 
 @pytest.mark.parametrize("warm_up", [None, 60])
-def test_a_free_run_s_figure_has_the_error_of_the_table(warm_up):
+def test_free_run_figure_has_the_error_of_the_assessment(warm_up):
     split = Split(record(400), record(300, seed=1))
     assessed = RankedModel(MODEL, assess(MODEL, split, 50, warm_up))
     figure = FIGURES["free-run"](assessed, split)

@@ -1,4 +1,4 @@
-"""The house style: labels carry units, a user's settings neither leak in nor change, files are the same."""
+"""Style of figures: labels, matplotlib settings, reproducible files."""
 
 import hashlib
 import subprocess
@@ -44,11 +44,11 @@ def matplotlib() -> ModuleType:
         ("_V", "V", "(V)"),
     ],
 )
-def test_a_label_is_the_name_with_its_unit_in_brackets(name, unit, expected):
+def test_label_is_the_name_with_the_unit_in_parentheses(name, unit, expected):
     assert label(name, unit) == expected
 
 
-def test_settings_hold_again_after_drawing(matplotlib):
+def test_matplotlib_settings_are_restored_after_drawing(matplotlib):
     before = dict(matplotlib.rcParams.copy())
     example()
     with house_style():
@@ -56,32 +56,32 @@ def test_settings_hold_again_after_drawing(matplotlib):
     assert dict(matplotlib.rcParams.copy()) == before
 
 
-def test_settings_hold_again_after_a_failure(matplotlib):
+def test_matplotlib_settings_are_restored_after_an_exception(matplotlib):
     with pytest.raises(ZeroDivisionError), house_style():
         raise ZeroDivisionError
     assert matplotlib.rcParams["svg.hashsalt"] is None
 
 
-def test_a_figure_fits_an_articles_column():
+def test_figure_has_the_width_of_an_article_column():
     assert blank(3.0).get_size_inches().tolist() == [WIDTH, 3.0]
 
 
-def test_a_long_title_is_broken_and_a_given_break_is_kept():
+def test_long_title_is_wrapped_and_line_breaks_are_kept():
     assert blank(3.0, "word " * 40 + "\nend").get_suptitle().count("\n") == 3
 
 
-def test_the_same_content_gives_the_same_bytes(tmp_path):
+def test_equal_content_gives_equal_bytes(tmp_path):
     figure = example()
     save(figure, tmp_path / "first.svg")
     figure.savefig(tmp_path / "between.png")
     save(figure, tmp_path / "again.svg")
-    save(example(), tmp_path / "anew.svg")
+    save(example(), tmp_path / "redrawn.svg")
     first = (tmp_path / "first.svg").read_bytes()
     assert (tmp_path / "again.svg").read_bytes() == first
-    assert (tmp_path / "anew.svg").read_bytes() == first
+    assert (tmp_path / "redrawn.svg").read_bytes() == first
 
 
-def test_another_curve_gives_other_bytes(tmp_path):
+def test_different_curves_give_different_bytes(tmp_path):
     save(example(), tmp_path / "one.svg")
     other = example()
     other.axes[0].lines[0].set_ydata(np.zeros(300))
@@ -89,14 +89,14 @@ def test_another_curve_gives_other_bytes(tmp_path):
     assert (tmp_path / "one.svg").read_bytes() != (tmp_path / "other.svg").read_bytes()
 
 
-def test_a_users_settings_do_not_show(tmp_path, matplotlib):
+def test_matplotlib_settings_of_the_user_have_no_effect(tmp_path, matplotlib):
     save(example(), tmp_path / "plain.svg")
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "none"}):
-        save(example(), tmp_path / "theirs.svg")
-    assert (tmp_path / "theirs.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
+        save(example(), tmp_path / "expected.svg")
+    assert (tmp_path / "expected.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
 
 
-def test_a_file_holds_no_date_no_image_and_no_font_of_this_machine(tmp_path, matplotlib):
+def test_file_has_no_date_no_image_and_no_font(tmp_path, matplotlib):
     save(example(), str(tmp_path / "figure.svg"))
     text = (tmp_path / "figure.svg").read_text(encoding="utf-8")
     assert text.count("<svg ") == 1
@@ -105,7 +105,7 @@ def test_a_file_holds_no_date_no_image_and_no_font_of_this_machine(tmp_path, mat
 
 
 @pytest.mark.ci
-def test_another_process_writes_the_same_bytes_and_never_loads_pyplot(tmp_path):
+def test_another_process_writes_equal_bytes_without_pyplot(tmp_path):
     code = """
 import hashlib, importlib.util, pkgutil, sys
 import islands.figures
@@ -118,17 +118,17 @@ spec.loader.exec_module(tests)
 tests.save(tests.example(), sys.argv[2])
 print("matplotlib.pyplot" in sys.modules)
 """
-    theirs, ours = tmp_path / "theirs.svg", tmp_path / "ours.svg"
+    expected, actual = tmp_path / "expected.svg", tmp_path / "actual.svg"
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code, __file__, str(theirs)],
+        [sys.executable, "-W", "error", "-c", code, __file__, str(expected)],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.stderr == ""
     assert done.stdout == "False\n"
-    save(example(), ours)
-    assert digest(theirs) == digest(ours)
+    save(example(), actual)
+    assert digest(expected) == digest(actual)
 
 
 def digest(path: Path) -> str:

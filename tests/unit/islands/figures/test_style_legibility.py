@@ -1,4 +1,4 @@
-"""What holds for every figure: no text is cut off or written over another, and saving is repeatable."""
+"""Properties of all figures: texts are neither cut off nor overlapping, and saving is reproducible."""
 
 import itertools
 from collections.abc import Callable, Iterable
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
 
-LONG_TITLE = "What a report may want to say over a figure, with the name of a record and of a model, is long"
+LONG_TITLE = (
+    "Title of a figure in a report with the name of a record and the name of a model, both rather long"
+)
 
 
 def record(samples: int, inputs: int = 1, scale: float = 1.0, dt: float = 1e-3, **changes: object) -> Dataset:
@@ -45,7 +47,7 @@ def leaking(pole: float) -> Model:
 
 @cache
 def diagnosis(samples: int, scale: float, dt: float):
-    """Return a diagnosis of a column that lacks an offset."""
+    """Return a diagnosis of a recorded simulation without an offset."""
     made = record(samples, scale=scale, dt=dt)
     noise = np.random.default_rng(8).standard_normal(samples)
     simulated = made.y - scale * (0.3 + 0.05 * noise)
@@ -75,13 +77,13 @@ FIGURES: dict[str, "Callable[[], Figure]"] = {
             diagnosis(*of)
         )
         for name, draw in DISCREPANCY_FIGURES.items()
-        # The third one's spectrum has little more than a decade.
+        # The spectrum of the third case has little more than one decade.
         for of in ((400, 1.0, 1e-3), (800, 12_345.0, 1e-3), (400, 1.0, 7.0))
     },
 }
 
 
-#: Figures of a diagnosis: of one record, each of its kind. One is looked at at the fast level.
+#: All figures of the diagnosis of one record. The fast level checks one of them.
 DIAGNOSED = tuple(f"{name} of a diagnosis, 400 samples of 0.001 s" for name in DISCREPANCY_FIGURES)
 
 #: Figures that are saved twice at the fast level.
@@ -89,14 +91,14 @@ SAVED = ("a run of two segments", "a loop of two inputs", DIAGNOSED[1])
 
 
 def fast(names: Iterable[str]) -> pytest.MarkDecorator:
-    """Give the names of all figures to a test; all but some are of the level ci."""
+    """Parametrise a test by all figures; those not in ``names`` belong to the level ci."""
     kept = set(names)
     return pytest.mark.parametrize(
         "name", [name if name in kept else pytest.param(name, marks=pytest.mark.ci) for name in FIGURES]
     )
 
 
-#: Figures that are laid out at the fast level: one of each kind, with the longest texts.
+#: Figures whose layout is checked at the fast level: one of each kind, with the longest texts.
 LAID_OUT = (
     *("a long run", "a run of two segments", "a loop of four inputs", "a diverging hold"),
     *("residuals of two inputs", DIAGNOSED[1]),
@@ -107,7 +109,7 @@ every_figure = fast(LAID_OUT)
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure, and every text that is drawn with its box: no tick outside its axis is among them."""
+    """Figure with the boxes of all texts that are drawn; ticks outside the axes are not drawn."""
 
     figure: "Figure"
     texts: "list[tuple[Text, Bbox]]"
@@ -132,7 +134,7 @@ def drawn(name: str) -> Drawn:
 
 
 @every_figure
-def test_no_text_is_cut_off_at_the_edge(name):
+def test_text_is_not_cut_off_at_the_edge(name):
     edge, texts = drawn(name).figure.bbox, drawn(name).texts
     assert len(texts) > 10
     for text, box in texts:
@@ -143,23 +145,23 @@ def test_no_text_is_cut_off_at_the_edge(name):
 
 
 @every_figure
-def test_no_text_is_written_over_another(name):
+def test_texts_do_not_overlap(name):
     inner = [(text.get_text(), box.padded(-1)) for text, box in drawn(name).texts]
     over = [
         (one, other)
-        for (one, box), (other, beside) in itertools.combinations(inner, 2)
-        if box.overlaps(beside)
+        for (one, box), (other, other_box) in itertools.combinations(inner, 2)
+        if box.overlaps(other_box)
     ]
     assert over == []
 
 
 @every_figure
-def test_no_text_is_smaller_than_a_journal_prints(name):
+def test_text_has_at_least_seven_points(name):
     assert min(text.get_fontsize() for text, _ in drawn(name).texts) >= 7.0
 
 
 @fast(SAVED)
-def test_saving_twice_gives_the_same_bytes(name, tmp_path):
+def test_saving_twice_gives_equal_bytes(name, tmp_path):
     for file in ("first", "second"):
         save(drawn(name).figure, tmp_path / f"{file}.svg")
     assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()

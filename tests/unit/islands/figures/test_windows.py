@@ -1,4 +1,4 @@
-"""Which part of a record is shown: loops are counted by the input, a stretch stands for the whole."""
+"""Parts of a record that figures show: last loops and representative section."""
 
 import numpy as np
 import pytest
@@ -14,72 +14,72 @@ def sine(periods: int, length: int = 100, **changes: object) -> Dataset:
 
 
 @pytest.mark.parametrize("periods", [1, 7, 40])
-def test_a_sine_has_as_many_loops_as_periods(periods):
+def test_sine_has_one_loop_per_period(periods):
     assert len(loop_starts(sine(periods))) == periods
 
 
-def test_an_offset_makes_no_difference():
+def test_offset_of_the_input_does_not_affect_loops():
     here = sine(9)
     there = Dataset(here.u + 100.0, here.y, here.dt)
     np.testing.assert_array_equal(loop_starts(here), loop_starts(there))
 
 
-def test_noise_on_a_slow_input_makes_no_loops():
+def test_noise_on_a_slow_input_creates_no_loops():
     record = sine(9)
     noisy = record.u[:, 0] + 0.05 * np.random.default_rng(0).standard_normal(record.samples)
     assert len(loop_starts(Dataset(noisy, record.y, record.dt))) == 9
 
 
-def test_a_constant_input_has_no_loops():
+def test_constant_input_has_no_loops():
     assert len(loop_starts(Dataset(np.ones(50), np.arange(50.0), 1.0))) == 0
 
 
-def test_loops_are_counted_by_the_first_input_that_varies():
+def test_loops_are_counted_by_the_first_varying_input():
     record = sine(9)
     both = Dataset(np.column_stack([np.ones(record.samples), record.u]), record.y, record.dt)
     np.testing.assert_array_equal(loop_starts(both), loop_starts(record))
 
 
-def test_the_last_loops_are_whole_periods_at_the_end():
+def test_last_loops_are_complete_periods_at_the_end():
     rows = last_loops(sine(40))
     assert rows.stop - rows.start == 100 * LOOPS + 1
     assert rows.stop > 3900
 
 
-def test_a_record_of_few_loops_is_shown_as_a_whole():
+def test_record_of_few_loops_is_shown_completely():
     assert last_loops(sine(LOOPS)) == slice(0, 100 * LOOPS)
 
 
-def test_a_stretch_is_asked_for_beyond_twenty_loops():
+def test_section_is_needed_for_more_than_twenty_loops():
     assert representative_window(sine(20), np.ones(2000)) is None
     assert representative_window(sine(21), np.ones(2100)) is not None
 
 
-def test_a_short_record_is_shown_as_a_whole_whatever_its_loops():
+def test_short_record_is_shown_completely_for_any_number_of_loops():
     record = sine(60, length=3)
     assert len(loop_starts(record)) > 20
     assert representative_window(record, np.ones(record.samples)) is None
 
 
-def test_the_stretch_has_the_median_residual():
+def test_section_has_the_median_residual():
     record = sine(25)
     residual = np.repeat([5.0, 1.0, 4.0, 3.0, 2.0], 500)
     assert representative_window(record, residual) == slice(1500, 2000)
 
 
-def test_a_stretch_without_a_residual_never_stands_for_the_whole():
+def test_section_with_missing_residuals_is_never_selected():
     record = sine(25)
     residual = np.repeat([5.0, np.nan, np.nan, np.nan, 2.0], 500)
     assert representative_window(record, residual) == slice(0, 500)
 
 
-def test_without_any_residual_the_first_stretch_is_shown():
+def test_first_section_is_selected_if_all_residuals_are_missing():
     assert representative_window(sine(25), np.full(2500, np.nan)) == slice(0, 500)
 
 
-def test_no_stretch_reaches_across_a_boundary_where_segments_are_long_enough():
+def test_sections_do_not_cross_segments_that_are_long_enough():
     record = sine(30, segments=(700, 1300, 1000))
-    stretch = representative_window(record, np.arange(3000.0))
-    assert stretch is not None
-    assert any(begin <= stretch.start and stretch.stop <= end for begin, end in record.bounds)
-    assert stretch == slice(1200, 1700)
+    section = representative_window(record, np.arange(3000.0))
+    assert section is not None
+    assert any(begin <= section.start and section.stop <= end for begin, end in record.bounds)
+    assert section == slice(1200, 1700)

@@ -1,4 +1,4 @@
-"""Evaluation of individuals (the paper, section 5.2) against the rooms that it stands on."""
+"""Evaluation of individuals (the paper, section 5.2) against estimation and simulation."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def individual(*texts):
     return Individual(tuple(parse(text) for text in texts))
 
 
-def evaluated(each, data=None, pruned=False, **changes):
+def evaluate_one(each, data=None, pruned=False, **changes):
     evaluator = Evaluator(data or record(), replace(SETTINGS, **changes))
     (found,), duplicates = evaluator.evaluate([(each, pruned)])
     assert duplicates == 0
@@ -65,11 +65,9 @@ STRUCTURES = [
 @pytest.mark.parametrize("texts", STRUCTURES)
 @pytest.mark.parametrize("constraints", ["none", "hysteresis"])
 @pytest.mark.parametrize(("fitness", "interval"), [("shooting", 50), ("one-step", 1), ("free-run", None)])
-def test_theta_and_fitness_are_those_of_estimation_and_multiple_shooting(
-    texts, constraints, fitness, interval
-):
+def test_theta_and_fitness_equal_estimation_and_multiple_shooting(texts, constraints, fitness, interval):
     data = record(segments=(300, 450, 50))
-    found = evaluated(individual(*texts), data, constraints=constraints, fitness=fitness)
+    found = evaluate_one(individual(*texts), data, constraints=constraints, fitness=fitness)
     expected = estimate(
         [make_regressor(parse(text)) for text in texts], data, constraints, SETTINGS.maximum_lag
     ).model
@@ -78,123 +76,128 @@ def test_theta_and_fitness_are_those_of_estimation_and_multiple_shooting(
     simulated = multiple_shooting(expected, data, interval, SETTINGS.maximum_lag)
     if simulated.outcome:
         assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-9)
-        # And the fitness of its own parameters, to the last bit.
+        # The fitness equals the simulation with its parameters to the last bit.
         own = multiple_shooting(expected.with_parameters(found.theta), data, interval, SETTINGS.maximum_lag)
         assert found.fitness == own.mean_squared_error
     else:
         assert found.outcome.verdict is Status.DIVERGED
 
 
-def test_a_regressor_that_the_constraint_forces_to_zero_leaves_and_is_not_counted():
-    found = evaluated(individual("y(k-1)", "u(k-1)*y(k-1)", "phi1(u(k-1), q1(u(k-1)))"))
+def test_regressor_forced_to_zero_by_the_constraint_is_removed():
+    found = evaluate_one(individual("y(k-1)", "u(k-1)*y(k-1)", "phi1(u(k-1), q1(u(k-1)))"))
     assert found.key == ("y(k-1)", "u1(k-1) - u1(k-2)")
     assert found.genes == individual("y(k-1)", "phi1(u(k-1), q1(u(k-1)))").genes
     assert found.size == 2
 
 
-def test_genes_that_say_the_same_are_one_term_and_the_first_stays():
-    found = evaluated(
+def test_first_of_equivalent_genes_is_kept():
+    found = evaluate_one(
         individual("q2(u(k-1))", "y(k-1)*u(k-1)", "u(k-3)", "u(k-1)*y(k-1)"), constraints="none"
     )
     assert found.genes == individual("q2(u(k-1))", "y(k-1)*u(k-1)").genes
     assert found.key == ("u1(k-3)", "y(k-1)*u1(k-1)")
 
 
-def test_pruning_shrinks_the_individual_itself_to_what_explains():
+def test_pruning_removes_genes_from_the_individual():
     each = individual("y(k-1)", "phi1(u(k-1), q1(u(k-1)))", "q3(y(k-1)*u(k-1)*u(k-1))")
-    whole = evaluated(each, constraints="none")
-    pruned = evaluated(each, pruned=True, constraints="none")
+    whole = evaluate_one(each, constraints="none")
+    pruned = evaluate_one(each, pruned=True, constraints="none")
     assert (whole.size, pruned.size) == (3, 2)
     assert pruned.genes == each.genes[:2]
-    assert evaluated(Individual(pruned.genes), constraints="none") == pruned
-    kept_all = evaluated(each, pruned=True, constraints="none", tolerance=0.0)
+    assert evaluate_one(Individual(pruned.genes), constraints="none") == pruned
+    kept_all = evaluate_one(each, pruned=True, constraints="none", tolerance=0.0)
     assert kept_all == whole
 
 
 # Failures are outcomes with reasons.
 
 
-def test_without_y_the_constraint_cannot_be_met():
-    found = evaluated(individual("u(k-1)", "phi1(u(k-1), q1(u(k-1)))"))
+def test_structure_without_y_is_infeasible_under_the_constraint():
+    found = evaluate_one(individual("u(k-1)", "phi1(u(k-1), q1(u(k-1)))"))
     assert found.outcome.verdict is Status.INFEASIBLE
     assert found.outcome.reason == "no regressor is y at rest: add y(k-1)"
     assert (found.fitness, found.theta) == (np.inf, ())
-    # What is alone in its cluster has gone before that was asked.
+    # Regressors that are alone in their cluster are removed before the check.
     assert found.genes == individual("phi1(u(k-1), q1(u(k-1)))").genes
 
 
-def test_nothing_left_is_infeasible():
-    found = evaluated(individual("phi1(u(k-1), u(k-1))"))
+def test_structure_without_remaining_genes_is_infeasible():
+    found = evaluate_one(individual("phi1(u(k-1), u(k-1))"))
     assert (found.outcome.verdict, found.outcome.reason) == (Status.INFEASIBLE, "no gene is left")
-    pruned = evaluated(individual("u(k-1)"), pruned=True, constraints="none", tolerance=0.999)
+    pruned = evaluate_one(individual("u(k-1)"), pruned=True, constraints="none", tolerance=0.999)
     assert (pruned.outcome.reason, pruned.genes) == ("no gene is left", individual("u(k-1)").genes)
 
 
-def test_regressors_that_depend_on_each_other_on_this_record_are_singular():
-    """An input of two levels: its cube is the input itself."""
+def test_regressors_that_are_dependent_on_the_record_are_singular():
+    """The cube of an input with the levels -1 and 1 equals the input."""
     rng = np.random.default_rng(0)
     u = np.sign(rng.normal(size=500))
     data = Dataset(u, np.convolve(u, [0.0, 1.0, 0.5])[:500] + 0.01 * rng.normal(size=500), 0.1)
-    found = evaluated(individual("u(k-1)", "u(k-1)*u(k-1)*u(k-1)", "y(k-1)"), data, constraints="none")
+    found = evaluate_one(individual("u(k-1)", "u(k-1)*u(k-1)*u(k-1)", "y(k-1)"), data, constraints="none")
     assert found.outcome.verdict is Status.SINGULAR
-    assert found.outcome.reason == "the free directions depend on each other"
+    assert (
+        found.outcome.reason == "the regressors are linearly dependent in the null space of the constraints"
+    )
 
 
-def test_a_regressor_that_is_zero_on_the_record_is_singular():
+def test_regressor_that_is_zero_on_the_record_is_singular():
     u = np.concatenate([np.zeros(300), [1.0]])
     data = Dataset(u, np.sin(np.arange(301.0)), 0.1)
-    found = evaluated(individual("y(k-1)", "phi2(u(k-1), q1(u(k-1)))"), data, constraints="none")
+    found = evaluate_one(individual("y(k-1)", "phi2(u(k-1), q1(u(k-1)))"), data, constraints="none")
     assert found.outcome.verdict is Status.SINGULAR
 
 
-def test_a_model_whose_simulation_leaves_the_bound_has_diverged():
-    """Two solutions side by side, the second not damped: the constraint allows it, one step shows nothing."""
+def test_model_whose_simulation_leaves_the_bound_has_diverged():
+    """The constraint allows a second, undamped solution, which one-step-ahead prediction does not show."""
     texts, data = ("y(k-2)", "y(k-3)"), searches.record()
     model = estimate(
         [make_regressor(parse(text)) for text in texts], data, "hysteresis", SETTINGS.maximum_lag
     ).model
     assert max(map(abs, model.parameters)) > 1.0
     assert not multiple_shooting(model, data, 60, SETTINGS.maximum_lag).outcome
-    found = evaluated(individual(*texts), data, shooting=60)
-    assert (found.outcome.verdict, found.outcome.reason) == (Status.DIVERGED, "an interval left the bound")
+    found = evaluate_one(individual(*texts), data, shooting=60)
+    assert (found.outcome.verdict, found.outcome.reason) == (
+        Status.DIVERGED,
+        "the simulation left the divergence bound in an interval",
+    )
     assert (found.fitness, found.theta, found.size) == (np.inf, (), 2)
-    assert evaluated(individual(*texts), data, fitness="one-step").outcome
+    assert evaluate_one(individual(*texts), data, fitness="one-step").outcome
 
 
-def test_a_regressor_that_overflows_on_the_record_has_diverged():
+def test_regressor_that_overflows_on_the_record_has_diverged():
     data = record()
     huge = replace(data, u=1e200 * data.u)
-    found = evaluated(individual("y(k-1)", "u(k-1)*u(k-1)"), huge, constraints="none")
+    found = evaluate_one(individual("y(k-1)", "u(k-1)*u(k-1)"), huge, constraints="none")
     assert found.outcome.verdict is Status.DIVERGED
     assert found.outcome.reason == "a regressor overflows on the record"
 
 
-def test_a_record_too_short_for_the_settings_is_a_caller_s_mistake():
+def test_record_shorter_than_the_warm_up_raises_record_error():
     with pytest.raises(RecordError, match="has 16 samples and the warm-up takes 16"):
         Evaluator(record(16), SETTINGS)
 
 
-def test_genes_of_another_record_or_of_other_settings_are_refused_before_a_kernel_reads_them():
+def test_genes_with_invalid_inputs_or_lags_raise_an_error():
     evaluator = Evaluator(record(), SETTINGS)
-    with pytest.raises(RecordError, match="read input 2, the record has 1"):
+    with pytest.raises(RecordError, match="use input 2, the record has 1"):
         evaluator.evaluate([(individual("y(k-1)", "u2(k-1)"), False)])
-    with pytest.raises(SettingsError, match="read 17 samples back, the settings let them read 16"):
+    with pytest.raises(SettingsError, match="lags up to 17, the settings allow 16"):
         evaluator.evaluate([(individual("y(k-1)", "u(k-17)"), False)])
-    # And nobody is refused for another one's genes.
+    # Invalid genes do not affect later calls.
     assert evaluator.evaluate([(individual("y(k-1)", "u(k-16)", "u(k-15)"), False)])[0][0].outcome
 
 
-def test_an_individual_larger_than_all_bars_is_evaluated():
+def test_individual_larger_than_all_thresholds_is_evaluated():
     each = individual("y(k-1)", "phi1(u(k-1), q1(u(k-1)))", "phi2(u(k-1), q1(u(k-1)))")
     found, _ = Evaluator(record(), replace(SETTINGS, constraints="none")).evaluate([(each, False)], [0.0] * 3)
     assert found[0].outcome
 
 
-# Where the Gram matrix alone does not know enough digits, the columns correct it.
+# Ill-conditioned structures: the columns correct the solution from the Gram matrix.
 
 
 def slow(samples=4000, frequency=0.01):
-    """An input so slow that neighbouring samples hardly differ, and their differences still less."""
+    """Return a record with a slow input, whose consecutive samples and differences are nearly equal."""
     time = np.arange(samples) * 1e-2
     u = 40 * np.sin(2 * np.pi * frequency * time) + 10 * np.sin(3.4 * np.pi * frequency * time + 1)
     rise = np.diff(u, prepend=u[0])
@@ -208,7 +211,7 @@ DIFFERENCES = ("y(k-1)", "u(k-1)", "q1(u(k-1))", "q2(u(k-1))")
 @pytest.mark.parametrize(
     ("texts", "constraints", "frequency"),
     [
-        # The constraint leaves second differences free: a scale of their own hides that little is left.
+        # The constraint leaves second differences free, whose scale hides the loss of digits.
         (DIFFERENCES, "hysteresis", 0.003),
         (DIFFERENCES, "hysteresis", 0.01),
         ((*DIFFERENCES, "q3(u(k-1))"), "hysteresis", 0.03),
@@ -216,27 +219,27 @@ DIFFERENCES = ("y(k-1)", "u(k-1)", "q1(u(k-1))", "q2(u(k-1))")
         (DIFFERENCES[:3], "none", 0.003),
     ],
 )
-def test_ill_conditioned_structures_agree_with_their_columns(texts, constraints, frequency):
+def test_ill_conditioned_structures_agree_with_least_squares(texts, constraints, frequency):
     data = slow(frequency=frequency)
     regressors = [make_regressor(parse(text)) for text in texts]
     expected = estimate(regressors, data, constraints, SETTINGS.maximum_lag).model
-    # The Gram matrix by itself would not do: of sixteen digits its solution loses ten and more.
+    # The solution from the Gram matrix alone loses ten or more of sixteen digits.
     psi = regressor_matrix(regressors, data, SETTINGS.maximum_lag)
     scaled = psi / np.linalg.norm(psi, axis=1, keepdims=True)
     assert np.linalg.eigvalsh(scaled @ scaled.T)[0] < 1e-9
-    found = evaluated(individual(*texts), data, constraints=constraints)
+    found = evaluate_one(individual(*texts), data, constraints=constraints)
     assert found.theta == pytest.approx(expected.theta, rel=1e-5)
 
 
-def test_what_only_roundings_tell_apart_is_singular():
-    found = evaluated(individual(*DIFFERENCES, "q3(u(k-1))"), slow(frequency=0.003), constraints="none")
+def test_regressors_that_differ_only_by_rounding_are_singular():
+    found = evaluate_one(individual(*DIFFERENCES, "q3(u(k-1))"), slow(frequency=0.003), constraints="none")
     assert found.outcome.verdict is Status.SINGULAR
 
 
-# Counting, and the paper's model.
+# Duplicates, and model (13) of the paper.
 
 
-def test_duplicates_are_counted_within_a_batch_and_against_what_was_seen():
+def test_duplicates_are_counted_within_a_batch_and_in_the_cache():
     evaluator = Evaluator(record(), SETTINGS)
     one, same, other = (
         individual("y(k-1)", "u(k-3)"),
@@ -264,8 +267,8 @@ MODEL_13 = (
 )
 
 
-def test_model_13_written_as_genes_gets_the_fitness_of_constrained_least_squares():
-    """It fits the paper's own limits: a height of 5 exactly, back-shifts counted, and nine of ten terms."""
+def test_model_13_as_genes_has_the_fitness_of_constrained_least_squares():
+    """The model meets the limits of the paper: height 5 including back-shifts, and nine of ten terms."""
     setting, model = PRESETS["paper-case1"], PUBLISHED["13"].model
     each = individual(*MODEL_13)
     assert max(map(height, each.genes)) == setting.max_height == 5
@@ -274,9 +277,9 @@ def test_model_13_written_as_genes_gets_the_fitness_of_constrained_least_squares
     (found,), _ = Evaluator(data, setting).evaluate([(each, False)])
     assert found.regressors == model.regressors
     expected = estimate(model.regressors, data, "hysteresis", setting.maximum_lag).model
-    # Four of its terms are differences of the slow input over samples close by: seven digits are known.
+    # Four terms are differences of nearby samples of a slow input, so only seven digits are accurate.
     assert found.theta == pytest.approx(expected.theta, rel=1e-6)
     simulated = multiple_shooting(expected, data, 500, setting.maximum_lag)
     assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-7)
-    # Its free run misses by 0.3 % of the range (Table 1); half a second of it by no more.
+    # The error of its free run is 0.3 % of the range (Table 1); intervals of 0.5 s have no larger error.
     assert 100 * found.fitness**0.5 / data.output_range < 0.4

@@ -1,4 +1,4 @@
-"""Schedules: numbers that change over a run, and where epochs end."""
+"""Schedules: values and stops over the generations, and parsing."""
 
 import re
 from itertools import takewhile
@@ -15,8 +15,8 @@ from support.strategies import schedule_text, schedules
 END = 70
 
 
-def walked(pieces):
-    """Value and stop of every generation, counted on one's fingers."""
+def simulate_schedule(pieces):
+    """Return the value of every generation and all stops, by counting generations."""
     begins, since, values, stops = dict(pieces), 0, [], []
     for generation in range(END):
         since = 0 if generation in begins else since + 1
@@ -29,21 +29,21 @@ def walked(pieces):
 
 
 def stops_after(read, generation):
-    """The stops that a run meets that goes from one to the next."""
+    """Yield the stops of a run that continues from stop to stop."""
     while True:
         generation = read.next_stop(generation)
         yield generation
 
 
 @given(schedules(least=0))
-def test_a_value_holds_from_where_its_piece_begins(pieces):
-    values, _ = walked(pieces)
+def test_value_applies_from_the_beginning_of_its_piece(pieces):
+    values, _ = simulate_schedule(pieces)
     assert [Schedule(pieces).at(generation) for generation in range(END)] == values
 
 
 @given(schedules())
-def test_a_piece_begins_with_a_stop_and_counts_from_there(pieces):
-    _, stops = walked(pieces)
+def test_stops_are_counted_from_the_beginning_of_each_piece(pieces):
+    _, stops = simulate_schedule(pieces)
     read = Schedule(pieces)
     assert [generation for generation in range(-1, END) if read.stops_at(generation)] == stops
     for generation in range(stops[-1]):
@@ -51,23 +51,23 @@ def test_a_piece_begins_with_a_stop_and_counts_from_there(pieces):
 
 
 @given(schedules(), st.integers(0, END))
-def test_stops_do_not_depend_on_where_a_run_was_interrupted(pieces, interrupted):
+def test_stops_do_not_depend_on_interruptions(pieces, interrupted):
     read = Schedule(pieces)
     never = takewhile(lambda stop: stop < 2 * END, stops_after(read, 0))
     resumed = takewhile(lambda stop: stop < 2 * END, stops_after(read, interrupted))
     assert list(resumed) == [stop for stop in never if stop > interrupted]
 
 
-def test_five_and_twenty_from_generation_100_on():
+def test_schedule_with_two_pieces_has_the_documented_meaning():
     read = schedule("5,100:20", 1, "migrate_every")
     assert [read.at(generation) for generation in (0, 99, 100, 10_000)] == [5, 5, 20, 20]
     assert list(takewhile(lambda stop: stop <= 140, stops_after(read, 90))) == [95, 100, 120, 140]
-    # An interval that does not end where a piece begins is cut there.
+    # The beginning of a piece cuts the interval before it.
     assert list(takewhile(lambda stop: stop < 12, stops_after(schedule("4,6:3", 1, "it"), 0))) == [4, 6, 9]
 
 
 @given(schedules(least=0))
-def test_the_text_of_a_schedule_is_read_back(pieces):
+def test_text_of_a_schedule_is_parsed_back(pieces):
     assert schedule(schedule_text(pieces), 0, "migrants") == Schedule(pieces)
 
 
@@ -86,7 +86,7 @@ def test_the_text_of_a_schedule_is_read_back(pieces):
         ("999999999,000000100:000000020", ((0, 999_999_999), (100, 20))),
     ],
 )
-def test_the_forms_of_a_schedule(text, pieces):
+def test_valid_forms_of_a_schedule_are_parsed(text, pieces):
     assert schedule(text, 1, "migrate_every").pieces == pieces
 
 
@@ -111,14 +111,14 @@ def test_the_forms_of_a_schedule(text, pieces):
         *((text, f"migrate_every is at least 1, got {text!r}") for text in (0, "0", "5,100:0", "0,100:5")),
     ],
 )
-def test_a_bad_text_is_refused_by_name(text, message):
+def test_invalid_text_raises_settings_error_with_the_setting(text, message):
     with pytest.raises(SettingsError) as refused:
         schedule(text, 1, "migrate_every")
     assert str(refused.value).startswith(message)
 
 
 @pytest.mark.parametrize(("known", "equal"), [(7, 7.0), (1, True), (7, np.float64(7.0))])
-def test_what_equals_a_number_that_was_read_before_is_refused_all_the_same(known, equal):
+def test_cached_schedule_does_not_accept_equal_values_of_other_types(known, equal):
     assert known == equal
     for _ in range(2):
         assert schedule(known, 1, "migrate_every").pieces == ((0, known),)
@@ -126,14 +126,14 @@ def test_what_equals_a_number_that_was_read_before_is_refused_all_the_same(known
             schedule(equal, 1, "migrate_every")
 
 
-def test_the_least_value_is_the_caller_s():
+def test_smallest_value_is_a_parameter():
     assert schedule("0,5:2", 0, "migrants").at(3) == 0
     with pytest.raises(SettingsError, match="migrants is at least 3, got '3,9:2'"):
         schedule("3,9:2", 3, "migrants")
 
 
 @given(st.text("0123456789,: -x", max_size=12))
-def test_any_text_is_read_or_refused(text):
+def test_arbitrary_text_is_parsed_or_raises_settings_error(text):
     try:
         read = schedule(text, 1, "migrate_every")
     except SettingsError:

@@ -1,4 +1,4 @@
-"""Topologies: from whom an island receives, and what cannot be laid out."""
+"""Topologies: definitions, random graphs, lists of edges, invalid texts."""
 
 from itertools import chain
 
@@ -10,7 +10,7 @@ from islands.errors import SettingsError
 from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE, topology
 from support.strategies import edges, layouts
 
-#: What every number of islands up to here has to obey: primes, squares and what has many divisors.
+#: Numbers of islands: primes, squares and numbers with many divisors.
 NUMBERS = range(1, 41)
 
 NAMED = [name for name in TOPOLOGIES if name not in WITH_DEGREE]
@@ -22,104 +22,104 @@ def sources(text, islands, seed=0):
     return topology(text, islands, seed).sources
 
 
-def out_degrees(laid):
-    given_away = list(chain(*laid))
-    return [given_away.count(island) for island in range(len(laid))]
+def out_degrees(built):
+    targets = list(chain(*built))
+    return [targets.count(island) for island in range(len(built))]
 
 
-def both_ways(laid):
-    return all(island in laid[source] for island, each in enumerate(laid) for source in each)
+def is_symmetric(built):
+    return all(island in built[source] for island, each in enumerate(built) for source in each)
 
 
-def reached(laid, start):
-    """All whose individuals may come to an island, itself among them."""
+def reachable(built, start):
+    """Return all islands whose individuals can reach an island, including the island."""
     found, new = {start}, [start]
     while new:
-        fresh = set(laid[new.pop()]) - found
-        found |= fresh
-        new += fresh
+        unseen = set(built[new.pop()]) - found
+        found |= unseen
+        new += unseen
     return found
 
 
-def strongly_connected(laid):
-    return all(len(reached(laid, island)) == len(laid) for island in range(len(laid)))
+def strongly_connected(built):
+    return all(len(reachable(built, island)) == len(built) for island in range(len(built)))
 
 
-# What all topologies have in common.
+# Properties of all topologies.
 
 
 @given(layouts(40), seeds)
-def test_sources_ascend_in_range_and_nobody_is_its_own(layout, seed):
+def test_sources_are_ascending_valid_and_exclude_the_island(layout, seed):
     text, islands = layout
-    laid = topology(text, islands, seed)
-    assert len(laid.sources) == islands
-    for island, each in enumerate(laid.sources):
+    built = topology(text, islands, seed)
+    assert len(built.sources) == islands
+    for island, each in enumerate(built.sources):
         assert list(each) == sorted(set(each))
         assert set(each) <= set(range(islands)) - {island}
-    assert laid.in_degree == max(len(each) for each in laid.sources)
+    assert built.in_degree == max(len(each) for each in built.sources)
 
 
 @given(layouts(20), seeds)
-def test_the_same_text_number_and_seed_give_the_same_topology(layout, seed):
-    """The cache is left out: it would hide what differs."""
+def test_equal_arguments_give_equal_topologies(layout, seed):
+    """The test bypasses the cache, which would hide differences."""
     text, islands = layout
     assert topology.__wrapped__(text, islands, seed) == topology.__wrapped__(text, islands, seed)
 
 
 @pytest.mark.parametrize("name", [name for name in TOPOLOGIES if name != "isolated"])
-def test_whoever_is_not_isolated_is_reached_by_everybody(name):
+def test_named_topologies_are_strongly_connected(name):
     for islands in NUMBERS[2:] if name in WITH_DEGREE else NUMBERS:
         assert strongly_connected(sources(name, islands)), islands
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_one_island_receives_from_nobody(name):
+def test_single_island_has_no_sources(name):
     assert sources(name, 1) == ((),)
     assert topology(name, 1, 0).in_degree == 0
 
 
-# Each by its definition.
+# Definitions of the topologies.
 
 
-def test_the_isolated_receive_from_nobody():
+def test_isolated_islands_have_no_sources():
     for islands in NUMBERS:
         assert sources("isolated", islands) == ((),) * islands
         assert topology("isolated", islands, 0).in_degree == 0
 
 
-def test_on_a_ring_everybody_receives_from_the_one_before():
+def test_ring_islands_receive_from_the_previous_island():
     assert sources("ring", 4) == ((3,), (0,), (1,), (2,))
     for islands in NUMBERS[1:]:
-        laid = sources("ring", islands)
-        assert laid == tuple(((island - 1) % islands,) for island in range(islands))
-        assert out_degrees(laid) == [1] * islands
-        assert both_ways(laid) == (islands == 2)
+        built = sources("ring", islands)
+        assert built == tuple(((island - 1) % islands,) for island in range(islands))
+        assert out_degrees(built) == [1] * islands
+        assert is_symmetric(built) == (islands == 2)
 
 
-def test_on_a_bidirectional_ring_everybody_receives_from_both_neighbours():
+def test_bidirectional_ring_islands_receive_from_both_neighbours():
     assert sources("bidirectional-ring", 4) == ((1, 3), (0, 2), (1, 3), (0, 2))
     for islands in NUMBERS[2:]:
-        laid = sources("bidirectional-ring", islands)
-        assert {len(each) for each in laid} == {2}
-        assert both_ways(laid)
-        assert all(island - 1 in laid[island] for island in range(1, islands))
+        built = sources("bidirectional-ring", islands)
+        assert {len(each) for each in built} == {2}
+        assert is_symmetric(built)
+        assert all(island - 1 in built[island] for island in range(1, islands))
 
 
-def test_all_receive_from_all_others_where_fully_connected():
+def test_fully_connected_islands_receive_from_all_others():
     for islands in NUMBERS:
-        everybody = set(range(islands))
-        laid = sources("fully-connected", islands)
-        assert [set(each) for each in laid] == [everybody - {island} for island in range(islands)]
+        every_island = set(range(islands))
+        built = sources("fully-connected", islands)
+        assert [set(each) for each in built] == [every_island - {island} for island in range(islands)]
 
 
-def test_on_a_star_island_0_gives_to_all_and_receives_from_all():
+def test_star_connects_island_0_with_all_others():
     for islands in NUMBERS:
         hub, *others = sources("star", islands)
         assert hub == tuple(range(1, islands))
         assert others == [(0,)] * (islands - 1)
 
 
-def test_a_torus_is_the_grid_nearest_to_a_square_closed_in_both_directions():
+def test_torus_is_the_most_square_grid_closed_in_both_directions():
     # Three rows of four.
     assert sources("torus", 12)[:2] == ((1, 3, 4, 8), (0, 2, 5, 9))
     for islands in NUMBERS:
@@ -141,57 +141,57 @@ def test_a_torus_is_the_grid_nearest_to_a_square_closed_in_both_directions():
             )
 
 
-def test_a_torus_has_four_neighbours_and_less_where_it_is_two_or_one_wide():
+def test_torus_has_fewer_than_four_neighbours_if_two_or_one_wide():
     neighbours = {1: 0, 2: 1}
     for rows, columns in ((1, 1), (1, 2), (1, 7), (2, 2), (2, 3), (3, 3), (3, 5), (4, 4), (5, 8)):
-        laid = sources("torus", rows * columns)
-        assert {len(each) for each in laid} == {neighbours.get(rows, 2) + neighbours.get(columns, 2)}
-        assert both_ways(laid)
+        built = sources("torus", rows * columns)
+        assert {len(each) for each in built} == {neighbours.get(rows, 2) + neighbours.get(columns, 2)}
+        assert is_symmetric(built)
 
 
 @pytest.mark.parametrize("prime", [2, 3, 5, 7, 31])
-def test_a_torus_of_a_prime_number_is_a_ring(prime):
+def test_torus_of_a_prime_number_is_a_bidirectional_ring(prime):
     assert sources("torus", prime) == sources("bidirectional-ring", prime)
 
 
-# Random ones.
+# Random topologies.
 
 
 @given(st.data(), st.integers(2, 14), seeds)
-def test_random_regular_ones_give_to_as_many_as_they_receive_from_and_reach_everybody(data, islands, seed):
+def test_random_regular_graphs_are_regular_and_strongly_connected(data, islands, seed):
     degree = data.draw(st.integers(1, islands - 1))
-    laid = sources(f"random-regular:{degree}", islands, seed)
-    assert [len(each) for each in laid] == [degree] * islands
-    assert out_degrees(laid) == [degree] * islands
-    assert strongly_connected(laid)
+    built = sources(f"random-regular:{degree}", islands, seed)
+    assert [len(each) for each in built] == [degree] * islands
+    assert out_degrees(built) == [degree] * islands
+    assert strongly_connected(built)
 
 
-def test_no_seed_leaves_a_part_that_is_cut_off():
-    """Of four islands that are switched at random many fall into two pairs; all of these are thrown away."""
+def test_random_regular_graphs_are_connected_for_many_seeds():
+    """Many random graphs of four islands consist of two pairs; all of these must be rejected."""
     for seed in range(300):
         for islands in (4, 6):
             assert strongly_connected(sources("random-regular:2", islands, seed)), seed
 
 
-def test_random_regular_ones_differ_with_the_seed_and_every_edge_comes():
+def test_random_regular_graphs_differ_by_seed_and_use_all_edges():
     drawn = [sources("random-regular:2", 8, seed) for seed in range(60)]
     assert len(set(drawn)) > 50
     for island in range(8):
-        assert set(chain(*(laid[island] for laid in drawn))) == set(range(8)) - {island}
+        assert set(chain(*(built[island] for built in drawn))) == set(range(8)) - {island}
 
 
-def test_a_degree_of_one_is_a_ring_and_of_all_others_fully_connected():
+def test_extreme_degrees_are_a_ring_and_a_fully_connected_graph():
     for islands in range(2, 9):
         assert sources("random-regular:1", islands, 5) == sources("ring", islands)
         assert sources(f"random-regular:{islands - 1}", islands, 5) == sources("fully-connected", islands)
 
 
-def test_random_regular_without_a_degree_has_two():
+def test_random_regular_has_a_default_degree_of_two():
     assert sources("random-regular", 9, 3) == sources("random-regular:2", 9, 3)
 
 
-def test_a_random_topology_is_what_it_has_always_been():
-    """Golden: a change of it changes every result that anybody has."""
+def test_random_topologies_have_golden_values():
+    """A change of these topologies changes every result that uses them."""
     assert sources("random-regular:2", 6, 7) == ((1, 2), (2, 3), (4, 5), (0, 4), (0, 5), (1, 3))
     assert sources("random-regular:3", 6, 0) == (
         (1, 2, 4),
@@ -207,19 +207,19 @@ def test_a_random_topology_is_what_it_has_always_been():
 
 
 @given(st.data(), st.integers(2, 9), st.booleans())
-def test_a_list_of_edges_is_read_as_written(data, islands, spaces):
+def test_list_of_edges_is_parsed_as_written(data, islands, spaces):
     drawn = data.draw(edges(islands))
     arrow, comma = (" > ", " , ") if spaces else (">", ",")
     text = comma.join(f"{source}{arrow}{target}" for source, target in [*drawn, drawn[0]])
-    laid = sources(text, islands)
-    assert {(source, target) for target, each in enumerate(laid) for source in each} == set(drawn)
+    built = sources(text, islands)
+    assert {(source, target) for target, each in enumerate(built) for source in each} == set(drawn)
 
 
-def test_an_edge_goes_from_its_first_island_to_its_second():
+def test_edge_leads_from_its_first_island_to_its_second():
     assert sources("0>1,1>2,0>2", 4) == ((), (0,), (0, 1), ())
 
 
-# What is refused.
+# Invalid topologies.
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_an_edge_goes_from_its_first_island_to_its_second():
             (
                 f"random-regular:{degree}",
                 islands,
-                f"{islands} islands of degree {degree} have more than 50000 edges to draw: take a",
+                f"{islands} islands of degree {degree} have more than 50000 edges: take a",
             )
             for degree, islands in ((1, 50_001), (2, 25_001), (6, 10_000), (99, 1_000))
         ),
@@ -260,7 +260,7 @@ def test_an_edge_goes_from_its_first_island_to_its_second():
             (f"0>1,{edge}", 4, f"cannot read the edge {edge!r}: write FROM>TO, for example 0>1,1>0")
             for edge in (
                 *("", "1", "1>", ">2", ">", "1>2>3", "1>-2", "one>two", "1.0>2", "1<2", "1 2>3"),
-                # Python itself would refuse to read the longest ones.
+                # Python refuses to convert the longest ones to integers.
                 *("0000000001>2", "1>1234567890", "9" * 5000 + ">1", "1>" + "0" * 5000),
             )
         ),
@@ -270,31 +270,31 @@ def test_an_edge_goes_from_its_first_island_to_its_second():
         ),
     ],
 )
-def test_what_cannot_be_laid_out_is_refused_with_a_reason(text, islands, message):
+def test_invalid_topologies_raise_settings_error_with_a_reason(text, islands, message):
     with pytest.raises(SettingsError) as refused:
         topology(text, islands, 0)
     assert str(refused.value).startswith(message)
 
 
 @pytest.mark.ci
-def test_as_many_edges_as_may_be_drawn_and_a_degree_of_99_are_laid_out():
+def test_largest_random_regular_graphs_are_built():
     assert topology.__wrapped__("random-regular:1", 50_000, 0).in_degree == 1
     assert topology.__wrapped__("random-regular:99", 100, 0).in_degree == 99
     assert topology.__wrapped__("random-regular:10", 30, 0).in_degree == 10
 
 
-def test_a_number_of_nine_digits_is_read_in_an_edge():
+def test_edge_accepts_island_numbers_of_nine_digits():
     assert sources("000000001>000000002", 3) == ((), (), (1,))
 
 
-def test_a_thousand_islands_may_be_fully_connected():
+def test_thousand_islands_can_be_fully_connected():
     assert topology.__wrapped__("fully-connected", 1000, 0).in_degree == 999
 
 
 @given(st.text("0123> ,:ring", max_size=10), st.integers(1, 4))
-def test_any_text_is_laid_out_or_refused(text, islands):
+def test_arbitrary_text_is_built_or_raises_settings_error(text, islands):
     try:
-        laid = topology(text, islands, 0)
+        built = topology(text, islands, 0)
     except SettingsError:
         return
-    assert len(laid.sources) == islands
+    assert len(built.sources) == islands

@@ -1,9 +1,9 @@
-"""One identification for all tests of its facade."""
+"""One identification that the tests of `identify` share."""
 
 import pytest
 
 from islands.facade.identify import identify
-from support.identifications import BUDGET, into, record
+from support.identifications import BUDGET, record, record_states
 
 
 @pytest.fixture(scope="session")
@@ -13,9 +13,9 @@ def data():
 
 @pytest.fixture(scope="session")
 def search(data):
-    """Return a search's result, and what was told of it meanwhile."""
+    """Return the result of an identification and the states that it reported."""
     states = []
-    return identify(data, **BUDGET, seed=5, progress=into(states)), states
+    return identify(data, **BUDGET, seed=5, progress=record_states(states)), states
 
 
 @pytest.fixture(scope="session")

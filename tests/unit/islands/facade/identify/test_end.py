@@ -1,4 +1,4 @@
-"""How an identification ends: by one of its budgets, by a wish to stop, by an error."""
+"""End of an identification: budgets, stop requests, errors."""
 
 from dataclasses import replace
 from math import inf, nextafter
@@ -13,18 +13,21 @@ from islands.evolution.island import StepInfo
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.facade.identify import identify
-from support.identifications import BUDGET, Telling, into
+from support.identifications import BUDGET, RecordingEngine, record_states
 
 
-def told(*best, evaluations=10):
+def make_info(*best, evaluations=10):
     return StepInfo(3, evaluations, 4, {"ok": evaluations - 1, "diverged": 1}, dict(best))
 
 
-def test_what_islands_did_in_a_generation_is_gathered():
+def test_statistics_of_islands_are_combined_per_generation():
     before = SearchState(
         empty_archipelago(2, 0), 100, 7, {"ok": 100}, (HistoryPoint(2, 100, {1: 9.0}, (9.0, inf)),)
     )
-    steps = ((told((2, 0.5), (1, 4.0)), told((1, 2.0), (2, 0.5))), (told(), told((3, 1.0), (2, 0.25))))
+    steps = (
+        (make_info((2, 0.5), (1, 4.0)), make_info((1, 2.0), (2, 0.5))),
+        (make_info(), make_info((3, 1.0), (2, 0.25))),
+    )
     state = advance(before, ArchipelagoEpoch(empty_archipelago(2, 1), steps, {"pairs": (1, 2)}))
     assert state.archipelago == empty_archipelago(2, 1)
     assert (state.evaluations, state.duplicates) == (140, 23)
@@ -52,7 +55,7 @@ def test_what_islands_did_in_a_generation_is_gathered():
         ({"target_error": 0.5}, "target error"),
         ({"target_error": nextafter(0.5, 1.0)}, "target error"),
         ({"target_error": nextafter(0.5, 0.0)}, ""),
-        # Squares of these are no numbers.
+        # The squares of these overflow or underflow.
         ({"target_error": 1e200}, "target error"),
         ({"target_error": 1.7976931348623157e308}, "target error"),
         ({"target_error": 1e-200}, ""),
@@ -61,8 +64,8 @@ def test_what_islands_did_in_a_generation_is_gathered():
         ({"target_error": 0.5, "max_evaluations": 400, "generations": 7}, "generations"),
     ],
 )
-def test_a_search_has_ended_when_one_of_its_budgets_is_used_up(changes, expected):
-    """The error is that of the best island, in the output's unit, as it is now."""
+def test_stop_reason_is_the_budget_that_is_used_up(changes, expected):
+    """The error is the latest RMSE of the best island, in the unit of the output."""
     archipelago = Archipelago(
         tuple(replace(island, generation=7) for island in empty_archipelago(2, 0).islands)
     )
@@ -72,14 +75,14 @@ def test_a_search_has_ended_when_one_of_its_budgets_is_used_up(changes, expected
 
 
 @pytest.mark.parametrize("target", [0.0, 1.0, 1.7976931348623157e308])
-def test_a_search_has_not_ended_before_anybody_has_a_model(target):
+def test_search_continues_until_an_island_has_a_model(target):
     settings = resolve_settings("narx", {"target_error": target, "max_evaluations": 1, "generations": 0})
     assert stop_reason(SearchState(empty_archipelago(2, 0)), settings) == ""
     waiting = SearchState(empty_archipelago(2, 0), history=(HistoryPoint(0, 0, {}, (inf, inf)),))
     assert stop_reason(waiting, replace(settings, generations=1)) == ""
 
 
-def test_an_exact_model_meets_every_target_and_without_a_target_none():
+def test_exact_model_meets_every_positive_target_error():
     exact = SearchState(empty_archipelago(1, 0), history=(HistoryPoint(0, 0, {1: 0.0}, (0.0,)),))
     assert stop_reason(exact, resolve_settings("narx", {"target_error": 1e-9})) == "target error"
     assert stop_reason(exact, resolve_settings("narx", {"target_error": 0.0})) == ""
@@ -88,9 +91,9 @@ def test_an_exact_model_meets_every_target_and_without_a_target_none():
 @pytest.mark.parametrize(
     "budget", [*(pytest.param(each, marks=pytest.mark.ci) for each in (1, 30, 151)), 31, 91]
 )
-def test_a_search_ends_with_the_first_epoch_that_reaches_its_evaluations(data, states, budget):
+def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, states, budget):
     seen = []
-    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, progress=into(seen))
+    found = identify(data, **BUDGET, max_evaluations=budget, seed=5, progress=record_states(seen))
     last = next((place for place, state in enumerate(states) if state.evaluations >= budget), 4)
     assert seen == states[: last + 1]
     search = found.search_result.search
@@ -100,10 +103,10 @@ def test_a_search_ends_with_the_first_epoch_that_reaches_its_evaluations(data, s
 
 
 @pytest.mark.parametrize("place", [0, 2, 4])
-def test_a_search_ends_with_the_first_epoch_that_reaches_its_error(data, states, place):
+def test_search_ends_with_the_first_epoch_that_reaches_target_error(data, states, place):
     seen = []
     target = nextafter(min(states[place].history[-1].islands) ** 0.5, inf)
-    found = identify(data, **BUDGET, target_error=target, seed=5, progress=into(seen))
+    found = identify(data, **BUDGET, target_error=target, seed=5, progress=record_states(seen))
     last = next(at for at, state in enumerate(states) if min(state.history[-1].islands) <= target**2)
     assert last <= place
     assert seen == states[: last + 1]
@@ -111,70 +114,70 @@ def test_a_search_ends_with_the_first_epoch_that_reaches_its_error(data, states,
     assert found.search_result.search.history == states[last].history
 
 
-def test_a_budget_that_is_reached_within_an_epoch_ends_with_it(data, states):
-    """Every epoch is one that a longer run has too: nobody is cut off in the middle."""
+def test_epoch_in_which_a_budget_is_reached_is_completed(data, states):
+    """A longer run has the same epochs, because no epoch is cut short."""
     seen = []
     changes = {**BUDGET, "migrate_every": 3, "max_evaluations": 31}
-    found = identify(data, **changes, seed=5, progress=into(seen))
+    found = identify(data, **changes, seed=5, progress=record_states(seen))
     assert [state.evaluations for state in seen] == [30, 120]
     assert seen[-1].history == states[3].history
     assert (found.search_result.search.generations, found.search_result.search.ended_by) == (3, "evaluations")
 
 
-def test_a_search_that_ends_early_leaves_its_engine(data):
-    engine = Telling()
+def test_search_that_ends_early_closes_its_engine(data):
+    engine = RecordingEngine()
     identify(data, **BUDGET, max_evaluations=60, seed=5, engine=engine)
-    assert (len(engine.epochs), engine.left) == (2, True)
+    assert (len(engine.epochs), engine.closed) == (2, True)
 
 
-def test_a_search_that_fails_leaves_its_engine(data):
+def test_search_that_fails_closes_its_engine(data):
     def broken(_state, _settings):
         raise ZeroDivisionError
 
-    engine = Telling()
+    engine = RecordingEngine()
     with pytest.raises(ZeroDivisionError) as failed:
         identify(data, **BUDGET, seed=5, engine=engine, progress=broken)
-    # At once, and not when the error's trace is forgotten.
-    assert (len(engine.epochs), engine.left) == (1, True), failed
+    # The engine is closed at once, not when the traceback is released.
+    assert (len(engine.epochs), engine.closed) == (1, True), failed
 
 
-def test_a_search_that_is_stopped_keeps_its_last_epoch(data, states):
+def test_stopped_search_keeps_its_last_epoch(data, states):
     seen = []
-    found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 2)
+    found = identify(data, **BUDGET, seed=5, progress=record_states(seen), stop=lambda: len(seen) == 2)
     assert seen == states[:2]
     assert found.search_result.search.ended_by == "stopped"
     assert found.search_result.search.generations == 1
     assert found.search_result.search.history == states[1].history
 
 
-def test_a_search_that_is_stopped_within_an_epoch_keeps_the_one_before(data, states):
-    asked = []
+def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
+    calls = []
 
     def stop():
-        asked.append(True)
-        return len(asked) > 6
+        calls.append(True)
+        return len(calls) > 6
 
     seen = []
-    found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, progress=into(seen), stop=stop)
+    found = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, progress=record_states(seen), stop=stop)
     assert seen == states[:1]
     assert (found.search_result.search.generations, found.search_result.search.ended_by) == (0, "stopped")
-    # It goes on from there as if never stopped.
-    go_on = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, start=seen[-1])
-    assert go_on.search_result.search.history == states[-1].history
+    # A resumed run continues as if it had not been stopped.
+    resumed = identify(data, **{**BUDGET, "migrate_every": 4}, seed=5, start=seen[-1])
+    assert resumed.search_result.search.history == states[-1].history
 
 
-def test_a_search_that_is_stopped_after_its_last_epoch_has_ended(data, states):
+def test_search_stopped_after_its_last_epoch_has_used_its_budget(data, states):
     seen = []
-    found = identify(data, **BUDGET, seed=5, progress=into(seen), stop=lambda: len(seen) == 5)
+    found = identify(data, **BUDGET, seed=5, progress=record_states(seen), stop=lambda: len(seen) == 5)
     assert seen == states
     assert found.search_result.search.ended_by == "generations"
 
 
-def test_a_search_that_is_stopped_before_its_first_population_is_refused(data):
+def test_search_stopped_before_its_first_population_raises_an_error(data):
     with pytest.raises(SettingsError, match="stopped before the first populations were evaluated"):
         identify(data, **BUDGET, progress=pytest.fail, stop=lambda: True)
 
 
-def test_a_state_is_that_of_an_archipelago():
+def test_search_state_needs_an_archipelago():
     with pytest.raises(TypeError, match="archipelago"):
         SearchState()

@@ -1,4 +1,4 @@
-"""The facade of evolution: settings in, a result out, the same with every engine and after every stop."""
+"""`islands.identify`: results, seeds, start states and engines."""
 
 from dataclasses import asdict, replace
 from itertools import pairwise
@@ -15,18 +15,18 @@ from islands.facade.identify import identify
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.candidate_library import full_set
 from islands.validation.physics import check_physics
-from support.identifications import BUDGET, Telling, parameters
+from support.identifications import BUDGET, RecordingEngine, parameters
 
-# What a result says.
+# Contents of a result.
 
 
-def test_a_result_says_what_the_search_did(result):
+def test_result_has_the_statistics_of_the_search(result):
     search = result.search_result.search
     assert search.generations == 4
     assert search.evaluations == 5 * 30
     assert sum(search.outcomes.values()) == search.evaluations
     assert 0 < search.duplicates < search.evaluations
-    # Who was abandoned has a model: nobody needed to know how good it is.
+    # Abandoned individuals count as feasible.
     assert search.outcomes["abandoned"] > 0
     models = search.outcomes["ok"] + search.outcomes["abandoned"]
     assert search.feasible_share == models / search.evaluations > 0.5
@@ -34,7 +34,7 @@ def test_a_result_says_what_the_search_did(result):
     assert search.ended_by == "generations"
 
 
-def test_a_result_holds_the_course_of_the_search(result, states):
+def test_result_has_the_history_of_the_search(result, states):
     history = result.search_result.search.history
     assert [point.generation for point in history] == [0, 1, 2, 3, 4]
     assert [point.evaluations for point in history] == [30, 60, 90, 120, 150]
@@ -44,8 +44,8 @@ def test_a_result_holds_the_course_of_the_search(result, states):
     assert [state.history for state in states] == [history[: count + 1] for count in range(5)]
 
 
-def test_the_full_set_is_that_of_the_lags_and_degree_of_what_was_found(result, states):
-    """Equation (5); and the memory that its matrix would take, eight bytes a number."""
+def test_full_set_has_the_lags_and_degree_of_the_hall_of_fame(result, states):
+    """Equation (5), and the memory of its regressor matrix with eight bytes per number."""
     found = [item for entry in states[-1].archipelago.hall_of_fame.entries for item in entry.regressors]
     lags = max(lag for item in found for _, lag in item.lags)
     full = result.search_result.search.full_set
@@ -56,17 +56,17 @@ def test_the_full_set_is_that_of_the_lags_and_degree_of_what_was_found(result, s
     assert full["bytes"] == 8 * rows * full["candidates"]
 
 
-def test_a_result_holds_every_setting_that_determines_it(result):
-    described = dict(result.search_result.settings)
+def test_result_has_all_settings_that_determine_it(result):
+    settings = dict(result.search_result.settings)
     expected = asdict(resolve_settings("hysteresis", BUDGET))
-    assert {name: described[name] for name in expected} == expected
-    assert (described["method"], described["preset"], described["islands"]) == ("identify", "hysteresis", 1)
-    assert described["validation"] == 0.25
+    assert {name: settings[name] for name in expected} == expected
+    assert (settings["method"], settings["preset"], settings["islands"]) == ("identify", "hysteresis", 1)
+    assert settings["validation"] == 0.25
     assert result.search_result.seed == 5
     assert result.search_result.record.samples == 3000
 
 
-def test_models_come_best_first_one_a_size_and_none_larger_than_asked_for(result):
+def test_models_are_ordered_and_have_different_sizes_up_to_max_terms(result):
     sizes = [fitted.model.size for fitted in result.models]
     assert len(set(sizes)) == len(sizes)
     assert max(sizes) <= 5
@@ -75,15 +75,15 @@ def test_models_come_best_first_one_a_size_and_none_larger_than_asked_for(result
     assert result.best.metrics["validation"]["free_run"].mape < 0.5
 
 
-def test_every_constrained_model_has_property_1_and_its_uncertainty(result):
+def test_constrained_models_have_property_1_and_standard_errors(result):
     for fitted in result.models:
         assert fitted.physics.property_1
         assert all(error >= 0.0 for error in fitted.model.standard_errors)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3])
-def test_a_model_without_property_1_is_never_the_answer_under_the_constraint(data, seed):
-    """The sums alone let it pass: with y(k-2) for y(k-1) two solutions run side by side, none damped."""
+def test_models_without_property_1_are_rejected_under_the_constraint(data, seed):
+    """With y(k-2) instead of y(k-1) the cluster sums are met, but two undamped solutions interleave."""
     states = []
     budget = {"preset": "paper-case1", "population": 30, "generations": 2, "max_terms": 4, "shooting": 100}
     short = data[:1500]
@@ -100,7 +100,7 @@ def test_a_model_without_property_1_is_never_the_answer_under_the_constraint(dat
 # Seeds and starts.
 
 
-def test_the_same_seed_gives_the_same_models_bit_for_bit_and_another_one_others(data, result):
+def test_equal_seeds_give_equal_bits_and_other_seeds_other_results(data, result):
     again = identify(data, **BUDGET, seed=5)
     assert parameters(again) == parameters(result)
     assert again.search_result.search.history == result.search_result.search.history
@@ -109,7 +109,7 @@ def test_the_same_seed_gives_the_same_models_bit_for_bit_and_another_one_others(
 
 
 @pytest.mark.parametrize("stop", [0, 2, 4])
-def test_a_start_goes_on_as_if_never_stopped(data, result, states, stop, tmp_path):
+def test_run_from_a_start_state_equals_an_uninterrupted_run(data, result, states, stop, tmp_path):
     write_checkpoint(states[stop].archipelago, tmp_path / "checkpoint.json", {})
     stored = replace(states[stop], archipelago=read_checkpoint(tmp_path / "checkpoint.json")[0])
     resumed = identify(data, **BUDGET, seed=5, start=stored)
@@ -133,12 +133,12 @@ def test_a_start_goes_on_as_if_never_stopped(data, result, states, stop, tmp_pat
         Archipelago((empty_archipelago(2, 5).islands[0], empty_archipelago(2, 6).islands[1])),
     ],
 )
-def test_a_start_of_other_islands_or_another_seed_is_refused(data, other):
-    with pytest.raises(SettingsError, match="the start has other islands than the settings, or another seed"):
+def test_start_with_other_islands_or_another_seed_raises_an_error(data, other):
+    with pytest.raises(SettingsError, match="the start state has other islands or another seed"):
         identify(data, **BUDGET, islands=2, seed=5, start=SearchState(other), progress=pytest.fail)
 
 
-def test_a_start_of_its_own_islands_that_nobody_lives_on_is_the_beginning(data, result):
+def test_empty_start_state_equals_a_run_without_a_start_state(data, result):
     begun = identify(data, **BUDGET, seed=5, start=SearchState(empty_archipelago(1, 5)))
     assert parameters(begun) == parameters(result)
     assert begun.search_result.search.history == result.search_result.search.history
@@ -148,12 +148,12 @@ def islands_budget(**changes):
     return {**BUDGET, "population": 12, "generations": 3, "migrants": 3, "emigrants": "random", **changes}
 
 
-def test_islands_evolve_beside_each_other(data):
-    one, three, apart = [], [], []
+def test_islands_evolve_independently_between_migrations(data):
+    one, three, isolated = [], [], []
     for states, changes in (
         (one, {}),
         (three, {"islands": 3}),
-        (apart, {"islands": 3, "topology": "isolated"}),
+        (isolated, {"islands": 3, "topology": "isolated"}),
     ):
         budget = islands_budget(**changes)
         result = identify(
@@ -166,17 +166,17 @@ def test_islands_evolve_beside_each_other(data):
                 best = min(entry.fitness for entry in island.hall_of_fame.entries)
                 assert state.history[-1].islands[place] == best
             assert min(state.history[-1].islands) == min(state.history[-1].best.values())
-    # Who receives from nobody evolves as if it were alone; nobody has left before the first epoch's end.
-    assert [state.archipelago.islands[0] for state in apart] == [
+    # An isolated island evolves as if it were alone. No migration happens before the end of the first epoch.
+    assert [state.archipelago.islands[0] for state in isolated] == [
         state.archipelago.islands[0] for state in one
     ]
-    assert [state.archipelago for state in apart[:2]] == [state.archipelago for state in three[:2]]
-    assert apart[-1].archipelago != three[-1].archipelago
+    assert [state.archipelago for state in isolated[:2]] == [state.archipelago for state in three[:2]]
+    assert isolated[-1].archipelago != three[-1].archipelago
     resumed = identify(data[:1000], **islands_budget(islands=3), seed=5, start=three[1])
     assert resumed.search_result.search.history == three[-1].history
 
 
-def test_an_epoch_ends_where_the_schedule_says_and_its_generations_are_all_told(data):
+def test_epochs_end_at_stops_and_report_all_generations(data):
     states, longer = [], []
     for to, every in ((states, 3), (longer, "2,3:1")):
         identify(
@@ -188,12 +188,12 @@ def test_an_epoch_ends_where_the_schedule_says_and_its_generations_are_all_told(
     assert [state.archipelago.generation for state in longer] == [0, 2, 3, 4]
     assert [state.history[-1].generation for state in states] == [0, 3, 4]
     assert [state.evaluations // states[0].evaluations for state in states] == [1, 4, 5]
-    # A single island does not notice.
+    # A single island does not depend on the schedule.
     assert states[-1].history == longer[-1].history
 
 
-def test_another_engine_may_carry_a_search_out(data, result):
-    engine = Telling()
+def test_other_engine_gives_the_same_result(data, result):
+    engine = RecordingEngine()
     found = identify(data, **BUDGET, seed=5, engine=engine)
     assert parameters(found) == parameters(result)
     infos = [info for epoch in engine.epochs for (info,) in epoch.steps]

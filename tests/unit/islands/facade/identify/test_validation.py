@@ -1,4 +1,4 @@
-"""What an identification takes and refuses: validation data, presets, constraints, settings."""
+"""Arguments of `islands.identify`: validation data, presets, constraints, settings."""
 
 from dataclasses import asdict, replace
 
@@ -19,18 +19,18 @@ from support.identifications import BUDGET, parameters, record, two_inputs
 from support.searches import distinct_genes
 
 
-def test_validation_may_be_a_record_of_its_own(data, result):
+def test_validation_data_may_be_a_separate_record(data, result):
     parts = split(data, 0.25)
-    own = identify(parts.estimation, parts.validation, **BUDGET, seed=5)
-    assert parameters(own) == parameters(result)
-    assert own.search_result.split.validation is parts.validation
+    separate = identify(parts.estimation, parts.validation, **BUDGET, seed=5)
+    assert parameters(separate) == parameters(result)
+    assert separate.search_result.split.validation is parts.validation
     elsewhere = identify(parts.estimation, record(seed=9), **BUDGET, seed=5)
-    assert own.search_result.settings["validation"] != elsewhere.search_result.settings["validation"]
+    assert separate.search_result.settings["validation"] != elsewhere.search_result.settings["validation"]
     assert elsewhere.search_result.search.history == result.search_result.search.history
 
 
-def test_validation_data_never_reaches_the_search(data, result):
-    """Only which models are kept, and in which order, may depend on it."""
+def test_validation_data_do_not_affect_the_search(data, result):
+    """Only the selection and order of models may depend on them."""
     parts = split(data, 0.25)
     spoilt = replace(parts.validation, y=parts.validation.y[::-1].copy())
     other = identify(parts.estimation, spoilt, **BUDGET, seed=5)
@@ -41,11 +41,11 @@ def test_validation_data_never_reaches_the_search(data, result):
 
 @pytest.mark.parametrize(
     ("seed", "changes"),
-    # Pruned as hard as that, hardly a seed outlives the first generation: it is a candidate all the same.
+    # Strong pruning removes the seeds from the first population, but they remain final candidates.
     [(0, {}), (1, {}), (1, {"prune": 1.0, "tolerance": 0.05})],
 )
-def test_a_result_is_never_worse_than_the_forward_selection_that_seeds_it(seed, changes):
-    """On the validation data, size for size, whatever the budget."""
+def test_result_is_never_worse_than_its_forward_selection_seeds(seed, changes):
+    """The comparison uses the validation data, for each size."""
     data = record(seed=seed)
     parts = split(data, 0.25)
     budget = {**BUDGET, "population": 8, "generations": 1, **changes}
@@ -62,8 +62,8 @@ def test_a_result_is_never_worse_than_the_forward_selection_that_seeds_it(seed, 
     assert compared >= 3
 
 
-def test_refinement_takes_nothing_away(data):
-    """Refined models stand beside those that were estimated: validation chooses."""
+def test_refinement_never_makes_the_result_worse(data):
+    """Validation selects between refined and estimated models."""
     plain, refined = (identify(data, **BUDGET, seed=5, refine=refine) for refine in (False, True))
     assert plain.search_result.search.history == refined.search_result.search.history
     errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in refined.models}
@@ -72,12 +72,12 @@ def test_refinement_takes_nothing_away(data):
     assert min(errors.values()) < 0.999 * plain.best.metrics["validation"]["free_run"].rmse
 
 
-def test_without_a_constraint_models_need_no_property_1(data):
+def test_models_without_a_constraint_do_not_need_property_1(data):
     found = identify(data, **BUDGET, constraints="none", structure="free")
     assert any(not fitted.physics.property_1 for fitted in found.models)
 
 
-def test_two_inputs_and_segments_are_identified():
+def test_record_with_two_inputs_and_segments_is_identified():
     one, other = record(1200, seed=1), record(1200, seed=2)
     rng = np.random.default_rng(3)
     u2 = np.cumsum(rng.normal(size=2400)) / 50
@@ -92,7 +92,7 @@ def test_two_inputs_and_segments_are_identified():
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_every_preset_runs_on_a_small_budget(data, preset):
+def test_presets_run_with_a_small_budget(data, preset):
     found = identify(data[:1500], preset=preset, population=12, generations=1, max_terms=4)
     assert found.search_result.settings["preset"] == preset
     search = found.search_result.search
@@ -101,7 +101,7 @@ def test_every_preset_runs_on_a_small_budget(data, preset):
     assert all(fitted.model.size <= 4 for fitted in found.models)
 
 
-# Messages before the search, not after it.
+# Errors before the search starts.
 
 
 @pytest.mark.parametrize(
@@ -126,13 +126,13 @@ def test_every_preset_runs_on_a_small_budget(data, preset):
         ({"validation": 1.5}, "the validation fraction lies between 0 and 1, got 1.5"),
     ],
 )
-def test_a_bad_budget_is_refused_by_name(data, changes, message):
+def test_invalid_setting_raises_settings_error_with_its_name(data, changes, message):
     with pytest.raises(SettingsError, match=message):
         identify(data, progress=pytest.fail, **changes)
 
 
-def test_records_that_are_too_short_are_refused_before_the_search(data):
-    with pytest.raises(RecordError, match="the validation data has 20 samples: with lags down to"):
+def test_too_short_records_raise_an_error_before_the_search(data):
+    with pytest.raises(RecordError, match="the validation data has 20 samples: lags up to"):
         identify(data, data[:20], progress=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="the validation data has 25 samples"):
         identify(data[:100], progress=pytest.fail, **BUDGET)
@@ -140,15 +140,15 @@ def test_records_that_are_too_short_are_refused_before_the_search(data):
         identify(data[:20], data, progress=pytest.fail, **BUDGET)
 
 
-def test_validation_data_of_another_system_is_refused(data):
+def test_validation_data_of_another_system_raise_an_error(data):
     with pytest.raises(RecordError, match="the validation data 2"):
         identify(data, two_inputs(seed=1), progress=pytest.fail)
     with pytest.raises(RecordError, match="resample one of them"):
         identify(data, replace(data, dt=0.5), progress=pytest.fail)
 
 
-def test_where_no_model_is_found_the_outcomes_say_why():
-    """What grows by 5 % a sample while it is measured runs out of all bounds on a longer record."""
+def test_error_without_models_lists_the_outcomes():
+    """The output grows by 5 % per sample, so the free run diverges on a longer record."""
     u = np.random.default_rng(0).normal(size=1000)
     growing = Dataset(u[:150], 1.05 ** np.arange(150.0), 0.1)
     with pytest.raises(SettingsError, match=r"no model was found: \{'ok': 1\}; take another preset, more"):
@@ -176,7 +176,7 @@ def test_where_no_model_is_found_the_outcomes_say_why():
         ({"max_height": 9}, {"initial_height": 3}),
     ],
 )
-def test_smaller_models_begin_smaller(changes, expected):
+def test_initial_sizes_are_limited_by_the_maximum_sizes(changes, expected):
     made = asdict(resolve_settings("paper-case1", changes))
     assert {name: made[name] for name in expected} == expected
     assert {name: made[name] for name in changes} == changes
