@@ -1,7 +1,7 @@
-"""What every engine owes: the same epochs, bit for bit, wherever it starts and however it carries them out.
+"""Contract of engines: equal epochs, bit for bit, from every start.
 
-A new engine joins the table of engines and is held to all of it. On Ray the laws about one course are fast,
-since they share its actors.
+The tests run for every entry of the table of engines. On Ray, tests of one history are fast because they
+share actors.
 """
 
 from collections import Counter
@@ -41,26 +41,26 @@ SETTINGS = Settings(
     characters=("plain", "explorer"),
 )
 
-#: The first populations, two epochs of two generations, a third, and what is left.
+#: Ends of the epochs: the first population, three epochs of two generations, and the rest.
 GENERATIONS = [0, 2, 4, 6, 7]
 
 
-#: On Ray a search that is resumed in the middle is enough for every change.
+#: Levels of the tests that resume a search on Ray; one of them runs for every change.
 RESUMED = [pytest.mark.nightly, pytest.mark.ci, pytest.mark.nightly, pytest.mark.nightly]
 
 
-def elsewhere(mark):
-    """Mark a law that starts actors of its own, two seconds of CPU, on every engine but the serial one."""
+def separate_actors(mark):
+    """Mark a test that starts separate actors (two seconds of CPU) on all engines except the serial one."""
     engines = [pytest.param(name, marks=() if name == "serial" else mark) for name in ENGINES]
     return pytest.mark.parametrize("name", engines, indirect=True, scope="module")
 
 
-def never():
+def never_stop():
     return False
 
 
 @pytest.fixture(scope="module")
-def posed():
+def search_problem():
     return problem(record(300), SETTINGS)
 
 
@@ -77,39 +77,39 @@ def engine(request, name):
 
 
 @pytest.fixture(scope="module")
-def courses():
-    """The course of every engine that has run, whatever the order of the tests."""
+def histories():
+    """Histories of the engines that have run, for any order of the tests."""
     return {}
 
 
 @pytest.fixture(scope="module")
-def course(name, engine, posed, courses):
-    """Every epoch of three islands, never stopped: every engine's is held against every other engine's."""
-    if name not in courses:
-        courses[name] = list(engine.run(posed, empty_archipelago(3, 7), never))
-    return courses[name]
+def history(name, engine, search_problem, histories):
+    """All epochs of an uninterrupted run with three islands."""
+    if name not in histories:
+        histories[name] = list(engine.run(search_problem, empty_archipelago(3, 7), never_stop))
+    return histories[name]
 
 
 def archipelagos(epochs):
     return [epoch.archipelago for epoch in epochs]
 
 
-def test_epochs_end_where_islands_migrate_and_at_the_last_generation(course):
-    assert [epoch.archipelago.generation for epoch in course] == GENERATIONS
-    for epoch in course:
+def test_epochs_end_at_migrations_and_at_the_last_generation(history):
+    assert [epoch.archipelago.generation for epoch in history] == GENERATIONS
+    for epoch in history:
         islands = epoch.archipelago.islands
         assert [island.generation for island in islands] == [epoch.archipelago.generation] * 3
         assert [island.index for island in islands] == [0, 1, 2]
         assert {island.seed for island in islands} == {7}
 
 
-def test_an_engine_does_what_the_islands_do_one_by_one(course, posed):
-    """The definition: every island by itself, and every island's emigrants handed to the next one."""
-    evaluators = [Evaluator(posed.record, posed.settings) for _ in range(3)]
+def test_engine_equals_single_epochs_of_the_islands(history, search_problem):
+    """By definition every island runs separately and passes its emigrants to the next one."""
+    evaluators = [Evaluator(search_problem.record, search_problem.settings) for _ in range(3)]
     islands, leaving = empty_archipelago(3, 7).islands, [(), (), ()]
-    for epoch in course:
+    for epoch in history:
         epochs = [
-            run_epoch(island, [leaving[index - 1]], evaluators[index], posed, never)
+            run_epoch(island, [leaving[index - 1]], evaluators[index], search_problem, never_stop)
             for index, island in enumerate(islands)
         ]
         islands, leaving = [each.island for each in epochs], [each.emigrants for each in epochs]
@@ -117,14 +117,14 @@ def test_an_engine_does_what_the_islands_do_one_by_one(course, posed):
         assert epoch.steps == tuple(each.steps for each in epochs)
 
 
-@elsewhere(pytest.mark.nightly)
-def test_migration_makes_a_difference(course, engine, posed):
-    alone = replace(posed, settings=replace(SETTINGS, topology="isolated"))
-    isolated = archipelagos(engine.run(alone, empty_archipelago(3, 7), never))
-    # Whoever leaves at generation 2 arrives at the beginning of the epoch behind it.
-    assert isolated[:2] == archipelagos(course)[:2]
-    assert isolated[-1] != course[-1].archipelago
-    assert all(select_migrants(island, SETTINGS) for island in course[1].archipelago.islands)
+@separate_actors(pytest.mark.nightly)
+def test_migration_affects_the_result(history, engine, search_problem):
+    alone = replace(search_problem, settings=replace(SETTINGS, topology="isolated"))
+    isolated = archipelagos(engine.run(alone, empty_archipelago(3, 7), never_stop))
+    # Emigrants of generation 2 immigrate at the beginning of the next epoch.
+    assert isolated[:2] == archipelagos(history)[:2]
+    assert isolated[-1] != history[-1].archipelago
+    assert all(select_migrants(island, SETTINGS) for island in history[1].archipelago.islands)
 
 
 @pytest.mark.parametrize(
@@ -137,72 +137,78 @@ def test_migration_makes_a_difference(course, engine, posed):
     indirect=["name"],
     scope="module",
 )
-def test_resumed_from_any_epoch_equals_never_stopped(engine, course, posed, stop):
-    resumed = engine.run(posed, course[stop].archipelago, never)
-    assert archipelagos(resumed) == archipelagos(course)[stop + 1 :]
+def test_run_resumed_from_any_epoch_equals_an_uninterrupted_run(engine, history, search_problem, stop):
+    resumed = engine.run(search_problem, history[stop].archipelago, never_stop)
+    assert archipelagos(resumed) == archipelagos(history)[stop + 1 :]
 
 
-@elsewhere(pytest.mark.nightly)
-def test_resumed_from_a_checkpoint_equals_never_stopped_bit_for_bit(engine, course, posed, tmp_path):
-    paths = tmp_path / "never-stopped.json", tmp_path / "resumed.json", tmp_path / "stop.json"
-    write_checkpoint(course[1].archipelago, paths[2], {})
+@separate_actors(pytest.mark.nightly)
+def test_run_resumed_from_a_checkpoint_has_equal_bits(engine, history, search_problem, tmp_path):
+    paths = tmp_path / "uninterrupted.json", tmp_path / "resumed.json", tmp_path / "stop.json"
+    write_checkpoint(history[1].archipelago, paths[2], {})
     stored, _ = read_checkpoint(paths[2])
-    assert stored == course[1].archipelago
-    # What the islands abandon next hangs on their bars.
+    assert stored == history[1].archipelago
+    # The thresholds determine which individuals the islands abandon next.
     assert all(island.abandon_threshold < inf for island in stored.islands)
-    *_, last = engine.run(posed, stored, never)
-    write_checkpoint(course[-1].archipelago, paths[0], {})
+    *_, last = engine.run(search_problem, stored, never_stop)
+    write_checkpoint(history[-1].archipelago, paths[0], {})
     write_checkpoint(last.archipelago, paths[1], {})
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-@elsewhere(pytest.mark.nightly)
-def test_an_engine_may_run_twice_and_be_left_between(engine, course, posed):
-    first = engine.run(posed, empty_archipelago(3, 7), never)
-    assert next(first).archipelago == course[0].archipelago
+@separate_actors(pytest.mark.nightly)
+def test_engine_can_be_closed_early_and_run_again(engine, history, search_problem):
+    first = engine.run(search_problem, empty_archipelago(3, 7), never_stop)
+    assert next(first).archipelago == history[0].archipelago
     first.close()
-    assert archipelagos(engine.run(posed, empty_archipelago(3, 7), never)) == archipelagos(course)
+    assert archipelagos(engine.run(search_problem, empty_archipelago(3, 7), never_stop)) == archipelagos(
+        history
+    )
 
 
-def test_from_the_last_epoch_there_is_nothing_to_do(engine, course, posed):
-    assert list(engine.run(posed, course[-1].archipelago, never)) == []
+def test_run_from_the_last_epoch_yields_nothing(engine, history, search_problem):
+    assert list(engine.run(search_problem, history[-1].archipelago, never_stop)) == []
 
 
-@elsewhere(pytest.mark.nightly)
-def test_more_generations_go_on_where_fewer_ended(engine, course, posed):
-    shorter = replace(posed, settings=replace(SETTINGS, generations=4))
-    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never)
-    assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
+@separate_actors(pytest.mark.nightly)
+def test_run_with_more_generations_continues_a_shorter_run(engine, history, search_problem):
+    shorter = replace(search_problem, settings=replace(SETTINGS, generations=4))
+    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never_stop)
+    assert (
+        archipelagos(engine.run(search_problem, stopped.archipelago, never_stop)) == archipelagos(history)[3:]
+    )
 
 
-@elsewhere(pytest.mark.nightly)
-def test_a_run_that_ended_between_two_stops_goes_on_to_the_same_stops(engine, course, posed):
-    shorter = replace(posed, settings=replace(SETTINGS, generations=5))
-    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never)
+@separate_actors(pytest.mark.nightly)
+def test_run_that_ended_between_stops_continues_to_the_same_stops(engine, history, search_problem):
+    shorter = replace(search_problem, settings=replace(SETTINGS, generations=5))
+    *_, stopped = engine.run(shorter, empty_archipelago(3, 7), never_stop)
     assert stopped.archipelago.generation == 5
-    assert archipelagos(engine.run(posed, stopped.archipelago, never)) == archipelagos(course)[3:]
+    assert (
+        archipelagos(engine.run(search_problem, stopped.archipelago, never_stop)) == archipelagos(history)[3:]
+    )
 
 
-@elsewhere(pytest.mark.ci)
-def test_told_to_stop_an_engine_ends_and_what_it_yielded_stands(engine, course, posed):
+@separate_actors(pytest.mark.ci)
+def test_stopped_engine_yields_no_further_epochs(engine, history, search_problem):
     seen = []
-    for epoch in engine.run(posed, empty_archipelago(3, 7), lambda: len(seen) == 2):
+    for epoch in engine.run(search_problem, empty_archipelago(3, 7), lambda: len(seen) == 2):
         seen.append(epoch.archipelago)  # noqa: PERF401 - the engine asks while the list grows
-    assert seen == archipelagos(course)[:2]
-    assert list(engine.run(posed, empty_archipelago(3, 7), lambda: True)) == []
+    assert seen == archipelagos(history)[:2]
+    assert list(engine.run(search_problem, empty_archipelago(3, 7), lambda: True)) == []
 
 
-@elsewhere(pytest.mark.nightly)
-def test_another_seed_is_another_run(engine, course, posed):
-    other = next(iter(engine.run(posed, empty_archipelago(3, 8), never))).archipelago
+@separate_actors(pytest.mark.nightly)
+def test_different_seeds_give_different_runs(engine, history, search_problem):
+    other = next(iter(engine.run(search_problem, empty_archipelago(3, 8), never_stop))).archipelago
     assert [island.population for island in other.islands] != [
-        island.population for island in course[0].archipelago.islands
+        island.population for island in history[0].archipelago.islands
     ]
 
 
-def test_every_step_is_told(course):
+def test_steps_report_all_generations(history):
     before = -1
-    for epoch in course:
+    for epoch in history:
         for island, steps in zip(epoch.archipelago.islands, epoch.steps, strict=True):
             assert [info.generation for info in steps] == list(range(before + 1, island.generation + 1))
             assert all(info.evaluations == SETTINGS.population for info in steps)
@@ -215,14 +221,14 @@ def test_every_step_is_told(course):
         before = epoch.archipelago.generation
 
 
-def test_an_epoch_says_what_the_caches_take_and_what_they_may(course):
-    for epoch in course:
+def test_epochs_report_use_and_limits_of_the_caches(history):
+    for epoch in history:
         assert set(epoch.caches) == {"pairs", "genes", "structures"}
         assert all(0 < taken <= limit for taken, limit in epoch.caches.values())
 
 
-def test_the_hall_of_an_archipelago_is_gathered_from_its_islands(course):
-    last = course[-1].archipelago
+def test_hall_of_fame_of_an_archipelago_merges_those_of_the_islands(history):
+    last = history[-1].archipelago
     assert exactly(last.hall_of_fame) == exactly(
         merge(*(island.hall_of_fame for island in reversed(last.islands)))
     )
@@ -235,23 +241,30 @@ def test_the_hall_of_an_archipelago_is_gathered_from_its_islands(course):
     assert Archipelago().hall_of_fame.entries == ()
 
 
-@elsewhere(pytest.mark.ci)
-def test_what_is_wrong_with_a_problem_comes_out_as_it_is(engine, posed):
-    """Not as a lost actor that is replaced again and again."""
+@separate_actors(pytest.mark.ci)
+def test_errors_of_a_problem_are_raised_unchanged(engine, search_problem):
+    """They are not treated as lost actors, which would be replaced again and again."""
     for wrong in (
-        replace(posed, seeds=((Lagged(2),),)),
-        replace(posed, record=Dataset(posed.record.u[:3], posed.record.y[:3], posed.record.dt)),
+        replace(search_problem, seeds=((Lagged(2),),)),
+        replace(
+            search_problem,
+            record=Dataset(
+                search_problem.record.u[:3], search_problem.record.y[:3], search_problem.record.dt
+            ),
+        ),
     ):
         with pytest.raises(RecordError) as raised:
-            list(engine.run(wrong, empty_archipelago(3, 7), never))
+            list(engine.run(wrong, empty_archipelago(3, 7), never_stop))
         assert type(raised.value) is RecordError
 
 
-@elsewhere(pytest.mark.ci)
-def test_more_islands_than_processors_share_them(engine, posed):
-    many = replace(posed, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2))
-    *_, last = engine.run(many, empty_archipelago(9, 1), never)
-    apart = replace(many, settings=replace(many.settings, generations=0))
-    *_, first = engine.run(apart, empty_archipelago(9, 1), never)
+@separate_actors(pytest.mark.ci)
+def test_more_islands_than_processors_are_evolved(engine, search_problem):
+    many = replace(
+        search_problem, settings=replace(SETTINGS, islands=9, topology="torus", migrants=1, generations=2)
+    )
+    *_, last = engine.run(many, empty_archipelago(9, 1), never_stop)
+    first_only = replace(many, settings=replace(many.settings, generations=0))
+    *_, first = engine.run(first_only, empty_archipelago(9, 1), never_stop)
     assert last.archipelago.generation == 2
     assert len({island.population for island in first.archipelago.islands}) == 9

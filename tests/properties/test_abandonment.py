@@ -1,4 +1,4 @@
-"""Laws of abandonment: a search that gives up the hopeless finds what one finds that never gives up."""
+"""Properties of abandonment: it never changes the result of a search."""
 
 from dataclasses import replace
 from functools import cache
@@ -17,7 +17,7 @@ from support.searches import SMALL, exactly, islands_of, record
 
 GENERATIONS = 9
 
-#: Whose individuals fail now and then, besides.
+#: Settings under which some individuals fail.
 UNSTRUCTURED = {"constraints": "none", "structure": "free", "primitives": ("mul", "phi1", "phi2", "tanh")}
 
 SETTINGS = {
@@ -35,7 +35,7 @@ SETTINGS = {
 }
 
 
-#: At the fast level every kind of constraints, of fitness and of elite stands once or more.
+#: The fast level includes every kind of constraint, fitness and elite at least once.
 FAST = (
     "hysteresis shooting copies",
     "none one-step distinct",
@@ -49,7 +49,7 @@ def abandoned(island):
 
 
 @cache
-def course_of(name):
+def make_history(name):
     return islands_of(Evaluator(record(), SETTINGS[name]), GENERATIONS)
 
 
@@ -61,111 +61,109 @@ def setting(request):
 
 
 @pytest.fixture
-def course(setting):
-    """The islands of a search; it is made once for a setting."""
+def history(setting):
+    """Islands of a search after every generation, computed once per setting."""
     (name,) = (name for name, each in SETTINGS.items() if each is setting)
-    return course_of(name)
+    return make_history(name)
 
 
-def test_halls_elites_and_genes_are_those_of_a_search_that_abandons_nobody(setting, course):
-    patient = islands_of(Evaluator(record(), setting, abandon=False), GENERATIONS)
-    for one, other in zip(course, patient, strict=True):
+def test_abandonment_does_not_change_halls_elites_and_genes(setting, history):
+    complete = islands_of(Evaluator(record(), setting, abandon=False), GENERATIONS)
+    for one, other in zip(history, complete, strict=True):
         assert repr(one.hall_of_fame) == repr(other.hall_of_fame)
         assert repr(one.elite) == repr(other.elite)
         assert [each.genes for each in one.population] == [each.genes for each in other.population]
         assert not abandoned(other)
-        # Everybody else is known exactly, and who was abandoned is known to be a model.
+        # Other individuals are equal; abandoned individuals differ only in parameters, fitness and outcome.
         for each, known in zip(one.population, other.population, strict=True):
             if each.outcome.verdict is Status.ABANDONED:
                 assert each == replace(known, theta=(), fitness=inf, outcome=each.outcome)
                 assert known.fitness > one.abandon_threshold
             else:
                 assert repr(each) == repr(known)
-    # The law says nothing where nobody is given up.
-    assert sum(len(abandoned(island)) for island in course) > 15
+    # The test is meaningful only if individuals are abandoned.
+    assert sum(len(abandoned(island)) for island in history) > 15
 
 
-def test_whoever_is_abandoned_is_less_fit_than_the_island_s_bar_and_settles_to_the_exact_evaluation(
-    setting, course
-):
-    seasoned = Evaluator(record(), setting)
-    fresh = Evaluator(record(), setting, Limits(pairs=1 << 16), abandon=False)
-    for island in course:
-        given_up = abandoned(island)
-        settled = seasoned.evaluate_abandoned(given_up)
-        exact, _ = fresh.evaluate([(Individual(each.genes), False) for each in given_up])
-        assert repr(settled) == repr(exact)
-        assert all(each.fitness > island.abandon_threshold for each in settled)
-        assert all(each.outcome or "interval" in each.outcome.reason for each in settled)
-        # Nobody is in an elite or a hall by less than its fitness.
+def test_abandoned_individuals_exceed_the_threshold_when_evaluated(setting, history):
+    warm = Evaluator(record(), setting)
+    cold = Evaluator(record(), setting, Limits(pairs=1 << 16), abandon=False)
+    for island in history:
+        abandoned_individuals = abandoned(island)
+        evaluated = warm.evaluate_abandoned(abandoned_individuals)
+        exact, _ = cold.evaluate([(Individual(each.genes), False) for each in abandoned_individuals])
+        assert repr(evaluated) == repr(exact)
+        assert all(each.fitness > island.abandon_threshold for each in evaluated)
+        assert all(each.outcome or "interval" in each.outcome.reason for each in evaluated)
+        # Elite and hall of fame contain only individuals with a known fitness.
         assert all(each.outcome.verdict is not Status.ABANDONED for each in island.elite)
         assert all(each.fitness < inf for each in island.hall_of_fame.entries)
 
 
-def test_what_an_evaluator_has_seen_does_not_change_who_is_abandoned(setting, course):
-    """Not even that it knows an individual's fitness already."""
-    seasoned = Evaluator(record(), setting)
-    for island in course:
-        seasoned.evaluate_abandoned([Individual(each.genes) for each in island.population])
-    islands_of(seasoned, 3, seed=99)
-    forgetful = Evaluator(record(), setting, Limits(pairs=0, genes=0, structures=0))
-    for evaluator in (seasoned, forgetful):
+def test_cache_contents_do_not_affect_abandonment(setting, history):
+    """This includes individuals whose exact fitness is cached."""
+    warm = Evaluator(record(), setting)
+    for island in history:
+        warm.evaluate_abandoned([Individual(each.genes) for each in island.population])
+    islands_of(warm, 3, seed=99)
+    tiny_cache = Evaluator(record(), setting, Limits(pairs=0, genes=0, structures=0))
+    for evaluator in (warm, tiny_cache):
         again = islands_of(evaluator, GENERATIONS)
-        assert [exactly(island) for island in again] == [exactly(island) for island in course]
+        assert [exactly(island) for island in again] == [exactly(island) for island in history]
 
 
-def test_with_a_library_s_genes_it_is_the_same():
+def test_abandonment_does_not_change_a_search_with_a_library():
     setting = replace(
         SMALL, library="phi-polynomial", library_degree=3, from_library=0.5, structure="increment"
     )
-    posed = problem(record(), setting)
+    search_problem = problem(record(), setting)
     ends = []
     for abandon in (True, False):
-        evaluator = Evaluator(posed.record, setting, abandon=abandon)
-        island, _ = first_generation(0, 4, evaluator, posed.seeds)
-        given_up = 0
+        evaluator = Evaluator(search_problem.record, setting, abandon=abandon)
+        island, _ = first_generation(0, 4, evaluator, search_problem.seeds)
+        abandoned_individuals = 0
         for _ in range(GENERATIONS):
-            island, info = step(island, evaluator, posed.pool)
-            given_up += info.outcomes.get("abandoned", 0)
-        assert (given_up > 10) == abandon
+            island, info = step(island, evaluator, search_problem.pool)
+            abandoned_individuals += info.outcomes.get("abandoned", 0)
+        assert (abandoned_individuals > 10) == abandon
         ends.append(
             (repr(island.hall_of_fame), repr(island.elite), [each.genes for each in island.population])
         )
     assert ends[0] == ends[1]
 
 
-# The bar.
+# The abandon threshold.
 
 
-def test_the_bar_follows_from_the_island_before_the_step(setting, course):
-    assert course[0].abandon_threshold == inf
-    for before, after in pairwise(course):
+def test_threshold_depends_only_on_the_previous_island(setting, history):
+    assert history[0].abandon_threshold == inf
+    for before, after in pairwise(history):
         assert after.abandon_threshold == _abandon_threshold(before, setting)
-    assert course[-1].abandon_threshold < inf
+    assert history[-1].abandon_threshold < inf
 
 
-def test_the_bar_lets_pass_whoever_may_enter_the_elite_or_the_hall(setting, course):
-    for island in course:
-        bar = _abandon_threshold(island, setting)
+def test_threshold_admits_candidates_of_elite_and_hall_of_fame(setting, history):
+    for island in history:
+        threshold = _abandon_threshold(island, setting)
         full = len(island.elite) == setting.elites
-        assert bar >= (island.elite[-1].fitness if full else inf)
-        bars = _thresholds_by_size(island.hall_of_fame, bar, setting.max_terms)
-        assert len(bars) == setting.max_terms + 1
-        for size, allowed in enumerate(bars):
+        assert threshold >= (island.elite[-1].fitness if full else inf)
+        thresholds = _thresholds_by_size(island.hall_of_fame, threshold, setting.max_terms)
+        assert len(thresholds) == setting.max_terms + 1
+        for size, allowed in enumerate(thresholds):
             known = [entry.fitness for entry in island.hall_of_fame.entries if entry.size == size]
-            assert allowed == (max(bar, known[-1]) if len(known) == DEPTH else inf)
+            assert allowed == (max(threshold, known[-1]) if len(known) == DEPTH else inf)
 
 
-def test_four_of_five_parents_are_better_than_the_bar_where_as_many_are_known():
-    (bred,) = islands_of(Evaluator(record(), SMALL), 0)
-    parents = sorted(each.fitness for each in (*bred.elite, *bred.population))
+def test_threshold_is_the_80_percent_quantile_of_known_parents():
+    (first,) = islands_of(Evaluator(record(), SMALL), 0)
+    parents = sorted(each.fitness for each in (*first.elite, *first.population))
     known = sum(fitness < inf for fitness in parents)
-    bar = _abandon_threshold(bred, SMALL)
+    threshold = _abandon_threshold(first, SMALL)
     expected = parents[min(int(0.8 * len(parents)), known - 1)]
-    assert bar == max(expected, bred.elite[-1].fitness)
+    assert threshold == max(expected, first.elite[-1].fitness)
 
 
-def test_where_most_parents_are_copies_of_the_best_the_whole_elite_is_within_the_bar():
+def test_threshold_includes_the_elite_if_most_parents_are_copies():
     setting = SETTINGS["none shooting distinct"]
     island = islands_of(Evaluator(record(), setting), 5)[-1]
     alike = replace(island, population=island.elite[:1] * setting.population)
@@ -178,8 +176,8 @@ def test_where_most_parents_are_copies_of_the_best_the_whole_elite_is_within_the
     assert elites[0] == elites[1]
 
 
-def test_as_long_as_the_elite_is_not_full_everybody_enters_and_nobody_is_abandoned():
-    """Of a single lag there are fewer models than an elite has room for, and more than a hall keeps."""
+def test_nothing_is_abandoned_while_the_elite_is_not_full():
+    """There are fewer models of a single lag than places in the elite, but more than in the hall of fame."""
     setting = replace(
         SMALL,
         constraints="none",

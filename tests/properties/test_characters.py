@@ -1,4 +1,4 @@
-"""Laws of characters: they change how an island breeds, and nothing else."""
+"""Properties of island profiles: they change only variation and selection."""
 
 from dataclasses import fields, replace
 from math import inf
@@ -14,60 +14,60 @@ from islands.evolution.problem import Problem
 from islands.evolution.settings import Settings
 from support.migrations import (
     SETTINGS,
-    advanced,
     evaluator,
     models,
     recorded,
+    run_next_epoch,
 )
 from support.searches import exactly, islands_of
 
-every_character = pytest.mark.parametrize("character", ISLAND_PROFILES)
+every_profile = pytest.mark.parametrize("profile", ISLAND_PROFILES)
 
-#: All that a character may change: not one of these says what an individual means, or what it is worth.
+#: Settings that a profile may change. None of them affects the model or fitness of an individual.
 BREEDING = {"crossover", "mutation", "prune", "tournament", "high_level", "outer", "from_library"}
 
 
-@every_character
-def test_a_character_changes_only_how_an_island_breeds(character):
-    assert ISLAND_PROFILES[character].keys() <= BREEDING
+@every_profile
+def test_profiles_change_only_variation_and_selection(profile):
+    assert ISLAND_PROFILES[profile].keys() <= BREEDING
 
 
-def test_characters_are_given_out_in_turn():
-    given_out = tuple(ISLAND_PROFILES)
-    posed = Problem(recorded(), replace(SETTINGS, characters=given_out))
-    for island in range(3 * len(given_out)):
-        character = ISLAND_PROFILES[given_out[island % len(given_out)]]
+def test_profiles_are_assigned_to_islands_in_turn():
+    assigned = tuple(ISLAND_PROFILES)
+    search_problem = Problem(recorded(), replace(SETTINGS, characters=assigned))
+    for island in range(3 * len(assigned)):
+        profile = ISLAND_PROFILES[assigned[island % len(assigned)]]
         for field in fields(Settings):
-            value = getattr(posed.settings_of(island), field.name)
-            assert value == character.get(field.name, getattr(posed.settings, field.name)), field.name
+            value = getattr(search_problem.settings_of(island), field.name)
+            assert value == profile.get(field.name, getattr(search_problem.settings, field.name)), field.name
 
 
-def test_without_characters_all_islands_have_the_problem_s_settings():
-    posed = Problem(recorded(), SETTINGS)
-    assert all(posed.settings_of(island) is SETTINGS for island in range(3))
+def test_islands_without_profiles_have_the_settings_of_the_problem():
+    search_problem = Problem(recorded(), SETTINGS)
+    assert all(search_problem.settings_of(island) is SETTINGS for island in range(3))
     plain = Problem(recorded(), replace(SETTINGS, characters=("plain",)))
     assert plain.settings_of(5) == plain.settings
 
 
-@every_character
-def test_a_character_breeds_otherwise_and_only_plain_does_not(character):
-    alone = Problem(recorded(), replace(SETTINGS, population=12))
-    alike = replace(alone, settings=replace(alone.settings, characters=(character,)))
-    island = islands_of(Evaluator(recorded(), alone.settings), 1)[-1]
-    one, other = advanced(island, alone), advanced(island, alike)
-    assert (exactly(one.island) == exactly(other.island)) == (character == "plain")
+@every_profile
+def test_profiles_other_than_plain_change_the_offspring(profile):
+    plain_problem = Problem(recorded(), replace(SETTINGS, population=12))
+    profile_problem = replace(plain_problem, settings=replace(plain_problem.settings, characters=(profile,)))
+    island = islands_of(Evaluator(recorded(), plain_problem.settings), 1)[-1]
+    one, other = run_next_epoch(island, plain_problem), run_next_epoch(island, profile_problem)
+    assert (exactly(one.island) == exactly(other.island)) == (profile == "plain")
 
 
-@every_character
-def test_an_individual_is_worth_the_same_on_an_island_of_any_character(character):
-    posed = Problem(recorded(), replace(SETTINGS, characters=(character,)))
-    epoch = advanced(Island(0, 3, -1, (), (), HallOfFame()), posed)
+@every_profile
+def test_fitness_does_not_depend_on_the_profile(profile):
+    search_problem = Problem(recorded(), replace(SETTINGS, characters=(profile,)))
+    epoch = run_next_epoch(Island(0, 3, -1, (), (), HallOfFame()), search_problem)
     population = [each for each in epoch.island.population if each.fitness < inf]
     assert population
-    own = Evaluator(recorded(), posed.settings_of(0))
-    asked = [
+    own = Evaluator(recorded(), search_problem.settings_of(0))
+    population_ = [
         (Individual(each.genes), pruned) for each in (*population, *models()) for pruned in (False, True)
     ]
-    assert repr(own.evaluate(asked)) == repr(Evaluator(recorded(), SETTINGS).evaluate(asked))
+    assert repr(own.evaluate(population_)) == repr(Evaluator(recorded(), SETTINGS).evaluate(population_))
     exact, _ = evaluator().evaluate([(Individual(each.genes), False) for each in population])
     assert repr(list(exact)) == repr(population)

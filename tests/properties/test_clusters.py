@@ -1,4 +1,4 @@
-"""The laws of clusters: what a regressor is at rest (the paper, section 3)."""
+"""Properties of clusters: steady states of regressors (the paper, section 3)."""
 
 import pytest
 from hypothesis import assume, given
@@ -12,12 +12,12 @@ from islands.model.regressor import canonical, regressor
 from support.strategies import grid, leaves, nearly, phi_factors, regressors, settled_value, signals
 
 
-def of(expression):
+def make_regressor(expression):
     return regressor(expression)[1]
 
 
 @given(regressors(), signals())
-def test_the_weighted_steady_state_is_the_value_where_every_lag_has_one_value(item, signal):
+def test_weighted_steady_state_is_the_value_for_constant_signals(item, signal):
     def rest(channel, _lag):
         return signal(channel, 0)
 
@@ -29,80 +29,80 @@ def test_the_weighted_steady_state_is_the_value_where_every_lag_has_one_value(it
 
 
 @given(regressors())
-def test_a_steady_state_reads_no_lag_and_no_other_signal(item):
+def test_steady_state_has_lag_zero_and_only_signals_of_the_regressor(item):
     _, state = steady_state(item)
     assert lags(state) <= {(channel, 0) for channel, _ in item.lags}
 
 
 @given(st.lists(leaves(), max_size=3), phi_factors(), st.integers(1, 4), st.lists(phi_factors(), max_size=2))
-def test_a_regressor_with_a_phi_factor_to_any_power_belongs_to_no_cluster(factors, phi, power, others):
-    item = of(Apply(MUL, (*factors, *[phi] * power, *others, Lagged(0, 1))))
+def test_regressor_with_a_phi_factor_belongs_to_no_cluster(factors, phi, power, others):
+    item = make_regressor(Apply(MUL, (*factors, *[phi] * power, *others, Lagged(0, 1))))
     assert steady_state(item)[0] == 0.0
     assert clusters([item]) == ()
 
 
 @given(phi_factors(), st.sampled_from(["sin", "tanh", "abs", "sqrt", "cube", "square", "sign", "log"]))
-def test_a_function_that_is_zero_at_zero_vanishes_with_its_phi(phi, name):
-    assert clusters([of(Apply(PRIMITIVES[name], (phi,)))]) == ()
+def test_function_that_is_zero_at_zero_vanishes_with_its_phi(phi, name):
+    assert clusters([make_regressor(Apply(PRIMITIVES[name], (phi,)))]) == ()
 
 
 @given(phi_factors(), st.sampled_from(["exp", "cos"]))
-def test_exp_and_cos_of_a_phi_are_one_at_rest(phi, name):
-    assert steady_state(of(Apply(PRIMITIVES[name], (phi,)))) == canonical(parse("1"))
+def test_exp_and_cos_of_a_phi_are_one_in_steady_state(phi, name):
+    assert steady_state(make_regressor(Apply(PRIMITIVES[name], (phi,)))) == canonical(parse("1"))
 
 
 @given(phi_factors(), leaves(), st.sampled_from(["max", "min"]))
 def test_max_and_min_of_a_phi_and_a_signal_do_not_vanish(phi, leaf, name):
-    found = clusters([of(Apply(PRIMITIVES[name], (phi, leaf)))])
+    found = clusters([make_regressor(Apply(PRIMITIVES[name], (phi, leaf)))])
     assert [cluster.weights for cluster in found] == [(1.0,)]
     assert lags(found[0].steady_state) == {(leaf.channel, 0)}
 
 
 @given(phi_factors(), st.lists(leaves(), min_size=1, max_size=3), grid)
-def test_a_sum_with_a_phi_rests_where_the_sum_without_it_rests(phi, signals_read, offset):
+def test_phi_does_not_change_the_steady_state_of_a_sum(phi, signals_read, offset):
     terms = (Apply(MUL, tuple(signals_read) * 2), Lagged(0, 1), Constant(offset))
-    pair = [of(Apply(ADD, (*added, *terms))) for added in ((phi,), ())]
+    pair = [make_regressor(Apply(ADD, (*added, *terms))) for added in ((phi,), ())]
     assert steady_state(pair[0]) == steady_state(pair[1])
     assert [cluster.members for cluster in clusters(pair)] == [(0, 1)]
 
 
 @given(st.lists(leaves(), min_size=1, max_size=4), st.lists(st.integers(0, 9), min_size=4, max_size=4))
-def test_a_product_of_signals_is_in_one_cluster_with_itself_at_any_other_lags(signals_read, shifts):
+def test_product_of_signals_is_in_one_cluster_at_all_lags(signals_read, shifts):
     moved = [Shift(more, leaf) for more, leaf in zip(shifts, signals_read, strict=False)]
-    pair = [of(Apply(MUL, (*factors, Lagged(0, 1)))) for factors in (signals_read, moved)]
+    pair = [make_regressor(Apply(MUL, (*factors, Lagged(0, 1)))) for factors in (signals_read, moved)]
     assert [cluster.members for cluster in clusters(pair)] == [(0, 1)]
     assert steady_state(pair[0])[0] == steady_state(pair[1])[0] == 1.0
 
 
 @given(st.lists(regressors(height=2), max_size=8), st.randoms(use_true_random=False))
-def test_clusters_part_the_regressors_that_do_not_vanish(found, rng):
-    parted = clusters(found)
-    members = sorted(member for cluster in parted for member in cluster.members)
+def test_clusters_partition_the_regressors_that_do_not_vanish(found, rng):
+    partition = clusters(found)
+    members = sorted(member for cluster in partition for member in cluster.members)
     assert members == [position for position, item in enumerate(found) if steady_state(item)[0]]
-    states = [content(cluster.steady_state) for cluster in parted]
+    states = [content(cluster.steady_state) for cluster in partition]
     assert states == sorted(set(states))
     shuffled = clusters(rng.sample(found, len(found)))
-    assert [cluster.steady_state for cluster in shuffled] == [cluster.steady_state for cluster in parted]
+    assert [cluster.steady_state for cluster in shuffled] == [cluster.steady_state for cluster in partition]
 
 
 @given(
     st.lists(regressors(height=2), min_size=1, max_size=6), st.lists(grid, min_size=6, max_size=6), signals()
 )
-def test_the_clusters_totals_are_the_model_at_rest(found, theta, signal):
+def test_totals_of_clusters_give_the_model_in_steady_state(found, theta, signal):
     def rest(channel, _lag):
         return signal(channel, 0)
 
     values = [settled_value(item.expression, rest) for item in found]
-    parted = clusters(found)
-    states = [settled_value(cluster.steady_state, rest) for cluster in parted]
+    partition = clusters(found)
+    states = [settled_value(cluster.steady_state, rest) for cluster in partition]
     assume(None not in values and None not in states)
     parts = [parameter * number for parameter, number in zip(theta, values, strict=False)]
-    sums = [cluster.total(theta) * number for cluster, number in zip(parted, states, strict=True)]
+    sums = [cluster.total(theta) * number for cluster, number in zip(partition, states, strict=True)]
     assert sum(sums) == pytest.approx(sum(parts), rel=1e-6, abs=1e-6 * sum(map(abs, parts)))
 
 
-def test_the_clusters_of_the_papers_model_14_are_its_three():
-    # Section 7: the output's, the input's and the nonlinear one; its six phi terms have no influence at rest.
+def test_model_14_of_the_paper_has_its_three_clusters():
+    # Section 7: clusters of output, input and their product; the phi terms vanish in steady state.
     texts = (
         "phi2(u(k-5), u(k-10))",
         "phi2(u(k-1), u(k-3))",
@@ -115,7 +115,9 @@ def test_the_clusters_of_the_papers_model_14_are_its_three():
         "y(k-1)",
     )
     theta = (2.10e-2, 2.35e-2, 1.52e-4, -1.52e-4, 3.14, -3.14, -2.15e-2, 13.8, 1.00)
-    found = {cluster.members: cluster for cluster in clusters([of(parse(text)) for text in texts])}
+    found = {
+        cluster.members: cluster for cluster in clusters([make_regressor(parse(text)) for text in texts])
+    }
     assert set(found) == {(2, 3), (4, 5), (8,)}
     assert found[8,].steady_state == OUTPUT_AT_REST
     assert [found[members].total(theta) for members in ((2, 3), (4, 5), (8,))] == [0.0, 0.0, 1.0]

@@ -1,4 +1,4 @@
-"""Laws of the constraints on parameters: Property 1 of the paper, section 3, and its null space."""
+"""Properties of parameter constraints: Property 1 of the paper, section 3, and the null space."""
 
 import numpy as np
 import pytest
@@ -19,12 +19,12 @@ from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.simulation.predictors import free_run
 
 
-def made(*texts):
+def make_regressors(*texts):
     """Return regressors of texts, in the order given."""
     return [regressor(parse(text))[1] for text in texts]
 
 
-MODEL_14 = made(
+MODEL_14 = make_regressors(
     "phi2(u(k-5), u(k-10))",
     "phi2(u(k-1), u(k-3))",
     "y(k-6)*u(k-10)",
@@ -47,10 +47,10 @@ def rows(constrained):
 
 
 def hysteresis(*texts):
-    return CONSTRAINTS["hysteresis"].constrain(made(*texts))
+    return CONSTRAINTS["hysteresis"].constrain(make_regressors(*texts))
 
 
-def test_model_14_has_the_papers_three_clusters():
+def test_model_14_has_the_three_clusters_of_the_paper():
     found = CONSTRAINTS["hysteresis"].constrain(MODEL_14)
     assert found.regressors == tuple(MODEL_14)
     expected = [
@@ -61,32 +61,32 @@ def test_model_14_has_the_papers_three_clusters():
     assert sorted(rows(found), key=str) == sorted(expected, key=str)
 
 
-def test_several_lags_of_y_share_the_sum_of_one():
+def test_several_lags_of_y_sum_to_one():
     found = hysteresis("y(k-1)", "y(k-2)", "phi1(u(k-1), u(k-2))")
     assert rows(found) == [({"y(k-1)": 1.0, "y(k-2)": 1.0}, 1.0)]
     assert len(found.regressors) == 3
 
 
 @pytest.mark.parametrize("lone", ["u(k-1)", "u(k-1)*y(k-3)", "y(k-2)^2", "1", "exp(u(k-1) - u(k-2))"])
-def test_a_lone_regressor_of_another_cluster_is_dropped_and_not_counted(lone):
+def test_single_regressor_of_another_cluster_is_dropped(lone):
     found = hysteresis(lone, "y(k-1)", "y(k-1)*y(k-3)*u(k-2)", "phi1(u(k-1), u(k-2))")
     assert [plain(item.expression) for item in found.regressors] == ["y(k-1)", "u(k-1) - u(k-2)"]
     assert rows(found) == [({"y(k-1)": 1.0}, 1.0)]
 
 
-def test_a_lone_y_keeps_its_parameter_of_one():
+def test_single_lag_of_y_has_the_parameter_one():
     found = hysteresis("y(k-3)")
     assert rows(found) == [({"y(k-3)": 1.0}, 1.0)]
 
 
 @pytest.mark.parametrize("texts", [["u(k-1)", "u(k-2)"], ["y(k-1)^2", "y(k-2)^2"], ["phi1(u(k-1), u(k-2))"]])
-def test_a_structure_without_y_is_infeasible(texts):
+def test_structure_without_y_is_infeasible(texts):
     found = hysteresis(*texts)
     assert found == EvaluationOutcome(Status.INFEASIBLE, "no regressor is y at rest: add y(k-1)")
     assert "change either as the reason says" in str(found)
 
 
-def test_members_enter_their_cluster_with_their_weight_at_rest():
+def test_members_enter_their_cluster_with_their_steady_state_weight():
     # 2 y(k-1) + y(k-2) is 3 y at rest; its canonical form takes the 2 out.
     found = hysteresis("2*y(k-1) + y(k-2)", "y(k-3)")
     (row, total), names = rows(found)[0], [plain(item.expression) for item in found.regressors]
@@ -94,7 +94,7 @@ def test_members_enter_their_cluster_with_their_weight_at_rest():
     assert [row[name] for name in names] == [1.5, 1.0]
 
 
-def test_a_constrained_estimate_rests_where_it_is_put():
+def test_constrained_estimate_has_every_output_as_equilibrium():
     generator = np.random.default_rng(10)
     u = np.cumsum(generator.normal(size=400)) / 5
     y = 0.8 * np.roll(u, 2) + 0.1 * generator.normal(size=400)
@@ -110,7 +110,7 @@ def test_a_constrained_estimate_rests_where_it_is_put():
         np.testing.assert_allclose(held, level, rtol=0, atol=1e-9)
 
 
-def test_no_constraint_leaves_all_free():
+def test_constraint_none_has_no_rows():
     found = CONSTRAINTS["none"].constrain(MODEL_14)
     assert found.regressors == tuple(MODEL_14)
     assert found.S.shape == (0, 9)
@@ -118,27 +118,27 @@ def test_no_constraint_leaves_all_free():
 
 
 @pytest.mark.parametrize("name", CONSTRAINTS)
-def test_every_constraint_is_found_by_its_name(name):
+def test_constraints_are_found_by_name(name):
     assert constraint(name) is CONSTRAINTS[name]
     assert constraint(name).description
 
 
-def test_an_unknown_constraint_is_refused():
+def test_unknown_constraint_raises_settings_error():
     with pytest.raises(SettingsError) as caught:
         constraint("backlash")
     assert str(caught.value) == "unknown constraints 'backlash': take one of none, hysteresis"
 
 
-# An entry of one's own: a group and what it sums to.
+# User-defined constraints.
 
 
 def first_signal(item):
-    """Put a regressor, its degree for a weight, with the first of its signals; a constant has no group."""
+    """Group regressors by their first signal, with the degree as weight; constants have no group."""
     channels = sorted(channel for channel, _ in item.lags)
     return (float(item.degree), Lagged(channels[0], 0)) if channels else (0.0, Lagged(0, 0))
 
 
-def of_ones_own(**sums):
+def make_constraint(**sums):
     return Constraint(
         first_signal,
         {Lagged(int(name[1:]), 0): total for name, total in sums.items()},
@@ -148,9 +148,9 @@ def of_ones_own(**sums):
     )
 
 
-def test_an_entry_says_what_its_groups_sum_to():
-    items = made("y(k-1)", "u1(k-1)", "y(k-1)*u2(k-3)", "u1(k-2)^2", "1", "u2(k-1)")
-    found = of_ones_own(c0=0.5, c1=-2.0, c2=3.0).constrain(items)
+def test_user_defined_constraint_sets_the_sums_of_its_groups():
+    items = make_regressors("y(k-1)", "u1(k-1)", "y(k-1)*u2(k-3)", "u1(k-2)^2", "1", "u2(k-1)")
+    found = make_constraint(c0=0.5, c1=-2.0, c2=3.0).constrain(items)
     assert found.regressors == tuple(items)
     assert found.S.tolist() == [
         [1.0, 0.0, 2.0, 0.0, 0.0, 0.0],
@@ -160,22 +160,22 @@ def test_an_entry_says_what_its_groups_sum_to():
     assert found.c.tolist() == [0.5, -2.0, 3.0]
 
 
-def test_a_group_that_no_sum_is_wanted_of_sums_to_zero_and_one_alone_in_it_is_left_out():
-    items = made("y(k-1)", "u1(k-1)", "u1(k-2)^2", "u2(k-1)", "1")
-    found = of_ones_own(c0=0.5).constrain(items)
+def test_group_without_a_given_sum_sums_to_zero():
+    items = make_regressors("y(k-1)", "u1(k-1)", "u1(k-2)^2", "u2(k-1)", "1")
+    found = make_constraint(c0=0.5).constrain(items)
     assert [plain(item.expression, 2) for item in found.regressors] == ["y(k-1)", "u1(k-1)", "u1(k-2)^2", "1"]
     assert found.S.tolist() == [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 2.0, 0.0]]
     assert found.c.tolist() == [0.5, 0.0]
 
 
 @pytest.mark.parametrize("sums", [{"c1": 1.0}, {"c0": 1.0, "c2": 0.5}])
-def test_a_structure_that_lacks_a_group_with_a_sum_is_infeasible(sums):
-    assert of_ones_own(**sums).constrain(made("y(k-1)", "y(k-2)")) == EvaluationOutcome(
+def test_structure_without_a_required_group_is_infeasible(sums):
+    assert make_constraint(**sums).constrain(make_regressors("y(k-1)", "y(k-2)")) == EvaluationOutcome(
         Status.INFEASIBLE, "none"
     )
 
 
-def test_the_table_holds_group_and_sums():
+def test_table_has_groups_and_sums():
     assert dict(CONSTRAINTS["hysteresis"].sums) == {OUTPUT_AT_REST: 1.0}
     assert dict(CONSTRAINTS["none"].sums) == {}
     for item in MODEL_14:
@@ -183,9 +183,9 @@ def test_the_table_holds_group_and_sums():
         assert CONSTRAINTS["none"].group(item)[0] == 0.0
 
 
-# Its null space, for selection.
+# Null space, for selection.
 
-LIBRARY = made(
+LIBRARY = make_regressors(
     "y(k-1)",
     "y(k-2)",
     "y(k-4)",
@@ -200,16 +200,16 @@ LIBRARY = made(
 )
 
 
-def test_every_direction_of_hysteresis_vanishes_at_rest():
+def test_directions_of_hysteresis_vanish_in_steady_state():
     found = CONSTRAINTS["hysteresis"].directions(LIBRARY)
     assert [plain(item.expression) for item in found.fixed] == ["y(k-1)"]
-    # One for each regressor but the first of the three clusters.
+    # One direction per regressor, except the first of each of the three clusters.
     assert len(found.free) == len(LIBRARY) - 3
     for direction in found.free:
         assert abs(steady_state(regressor(direction.expression)[1])[0]) < 1e-15
 
 
-def test_estimating_in_the_null_space_is_constrained_least_squares():
+def test_estimation_in_the_null_space_is_constrained_least_squares():
     generator = np.random.default_rng(12)
     record = Dataset(generator.normal(size=300), generator.normal(size=300), 0.1)
     found = CONSTRAINTS["hysteresis"].directions(LIBRARY)
@@ -224,13 +224,13 @@ def test_estimating_in_the_null_space_is_constrained_least_squares():
     assert free.residual_variance == pytest.approx(constrained.residual_variance, rel=1e-10)
 
 
-def test_a_library_without_y_cannot_meet_the_constraint():
-    found = CONSTRAINTS["hysteresis"].directions(made("u(k-1)", "u(k-2)"))
+def test_library_without_y_is_infeasible_under_the_constraint():
+    found = CONSTRAINTS["hysteresis"].directions(make_regressors("u(k-1)", "u(k-2)"))
     assert found.verdict is Status.INFEASIBLE
     assert "add y(k-1) to the library" in found.reason
 
 
-def test_without_a_constraint_every_regressor_is_a_direction():
+def test_regressors_without_a_constraint_are_the_directions():
     found = CONSTRAINTS["none"].directions(LIBRARY)
     assert (found.target, found.fixed) == (Lagged(0, 0), ())
     assert [direction.regressors for direction in found.free] == [(item,) for item in LIBRARY]

@@ -1,4 +1,4 @@
-"""Laws of emigration: who leaves an island, and when."""
+"""Properties of emigration: selection policies and schedule."""
 
 from dataclasses import replace
 from itertools import chain
@@ -19,110 +19,124 @@ from islands.evolution.migration.policies import SELECTION_POLICIES
 from islands.evolution.problem import Problem
 from islands.model.expression import Apply, Lagged, height, walk
 from islands.simulation.outcome import Status
-from support.migrations import SETTINGS, every_emigrants, folk, islands, keys, models, never, recorded
+from support.migrations import (
+    SETTINGS,
+    every_selection_policy,
+    islands,
+    keys,
+    models,
+    never_stop,
+    recorded,
+    sample_individuals,
+)
 from support.searches import SMALL, islands_of
 
 
-def test_the_folk_of_these_tests_are_of_all_sorts():
-    verdicts = [each.outcome.verdict for each in folk()]
+def test_sample_individuals_have_all_kinds_of_outcomes():
+    verdicts = [each.outcome.verdict for each in sample_individuals()]
     assert verdicts.count(Status.OK) > 30
     assert verdicts.count(Status.ABANDONED) > 10
     assert len(set(verdicts)) > 2
 
 
-@every_emigrants
+@every_selection_policy
 @given(islands(), st.integers(0, 5))
-def test_emigrants_are_members_with_a_known_fitness_each_structure_once(leave, island, count):
-    setting = replace(SETTINGS, emigrants=leave, migrants=count, migrate_every=1)
-    leaving = select_migrants(replace(island, generation=4), setting)
-    assert len(leaving) <= count
-    assert all(isfinite(each.fitness) for each in leaving)
-    assert len(set(keys(leaving))) == len(leaving)
-    assert all(each in island.elite for each in leaving)
+def test_emigrants_are_distinct_elite_members_with_a_known_fitness(policy, island, count):
+    setting = replace(SETTINGS, emigrants=policy, migrants=count, migrate_every=1)
+    emigrants = select_migrants(replace(island, generation=4), setting)
+    assert len(emigrants) <= count
+    assert all(isfinite(each.fitness) for each in emigrants)
+    assert len(set(keys(emigrants))) == len(emigrants)
+    assert all(each in island.elite for each in emigrants)
 
 
-@every_emigrants
+@every_selection_policy
 @given(islands())
-def test_nobody_leaves_but_at_a_stop(leave, island):
-    setting = replace(SETTINGS, emigrants=leave, migrate_every="3,8:2", elite=1.0)
+def test_emigration_happens_only_at_stops(policy, island):
+    setting = replace(SETTINGS, emigrants=policy, migrate_every="3,8:2", elite=1.0)
     island = replace(island, elite=(models()[0],), hall_of_fame=with_entries(HallOfFame(), models()[:1]))
-    leaving = [
+    emigrants = [
         len(select_migrants(replace(island, generation=generation), setting)) for generation in range(-1, 13)
     ]
-    assert leaving == [int(generation in (3, 6, 8, 10, 12)) for generation in range(-1, 13)]
+    assert emigrants == [int(generation in (3, 6, 8, 10, 12)) for generation in range(-1, 13)]
 
 
-@every_emigrants
-def test_as_many_leave_as_the_schedule_says(leave):
+@every_selection_policy
+def test_number_of_emigrants_follows_the_schedule(policy):
     sizes = {each.size: each for each in sorted(models(), key=lambda each: (-each.size, -each.fitness))}
-    # Every larger model is fitter: all are on the front.
-    people = tuple(replace(each, fitness=1.0 / size) for size, each in sizes.items())
-    assert len(people) > 3
-    island = Island(0, 3, 0, people, people, with_entries(HallOfFame(), people))
-    setting = replace(SETTINGS, emigrants=leave, migrants="2,9:0,12:3", migrate_every=1)
+    # Every larger model is fitter, so all are on the front.
+    population = tuple(replace(each, fitness=1.0 / size) for size, each in sizes.items())
+    assert len(population) > 3
+    island = Island(0, 3, 0, population, population, with_entries(HallOfFame(), population))
+    setting = replace(SETTINGS, emigrants=policy, migrants="2,9:0,12:3", migrate_every=1)
     counted = [len(select_migrants(replace(island, generation=each), setting)) for each in (8, 9, 11, 12, 99)]
     assert counted == [2, 0, 0, 3, 3]
     many = replace(setting, population=1000, migrants=1000)
-    assert len(select_migrants(replace(island, generation=8), many)) == len(people)
+    assert len(select_migrants(replace(island, generation=8), many)) == len(population)
 
 
 @given(islands(), st.integers(1, 5))
-def test_the_best_leave_first(island, count):
-    leaving = SELECTION_POLICIES["best"](island.elite, count, Stream(0, 0, 0, Purpose.EMIGRATION))
+def test_best_policy_selects_the_fittest(island, count):
+    emigrants = SELECTION_POLICIES["best"](island.elite, count, Stream(0, 0, 0, Purpose.EMIGRATION))
     fitness = {each.key: each.fitness for each in island.elite if isfinite(each.fitness)}
-    assert [each.fitness for each in leaving] == sorted(fitness.values())[:count]
+    assert [each.fitness for each in emigrants] == sorted(fitness.values())[:count]
 
 
-@pytest.mark.parametrize("leave", ["best", "random"])
-def test_of_two_that_are_one_model_the_first_leaves(leave):
+@pytest.mark.parametrize("policy", ["best", "random"])
+def test_first_of_two_equal_structures_is_selected(policy):
     one = next(each for each in models() if each.size > 1)
     copy = replace(one, genes=one.genes[::-1])
     assert copy != one
-    leaving = SELECTION_POLICIES[leave]((one, copy), 2, Stream(0, 0, 0, Purpose.EMIGRATION))
-    assert leaving == (one,)
+    emigrants = SELECTION_POLICIES[policy]((one, copy), 2, Stream(0, 0, 0, Purpose.EMIGRATION))
+    assert emigrants == (one,)
 
 
-def front_of(elite):
-    """Nobody of the elite is smaller and as fit, or fitter and as small; of equals the first."""
-    worth = {each.key: (each.size, each.fitness) for each in reversed(elite) if isfinite(each.fitness)}
-    beaten = {
+def pareto_reference(elite):
+    """Return the non-dominated members of the elite, the first of equals."""
+    size_and_fitness = {
+        each.key: (each.size, each.fitness) for each in reversed(elite) if isfinite(each.fitness)
+    }
+    dominated = {
         own
-        for own in worth.values()
-        if any(size <= own[0] and error <= own[1] and (size, error) != own for size, error in worth.values())
+        for own in size_and_fitness.values()
+        if any(
+            size <= own[0] and error <= own[1] and (size, error) != own
+            for size, error in size_and_fitness.values()
+        )
     }
     first = {(each.size, each.fitness): each for each in reversed(elite)}
-    return [first[own] for own in dict.fromkeys(worth.values()) if own not in beaten]
+    return [first[own] for own in dict.fromkeys(size_and_fitness.values()) if own not in dominated]
 
 
 @given(st.data())
-def test_the_front_is_who_nobody_of_the_elite_beats_in_error_and_size(data):
-    one = st.tuples(st.sampled_from(folk()), st.sampled_from([None, 0.5, 1.0, 2.0]))
+def test_front_policy_selects_the_pareto_front(data):
+    one = st.tuples(st.sampled_from(sample_individuals()), st.sampled_from([None, 0.5, 1.0, 2.0]))
     drawn = data.draw(st.lists(one, max_size=30))
-    people = {
+    population = {
         each.key: replace(each, fitness=error) if error and isfinite(each.fitness) else each
         for each, error in drawn
     }
-    elite = select_elite(people.values(), 20, False)
-    leaving = SELECTION_POLICIES["front"](elite, len(elite), Stream(0, 0, 0, Purpose.EMIGRATION))
-    assert sorted(map(id, leaving)) == sorted(map(id, front_of(elite)))
+    elite = select_elite(population.values(), 20, False)
+    emigrants = SELECTION_POLICIES["front"](elite, len(elite), Stream(0, 0, 0, Purpose.EMIGRATION))
+    assert sorted(map(id, emigrants)) == sorted(map(id, pareto_reference(elite)))
 
 
-@pytest.mark.parametrize("leave", ["best", "random", "front"])
-def test_whoever_is_in_the_hall_of_fame_alone_does_not_leave(leave):
-    """Its genes are those that were estimated: variation could not breed from them."""
+@pytest.mark.parametrize("policy", ["best", "random", "front"])
+def test_hall_of_fame_members_outside_the_elite_do_not_emigrate(policy):
+    """Its genes are in canonical form, to which variation does not apply."""
     small, *others = sorted(models(), key=lambda each: each.size)
     island = Island(0, 3, 4, (), tuple(others[-3:]), with_entries(HallOfFame(), [small, *others]))
-    setting = replace(SETTINGS, emigrants=leave, migrants=3, migrate_every=1)
+    setting = replace(SETTINGS, emigrants=policy, migrants=3, migrate_every=1)
     assert set(keys(select_migrants(island, setting))) <= set(keys(others[-3:]))
 
 
-@pytest.mark.parametrize("leave", ["random", "front"])
-def test_anyone_may_leave_and_every_place_of_a_run_draws_others(leave):
+@pytest.mark.parametrize("policy", ["random", "front"])
+def test_random_policies_select_every_member_of_their_pool(policy):
     elite = select_elite(models(), len(models()), True)
-    elite = (*front_of(elite), *elite[:10])
-    pool = {"random": elite, "front": front_of(elite)}[leave]
+    elite = (*pareto_reference(elite), *elite[:10])
+    pool = {"random": elite, "front": pareto_reference(elite)}[policy]
     assert len(pool) > 3
-    setting = replace(SETTINGS, emigrants=leave, migrants=1, migrate_every=1)
+    setting = replace(SETTINGS, emigrants=policy, migrants=1, migrate_every=1)
     everywhere = [
         select_migrants(Island(index, seed, generation, (), elite, HallOfFame()), setting)[0]
         for index in range(6)
@@ -132,12 +146,12 @@ def test_anyone_may_leave_and_every_place_of_a_run_draws_others(leave):
     assert set(keys(everywhere)) == set(keys(pool))
 
 
-def test_the_draws_of_those_who_leave_know_island_generation_and_seed_and_are_their_own():
+def test_emigration_stream_depends_on_island_generation_and_seed():
     elite = select_elite(models(), 20, True)
     setting = replace(SETTINGS, emigrants="random", migrants=6, migrate_every=1)
     island = Island(0, 3, 1, (), elite, HallOfFame())
     others = (replace(island, index=1), replace(island, generation=2), replace(island, seed=4))
-    # 20 * 19 * .. * 15 orders: no two are the same by chance.
+    # There are 20 * 19 * ... * 15 orders, so equal ones by chance are improbable.
     assert len({select_migrants(each, setting) for each in (island, *others, island)}) == 4
     for purpose in Purpose:
         drawn = SELECTION_POLICIES["random"](elite, 6, Stream(3, 0, 1, purpose))
@@ -145,22 +159,22 @@ def test_the_draws_of_those_who_leave_know_island_generation_and_seed_and_are_th
 
 
 @pytest.mark.parametrize("structure", ["free", "phi"])
-@every_emigrants
-def test_whoever_leaves_is_made_of_what_the_settings_allow(leave, structure):
-    """Variation relies on it: a leaf that reads farther than any of its own may be put under back-shifts."""
-    setting = replace(SMALL, emigrants=leave, migrants=9, migrate_every=1, structure=structure)
+@every_selection_policy
+def test_genes_of_emigrants_conform_to_the_settings(policy, structure):
+    """Variation may put leaves under back-shifts, so larger lags would exceed the maximum lag."""
+    setting = replace(SMALL, emigrants=policy, migrants=9, migrate_every=1, structure=structure)
     for island in islands_of(Evaluator(recorded(), setting), 4)[1:]:
-        leaving = select_migrants(island, setting)
-        assert leaving
-        for gene in chain(*(each.genes for each in leaving)):
+        emigrants = select_migrants(island, setting)
+        assert emigrants
+        for gene in chain(*(each.genes for each in emigrants)):
             assert height(gene) <= setting.max_height
             for node in walk(gene):
                 assert not isinstance(node, Apply) or node.primitive.name in setting.primitives
                 assert not isinstance(node, Lagged) or node.lag == 1
 
 
-def test_a_long_search_breeds_from_the_front_without_a_gene_that_the_settings_forbid():
-    """Genes that read farther than the settings let them are refused by the evaluator."""
+def test_long_search_with_front_policy_has_only_valid_genes():
+    """The evaluator raises an error for genes that exceed the maximum lag."""
     setting = replace(
         SMALL,
         emigrants="front",
@@ -170,6 +184,6 @@ def test_a_long_search_breeds_from_the_front_without_a_gene_that_the_settings_fo
         migrants=3,
         generations=40,
     )
-    for epoch in SerialEngine().run(Problem(recorded(), setting), empty_archipelago(4, 2), never):
+    for epoch in SerialEngine().run(Problem(recorded(), setting), empty_archipelago(4, 2), never_stop):
         last = epoch.archipelago
     assert last.generation == 40

@@ -1,4 +1,4 @@
-"""Laws of estimation: least squares and constrained least squares, equations (2) and (4).
+"""Properties of estimation: least squares and constrained least squares, equations (2) and (4).
 
 Oracles: numpy's least squares, and equation (4) as it is printed, in extended precision.
 """
@@ -30,7 +30,7 @@ def restriction(seed, constraints, terms):
     return generator.normal(size=(constraints, terms)), generator.normal(size=constraints)
 
 
-def made(*texts):
+def make_regressors(*texts):
     """Return regressors of texts, in the order given."""
     return [regressor(parse(text))[1] for text in texts]
 
@@ -39,7 +39,7 @@ def made(*texts):
 
 
 @given(seeds, st.integers(1, 8))
-def test_least_squares_is_that_of_numpy(seed, terms):
+def test_least_squares_agrees_with_numpy(seed, terms):
     psi, y = problem(seed, terms)
     found = least_squares(psi, y)
     assert found.outcome == OK
@@ -57,7 +57,7 @@ def test_least_squares_on_exact_data_returns_theta(seed, terms):
     assert found.residual_variance < 1e-24
 
 
-def test_least_squares_keeps_eight_digits_where_the_normal_equations_lose_all():
+def test_least_squares_is_accurate_if_normal_equations_are_singular():
     psi, _ = problem(0, 4)
     psi[3] = psi[0] + 1e-8 * psi[3]
     assert np.linalg.cond(psi @ psi.T) > 1e15
@@ -67,7 +67,7 @@ def test_least_squares_keeps_eight_digits_where_the_normal_equations_lose_all():
 
 @pytest.mark.parametrize("layout", ["C", "F"])
 @pytest.mark.parametrize("kind", [np.float64, np.int64])
-def test_the_layout_in_memory_and_whole_numbers_make_no_difference(layout, kind):
+def test_memory_layout_and_integer_data_have_no_effect(layout, kind):
     psi, y = (np.round(10 * item) for item in problem(1))
     expected = least_squares(psi, y)
     found = least_squares(np.array(psi, dtype=kind, order=layout), y.astype(kind))
@@ -75,7 +75,7 @@ def test_the_layout_in_memory_and_whole_numbers_make_no_difference(layout, kind)
     assert np.array_equal(found.standard_errors, expected.standard_errors)
 
 
-def test_an_estimation_leaves_its_arguments_as_they_were():
+def test_estimation_does_not_modify_its_arguments():
     psi, y = problem(2)
     S, c = restriction(2, 2, 5)
     arguments = (psi, y, S, c)
@@ -87,7 +87,7 @@ def test_an_estimation_leaves_its_arguments_as_they_were():
         assert np.array_equal(item, copy)
 
 
-def test_a_target_of_another_length_is_refused():
+def test_target_of_another_length_raises_record_error():
     psi, y = problem(3)
     for wrong in (y[:-1], np.append(y, 0.0), y[:, None]):
         with pytest.raises(RecordError, match=r"has 120 rows, the target has shape \("):
@@ -95,8 +95,9 @@ def test_a_target_of_another_length_is_refused():
 
 
 @pytest.mark.parametrize("constrained", [False, True])
-def test_standard_errors_are_the_spread_of_the_estimates(constrained):
-    # 300 repetitions know a standard deviation to 1 / sqrt(2 * 300) = 4 %: three of these are allowed.
+def test_standard_errors_are_the_standard_deviations_of_estimates(constrained):
+    # The standard deviation of 300 repetitions has an error of 1 / sqrt(2 * 300) = 4 %; three times it is
+    # allowed.
     psi, clean = problem(4, 4, 80, noise=0.0)
     S, c = restriction(4, 1, 4)
     if constrained:
@@ -122,7 +123,7 @@ def test_as_many_rows_as_parameters_are_too_few():
 
 
 @pytest.mark.parametrize("estimate", [least_squares, lambda psi, y: constrained_least_squares(psi, y, *SUM)])
-def test_a_regressor_that_depends_on_others_is_named(estimate):
+def test_dependent_regressor_is_named(estimate):
     psi, y = problem(6, 4)
     psi[2] = psi[0] - 2.0 * psi[1]
     found = estimate(psi, y)
@@ -178,7 +179,7 @@ def test_constrained_least_squares_is_equation_4(seed, constraints):
 
 
 @given(seeds, st.integers(0, 4))
-def test_constrained_least_squares_is_least_squares_where_the_constraints_hold_already(seed, constraints):
+def test_satisfied_constraints_do_not_change_least_squares(seed, constraints):
     psi, y = problem(seed)
     free = least_squares(psi, y)
     S, _ = restriction(seed + 1, constraints, 5)
@@ -199,7 +200,7 @@ def test_constraints_never_make_the_residual_smaller(seed, constraints):
 
 
 @given(seeds)
-def test_no_admissible_parameters_are_better(seed):
+def test_admissible_perturbations_increase_the_residual(seed):
     psi, y = problem(seed)
     S, c = restriction(seed + 1, 2, 5)
     theta = constrained_least_squares(psi, y, S, c).theta
@@ -209,7 +210,7 @@ def test_no_admissible_parameters_are_better(seed):
         assert squares(psi, y, theta + size * step) > squares(psi, y, theta)
 
 
-def test_as_many_constraints_as_terms_leave_nothing_to_the_data():
+def test_as_many_constraints_as_terms_determine_the_parameters():
     psi, y = problem(7)
     S, c = restriction(7, 5, 5)
     found = constrained_least_squares(psi, y, S, c)
@@ -230,8 +231,8 @@ def test_as_many_constraints_as_terms_leave_nothing_to_the_data():
         ([[1, 1, 0, 0], [1, 1, 0, 0]], [0, 1], "constraint 2 contradicts the others"),
     ],
 )
-def test_constraints_that_cannot_be_met_are_outcomes_with_a_reason(S, c, reason, size):
-    # Whatever the regressors' unit.
+def test_infeasible_constraints_are_outcomes_with_a_reason(S, c, reason, size):
+    # The outcome does not depend on the unit of the regressors.
     psi, y = problem(8, 4)
     found = constrained_least_squares(size * psi, y, np.array(S, float), np.array(c, float))
     assert found.outcome == EvaluationOutcome(Status.INFEASIBLE, reason)
@@ -239,7 +240,7 @@ def test_constraints_that_cannot_be_met_are_outcomes_with_a_reason(S, c, reason,
 
 
 @given(seeds, st.booleans())
-def test_a_combination_of_constraints_is_told_from_a_contradiction(seed, contradicts):
+def test_redundant_and_contradictory_constraints_are_distinguished(seed, contradicts):
     psi, y = problem(seed, 6)
     S, c = restriction(seed + 1, 3, 6)
     weights = np.random.default_rng(seed + 2).normal(size=3)
@@ -256,7 +257,7 @@ def test_more_constraints_than_terms_are_infeasible():
     assert found.outcome.reason.endswith("contradicts the others")
 
 
-def test_no_constraints_are_least_squares_to_the_last_bit():
+def test_zero_constraints_equal_least_squares_bit_for_bit():
     psi, y = problem(11)
     found, free = constrained_least_squares(psi, y, np.empty((0, 5)), np.empty(0)), least_squares(psi, y)
     assert np.array_equal(found.theta, free.theta)
@@ -288,7 +289,7 @@ def measured(volts=1.0, metres=1.0):
 
 @pytest.mark.parametrize(("volts", "metres"), [(1e3, 1.0), (1.0, 1e-6), (58.8, 4.7e-5), (1e-4, 1e5)])
 def test_theta_scales_with_the_units_of_the_record(volts, metres):
-    terms = [*made(*TERMS), Lagged(0, 0)]
+    terms = [*make_regressors(*TERMS), Lagged(0, 0)]
     here, there = (regressor_matrix(terms, item, 3) for item in (measured(), measured(volts, metres)))
     factor = np.array([metres / (volts**a * metres**b) for a, b in TERMS.values()])
     S = np.array([[1.0, 1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0, 1.0]])
@@ -320,15 +321,15 @@ terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]
 u, y = np.random.default_rng(0).normal(size=(2, 60_000)).cumsum(axis=1) / 100
 record = Dataset(u, y, 0.1)
 psi = regressor_matrix(terms, record, 2)
-made = factor(psi[:-1], psi[-1])
-parts = [made.triangle, made.scale, made.projection, np.array(made.residual), gram_matrix(terms, record, 2)]
-print(hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest(), made.residual)
+qr = factor(psi[:-1], psi[-1])
+parts = [qr.triangle, qr.scale, qr.projection, np.array(qr.residual), gram_matrix(terms, record, 2)]
+print(hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest(), qr.residual)
 """
 
 
 @pytest.mark.ci
 def test_long_sums_do_not_depend_on_the_number_of_threads(capsys):
-    # This process computes with as many threads of its linear algebra as it was started with, mostly one.
+    # This process uses the number of linear-algebra threads it was started with, usually one.
     exec(DIGEST, {})
     here = capsys.readouterr().out.split()
     threads = "1" if os.environ.get("OPENBLAS_NUM_THREADS") == "2" else "2"

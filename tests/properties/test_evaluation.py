@@ -1,4 +1,4 @@
-"""Laws of evaluation: what comes out depends on the individual and its bar, not on company or on the past."""
+"""Properties of evaluation: results depend only on the individual, its pruning and its threshold."""
 
 from dataclasses import replace
 from functools import cache
@@ -34,7 +34,7 @@ FREE = Settings(
 CONSTRAINED = replace(FREE, constraints="hysteresis", fitness="shooting", shooting=60)
 SETTINGS = {"free": FREE, "constrained": CONSTRAINED}
 
-#: Individuals that fail in every way that there is, and some of one structure written in two ways.
+#: Individuals with every kind of failure, and equal structures in different notation.
 AWKWARD = (
     ("u(k-1)",),
     ("phi1(u(k-1), u(k-1))",),
@@ -48,8 +48,8 @@ AWKWARD = (
 )
 
 
-def drawn(count):
-    """Half of them have a linear y."""
+def random_pool(count):
+    """Draw genes of individuals, half of them with a linear output."""
     draw = Stream(2, 0, 0, Purpose.INITIAL)
     return [random_genes(setting, 1, draw) for setting in (FREE, CONSTRAINED) for _ in range(count // 2)]
 
@@ -58,11 +58,11 @@ POOL = tuple(
     Individual(genes)
     for genes in (
         *(tuple(map(parse, texts)) for texts in AWKWARD),
-        *drawn(60),
+        *random_pool(60),
     )
 )
 
-#: From an evaluator that remembers all to one that forgets whatever it can between two calls.
+#: From limits that keep everything to limits that empty all caches between calls.
 LIMITS = [
     Limits(pairs=1 << 17),
     Limits(pairs=0),
@@ -74,101 +74,105 @@ LIMITS = [
 
 
 @cache
-def alone(name, place, pruned):
-    """What an evaluator that has never seen anybody says of one individual."""
+def evaluate_alone(name, place, pruned):
+    """Evaluate one individual with a new evaluator."""
     evaluator = Evaluator(record(), SETTINGS[name], Limits(pairs=0))
     (found,), duplicates = evaluator.evaluate([(POOL[place], pruned)])
     assert duplicates == 0
     return found
 
 
-def expected(name, place, pruned, bars):
-    """The definition of being abandoned: simulated, and beyond the bar of its size."""
-    found = alone(name, place, pruned)
+def expected(name, place, pruned, thresholds):
+    """Return the expected result: abandoned if simulated and above the threshold of its size."""
+    found = evaluate_alone(name, place, pruned)
     simulated = bool(found.outcome) or "interval" in found.outcome.reason
-    if bars is not None and simulated and found.fitness > bars[found.size]:
+    if thresholds is not None and simulated and found.fitness > thresholds[found.size]:
         return replace(found, theta=(), fitness=inf, outcome=evaluation._ABANDONED)
     return found
 
 
 populations = st.lists(st.tuples(st.integers(0, len(POOL) - 1), st.booleans()), max_size=30)
 
-#: Bars around the fitnesses that there are, one of them exactly; and none.
-bars_of_sizes = st.none() | st.lists(
+#: Thresholds around the occurring fitnesses, or none.
+thresholds_by_size = st.none() | st.lists(
     st.sampled_from([0.0, 1e-8, 1e-6, 2e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1.0, 1e6, inf]), min_size=6, max_size=6
 )
 
 
-def test_the_individuals_of_these_laws_end_in_every_way():
+def test_pool_has_all_outcomes():
     for name, others in (
         ("free", {"OK", "SINGULAR", "INFEASIBLE", "DIVERGED"}),
         ("constrained", {"OK", "INFEASIBLE", "DIVERGED"}),
     ):
-        found = [alone(name, place, pruned) for place in range(len(POOL)) for pruned in (False, True)]
+        found = [
+            evaluate_alone(name, place, pruned) for place in range(len(POOL)) for pruned in (False, True)
+        ]
         assert {each.outcome.verdict.name for each in found} == others
         assert len({each.fitness for each in found if each.outcome}) > 20
         assert any(
-            alone(name, place, True).size < alone(name, place, False).size for place in range(len(POOL))
+            evaluate_alone(name, place, True).size < evaluate_alone(name, place, False).size
+            for place in range(len(POOL))
         )
-    diverged = {alone("constrained", place, False).outcome.reason for place in range(len(POOL))}
-    assert diverged >= {"a regressor overflows on the record", "an interval left the bound"}
+    diverged = {evaluate_alone("constrained", place, False).outcome.reason for place in range(len(POOL))}
+    assert diverged >= {
+        "a regressor overflows on the record",
+        "the simulation left the divergence bound in an interval",
+    }
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-@given(st.sampled_from(LIMITS), st.lists(st.tuples(populations, bars_of_sizes), min_size=1, max_size=4))
-def test_whatever_was_evaluated_before_and_beside_it_an_individual_is_the_same_to_the_last_bit(
-    name, limits, history
-):
+@given(st.sampled_from(LIMITS), st.lists(st.tuples(populations, thresholds_by_size), min_size=1, max_size=4))
+def test_evaluation_does_not_depend_on_batch_and_cache(name, limits, history):
     evaluator = Evaluator(record(), SETTINGS[name], limits)
-    for population, bars in history:
-        found, duplicates = evaluator.evaluate([(POOL[place], pruned) for place, pruned in population], bars)
+    for population, thresholds in history:
+        found, duplicates = evaluator.evaluate(
+            [(POOL[place], pruned) for place, pruned in population], thresholds
+        )
         for (place, pruned), each in zip(population, found, strict=True):
-            assert repr(each) == repr(expected(name, place, pruned, bars))
-        # Nobody is evaluated twice; how many were known depends on the past.
+            assert repr(each) == repr(expected(name, place, pruned, thresholds))
+        # Each individual is evaluated once; the number of cached ones depends on earlier calls.
         assert len(population) - len(set(population)) <= duplicates <= len(population)
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-@given(bars_of_sizes, populations, populations)
-def test_who_is_abandoned_has_an_exact_fitness_above_its_bar_and_can_be_settled(
-    name, bars, before, population
-):
+@given(thresholds_by_size, populations, populations)
+def test_abandoned_individuals_have_a_fitness_above_the_threshold(name, thresholds, before, population):
     evaluator = Evaluator(record(), SETTINGS[name], Limits(pairs=1 << 16))
     evaluator.evaluate([(POOL[place], pruned) for place, pruned in before])
-    found, _ = evaluator.evaluate([(POOL[place], pruned) for place, pruned in population], bars)
+    found, _ = evaluator.evaluate([(POOL[place], pruned) for place, pruned in population], thresholds)
     abandoned = [
         (each, key)
         for each, key in zip(found, population, strict=True)
         if each.outcome.verdict is Status.ABANDONED
     ]
-    assert bars is not None or not abandoned
-    settled = evaluator.evaluate_abandoned([each for each, _ in abandoned])
-    for (each, key), exact in zip(abandoned, settled, strict=True):
+    assert thresholds is not None or not abandoned
+    evaluated_again = evaluator.evaluate_abandoned([each for each, _ in abandoned])
+    for (each, key), exact in zip(abandoned, evaluated_again, strict=True):
         assert (each.fitness, each.theta) == (inf, ())
-        assert exact.fitness > bars[each.size]
-        assert repr(exact) == repr(alone(name, *key))
+        assert exact.fitness > thresholds[each.size]
+        assert repr(exact) == repr(evaluate_alone(name, *key))
 
 
-def test_without_permission_to_abandon_bars_change_nothing():
+def test_thresholds_are_ignored_if_abandonment_is_disabled():
     population = [(each, True) for each in POOL]
-    patient = Evaluator(record(), CONSTRAINED, abandon=False)
-    assert patient.evaluate(population, [0.0] * 6) == Evaluator(record(), CONSTRAINED).evaluate(population)
+    complete = Evaluator(record(), CONSTRAINED, abandon=False)
+    assert complete.evaluate(population, [0.0] * 6) == Evaluator(record(), CONSTRAINED).evaluate(population)
 
 
-def test_a_bar_that_is_exactly_the_fitness_abandons_nobody():
+def test_threshold_equal_to_the_fitness_abandons_nothing():
     for name, setting in SETTINGS.items():
-        known = [alone(name, place, False) for place in range(len(POOL))]
+        known = [evaluate_alone(name, place, False) for place in range(len(POOL))]
         for place, each in enumerate(known):
             if each.outcome:
-                bars = [each.fitness if size == each.size else 0.0 for size in range(6)]
+                thresholds = [each.fitness if size == each.size else 0.0 for size in range(6)]
                 evaluator = Evaluator(record(), setting, Limits(pairs=0))
-                assert repr(evaluator.evaluate([(POOL[place], False)], bars)[0][0]) == repr(each)
+                assert repr(evaluator.evaluate([(POOL[place], False)], thresholds)[0][0]) == repr(each)
 
 
 # Batches.
 
 
-def test_a_batch_equals_one_by_one():
+def test_batch_equals_single_evaluations():
     population = [(each, bool(place % 3)) for place, each in enumerate(evolved(2).population)]
     together, duplicates = Evaluator(record(), SMALL).evaluate(population)
     one_by_one = [Evaluator(record(), SMALL, Limits(pairs=0)).evaluate([pair])[0][0] for pair in population]
@@ -180,7 +184,7 @@ def test_a_batch_equals_one_by_one():
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Sizes of the batches that the kernel was given."""
+    """Sizes of the batches passed to the kernel."""
     sizes = []
     original = evaluation.kernel.evaluate
 
@@ -193,36 +197,36 @@ def calls(monkeypatch):
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_a_generation_is_one_call_and_several_where_the_table_of_pairs_is_small(calls, name):
+def test_small_pair_table_splits_a_generation_into_several_calls(calls, name):
     population = [(each, pruned) for each in POOL for pruned in (False, True)]
     whole = Evaluator(record(), SETTINGS[name]).evaluate(population)
     assert calls == [len(population) - whole[1]]
     del calls[:]
-    # 1024 places, half of them for one call: of five genes and y(k) 21 pairs each.
+    # A call may use half of 1024 places; five genes and y(k) have 21 pairs.
     parts = Evaluator(record(), SETTINGS[name], Limits(pairs=0)).evaluate(population)
     assert repr(parts) == repr(whole)
     assert max(calls) == 1024 // 2 // 21
     assert sum(calls) == len(population) - whole[1]
 
 
-def test_a_table_that_is_nearly_full_is_emptied_between_calls():
+def test_nearly_full_pair_table_is_emptied_between_calls():
     evaluator = Evaluator(record(), FREE, Limits(pairs=0))
-    course = []
+    history = []
     for lag in range(1, 17):
         for other in range(1, 14, 4):
             texts = [f"u(k-{lag})*y(k-{other + more})" for more in range(4)]
             evaluator.evaluate([(Individual(tuple(map(parse, texts))), False)])
-            course.append(evaluator.memory["pairs"][0])
-    # Fifteen pairs of four regressors and y(k); that of y(k) with itself is known to the second.
-    assert course[:2] == [15 * 16, 29 * 16]
-    assert max(course) <= 1024 * 16 * 3 // 4
-    assert any(after < before for before, after in pairwise(course))
+            history.append(evaluator.memory["pairs"][0])
+    # Four regressors and y(k) have fifteen pairs; the second call shares the pair of y(k) with itself.
+    assert history[:2] == [15 * 16, 29 * 16]
+    assert max(history) <= 1024 * 16 * 3 // 4
+    assert any(after < before for before, after in pairwise(history))
 
 
 # Duplicates.
 
 
-def test_the_pruning_decision_is_part_of_a_duplicate_s_key():
+def test_pruning_decision_is_part_of_the_cache_key():
     genes = tuple(parse(text) for text in ("y(k-1)", "phi1(u(k-1), u(k-2))", "phi2(u(k-1), u(k-9))*y(k-3)"))
     each = Individual(genes)
     evaluator = Evaluator(record(), replace(SMALL, tolerance=1e-3))
@@ -232,10 +236,10 @@ def test_the_pruning_decision_is_part_of_a_duplicate_s_key():
     assert evaluator.evaluate([(each, True), (each, False), (each, True)]) == ((pruned, whole, pruned), 3)
 
 
-def test_a_bar_that_was_lower_is_no_answer_and_one_that_was_higher_is():
-    """Of an abandoned one all that is known is a bound."""
-    place = next(place for place in range(len(POOL)) if alone("free", place, False).fitness < inf)
-    exact = alone("free", place, False)
+def test_abandoned_evaluation_answers_only_lower_thresholds():
+    """Only a lower bound on the fitness of an abandoned individual is known."""
+    place = next(place for place in range(len(POOL)) if evaluate_alone("free", place, False).fitness < inf)
+    exact = evaluate_alone("free", place, False)
     evaluator = Evaluator(record(), FREE)
 
     def evaluated(bar):
@@ -245,20 +249,20 @@ def test_a_bar_that_was_lower_is_no_answer_and_one_that_was_higher_is():
     assert evaluated(exact.fitness / 2) == ("ABANDONED", 0)
     assert evaluated(exact.fitness / 4) == ("ABANDONED", 1)
     assert evaluated(exact.fitness * 2) == ("OK", 0)
-    # What is known exactly is known for every bar, and does not spoil it.
+    # An exact fitness answers every threshold.
     assert evaluated(exact.fitness / 4) == ("ABANDONED", 1)
     assert evaluated(inf) == ("OK", 1)
 
 
-def test_a_duplicate_consumes_the_same_draws():
-    """Every individual draws its pruning, in order, known or not."""
+def test_duplicates_consume_random_draws():
+    """The pruning of every individual is drawn in order, also if the individual is cached."""
 
     class Spy(Evaluator):
         decisions, known = (), 0
 
-        def evaluate(self, population, bars=None):
+        def evaluate(self, population, thresholds=None):
             self.decisions = [pruned for _, pruned in population]
-            found, self.known = super().evaluate(population, bars)
+            found, self.known = super().evaluate(population, thresholds)
             return found, self.known
 
     setting = replace(SMALL, prune=0.5, initial_terms=(1, 1), initial_height=0)
@@ -266,27 +270,27 @@ def test_a_duplicate_consumes_the_same_draws():
     island, info = first_generation(0, 8, spy)
     draw = Stream(8, 0, 0, Purpose.PRUNING)
     assert spy.decisions == [draw.chance(0.5) for _ in range(setting.population)]
-    # Leaves alone: hardly any individual is the first of its kind.
+    # Individuals of one leaf are mostly duplicates.
     assert setting.population > info.duplicates >= setting.population - 8
     assert spy.known < setting.population
-    once_more, seen_before = first_generation(0, 8, spy)
+    second_island, second_info = first_generation(0, 8, spy)
     assert spy.known == setting.population
-    # What the evaluator has seen tells how long a generation takes, and nothing of the generation.
-    assert (once_more, seen_before) == (island, info)
+    # The cache affects the speed of a generation, not its result.
+    assert (second_island, second_info) == (island, info)
 
 
-# Forgetting, and genes that say nothing.
+# Emptied caches, and zero genes.
 
 
-def test_a_forgetful_evaluator_changes_nothing():
-    forgetful = Evaluator(record(), SMALL, Limits(pairs=0, genes=0, structures=0))
+def test_evaluator_without_caches_gives_equal_results():
+    without_caches = Evaluator(record(), SMALL, Limits(pairs=0, genes=0, structures=0))
     known = [(Individual((Lagged(0),)), False)]
-    assert [forgetful.evaluate(known)[1] for _ in range(3)] == [0, 0, 0]
+    assert [without_caches.evaluate(known)[1] for _ in range(3)] == [0, 0, 0]
     assert [Evaluator(record(), SMALL).evaluate(known * 2)[1] for _ in range(2)] == [1, 1]
-    assert repr(evolved(4, evaluator=forgetful)) == repr(evolved(4))
+    assert repr(evolved(4, evaluator=without_caches)) == repr(evolved(4))
 
 
-def test_forgetting_empties_everything_and_changes_nothing():
+def test_clear_caches_empties_all_and_keeps_results():
     evaluator = Evaluator(record(), FREE)
     population = [(each, False) for each in POOL]
     first = evaluator.evaluate(population)
@@ -297,8 +301,8 @@ def test_forgetting_empties_everything_and_changes_nothing():
     assert repr(evaluator.evaluate(population)) == repr(first)
 
 
-def test_zero_genes_and_constants_are_no_surprise():
-    """phi of equal lags is zero; such a gene is left out, and an individual of nothing else is infeasible."""
+def test_zero_genes_are_removed_and_constants_are_kept():
+    """phi of equal lags is zero; an individual with no other genes is infeasible."""
     zero = parse("phi1(q2(u(k-1)), q2(u(k-1)))")
     evaluator = Evaluator(record(), replace(SMALL, constraints="none"))
     (nothing, something), _ = evaluator.evaluate(

@@ -1,4 +1,4 @@
-"""Laws of an evaluator's memory: every cache keeps to its limit, and says what it takes."""
+"""Properties of the memory of an evaluator: caches keep their limits and report their size."""
 
 import gc
 import tracemalloc
@@ -22,9 +22,9 @@ from support.searches import SMALL, evolved, islands_of, record
 LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)
 
 
-def test_every_cache_stays_within_its_limit_but_for_one_generation():
+def test_caches_exceed_their_limits_by_at_most_one_generation():
     evaluator = Evaluator(record(), SMALL, LIMITS)
-    # A generation's genes and their regressors, its individuals, and those that tournaments settle.
+    # Genes with regressors, and individuals of a generation, including those evaluated for tournaments.
     generation = {
         "pairs": 0,
         "genes": SMALL.population * SMALL.max_terms * 6_000,
@@ -39,32 +39,31 @@ def test_every_cache_stays_within_its_limit_but_for_one_generation():
             assert limit == getattr(LIMITS, name)
             assert 0 < taken <= limit + generation[name]
             emptied[name] += taken < before[name][0]
-    # The law says nothing where nobody comes near the limit.
+    # The test is meaningful only if all limits are reached.
     assert all(emptied.values()), emptied
     assert repr(island) == repr(evolved(40))
 
 
 @pytest.mark.ci
-def test_with_its_own_limits_an_evaluator_takes_no_more_memory_however_long_it_is_at_work():
-    """Measured, not said."""
+def test_measured_memory_of_an_evaluator_is_bounded():
     evaluator = Evaluator(record(), SMALL, LIMITS)
     islands_of(evaluator, 15)
     tracemalloc.start()
     try:
-        course = []
+        measured = []
         for seed in range(3):
             islands_of(evaluator, 7, seed=seed)
             gc.collect()
-            course.append(tracemalloc.get_traced_memory()[0])
+            measured.append(tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
-    assert max(course) < 3 * (LIMITS.genes + LIMITS.structures)
+    assert max(measured) < 3 * (LIMITS.genes + LIMITS.structures)
 
 
 @pytest.fixture
-def traced():
-    """The growth of memory from here on."""
-    # A function that no kernel has called yet is compiled, and that is not a gene's.
+def memory_growth():
+    """Return a function that measures the growth of traced memory."""
+    # Compile the functions first, because compilation takes memory, too.
     GeneIndex(CONSTRAINTS["none"], [parse("tanh(exp(y(k-1)))")])
     gc.collect()
     tracemalloc.start()
@@ -89,18 +88,18 @@ FREE = replace(HIGH, constraints="none", structure="free", primitives=("mul", "t
     "setting",
     [pytest.param(HIGH, id="paper", marks=pytest.mark.nightly), pytest.param(FREE, id="free")],
 )
-def test_genes_take_what_a_vocabulary_says(traced, setting):
-    vocabulary = GeneIndex(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
+def test_measured_memory_of_genes_equals_the_estimate(memory_growth, setting):
+    gene_index = GeneIndex(CONSTRAINTS[setting.constraints], [Lagged(0, 0)])
     draw = Stream(7, 0, 0, Purpose.INITIAL)
     for _ in range(400):
-        vocabulary.index_of(random_gene(setting, 2, draw))
-    taken = traced()
-    assert vocabulary.bytes > 300_000
-    assert vocabulary.bytes / 2.5 < taken < vocabulary.bytes * 2.5
+        gene_index.index_of(random_gene(setting, 2, draw))
+    taken = memory_growth()
+    assert gene_index.bytes > 300_000
+    assert gene_index.bytes / 2.5 < taken < gene_index.bytes * 2.5
 
 
 @pytest.mark.ci
-def test_structures_take_what_an_evaluator_says(traced):
+def test_measured_memory_of_structures_equals_the_estimate(memory_growth):
     setting = replace(SMALL, max_terms=6, constraints="none", structure="free")
     evaluator = Evaluator(record(), setting)
     genes = [parse(text) for lag in range(1, 11) for text in (f"u(k-{lag})", f"y(k-{lag})*u(k-1)")]
@@ -108,14 +107,14 @@ def test_structures_take_what_an_evaluator_says(traced):
     structures = [chosen for size in (2, 3, 5, 6) for chosen in list(combinations(genes, size))[:120]]
     rng = np.random.default_rng(0)
     population = [(Individual(chosen), bool(rng.integers(2))) for chosen in structures]
-    said, before = evaluator.memory["structures"][0], traced()
+    estimated, before = evaluator.memory["structures"][0], memory_growth()
     evaluator.evaluate(population)
-    said, taken = evaluator.memory["structures"][0] - said, traced() - before
-    assert said > 300_000
-    assert said / 2.5 < taken < said * 2.5
+    estimated, taken = evaluator.memory["structures"][0] - estimated, memory_growth() - before
+    assert estimated > 300_000
+    assert estimated / 2.5 < taken < estimated * 2.5
 
 
-def test_the_table_of_pairs_is_as_large_as_its_limit_lets_it_be():
+def test_pair_table_has_the_size_of_its_limit():
     for limit in (1 << 15, 1 << 18):
         evaluator = Evaluator(record(), SMALL, Limits(pairs=limit))
         assert evaluator.memory["pairs"] == (0, limit)
@@ -124,8 +123,8 @@ def test_the_table_of_pairs_is_as_large_as_its_limit_lets_it_be():
     assert set(Evaluator(record(), SMALL).memory) == {"pairs", "genes", "structures"}
 
 
-def test_whatever_the_limit_a_single_individual_finds_room():
-    """Of 60 genes and y(k) there are 1891 pairs; the smallest table has 1024 places."""
+def test_pair_table_has_room_for_one_individual_at_any_limit():
+    """60 genes and y(k) have 1891 pairs; the smallest table has 1024 places."""
     texts = [f"y(k-{1 + place % 10})*u(k-{1 + place // 10})" for place in range(60)]
     setting = replace(SMALL, constraints="none", structure="free", max_terms=60, fitness="one-step")
     large = [(Individual(tuple(map(parse, texts))), True)]

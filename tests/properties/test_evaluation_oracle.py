@@ -1,4 +1,4 @@
-"""Evaluation against an oracle: columns, a plain orthogonalisation, factored least squares, shooting."""
+"""Evaluation against a test oracle: columns, orthogonalisation, factored least squares, shooting."""
 
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -33,46 +33,46 @@ SETTINGS = Settings(
     tolerance=1e-4,
 )
 
-#: Squared pivots, beside the regressors' own norms, between which the columns, that the oracle factors, still
-#: tell regressors apart, and their squares may not.
-DOUBTFUL = (1e-22, 1e-11)
+#: Squared pivots, relative to the norms of the regressors, for which the columns (which the oracle factors)
+#: are numerically independent, but their Gram matrix may be singular.
+UNCERTAIN_PIVOTS = (1e-22, 1e-11)
 
 
 @dataclass
-class DoubtError(Exception):
-    """The oracle's answer hangs on a rounding."""
+class UncertainError(Exception):
+    """The answer of the oracle depends on rounding."""
 
     where: str
 
 
-def pruned_by_columns(psi, y, tolerance):
-    """Positions of the terms whose error reduction ratio exceeds the tolerance, all of them taken in turn."""
+def prune_columns(psi, y, tolerance):
+    """Return the positions of the terms whose error reduction ratio exceeds the tolerance."""
     left, norms = psi.copy(), np.sum(psi**2, axis=1)
     ratios = {}
     while len(ratios) < len(psi):
         sizes = np.sum(left**2, axis=1)
         if np.any((sizes < 1e-8 * norms) & (sizes > 1e-18 * norms)):
-            raise DoubtError("a candidate nearly depends on those before it")
+            raise UncertainError("a candidate nearly depends on those before it")
         usable = [j for j in range(len(psi)) if j not in ratios and sizes[j] > 1e-8 * norms[j]]
         if not usable:
             break
         gains = sorted(((left[j] @ y) ** 2 / sizes[j] / (y @ y), -j) for j in usable)
         best, gain = -gains[-1][1], gains[-1][0]
         if len(gains) > 1 and gains[-2][0] > gain * (1 - 1e-7):
-            raise DoubtError("a tie")
+            raise UncertainError("a tie")
         if abs(gain - tolerance) < 1e-6 * tolerance:
-            raise DoubtError("at the tolerance")
+            raise UncertainError("at the tolerance")
         ratios[best] = gain
         direction = left[best] / np.sqrt(sizes[best])
-        # Twice is enough.
+        # Two passes suffice.
         for _ in range(2):
             left -= np.outer(left @ direction, direction)
         left[best] = 0.0
     return sorted(j for j, ratio in ratios.items() if ratio > tolerance)
 
 
-def least_pivot(psi, S, c):
-    """Of the free directions; those of equilibrated columns, squared."""
+def smallest_pivot(psi, S, c):
+    """Return the smallest squared singular value of the equilibrated columns in the null space."""
     scaled = psi / np.linalg.norm(psi, axis=1, keepdims=True)
     found = null_space(S / np.linalg.norm(psi, axis=1), c)
     assert not isinstance(found, EvaluationOutcome)
@@ -80,7 +80,7 @@ def least_pivot(psi, S, c):
 
 
 def expected(genes, pruned, data, setting):
-    """Regressors, and parameters, error and condition or a verdict."""
+    """Return regressors, and either a status or model, simulation, norms and smallest pivot."""
     warm_up = setting.maximum_lag
     regressors = canonical_order(distinct_genes(genes))
     if not regressors:
@@ -88,7 +88,7 @@ def expected(genes, pruned, data, setting):
     *psi, y = regressor_matrix([*regressors, Lagged(0, 0)], data, warm_up)
     psi = np.array(psi)
     if pruned:
-        regressors = [regressors[j] for j in pruned_by_columns(psi, y, setting.tolerance)]
+        regressors = [regressors[j] for j in prune_columns(psi, y, setting.tolerance)]
         if not regressors:
             return (), Status.INFEASIBLE
     constrained = CONSTRAINTS[setting.constraints].constrain(regressors)
@@ -96,11 +96,11 @@ def expected(genes, pruned, data, setting):
         return None, constrained.verdict
     regressors = constrained.regressors
     psi = regressor_matrix(regressors, data, warm_up)
-    pivot = least_pivot(psi, constrained.S, constrained.c)
-    if DOUBTFUL[0] < pivot < DOUBTFUL[1]:
-        raise DoubtError("nearly singular")
+    pivot = smallest_pivot(psi, constrained.S, constrained.c)
+    if UNCERTAIN_PIVOTS[0] < pivot < UNCERTAIN_PIVOTS[1]:
+        raise UncertainError("nearly singular")
     estimate = constrained_least_squares(psi, y, constrained.S, constrained.c)
-    assert bool(estimate.outcome) == (pivot >= DOUBTFUL[1])
+    assert bool(estimate.outcome) == (pivot >= UNCERTAIN_PIVOTS[1])
     if not estimate.outcome:
         return regressors, estimate.outcome.verdict
     theta = tuple(estimate.theta.tolist())
@@ -110,16 +110,16 @@ def expected(genes, pruned, data, setting):
     return regressors, (model, simulated, np.linalg.norm(psi, axis=1), pivot)
 
 
-def held_against_the_oracle(individuals, data, setting):
-    """Hold individuals, pruned and not, against the oracle; return what became of them."""
+def compare_with_oracle(individuals, data, setting):
+    """Compare individuals, pruned and not, with the oracle; return counts of the outcomes."""
     population = [(each, pruned) for each in individuals for pruned in (False, True)]
-    evaluated, _ = Evaluator(data, setting).evaluate(population)
+    evaluate, _ = Evaluator(data, setting).evaluate(population)
     seen = Counter()
-    for (each, pruned), found in zip(population, evaluated, strict=True):
+    for (each, pruned), found in zip(population, evaluate, strict=True):
         try:
             regressors, rest = expected(each.genes, pruned, data, setting)
-        except DoubtError as doubt:
-            seen[doubt.where] += 1
+        except UncertainError as uncertain:
+            seen[uncertain.where] += 1
             continue
         if isinstance(rest, Status):
             assert found.outcome.verdict is rest
@@ -131,7 +131,7 @@ def held_against_the_oracle(individuals, data, setting):
         assert found.genes == tuple(
             gene for item, gene in distinct_genes(each.genes).items() if item in set(regressors)
         )
-        # Of the parameters as many digits are known as their squares have left; a simulation may lose two.
+        # The smallest pivot limits the accuracy of the parameters; a simulation may lose two more digits.
         close = min(max(1e-14 / pivot, 1e-12), 2e-5)
         if not simulated.outcome:
             assert found.outcome.verdict is Status.DIVERGED
@@ -146,7 +146,7 @@ def held_against_the_oracle(individuals, data, setting):
     return seen
 
 
-#: Lags of one product, so that clusters have several members; the inputs are so slow that lags hardly differ.
+#: Several lags of each product, so that clusters have several members. Lags of slow inputs are nearly equal.
 CLUSTERED = [
     *(f"y(k-{lag})" for lag in (1, 2, 3)),
     *(f"u1(k-{lag})" for lag in (1, 2, 3, 4, 5)),
@@ -158,13 +158,13 @@ CLUSTERED = [
 ]
 
 
-def randomly_drawn(setting, count):
+def draw_random(setting, count):
     draw = Stream(1, 0, 0, Purpose.INITIAL)
     return [Individual(random_genes(setting, 2, draw)) for _ in range(count)]
 
 
-def of_few_clusters(count):
-    """Half of them have a linear y for certain."""
+def draw_clustered(count):
+    """Draw individuals with few clusters; at least half of them have a linear output."""
     rng, genes = np.random.default_rng(3), [parse(text) for text in CLUSTERED]
     drawn = [
         [genes[place] for place in rng.permutation(len(genes))[: rng.integers(1, 8)]] for _ in range(count)
@@ -185,13 +185,13 @@ def of_few_clusters(count):
         ("hysteresis", "free-run", {"well", "ill", "pruned", "INFEASIBLE", "DIVERGED"}),
     ],
 )
-def test_random_structures_get_what_the_oracle_says(constraints, fitness, ends):
+def test_random_structures_agree_with_the_oracle(constraints, fitness, ends):
     setting = replace(SETTINGS, constraints=constraints, fitness=fitness)
     data = record(700, inputs=2, segments=(300, 350, 50))
-    individuals = [*randomly_drawn(setting, 60), *of_few_clusters(120)]
-    seen = held_against_the_oracle(individuals, data, setting)
+    individuals = [*draw_random(setting, 60), *draw_clustered(120)]
+    seen = compare_with_oracle(individuals, data, setting)
     assert seen.keys() >= ends
-    # What is left out is the exception.
+    # Only a few individuals are uncertain.
     assert seen["well"] + seen["ill"] > 220
 
 
@@ -204,70 +204,72 @@ def test_random_structures_get_what_the_oracle_says(constraints, fitness, ends):
         pytest.param(600, "hysteresis", marks=pytest.mark.nightly),
     ],
 )
-def test_where_neighbouring_samples_hardly_differ_it_is_the_same(constraints, rate):
+def test_slow_inputs_agree_with_the_oracle(constraints, rate):
     setting = replace(SETTINGS, constraints=constraints)
-    seen = held_against_the_oracle(of_few_clusters(200), record(900, inputs=2, rate=rate), setting)
+    seen = compare_with_oracle(draw_clustered(200), record(900, inputs=2, rate=rate), setting)
     assert seen["ill"] > 15
 
 
-# Failures, each with its own structure.
+# Failures.
 
 
-def evaluated(*texts, data=None, pruned=False, **changes):
+def evaluate(*texts, data=None, pruned=False, **changes):
     each = Individual(tuple(map(parse, texts)))
     (found,), _ = Evaluator(data or record(700), replace(SETTINGS, **changes)).evaluate([(each, pruned)])
     return found
 
 
-def test_a_regressor_alone_in_its_cluster_is_left_out_and_one_that_pruning_leaves_alone_too():
-    lone = evaluated("y(k-1)", "u(k-1)*y(k-1)", "phi1(u(k-1), u(k-2))")
+def test_single_regressors_of_a_cluster_are_removed_also_after_pruning():
+    lone = evaluate("y(k-1)", "u(k-1)*y(k-1)", "phi1(u(k-1), u(k-2))")
     assert lone.key == ("y(k-1)", "u1(k-1) - u1(k-2)")
-    assert repr(lone) == repr(evaluated("y(k-1)", "phi1(u(k-1), u(k-2))"))
-    # Two of them are a cluster; three samples of a slow input are as good as two.
-    kept = evaluated("y(k-1)", "phi1(u(k-1), u(k-2))", "u(k-1)*y(k-1)", "u(k-3)*y(k-2)")
+    assert repr(lone) == repr(evaluate("y(k-1)", "phi1(u(k-1), u(k-2))"))
+    # Two members form a cluster.
+    kept = evaluate("y(k-1)", "phi1(u(k-1), u(k-2))", "u(k-1)*y(k-1)", "u(k-3)*y(k-2)")
     assert kept.size == 4
     theta = dict(zip(kept.key, kept.theta, strict=True))
     assert theta["y(k-1)"] == 1.0
     assert theta["y(k-1)*u1(k-1)"] == -theta["y(k-2)*u1(k-3)"] != 0.0
-    pruned = evaluated(
+    pruned = evaluate(
         "y(k-1)", "phi1(u(k-1), u(k-2))", "u(k-1)*y(k-1)", "u(k-3)*y(k-2)", pruned=True, tolerance=1e-3
     )
     assert pruned.key == lone.key
 
 
 @pytest.mark.parametrize("constraints", ["none", "hysteresis"])
-def test_a_regressor_that_is_zero_on_the_record_is_singular_and_pruning_removes_it(constraints):
-    """Where its cluster has another member, too: what a parameter of nothing makes up for is no estimate."""
+def test_zero_regressor_is_singular_unless_it_is_pruned(constraints):
+    """This includes clusters with another member, because the parameter of a zero regressor is arbitrary."""
     data = record(700)
     late = Dataset(np.where(np.arange(700) < 699 - 4, 0.0, 1.0), data.y, data.dt)
     texts = ("y(k-1)", "u(k-1)", "u(k-9)")
     assert not regressor_matrix([Lagged(1, 9)], late, SETTINGS.maximum_lag).any()
-    whole = evaluated(*texts, data=late, constraints=constraints)
+    whole = evaluate(*texts, data=late, constraints=constraints)
     assert whole.outcome.verdict is Status.SINGULAR
-    pruned = evaluated(*texts, data=late, constraints=constraints, pruned=True, tolerance=0.0)
+    pruned = evaluate(*texts, data=late, constraints=constraints, pruned=True, tolerance=0.0)
     assert pruned.outcome
     assert pruned.key == (("y(k-1)", "u1(k-1)") if constraints == "none" else ("y(k-1)",))
 
 
-def test_without_y_at_rest_the_constraint_cannot_be_met():
+def test_structure_without_y_in_steady_state_is_infeasible():
     for texts in (("u(k-1)",), ("u(k-1)", "u(k-2)"), ("y(k-1)*y(k-2)", "y(k-3)*y(k-1)")):
-        found = evaluated(*texts)
+        found = evaluate(*texts)
         assert found.outcome.verdict is Status.INFEASIBLE
         assert found.outcome.reason == "no regressor is y at rest: add y(k-1)" or found.size == 0
-        assert evaluated(*texts, constraints="none").outcome
+        assert evaluate(*texts, constraints="none").outcome
 
 
 @pytest.mark.parametrize(("constraints", "most"), [("none", 4), ("hysteresis", 5)])
-def test_regressors_that_depend_on_each_other_are_singular_and_pruning_may_help(constraints, most):
-    """Two sines are known from four samples; that their parameters sum to zero makes room for a fifth."""
+def test_dependent_regressors_are_singular_unless_they_are_pruned(constraints, most):
+    """Four samples determine two sines; the constraint on the sum allows a fifth regressor."""
     setting = {"constraints": constraints, "data": record(700, rate=6)}
     texts = ["y(k-1)", *(f"u(k-{lag})" for lag in range(1, 8))]
-    assert evaluated(*texts[: 1 + most], **setting).outcome
-    found = evaluated(*texts[: 2 + most], **setting)
+    assert evaluate(*texts[: 1 + most], **setting).outcome
+    found = evaluate(*texts[: 2 + most], **setting)
     assert found.outcome.verdict is Status.SINGULAR
-    assert found.outcome.reason == "the free directions depend on each other"
+    assert (
+        found.outcome.reason == "the regressors are linearly dependent in the null space of the constraints"
+    )
     assert (found.size, found.fitness, found.theta) == (2 + most, np.inf, ())
-    pruned = evaluated(*texts, pruned=True, **setting)
+    pruned = evaluate(*texts, pruned=True, **setting)
     assert pruned.outcome
     assert pruned.size <= 1 + most
 
@@ -276,23 +278,23 @@ def test_no_more_rows_than_parameters_are_too_few():
     texts = ["y(k-1)", *(f"u(k-{lag})" for lag in (1, 3, 5, 8))]
     for rows in (1, 2, 3, 4, 5):
         for constraints in ("none", "hysteresis"):
-            found = evaluated(*texts, constraints=constraints, data=record(16 + rows))
+            found = evaluate(*texts, constraints=constraints, data=record(16 + rows))
             assert found.outcome.verdict is Status.TOO_FEW_ROWS
             assert (found.fitness, found.theta) == (np.inf, ())
-    assert evaluated(*texts, constraints="none", data=record(16 + 30)).outcome
+    assert evaluate(*texts, constraints="none", data=record(16 + 30)).outcome
 
 
-def test_what_overflows_on_the_record_has_diverged():
+def test_regressor_that_overflows_has_diverged():
     data = record(700)
     huge = Dataset(1e160 * data.u, data.y, data.dt)
     for pruned in (False, True):
-        found = evaluated("y(k-1)", "u(k-1)*u(k-2)", data=huge, constraints="none", pruned=pruned)
+        found = evaluate("y(k-1)", "u(k-1)*u(k-2)", data=huge, constraints="none", pruned=pruned)
         assert found.outcome.verdict is Status.DIVERGED
         assert found.outcome.reason == "a regressor overflows on the record"
         assert found.size == 2
 
 
-def test_no_genes_at_all_are_infeasible_pruned_or_not():
+def test_individuals_without_genes_are_infeasible():
     for genes in ((), (parse("phi1(u(k-1), u(k-1))"),)):
         for pruned in (False, True):
             for constraints in ("none", "hysteresis"):

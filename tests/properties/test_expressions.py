@@ -1,4 +1,4 @@
-"""The laws of expressions: text, canonical form and what they mean."""
+"""Properties of expressions: text, canonical form and value."""
 
 import math
 import os
@@ -36,18 +36,18 @@ def product(*factors):
 
 
 @given(expressions(constants=any_number))
-def test_text_is_read_back_as_the_expression_that_was_written(expression):
+def test_text_of_an_expression_is_parsed_back(expression):
     assert parse(plain(expression)) == expression
 
 
 @given(expressions(inputs=1))
-def test_a_single_input_is_read_back_without_a_number(expression):
+def test_single_input_is_written_without_a_number(expression):
     assert "u1" not in plain(expression)
     assert parse(plain(expression)) == expression
 
 
 @given(expressions(inputs=2))
-def test_two_inputs_are_read_back_with_their_numbers(expression):
+def test_two_inputs_are_written_with_their_numbers(expression):
     text = plain(expression, inputs=2)
     assert "u(" not in text
     assert parse(text) == expression
@@ -61,7 +61,7 @@ def test_canonical_form_is_idempotent(expression):
 
 
 @given(expressions())
-def test_canonical_text_is_read_back_as_the_same_regressor(expression):
+def test_canonical_text_is_parsed_back_as_the_same_regressor(expression):
     _, item = regressor(expression)
     if item is not None:
         assert regressor(parse(plain(item.expression))) == (1.0, item)
@@ -78,13 +78,13 @@ def test_canonical_form_keeps_the_value(expression, signal):
 
 
 @given(expressions())
-def test_canonical_form_reads_no_lag_that_the_expression_does_not_read(expression):
+def test_canonical_form_has_no_additional_lags(expression):
     _, core = canonical(expression)
     assert lags(core) <= lags(expression)
 
 
 @given(expressions())
-def test_canonical_form_has_its_back_shifts_at_the_leaves_and_no_other_name_for_a_primitive(expression):
+def test_canonical_form_has_no_back_shifts_and_no_synonyms(expression):
     rewritten = {"phi1", "phi2", "square", "cube"}
     for node in walk(canonical(expression)[1]):
         assert not isinstance(node, Shift)
@@ -111,7 +111,7 @@ def test_commuted_sums_are_one_regressor(signals_read, weights, rng):
     expressions(height=2),
     expressions(height=2),
 )
-def test_the_arguments_of_a_commutative_primitive_are_one_regressor_in_either_order(entry, first, second):
+def test_commuted_arguments_of_primitives_are_one_regressor(entry, first, second):
     assert canonical(Apply(entry, (first, second))) == canonical(Apply(entry, (second, first)))
 
 
@@ -120,7 +120,7 @@ def test_the_arguments_of_a_commutative_primitive_are_one_regressor_in_either_or
     leaves(),
     grid.filter(bool),
 )
-def test_a_declared_parity_and_degree_move_a_number_out_of_the_function(entry, leaf, number):
+def test_parity_and_degree_move_factors_out_of_functions(entry, leaf, number):
     if entry.degree is None:
         number = math.copysign(1.0, number)
     elif not entry.parity:
@@ -132,7 +132,7 @@ def test_a_declared_parity_and_degree_move_a_number_out_of_the_function(entry, l
 
 
 @given(expressions(height=2), expressions(height=2), expressions(height=2))
-def test_brackets_of_a_product_do_not_matter(a, b, c):
+def test_products_are_associative(a, b, c):
     assert canonical(product(a, product(b, c)))[1] == canonical(product(product(a, b), c))[1]
 
 
@@ -142,7 +142,7 @@ def test_phi_of_equal_arguments_is_zero(argument, name):
 
 
 @given(phi_factors())
-def test_phi_with_its_arguments_exchanged_changes_its_sign_alone(phi):
+def test_phi_is_antisymmetric(phi):
     exchanged = Apply(phi.primitive, phi.arguments[::-1])
     factor, core = canonical(phi)
     assert canonical(exchanged) == (-factor, core)
@@ -154,19 +154,19 @@ def test_back_shifts_add(expression, first, second):
 
 
 @given(expressions(height=2), st.integers(1, 5), signals())
-def test_a_back_shift_moves_every_signal_under_it(expression, samples, signal):
+def test_back_shift_delays_every_signal_under_it(expression, samples, signal):
     now = settled_value(expression, lambda channel, lag: signal(channel, lag + samples))
     assume(now is not None)
     assert value(Shift(samples, expression), signal) == now
     assert value(unshifted(Shift(samples, expression)), signal) == now
 
 
-def test_two_back_shifts_of_five_are_eleven_samples_back():
+def test_two_back_shifts_of_five_give_lag_eleven():
     assert regressor(parse("q5(q5(u(k-1)))"))[1].expression == Lagged(1, 11)
 
 
 @given(phi_factors(), st.integers(1, 9))
-def test_an_odd_power_of_a_sign_is_the_sign_and_an_even_one_never_one(phi, power):
+def test_odd_power_of_a_sign_is_the_sign_and_even_power_its_square(phi, power):
     sign = canonical(Apply(SIGN, (Apply(SUB, phi.arguments),)))[1]
     _, core = canonical(product(*[sign] * power)) if power > 1 else (1.0, sign)
     assert core == (sign if power % 2 else product(sign, sign))
@@ -186,7 +186,7 @@ def test_equal_terms_of_a_sum_merge(expression, first, second):
 
 
 @given(expressions(height=2), grid.filter(bool))
-def test_a_number_in_front_belongs_to_the_parameter(expression, number):
+def test_constant_factor_belongs_to_the_parameter(expression, number):
     assume(canonical(expression)[0] != 0.0)
     factor, item = regressor(expression)
     found, same = regressor(product(Constant(number), expression))
@@ -195,14 +195,14 @@ def test_a_number_in_front_belongs_to_the_parameter(expression, number):
 
 
 @given(expressions(height=2), leaves().map(lambda leaf: Lagged(leaf.channel, 0)))
-def test_a_regressor_never_looks_at_the_present(expression, present):
+def test_regressor_with_lag_zero_raises_model_error(expression, present):
     assume(canonical(expression)[0] != 0.0)
     with pytest.raises(ModelError, match=rf"reads only past samples: channel {present.channel} has lag 0"):
         regressor(product(expression, present))
 
 
 @given(st.lists(expressions(height=2), min_size=3, max_size=3))
-def test_the_order_of_content_is_total(three):
+def test_order_of_content_is_total(three):
     a, b, c = map(content, three)
     assert [a < b, a == b, a > b].count(True) == 1
     assert (a == b) == (three[0] == three[1])
@@ -211,7 +211,7 @@ def test_the_order_of_content_is_total(three):
 
 
 @given(leaves(), leaves())
-def test_content_tells_all_functions_of_the_same_arguments_apart(first, second):
+def test_content_differs_between_functions_of_equal_arguments(first, second):
     for arity in (1, 2):
         functions = [entry for entry in PRIMITIVES.values() if entry.arity == arity]
         applied = [Apply(entry, (first, second)[:arity]) for entry in functions]
@@ -219,7 +219,7 @@ def test_content_tells_all_functions_of_the_same_arguments_apart(first, second):
 
 
 @given(st.lists(expressions(height=2), min_size=2, max_size=8), st.randoms())
-def test_sorting_by_content_forgets_the_order_of_arrival(found, rng):
+def test_sorting_by_content_does_not_depend_on_the_initial_order(found, rng):
     shuffled = rng.sample(found, len(found))
     assert sorted(found, key=content) == sorted(shuffled, key=content)
 
@@ -276,13 +276,13 @@ def test_text_and_clusters_do_not_depend_on_the_seed_of_the_hash():
 # Hashes are kept within a process, and never leave it.
 
 
-def again(expression):
-    """The same tree, of nodes of its own."""
+def copy_tree(expression):
+    """Return an equal tree with new nodes."""
     match expression:
         case Shift(samples, argument):
-            return Shift(samples, again(argument))
+            return Shift(samples, copy_tree(argument))
         case Apply(primitive, arguments):
-            return Apply(replace(primitive), tuple(again(argument) for argument in arguments))
+            return Apply(replace(primitive), tuple(copy_tree(argument) for argument in arguments))
         case Constant(number):
             return Constant(number)
         case _:
@@ -290,8 +290,8 @@ def again(expression):
 
 
 @given(expressions(), expressions())
-def test_equal_trees_have_equal_hashes_and_others_are_other_keys(expression, other):
-    same = again(expression)
+def test_equal_trees_have_equal_hashes(expression, other):
+    same = copy_tree(expression)
     assert same is not expression
     assert same == expression
     assert hash(same) == hash(expression)
@@ -299,10 +299,10 @@ def test_equal_trees_have_equal_hashes_and_others_are_other_keys(expression, oth
 
 
 @given(expressions())
-def test_trees_that_differ_in_one_node_are_other_keys(expression):
+def test_trees_that_differ_in_one_node_are_different_keys(expression):
     wider = Apply(PRIMITIVES["tanh"], (expression,))
     others = [Shift(1, expression), Shift(2, expression), wider, Apply(PRIMITIVES["sin"], (expression,))]
-    assert len({expression, *others, *map(again, others)}) == 5
+    assert len({expression, *others, *map(copy_tree, others)}) == 5
 
 
 @given(expressions())
@@ -334,7 +334,7 @@ sys.stdout.buffer.write(pickle.dumps((trees, regressors)))
 """
 
 
-def test_in_a_process_with_another_seed_of_the_hash_pickled_trees_are_as_good_as_its_own():
+def test_pickled_trees_equal_those_of_other_hash_seeds():
     texts = [
         "q5(q3(tanh(u(k-1)*y(k-2))))",
         "phi1(u(k-1), q4(u(k-1)))*y(k-1)^2",
@@ -353,5 +353,5 @@ def test_in_a_process_with_another_seed_of_the_hash_pickled_trees_are_as_good_as
         assert run.returncode == 0, run.stderr.decode()
         carried = run.stdout
         seeds.append(run.stderr)
-    # The law says nothing where the hashes of the processes are the same.
+    # The test is meaningful only if the hashes of the processes differ.
     assert seeds[0] == seeds[2] != seeds[1]

@@ -1,7 +1,7 @@
-"""Laws of forward selection over a library: nested, constrained, and right where it can be.
+"""Properties of forward selection over a library: nested, constrained and correct structures.
 
-It is greedy: on slow or rich excitation it may pass a true term by. Here it is held to what it can do: small
-systems out of the library, under an excitation that tells their terms apart.
+Forward selection is greedy and may miss a true term if the excitation is slow or rich. These tests use small
+systems of the library under an excitation that separates their terms.
 """
 
 from itertools import pairwise
@@ -37,7 +37,7 @@ def texts(structure, inputs=1):
 
 
 def walk(samples, seed, inputs=1):
-    """A slow input that is everywhere and goes both ways at all levels."""
+    """Return a slow input that crosses all levels in both directions."""
     return 0.1 * np.cumsum(np.random.default_rng(seed).normal(size=(samples, inputs)), axis=0)
 
 
@@ -74,17 +74,17 @@ HYSTERESIS = {
 
 
 def measured(seed=0, samples=400):
-    """A record that no structure of any library explains."""
+    """Return a record that no structure of any library explains exactly."""
     u = walk(samples, seed)
     y = np.tanh(hysteresis(u, 0.02, seed)) + 0.3 * np.sin(3 * u[:, 0])
     return Dataset(u, y, 0.1)
 
 
-# Nested.
+# Nesting.
 
 
 @pytest.mark.parametrize(("name", "degree", "constraints"), SETTINGS)
-def test_the_first_structures_do_not_depend_on_how_many_are_asked_for(name, degree, constraints):
+def test_first_structures_do_not_depend_on_max_terms(name, degree, constraints):
     longest = forward_selection(library(name, degree), measured(), constraints, 12)
     assert len(longest[-1]) == 12 or constraints == "hysteresis"
     for most in range(1, 13):
@@ -93,7 +93,7 @@ def test_the_first_structures_do_not_depend_on_how_many_are_asked_for(name, degr
 
 
 @pytest.mark.parametrize(("name", "degree", "constraints"), SETTINGS)
-def test_every_structure_is_the_one_before_it_and_what_was_added(name, degree, constraints):
+def test_structures_are_nested(name, degree, constraints):
     found = forward_selection(library(name, degree), measured(1), constraints, 10)
     for before, after in pairwise(found):
         assert set(before) < set(after)
@@ -101,7 +101,7 @@ def test_every_structure_is_the_one_before_it_and_what_was_added(name, degree, c
         assert list(after) == [item for item in library(name, degree) if item in set(after)]
 
 
-def test_without_a_constraint_every_size_is_there_and_the_residual_falls():
+def test_residual_decreases_with_size_without_a_constraint():
     data = measured(2)
     found = forward_selection(library("polynomial", 2), data, "none", 10)
     assert [len(structure) for structure in found] == list(range(1, 11))
@@ -109,13 +109,13 @@ def test_without_a_constraint_every_size_is_there_and_the_residual_falls():
     assert variances == sorted(variances, reverse=True)
 
 
-# Right.
+# Correctness.
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 @pytest.mark.parametrize("degree", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_sparse_system_out_of_the_library_is_found_and_nothing_else(seed, degree, noise):
+def test_sparse_system_of_the_library_is_found_exactly(seed, degree, noise):
     u = white(1000, seed)
     data = Dataset(u, narx(u, noise, seed), 0.1)
     found = forward_selection(library("polynomial", degree), data, "none", 4)
@@ -129,9 +129,7 @@ def test_a_sparse_system_out_of_the_library_is_found_and_nothing_else(seed, degr
 @pytest.mark.parametrize("constraints", CONSTRAINTS)
 @pytest.mark.parametrize("noise", [0.0, 0.005])
 @pytest.mark.parametrize("seed", range(4))
-def test_sparse_hysteresis_out_of_the_library_is_found_with_and_without_the_constraint(
-    seed, noise, constraints
-):
+def test_sparse_hysteresis_of_the_library_is_found_exactly(seed, noise, constraints):
     u = walk(1000, seed)
     data = Dataset(u, hysteresis(u, noise, seed), 0.1)
     found = forward_selection(library("phi-polynomial", 3), data, constraints, 4)
@@ -143,7 +141,7 @@ def test_sparse_hysteresis_out_of_the_library_is_found_with_and_without_the_cons
         assert model.theta[0] == pytest.approx(1.0, abs=1e-15)
 
 
-def test_of_two_inputs_the_one_that_acts_is_found():
+def test_active_one_of_two_inputs_is_found():
     u = walk(1000, 5, inputs=2)
     y = hysteresis(u[:, 1:], 0.0, 5)
     found = forward_selection(library("phi-polynomial", 3, inputs=2), Dataset(u, y, 0.1), "hysteresis", 4)
@@ -151,27 +149,27 @@ def test_of_two_inputs_the_one_that_acts_is_found():
     assert sorted(texts(found[-1], inputs=2)) == sorted(expected)
 
 
-# Constrained.
+# Constraints.
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("name", "degree"), [("polynomial", 2), ("phi-polynomial", 3)])
-def test_under_the_hysteresis_constraint_every_estimated_structure_meets_it(name, degree, seed):
+def test_structures_selected_under_the_constraint_meet_it(name, degree, seed):
     data = measured(seed)
     found = forward_selection(library(name, degree), data, "hysteresis", 12)
     assert len(found) >= 4
     for structure in found:
         estimated = estimate(structure, data, "hysteresis", LAGS)
         assert isinstance(estimated, FittedStructure)
-        # Nothing that was selected is dropped again.
+        # Estimation keeps all selected regressors.
         assert estimated.model.regressors == structure
         sums = {entry.cluster: entry.sum for entry in cluster_sums(estimated.model)}
         assert sums.pop("y") == pytest.approx(1.0, abs=1e-9)
         assert all(total == pytest.approx(0.0, abs=1e-9) for total in sums.values())
 
 
-def test_selecting_under_the_constraint_beats_repairing_a_free_selection():
-    # Selected freely, part of the terms is what the constraint then forbids.
+def test_constrained_selection_is_better_than_repaired_free_selection():
+    # The constraint removes some of the freely selected terms.
     data = measured(1)
     free, bound = (forward_selection(library("polynomial", 2), data, name, 8) for name in CONSTRAINTS)
     repaired = [estimate(structure, data, "hysteresis", LAGS) for structure in free]
@@ -182,7 +180,7 @@ def test_selecting_under_the_constraint_beats_repairing_a_free_selection():
         assert chosen.residual_variance < 0.8 * repaired[size - 1].residual_variance
 
 
-def test_a_library_that_cannot_meet_the_constraint_is_an_outcome():
+def test_library_that_cannot_meet_the_constraint_is_infeasible():
     without = [item for item in library("phi-polynomial", 2) if plain(item.expression) != "y(k-1)"]
     found = forward_selection(without, measured(), "hysteresis")
     assert isinstance(found, EvaluationOutcome)
@@ -190,7 +188,7 @@ def test_a_library_that_cannot_meet_the_constraint_is_an_outcome():
     assert found.reason == "no candidate is y at rest: add y(k-1) to the library"
 
 
-def test_an_output_that_never_moves_needs_no_increment():
+def test_constant_output_needs_no_increment():
     still = Dataset(walk(100, 0), np.full(100, 3.0), 0.1)
     found = forward_selection(library("phi-polynomial", 2), still, "hysteresis")
     assert [texts(structure) for structure in found] == [["y(k-1)"]]
@@ -201,8 +199,8 @@ def test_an_output_that_never_moves_needs_no_increment():
 
 
 @pytest.mark.parametrize(("name", "degree", "constraints"), SETTINGS)
-def test_recordings_that_overlap_by_the_deepest_lag_are_one_recording(name, degree, constraints):
-    # Then their rows are the record's own, each once. A cut without overlap loses the rows that reach across.
+def test_recordings_that_overlap_by_the_maximum_lag_equal_one_record(name, degree, constraints):
+    # With the overlap, every row of the record occurs once; without it, rows across the cut are missing.
     data = measured(3)
     cut = join((data[:170], data[170 - LAGS :]))
     whole = forward_selection(library(name, degree), data, constraints, 8)
@@ -211,7 +209,7 @@ def test_recordings_that_overlap_by_the_deepest_lag_are_one_recording(name, degr
     assert forward_selection(library(name, degree), turned, constraints, 8) == whole
 
 
-def test_no_row_reaches_across_a_boundary():
+def test_rows_do_not_cross_segments():
     parts = []
     for seed, start in ((7, 0.0), (8, 40.0), (9, -70.0)):
         u = walk(300, seed)
@@ -227,19 +225,19 @@ def test_no_row_reaches_across_a_boundary():
 # From a structure to a model.
 
 
-def test_an_estimate_keeps_the_records_columns_and_sampling_time():
+def test_estimate_keeps_column_names_and_sampling_time():
     data = Dataset(measured().u, measured().y, 0.25, ("u_V",), "y_um")
     model = estimate(library("polynomial", 1), data).model
     assert (model.input_names, model.output_name, model.dt) == (("u_V",), "y_um", 0.25)
     assert len(model.theta) == len(model.standard_errors) == 7
 
 
-def test_a_regressor_may_be_given_twice_and_in_any_order():
+def test_order_and_repetition_of_regressors_have_no_effect():
     terms = library("polynomial", 1)
     assert estimate((*reversed(terms), terms[0]), measured()) == estimate(terms, measured())
 
 
-def test_a_warm_up_leaves_the_rows_before_it_out():
+def test_rows_before_the_warm_up_are_ignored():
     u = walk(200, 1)
     y = hysteresis(u, 0.0, 1)
     y[:50] = np.random.default_rng(1).normal(size=50)
@@ -255,7 +253,7 @@ def test_a_warm_up_leaves_the_rows_before_it_out():
     ("samples", "constraints", "verdict"),
     [(10, "none", Status.TOO_FEW_ROWS), (400, "none", Status.SINGULAR), (400, "hysteresis", Status.OK)],
 )
-def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
+def test_estimation_failure_is_an_outcome_with_a_reason(samples, constraints, verdict):
     # u(k-1), u(k-2) and their difference depend on each other; the constraint drops the lone u(k-1)*y(k-1).
     names = ["y(k-1)", "u(k-1) - u(k-2)", "u(k-1)", "u(k-2)", "1", "u(k-3)", "u(k-3)^2", "y(k-1)*u(k-1)"]
     if verdict is Status.OK:
@@ -269,6 +267,6 @@ def test_a_failure_is_an_outcome_with_its_reason(samples, constraints, verdict):
         assert found.reason
 
 
-def test_a_structure_without_y_cannot_be_estimated_under_the_constraint():
+def test_structure_without_y_is_infeasible_under_the_constraint():
     terms = islands.make_model([(islands.parse("u(k-1) - u(k-2)"), 1.0)]).regressors
     assert estimate(terms, measured(), "hysteresis").verdict is Status.INFEASIBLE

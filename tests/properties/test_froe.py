@@ -1,4 +1,4 @@
-"""Laws of forward orthogonal regression by error reduction ratio, equation (6).
+"""Properties of forward orthogonal regression by error reduction ratio, equation (6).
 
 Oracle: a textbook forward selection by modified Gram-Schmidt on columns, in extended precision.
 """
@@ -28,7 +28,7 @@ def inner_products(psi, y):
 
 
 def prune(gram, tolerance):
-    """Return the positions that pruning leaves."""
+    """Return the positions that pruning keeps."""
     terms = len(gram) - 1
     kept = np.full(terms, -1)
     return tuple(kept[: err_selection.prune(gram, terms, tolerance, kept)].tolist())
@@ -60,7 +60,7 @@ def textbook(psi, y):
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_froe_is_the_textbooks_forward_selection_on_columns(seed):
+def test_froe_agrees_with_the_textbook_selection_on_columns(seed):
     psi, y = problem(seed, 8, 200, noise=3.0)
     found = froe(inner_products(psi, y))
     order, ratios = textbook(psi, y)
@@ -69,7 +69,7 @@ def test_froe_is_the_textbooks_forward_selection_on_columns(seed):
 
 
 @given(seeds, st.integers(1, 10))
-def test_error_reduction_ratios_sum_to_what_least_squares_explains_and_to_one_at_most(seed, terms):
+def test_error_reduction_ratios_sum_to_the_explained_fraction(seed, terms):
     psi, y = problem(seed, terms, noise=1.0)
     found = froe(inner_products(psi, y))
     assert len(found.order) == terms
@@ -80,14 +80,14 @@ def test_error_reduction_ratios_sum_to_what_least_squares_explains_and_to_one_at
 
 
 @given(seeds)
-def test_ratios_of_a_target_that_is_explained_fully_sum_to_one(seed):
+def test_ratios_of_a_fully_explained_target_sum_to_one(seed):
     psi, _ = problem(seed, 6)
     found = froe(inner_products(psi, np.random.default_rng(seed).normal(size=6) @ psi))
     assert sum(found.err) == pytest.approx(1.0, abs=1e-9)
 
 
 @given(seeds)
-def test_froe_with_n_terms_begins_froe_with_one_more(seed):
+def test_selections_of_different_lengths_are_nested(seed):
     gram = inner_products(*problem(seed, 7, noise=1.0))
     selections = [froe(gram, max_terms=terms) for terms in range(9)]
     assert [len(selection.order) for selection in selections] == [0, 1, 2, 3, 4, 5, 6, 7, 7]
@@ -97,14 +97,14 @@ def test_froe_with_n_terms_begins_froe_with_one_more(seed):
 
 
 @given(seeds)
-def test_the_first_selected_has_the_largest_correlation(seed):
+def test_first_selected_term_has_the_largest_correlation(seed):
     psi, y = problem(seed, 7, noise=1.0)
     correlation = np.abs(psi @ y) / np.sqrt(np.sum(psi**2, axis=1))
     assert froe(inner_products(psi, y), max_terms=1).order == (int(np.argmax(correlation)),)
 
 
 @given(seeds, st.floats(1e-6, 0.3))
-def test_a_tolerance_stops_the_selection_and_changes_nothing_before(seed, tolerance):
+def test_tolerance_truncates_the_selection(seed, tolerance):
     gram = inner_products(*problem(seed, 7, noise=1.0))
     full, stopped = froe(gram), froe(gram, tolerance)
     count = len(stopped.order)
@@ -123,26 +123,26 @@ def test_zeros_and_duplicates_are_never_selected():
     assert sum(found.err) == pytest.approx(sum(froe(inner_products(psi, y)).err), abs=1e-12)
 
 
-def test_what_explains_nothing_at_all_is_not_selected():
+def test_candidate_that_explains_nothing_is_not_selected():
     gram = np.array([[4.0, 0.0, 1.0, 2.0], [0.0, 9.0, 0.0, 0.0], [1.0, 0.0, 1.0, 3.0], [2.0, 0.0, 3.0, 25.0]])
     assert froe(gram).order == (2, 0)
     assert prune(gram, 0.0) == (0, 2)
 
 
-def test_ties_go_to_the_first_candidate():
+def test_first_candidate_wins_ties():
     psi, y = problem(14, 3)
     order = froe(inner_products(np.vstack([psi, psi]), y)).order
     assert sorted(order) == [0, 1, 2]
 
 
-def test_nothing_is_selected_for_a_target_of_zeros():
+def test_target_of_zeros_selects_nothing():
     psi, _ = problem(15, 3)
     assert froe(inner_products(psi, np.zeros(120))).order == ()
     assert froe(np.array([[4.0]])).order == ()
 
 
 @pytest.mark.parametrize("value", [math.inf, math.nan])
-def test_a_candidate_that_overflowed_is_never_selected_and_spoils_no_other(value):
+def test_overflowed_candidate_is_not_selected_and_has_no_effect(value):
     psi, y = problem(16, 4)
     usual = froe(inner_products(np.delete(psi, 2, axis=0), y))
     gram = inner_products(psi, y)
@@ -153,22 +153,22 @@ def test_a_candidate_that_overflowed_is_never_selected_and_spoils_no_other(value
 
 
 @pytest.mark.parametrize("value", [math.inf, math.nan])
-def test_a_target_that_is_no_number_selects_nothing(value):
+def test_non_finite_target_selects_nothing(value):
     gram = inner_products(*problem(16, 4))
     gram[4] = gram[:, 4] = value
     assert froe(gram).order == ()
 
 
 @given(seeds, st.floats(1e-6, 0.3))
-def test_pruning_leaves_exactly_those_whose_ratio_exceeds_the_tolerance(seed, tolerance):
+def test_pruning_keeps_terms_whose_ratio_exceeds_the_tolerance(seed, tolerance):
     psi, y = problem(seed, 7, noise=1.0)
     order, ratios = textbook(psi, y)
     expected = [item for item, err in zip(order, ratios, strict=True) if err > tolerance]
     assert prune(inner_products(psi, y), tolerance) == tuple(sorted(expected))
 
 
-def test_pruning_orthogonalises_all_before_any_leaves():
-    # The second term explains 1 % alone and is selected first; with it the other explains all that is left.
+def test_pruning_orthogonalises_all_terms_before_removing_any():
+    # The second term alone explains 1 % and is selected first; then the first term explains the rest.
     a, b, c = np.linalg.qr(np.random.default_rng(17).normal(size=(50, 3)))[0].T
     y = a
     psi = np.array([c + 0.05 * a, 0.1 * a + c + 0.01 * b])
@@ -206,7 +206,7 @@ def measured(volts=1.0, metres=1.0):
 
 
 @pytest.mark.parametrize(("volts", "metres"), [(1e3, 1.0), (1.0, 1e-6), (58.8, 4.7e-5), (1e-4, 1e5)])
-def test_the_units_of_the_record_leave_froes_order_as_it_was(volts, metres):
+def test_units_of_the_record_do_not_change_the_order(volts, metres):
     terms = [*(regressor(parse(text))[1] for text in TEXTS), Lagged(0, 0)]
     before, after = (froe(gram_matrix(terms, item, 3)) for item in (measured(), measured(volts, metres)))
     assert len(before.order) == len(TEXTS)

@@ -1,4 +1,4 @@
-"""Laws of the hall of fame: halls gathered in any order, in any groups, any number of times are one hall."""
+"""Properties of the hall of fame: merging is commutative, associative and idempotent."""
 
 from collections import Counter
 from itertools import pairwise
@@ -14,20 +14,20 @@ from islands.model.expression import Lagged, Shift
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
 
-#: Leaves enough for more structures of one size than a hall keeps.
+#: The leaves give more structures of one size than a hall keeps.
 LEAVES = [Lagged(channel, lag) for channel in (0, 1) for lag in (1, 2, 3, 4, 5, 6)]
 
-#: Few values, so that ties are common; failures among them.
+#: Few values make ties common; some are failures.
 FITNESSES = [0.25, 0.5, 1.0, 2.0, 3.0, inf, nan]
 
 
 @st.composite
 def individuals(draw):
-    """Small models; equal structures come with other genes, other parameters and other fitnesses."""
+    """Draw small models; equal structures may have different genes, parameters and fitnesses."""
     leaves = draw(st.lists(st.sampled_from(LEAVES), min_size=1, max_size=3, unique=True))
     genes = []
     for leaf in leaves:
-        # u(k-3) is also q2(u(k-1)): one structure, written in two ways.
+        # u(k-3) and q2(u(k-1)) are the same structure.
         shift = draw(st.integers(0, leaf.lag - 1))
         genes.append(Shift(shift, Lagged(leaf.channel, leaf.lag - shift)) if shift else leaf)
     regressors = tuple(canonical_order(make_regressor(gene) for gene in genes))
@@ -39,7 +39,7 @@ halls = st.lists(individuals(), max_size=25).map(lambda found: with_entries(Hall
 
 
 def exactly(hall):
-    """All that a checkpoint would hold of it: equality of dataclasses does not look into regressors."""
+    """Return all content for exact comparison; equality of regressors compares only their text."""
     return [
         (
             [repr(gene) for gene in entry.genes],
@@ -73,7 +73,7 @@ def test_merging_is_idempotent(one, other):
 
 
 @given(st.lists(individuals(), max_size=30), st.randoms(use_true_random=False))
-def test_the_order_in_which_individuals_come_does_not_matter(found, random):
+def test_order_of_individuals_does_not_matter(found, random):
     expected = exactly(with_entries(HallOfFame(), found))
     shuffled = list(found)
     random.shuffle(shuffled)
@@ -85,7 +85,7 @@ def test_the_order_in_which_individuals_come_does_not_matter(found, random):
 
 
 @given(st.lists(individuals(), max_size=40))
-def test_it_keeps_the_best_of_every_size_each_structure_once(found):
+def test_hall_keeps_the_best_distinct_structures_of_every_size(found):
     hall = with_entries(HallOfFame(), found)
     best = {}
     for each in found:
@@ -106,15 +106,15 @@ single = st.tuples(st.sampled_from(LEAVES), st.sampled_from(FITNESSES)).map(
 
 
 @given(st.lists(single, min_size=10, max_size=60), st.integers(1, 12))
-def test_a_full_hall_takes_in_generations_what_it_takes_at_once(found, generation):
-    """Whoever is less fit than the last of a full size is passed over, whoever is as fit is not."""
+def test_division_into_generations_does_not_matter(found, generation):
+    """Individuals less fit than the last of a full size are skipped; equally fit ones are not."""
     hall = HallOfFame()
     for begin in range(0, len(found), generation):
         hall = with_entries(hall, found[begin : begin + generation])
     assert exactly(hall) == exactly(with_entries(HallOfFame(), found))
 
 
-def test_one_as_fit_as_the_last_of_a_full_size_takes_its_place_by_its_text():
+def test_ties_with_the_last_of_a_full_size_are_broken_by_text():
     full = with_entries(HallOfFame(), [entry(1.0, f"y(k-{lag})") for lag in range(1, DEPTH + 1)])
     early, late = entry(1.0, "u(k-1)"), entry(1.0, "y(k-9)")
     assert with_entries(full, [late]) == full
@@ -126,7 +126,7 @@ def test_one_as_fit_as_the_last_of_a_full_size_takes_its_place_by_its_text():
 
 
 @given(halls)
-def test_the_places_are_counted_within_a_size(hall):
+def test_ranks_are_counted_within_a_size(hall):
     counted = [(place, each.size) for place, each in hall.ranked()]
     assert [each for _, each in hall.ranked()] == list(hall.entries)
     assert counted == [
@@ -137,7 +137,7 @@ def test_the_places_are_counted_within_a_size(hall):
 
 
 @given(halls)
-def test_the_front_gets_better_with_every_term(hall):
+def test_fitness_improves_along_the_pareto_front(hall):
     best = pareto_front(hall.entries)
     assert all(one.size < other.size and one.fitness > other.fitness for one, other in pairwise(best))
     for entry in hall.entries:
@@ -154,18 +154,18 @@ def entry(fitness, *texts, theta=None):
     return Individual(genes, regressors, theta or (1.0,) * len(genes), fitness)
 
 
-def test_of_equal_structures_the_fitter_stays_whatever_its_genes():
+def test_fitter_of_equal_structures_is_kept():
     worse, better = entry(2.0, "q1(y(k-1))"), entry(1.0, "y(k-2)")
     hall = with_entries(HallOfFame(), [better, worse])
     assert [(each.fitness, each.genes) for each in hall.entries] == [(1.0, (Lagged(0, 2),))]
 
 
-def test_a_tie_of_fitness_and_structure_goes_to_the_smaller_parameters():
+def test_ties_of_fitness_and_structure_are_broken_by_parameters():
     one, other = entry(1.0, "y(k-1)", theta=(0.5,)), entry(1.0, "y(k-1)", theta=(0.25,))
     assert with_entries(HallOfFame(), [one, other]).entries[0].theta == (0.25,)
 
 
-def test_a_tie_of_fitness_goes_by_the_structure_s_text():
+def test_ties_of_fitness_are_broken_by_text():
     hall = with_entries(HallOfFame(), [entry(1.0, "y(k-1)"), entry(1.0, "u(k-1)")])
     assert [each.key for each in hall.entries] == [("u1(k-1)",), ("y(k-1)",)]
 
@@ -178,13 +178,13 @@ def test_at_most_eight_models_of_a_size_are_kept():
 
 
 @pytest.mark.parametrize("fitness", [nan, inf, -inf])
-def test_what_is_not_finite_never_enters(fitness):
+def test_non_finite_fitness_never_enters(fitness):
     assert with_entries(HallOfFame(), [entry(fitness, "y(k-1)")]) == HallOfFame()
     good = with_entries(HallOfFame(), [entry(3.0, "y(k-1)")])
     assert with_entries(good, [entry(fitness, "y(k-1)")]) == good
 
 
-def test_a_larger_model_that_is_no_better_is_off_the_front():
+def test_larger_model_without_better_fitness_is_not_on_the_front():
     hall = with_entries(
         HallOfFame(),
         [entry(1.0, "y(k-1)"), entry(1.0, "y(k-1)", "u(k-1)"), entry(0.5, "y(k-1)", "y(k-2)", "u(k-1)")],

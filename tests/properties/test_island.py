@@ -1,4 +1,4 @@
-"""Laws of an island: its steps are pure, its elite does not get worse, failures never lead."""
+"""Properties of an island: steps are pure functions, and the elite never gets worse."""
 
 import hashlib
 import os
@@ -26,7 +26,7 @@ from support.searches import SMALL, distinct_genes, evolved, exactly, islands_of
 
 
 def digest():
-    """The hash of a checkpoint after ten generations of two islands that send each other individuals."""
+    """Return the hash of a checkpoint after ten generations of two islands with migration."""
     library = {"library": "phi-polynomial", "library_degree": 3, "from_library": 0.5}
     migration = {"migrate_every": 3, "migrants": 2, "emigrants": "front", "replaced": "random"}
     setting = replace(
@@ -43,7 +43,7 @@ def digest():
 # An individual recombines or mutates, never both.
 
 
-def bred(**changes):
+def step_once(**changes):
     setting = replace(SMALL, prune=0.0, constraints="none", structure="free", **changes)
     evaluator = Evaluator(record(), setting)
     island, _ = first_generation(0, 1, evaluator)
@@ -51,31 +51,31 @@ def bred(**changes):
     return island, following
 
 
-def test_who_recombined_does_not_mutate():
-    """Every pair recombines by whole genes; a mutation, as sure as can be, would bring in new ones."""
-    island, following = bred(crossover=1.0, high_level=1.0, mutation=1.0, outer=1.0)
+def test_recombined_individuals_do_not_mutate():
+    """All pairs exchange whole genes; a mutation would introduce new genes."""
+    island, following = step_once(crossover=1.0, high_level=1.0, mutation=1.0, outer=1.0)
     known = {gene for each in island.population for gene in each.genes}
     assert {gene for each in following.population for gene in each.genes} <= known
     assert [each.genes for each in following.population] != [each.genes for each in island.population]
 
 
-def test_who_did_not_recombine_mutates_in_one_gene():
-    island, following = bred(crossover=0.0, mutation=1.0, outer=1.0)
+def test_individuals_without_crossover_mutate_in_one_gene():
+    island, following = step_once(crossover=0.0, mutation=1.0, outer=1.0)
     known = {gene for each in island.population for gene in each.genes}
-    fresh = [sum(gene not in known for gene in each.genes) for each in following.population]
-    assert max(fresh) == 1
-    assert sum(fresh) > len(fresh) / 2
+    new_genes = [sum(gene not in known for gene in each.genes) for each in following.population]
+    assert max(new_genes) == 1
+    assert sum(new_genes) > len(new_genes) / 2
 
 
-def test_who_neither_recombines_nor_mutates_is_a_copy():
-    island, following = bred(crossover=0.0, mutation=0.0)
+def test_individuals_without_crossover_and_mutation_are_copies():
+    island, following = step_once(crossover=0.0, mutation=0.0)
     assert set(following.population) <= set(island.population)
 
 
-# The same island steps to the same island.
+# Steps are pure functions.
 
 
-def test_a_step_twice_gives_the_same_island():
+def test_step_is_a_pure_function():
     evaluator = Evaluator(record(), SMALL)
     island, _ = first_generation(0, 3, evaluator)
     first, second = step(island, evaluator), step(island, evaluator)
@@ -85,19 +85,19 @@ def test_a_step_twice_gives_the_same_island():
     assert first[0].generation == 1
 
 
-def test_an_island_that_breeds_in_its_own_way_is_one_whose_settings_all_breed_like_it():
-    """What another island's evaluator knows, and the settings it was made for, change nothing."""
-    own = replace(SMALL, crossover=0.3, mutation=1.0, tournament=2, prune=0.7, population=30)
-    shared, alike = Evaluator(record(), SMALL), Evaluator(record(), own)
-    here, there = first_generation(0, 3, shared, (), own), first_generation(0, 3, alike)
+def test_settings_of_an_island_override_those_of_the_evaluator():
+    """The settings and the cache of a shared evaluator have no effect."""
+    profile_settings = replace(SMALL, crossover=0.3, mutation=1.0, tournament=2, prune=0.7, population=30)
+    shared, alike = Evaluator(record(), SMALL), Evaluator(record(), profile_settings)
+    here, there = first_generation(0, 3, shared, (), profile_settings), first_generation(0, 3, alike)
     for _ in range(3):
         assert exactly(here) == exactly(there)
-        here, there = step(here[0], shared, (), own), step(there[0], alike)
+        here, there = step(here[0], shared, (), profile_settings), step(there[0], alike)
     assert len(here[0].population) == 30
-    assert step(here[0], shared)[0] != step(here[0], shared, (), own)[0]
+    assert step(here[0], shared)[0] != step(here[0], shared, (), profile_settings)[0]
 
 
-# What is told of a step.
+# Statistics of a step.
 
 
 def structures(population):
@@ -105,7 +105,7 @@ def structures(population):
 
 
 @pytest.mark.parametrize("initial_terms", [(1, 1), (1, 4)])
-def test_a_duplicate_is_who_has_the_structure_of_a_parent_or_of_an_earlier_sibling(initial_terms):
+def test_duplicates_are_structures_of_parents_or_earlier_siblings(initial_terms):
     evaluator = Evaluator(record(), replace(SMALL, initial_terms=initial_terms))
     island, info = first_generation(0, 3, evaluator)
     parents, counted = [], []
@@ -122,20 +122,20 @@ def test_a_duplicate_is_who_has_the_structure_of_a_parent_or_of_an_earlier_sibli
     assert max(counted) < len(island.population)
 
 
-def test_what_is_told_of_a_step_follows_from_the_island_alone():
-    """An evaluator that has seen it all, and one that has seen nothing, as after a resume."""
+def test_step_info_does_not_depend_on_the_evaluator():
+    """Evaluators with a full and with an empty cache, as after a resume, give equal statistics."""
     warm = Evaluator(record(), SMALL)
     islands = islands_of(warm, 4)
     for island in islands[:-1]:
         assert step(island, warm)[1] == step(island, Evaluator(record(), SMALL))[1]
 
 
-def test_ten_generations_give_the_same_bits_twice():
+def test_ten_generations_give_equal_bits_twice():
     assert digest() == digest()
 
 
 @pytest.mark.ci
-def test_ten_generations_give_the_same_bits_in_other_processes():
+def test_ten_generations_give_equal_bits_in_other_processes():
     command = "import runpy, sys; print(runpy.run_path(sys.argv[1])['digest']())"
     running = [
         subprocess.Popen(
@@ -149,12 +149,12 @@ def test_ten_generations_give_the_same_bits_in_other_processes():
     assert [process.communicate(timeout=120)[0].strip() for process in running] == [digest()] * 2
 
 
-def test_runs_of_other_seeds_differ():
+def test_runs_with_different_seeds_differ():
     assert evolved(2, seed=3) != replace(evolved(2, seed=4), seed=3)
 
 
-def test_every_stream_of_a_step_knows_its_island_and_its_generation():
-    """Where all else is equal, other islands and other generations select, vary and prune otherwise."""
+def test_random_streams_depend_on_island_and_generation():
+    """Selection, variation and pruning differ between islands and between generations."""
     for one_parent, changes in (
         (False, {"prune": 0.0, "crossover": 0.0, "mutation": 0.0}),
         (True, {"prune": 0.0, "crossover": 0.0, "mutation": 1.0}),
@@ -173,19 +173,19 @@ def test_every_stream_of_a_step_knows_its_island_and_its_generation():
         assert len(following) == 4, changes
 
 
-def test_parents_are_elite_and_offspring_together():
+def test_parents_are_elite_and_offspring():
     evaluator = Evaluator(record(), replace(SMALL, prune=0.0, crossover=0.0, mutation=0.0, distinct=True))
     island = evolved(0, evaluator.settings, evaluator=evaluator)
     best, others = island.elite[:1], island.population[1:]
     only_in_elite = replace(island, elite=best, population=tuple(each for each in others if each != best[0]))
     following, info = step(only_in_elite, evaluator)
     assert best[0] in following.population
-    # Copies of parents, whichever half of them these come from.
+    # All offspring are copies of parents.
     assert info.duplicates == len(following.population)
     assert len(set(following.population)) > 3
 
 
-def test_the_hall_of_an_island_remembers_what_its_population_has_lost():
+def test_hall_of_fame_keeps_models_that_the_population_has_lost():
     evaluator = Evaluator(record(), SMALL)
     island, _ = first_generation(0, 3, evaluator)
     expected = with_entries(HallOfFame(), island.population)
@@ -200,20 +200,22 @@ def test_the_hall_of_an_island_remembers_what_its_population_has_lost():
 # Seeds, elites, failures.
 
 
-def test_the_first_population_begins_with_the_seeds():
+def test_first_population_begins_with_the_seeds():
     setting = replace(SMALL, prune=0.0, library="phi-polynomial", library_degree=3, library_lags=3)
-    posed = problem(record(), setting)
-    assert [len(genes) for genes in posed.seeds] == sorted(len(genes) for genes in posed.seeds)
-    assert len(posed.seeds) > 2
-    island, _ = first_generation(0, 1, Evaluator(posed.record, setting), posed.seeds)
-    for each, genes in zip(island.population, posed.seeds, strict=False):
+    search_problem = problem(record(), setting)
+    assert [len(genes) for genes in search_problem.seeds] == sorted(
+        len(genes) for genes in search_problem.seeds
+    )
+    assert len(search_problem.seeds) > 2
+    island, _ = first_generation(0, 1, Evaluator(search_problem.record, setting), search_problem.seeds)
+    for each, genes in zip(island.population, search_problem.seeds, strict=False):
         assert each.genes == genes
         assert set(each.regressors) == set(distinct_genes(genes))
-    unseeded, _ = first_generation(0, 1, Evaluator(posed.record, setting))
-    assert island.population[len(posed.seeds) :] == unseeded.population[: -len(posed.seeds)]
+    unseeded, _ = first_generation(0, 1, Evaluator(search_problem.record, setting))
+    assert island.population[len(search_problem.seeds) :] == unseeded.population[: -len(search_problem.seeds)]
 
 
-def test_seeds_are_mended_and_cut_like_everybody():
+def test_seeds_are_repaired_and_truncated():
     setting = replace(SMALL, prune=0.0, max_terms=3, initial_terms=(1, 3))
     given_seeds = [
         (parse("phi1(y(k-1), q1(u(k-1)))"),),
@@ -224,7 +226,7 @@ def test_seeds_are_mended_and_cut_like_everybody():
     assert island.population[1].genes == (Lagged(0), *given_seeds[1][:2])
 
 
-def test_more_seeds_than_the_population_are_cut():
+def test_seeds_beyond_the_population_are_ignored():
     setting = replace(SMALL, population=2)
     given_seeds = [(Lagged(0), parse(f"phi1(u(k-1), u(k-{lag}))")) for lag in (2, 3, 4)]
     island, _ = first_generation(0, 1, Evaluator(record(), setting), given_seeds)
@@ -232,7 +234,7 @@ def test_more_seeds_than_the_population_are_cut():
 
 
 @pytest.mark.parametrize("distinct", [False, True])
-def test_the_elite_is_the_best_of_old_elite_and_offspring(distinct):
+def test_elite_is_the_best_of_previous_elite_and_offspring(distinct):
     setting = replace(SMALL, distinct=distinct, elite=0.25)
     evaluator = Evaluator(record(), setting)
     island, _ = first_generation(0, 3, evaluator)
@@ -253,7 +255,7 @@ def test_the_elite_is_the_best_of_old_elite_and_offspring(distinct):
         assert len(island.population) == setting.population
 
 
-def test_ties_for_the_elite_go_to_the_smaller_then_to_the_structure_s_text():
+def test_ties_for_the_elite_are_broken_by_size_and_then_by_text():
     def each(*texts):
         regressors = tuple(make_regressor(parse(text)) for text in texts)
         return Individual(tuple(map(parse, texts)), regressors, (1.0,) * len(texts), 0.5)
@@ -268,12 +270,12 @@ def finite(fitness, text="y(k-1)"):
     return Individual((parse(text),), (make_regressor(parse(text)),), (1.0,), fitness)
 
 
-def test_a_failure_never_enters_the_hall_of_fame_and_is_last_in_anelite_of():
+def test_failures_never_enter_the_hall_of_fame():
     failures = [finite(value, text) for value, text in ((nan, "y(k-2)"), (inf, "y(k-3)"))]
     good = finite(5.0)
     assert with_entries(HallOfFame(), failures) == HallOfFame()
     assert with_entries(HallOfFame(), [*failures, good]).entries == (good,)
-    # A record on which the only structures diverge: nothing enters, and the run goes on.
+    # The run continues if structures diverge.
     setting = replace(
         SMALL, constraints="none", structure="free", primitives=("cube", "exp"), initial_height=4
     )

@@ -1,7 +1,7 @@
-"""Laws of simulation: what one-step-ahead, multiple shooting and free run mean, whatever the model.
+"""Properties of simulation: one-step-ahead prediction, multiple shooting and free run.
 
-The oracle is the definition: a recursion over samples in plain floats, on `islands.model.expression.value`.
-The kernel has to agree with it to the last bit.
+The test oracle is the definition: a recursion over samples in plain floats, with
+`islands.model.expression.value`. The kernel must agree with it to the last bit.
 """
 
 import pickle
@@ -24,13 +24,13 @@ from islands.simulation.predictors import free_run, multiple_shooting, one_step_
 
 
 def model(inputs=1, **terms):
-    """Make a model of ``name="parameter * text"`` terms; the names only tell them apart."""
+    """Make a model of ``name="parameter * text"`` terms; the names only distinguish them."""
     split = (term.split(" * ", 1) for term in terms.values())
     names = ("u",) if inputs == 1 else tuple(f"u{index + 1}" for index in range(inputs))
     return make_model([(parse(text), float(parameter)) for parameter, text in split], names)
 
 
-#: Stable models of every kind that the kernel treats in its own way.
+#: Stable models of every kind that the kernel treats separately.
 MODELS = {
     "linear": model(a="1.2 * y(k-1)", b="-0.5 * y(k-2)", c="0.3 * u(k-1)"),
     "deepest lag on y": model(a="0.4 * y(k-9)", b="0.3 * y(k-1)", c="1 * u(k-2)"),
@@ -66,14 +66,14 @@ MODELS = {
     "two inputs": model(2, a="0.5 * y(k-1)", b="1 * u1(k-2)*u2(k-5)", c="-0.3 * u2(k-1)", d="0.1 * u1(k-1)"),
 }
 
-#: Two and more chunks of the kernel's 64 steps, as long as a warm-up, shorter, and of a single sample.
+#: Segments of several chunks (64 steps), as long as a warm-up, shorter, and of a single sample.
 SEGMENTS = (150, 3, 70, 12, 1, 64, 30)
 
 every_model = pytest.mark.parametrize("name", MODELS)
 
 
 def record(model, segments=SEGMENTS, seed=0):
-    """Draw a record of noise: nothing that the model could have made."""
+    """Draw a record of noise."""
     generator = np.random.default_rng(seed)
     samples = sum(segments)
     u, y = generator.normal(size=(samples, model.inputs)), generator.normal(size=samples)
@@ -81,7 +81,7 @@ def record(model, segments=SEGMENTS, seed=0):
 
 
 def recursion(model, record, interval=None, warm_up=None):
-    """Simulate sample by sample, as the definition says; ``interval=None`` is the free run."""
+    """Simulate sample by sample by definition; ``interval=None`` is the free run."""
     warm_up = model.maximum_lag if warm_up is None else warm_up
     u, measured, found = record.u.tolist(), record.y.tolist(), [float("nan")] * record.samples
     terms = [(weight, item.expression) for weight, item in zip(model.theta, model.regressors, strict=True)]
@@ -101,13 +101,13 @@ def recursion(model, record, interval=None, warm_up=None):
     return np.array(found)
 
 
-def same(left, right):
-    """Tell whether two predictions agree in every bit, and are missing in the same places."""
+def equal_bits(left, right):
+    """Return whether two predictions are equal bit for bit, including missing values."""
     return left.tobytes() == right.tobytes()
 
 
-def drawn_records(data):
-    """Draw a model, segments of which one at least is long enough, and a warm-up."""
+def draw_records(data):
+    """Draw a model, segments of which at least one is long enough, and a warm-up."""
     name = data.draw(st.sampled_from(list(MODELS)))
     warm_up = MODELS[name].maximum_lag + data.draw(st.integers(0, 8))
     lengths = data.draw(st.lists(st.integers(1, 90), min_size=1, max_size=5))
@@ -116,34 +116,36 @@ def drawn_records(data):
     return MODELS[name], record(MODELS[name], tuple(lengths), seed), warm_up
 
 
-# The kernel is the definition.
+# Kernel and definition.
 
 
 @every_model
 @pytest.mark.parametrize("interval", [1, 2, 3, 7, 63, 64, 65, 140, None])
-def test_the_kernel_is_the_recursion_bit_for_bit(name, interval):
+def test_kernel_equals_the_recursion_bit_for_bit(name, interval):
     data = record(MODELS[name])
     found = multiple_shooting(MODELS[name], data, interval)
     assert found.outcome
-    assert same(found.y, recursion(MODELS[name], data, interval))
+    assert equal_bits(found.y, recursion(MODELS[name], data, interval))
 
 
 @given(st.data())
-def test_the_kernel_is_the_recursion_for_any_segments_intervals_and_warm_up(data):
-    chosen, drawn, warm_up = drawn_records(data)
+def test_kernel_equals_the_recursion_for_random_layouts(data):
+    chosen, drawn, warm_up = draw_records(data)
     interval = data.draw(st.none() | st.integers(1, 100))
     found = multiple_shooting(chosen, drawn, interval, warm_up)
     assert found.outcome
-    assert same(found.y, recursion(chosen, drawn, interval, warm_up))
+    assert equal_bits(found.y, recursion(chosen, drawn, interval, warm_up))
 
 
 @pytest.mark.parametrize("name", ["linear", "deepest lag on u", "hysteresis"])
 @pytest.mark.parametrize("interval", [1, 2])
-def test_more_intervals_than_a_block_has_lanes_are_all_simulated(name, interval):
+def test_more_intervals_than_lanes_of_a_block_are_simulated(name, interval):
     data = record(MODELS[name], (3 * WIDTHS[-1] + 17, 5, 2 * WIDTHS[-1] + 1), seed=1)
     cut = layout(data, MODELS[name].maximum_lag, interval)
     assert len(cut.block_lanes) > 2
-    assert same(multiple_shooting(MODELS[name], data, interval).y, recursion(MODELS[name], data, interval))
+    assert equal_bits(
+        multiple_shooting(MODELS[name], data, interval).y, recursion(MODELS[name], data, interval)
+    )
 
 
 def test_functions_of_the_mathematical_library_agree_to_rounding():
@@ -162,27 +164,27 @@ def test_functions_of_the_mathematical_library_agree_to_rounding():
 @every_model
 @pytest.mark.parametrize("interval", [1, 7, None])
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_result_does_not_depend_on_how_lanes_are_blocked(monkeypatch, name, interval, width):
+def test_result_does_not_depend_on_the_block_width(monkeypatch, name, interval, width):
     data = record(MODELS[name])
     usual = multiple_shooting(MODELS[name], data, interval)
     assert usual.outcome
     monkeypatch.setattr("islands.simulation.layout.WIDTHS", (width,))
     assert layout(data, MODELS[name].maximum_lag, interval).width == width
     other = multiple_shooting(MODELS[name], data, interval)
-    assert same(usual.y, other.y)
+    assert equal_bits(usual.y, other.y)
     assert usual.mean_squared_error == other.mean_squared_error
 
 
-# One kernel, three names.
+# One-step-ahead prediction and free run as special cases.
 
 
 @every_model
-def test_intervals_of_one_sample_are_one_step_ahead_prediction(name):
+def test_intervals_of_one_sample_are_one_step_ahead_predictions(name):
     chosen, data = MODELS[name], record(MODELS[name])
     found, other = one_step_ahead(chosen, data), multiple_shooting(chosen, data, 1)
-    assert same(found.y, other.y)
+    assert equal_bits(found.y, other.y)
     assert found.mean_squared_error == other.mean_squared_error
-    # Its definition needs no recursion at all.
+    # Its definition needs no recursion.
     channels = [data.y.tolist(), *data.u.T.tolist()]
     for begin, end in data.bounds:
         for k in range(begin + chosen.maximum_lag, end):
@@ -195,30 +197,30 @@ def test_intervals_of_one_sample_are_one_step_ahead_prediction(name):
 
 @every_model
 @pytest.mark.parametrize("more", [0, 1, 10**9])
-def test_an_interval_as_long_as_the_record_is_the_free_run(name, more):
+def test_interval_as_long_as_the_record_is_the_free_run(name, more):
     data = record(MODELS[name])
     found = multiple_shooting(MODELS[name], data, data.samples + more)
     expected = free_run(MODELS[name], data)
-    assert same(found.y, expected.y)
+    assert equal_bits(found.y, expected.y)
     assert found.mean_squared_error == expected.mean_squared_error
 
 
 @every_model
 @pytest.mark.parametrize("interval", [2, 10, 64])
-def test_an_interval_begins_with_the_one_step_ahead_prediction(name, interval):
+def test_intervals_begin_with_the_one_step_ahead_prediction(name, interval):
     data = record(MODELS[name], (200, 90))
     found, ahead = multiple_shooting(MODELS[name], data, interval).y, one_step_ahead(MODELS[name], data).y
     for begin, end in data.bounds:
         first = slice(begin + MODELS[name].maximum_lag, end, interval)
-        assert same(found[first], ahead[first])
+        assert equal_bits(found[first], ahead[first])
 
 
-# Which samples are predicted.
+# Predicted samples.
 
 
 @given(st.data())
-def test_every_sample_after_a_warm_up_is_predicted_and_no_other(data):
-    chosen, drawn, warm_up = drawn_records(data)
+def test_exactly_the_samples_after_the_warm_up_are_predicted(data):
+    chosen, drawn, warm_up = draw_records(data)
     found = multiple_shooting(chosen, drawn, data.draw(st.none() | st.integers(1, 50)), warm_up).y
     expected = np.concatenate([np.arange(length) >= warm_up for length in drawn.segments])
     assert np.array_equal(np.isfinite(found), expected)
@@ -227,7 +229,7 @@ def test_every_sample_after_a_warm_up_is_predicted_and_no_other(data):
 @every_model
 @pytest.mark.parametrize("interval", [1, 7, None])
 @pytest.mark.parametrize("more", [0, 5])
-def test_the_mean_squared_error_is_the_mean_over_the_predicted_samples(name, interval, more):
+def test_mean_squared_error_is_the_mean_over_predicted_samples(name, interval, more):
     data = record(MODELS[name])
     found = multiple_shooting(MODELS[name], data, interval, MODELS[name].maximum_lag + more)
     predicted = ~np.isnan(found.y)
@@ -238,35 +240,36 @@ def test_the_mean_squared_error_is_the_mean_over_the_predicted_samples(name, int
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("interval", [1, 20, None])
-def test_squared_errors_are_added_in_the_order_of_time_and_intervals_from_the_longest_on(seed, interval):
+def test_squared_errors_are_summed_from_the_longest_interval_on(seed, interval):
     chosen, data = MODELS["linear"], record(MODELS["linear"], seed=seed)
     found = multiple_shooting(chosen, data, interval)
-    stretches = [
+    intervals = [
         slice(start, min(start + (interval or data.samples), end))
         for begin, end in data.bounds
         for start in range(begin + 2, end, interval or data.samples)
     ]
-    stretches.sort(key=lambda stretch: stretch.start - stretch.stop)
+    intervals.sort(key=lambda interval_: interval_.start - interval_.stop)
     sums = [
-        sum((error * error for error in (found.y - data.y)[stretch].tolist()), 0.0) for stretch in stretches
+        sum((error * error for error in (found.y - data.y)[interval_].tolist()), 0.0)
+        for interval_ in intervals
     ]
     assert found.mean_squared_error == total(np.array(sums)) / np.isfinite(found.y).sum()
 
 
 @every_model
-def test_a_longer_warm_up_only_leaves_one_step_ahead_predictions_out(name):
+def test_longer_warm_up_only_omits_one_step_ahead_predictions(name):
     data = record(MODELS[name])
     short, long = one_step_ahead(MODELS[name], data).y, one_step_ahead(MODELS[name], data, 20).y
     assert np.isnan(short).sum() < np.isnan(long).sum()
-    assert same(long[~np.isnan(long)], short[~np.isnan(long)])
+    assert equal_bits(long[~np.isnan(long)], short[~np.isnan(long)])
 
 
-# Nothing looks ahead, nothing looks across a boundary.
+# Causality and boundaries.
 
 
 @given(st.data())
-def test_the_present_and_the_future_leave_predictions_as_they_were(data):
-    chosen, drawn, warm_up = drawn_records(data)
+def test_present_and_future_samples_do_not_affect_predictions(data):
+    chosen, drawn, warm_up = draw_records(data)
     interval = data.draw(st.none() | st.integers(1, 40))
     k = data.draw(st.integers(0, drawn.samples - 1))
     other = record(chosen, drawn.segments, seed=99)
@@ -274,109 +277,109 @@ def test_the_present_and_the_future_leave_predictions_as_they_were(data):
     u[k:], y[k:] = other.u[k:], other.y[k:]
     before = multiple_shooting(chosen, drawn, interval, warm_up).y
     after = multiple_shooting(chosen, replace(drawn, u=u, y=y), interval, warm_up).y
-    assert same(before[: k + 1], after[: k + 1])
+    assert equal_bits(before[: k + 1], after[: k + 1])
 
 
-def test_the_past_does_not_leave_predictions_as_they_were():
-    # So the law above can fail: the sample before k is read at k.
+def test_past_samples_affect_predictions():
+    # Shows that the previous test can fail: the prediction at k depends on sample k - 1.
     chosen = MODELS["linear"]
     data, k = record(chosen, (100,)), 60
     for field in ("u", "y"):
         changed = getattr(data, field).copy()
         changed[k - 1] += 1.0
         before, after = (one_step_ahead(chosen, item).y for item in (data, replace(data, **{field: changed})))
-        assert same(before[:k], after[:k])
+        assert equal_bits(before[:k], after[:k])
         assert before[k] != after[k]
 
 
 @given(st.data())
-def test_a_free_run_never_reads_the_output_after_its_warm_up(data):
-    chosen, drawn, warm_up = drawn_records(data)
+def test_free_run_does_not_use_outputs_after_the_warm_up(data):
+    chosen, drawn, warm_up = draw_records(data)
     y = drawn.y.copy()
     for begin, end in drawn.bounds:
         y[begin + warm_up : end] = np.nan
     found = free_run(chosen, replace(drawn, y=y), warm_up)
     assert found.outcome
     assert np.isnan(found.mean_squared_error)
-    assert same(found.y, free_run(chosen, drawn, warm_up).y)
+    assert equal_bits(found.y, free_run(chosen, drawn, warm_up).y)
 
 
 @every_model
 @pytest.mark.parametrize("interval", [1, 7, None])
-def test_joined_recordings_are_predicted_as_each_alone(name, interval):
+def test_joined_recordings_are_predicted_independently(name, interval):
     chosen = MODELS[name]
     recordings = [record(chosen, (length,), seed) for seed, length in enumerate((40, 90, 13, 200))]
     alone = [multiple_shooting(chosen, recording, interval).y for recording in recordings]
     together = multiple_shooting(chosen, join(tuple(recordings)), interval).y
-    assert same(together, np.concatenate(alone))
+    assert equal_bits(together, np.concatenate(alone))
 
 
-def test_without_the_boundary_the_recordings_would_have_met():
-    # So the law above can fail: the same samples as one recording are predicted otherwise.
+def test_recordings_without_a_boundary_are_not_independent():
+    # Shows that the previous test can fail: the same samples as one recording have other predictions.
     chosen, data = MODELS["linear"], record(MODELS["linear"], (40, 60))
     apart, joined = (free_run(chosen, item).y for item in (data, replace(data, segments=(100,))))
-    assert same(apart[:40], joined[:40])
+    assert equal_bits(apart[:40], joined[:40])
     assert np.isnan(apart[40])
     assert np.isfinite(joined[40])
     assert apart[45] != joined[45]
 
 
-# Linked once.
+# Linked models.
 
 
-def begun(drawn, warm_up):
-    """Return a record whose output is known at its start alone."""
+def mask_after_warm_up(drawn, warm_up):
+    """Return a record whose output is missing after the warm-up."""
     return replace(drawn, y=np.where(np.arange(drawn.samples) < warm_up, drawn.y, np.nan))
 
 
 @given(st.data())
-def test_a_linked_model_runs_free_as_the_model_does_with_any_parameters_on_any_input(data):
+def test_linked_model_has_the_free_run_of_the_model(data):
     chosen = MODELS[data.draw(st.sampled_from(list(MODELS)))]
     linked = LinkedModel(chosen.regressors)
     for _ in range(2):
         length = chosen.maximum_lag + data.draw(st.integers(1, 200))
         drawn = record(chosen, (length,), data.draw(st.integers(0, 2**32 - 1)))
-        # Large parameters make it diverge.
+        # Large parameters cause divergence.
         factor = data.draw(st.sampled_from([1.0, -0.3, 0.0, 40.0]))
         theta = factor * np.array(chosen.theta)
-        expected = free_run(chosen.with_parameters(theta), begun(drawn, chosen.maximum_lag)).y
+        expected = free_run(chosen.with_parameters(theta), mask_after_warm_up(drawn, chosen.maximum_lag)).y
         found = linked.free_run(theta, drawn.u, drawn.y[: chosen.maximum_lag])
-        assert same(found, expected)
+        assert equal_bits(found, expected)
 
 
-def test_a_linked_model_diverges_where_the_model_does():
+def test_linked_model_diverges_where_the_model_diverges():
     chosen, data = MODELS["linear"], record(MODELS["linear"], (300,))
     theta = 3.0 * np.array(chosen.theta)
     found = LinkedModel(chosen.regressors).free_run(theta, data.u, data.y[:2])
     assert np.isnan(found[-1])
     assert np.isfinite(found[2])
-    assert same(found, free_run(chosen.with_parameters(theta), begun(data, 2)).y)
+    assert equal_bits(found, free_run(chosen.with_parameters(theta), mask_after_warm_up(data, 2)).y)
 
 
-def test_a_linked_model_is_linked_anew_in_another_process():
+def test_unpickled_linked_model_is_linked_again():
     chosen, data = MODELS["shared subexpressions"], record(MODELS["shared subexpressions"], (90,))
     linked = LinkedModel(chosen.regressors)
     runs = [
         each.free_run(np.array(chosen.theta), data.u, data.y[:2])
         for each in (linked, pickle.loads(pickle.dumps(linked)))
     ]
-    assert same(*runs)
-    # It takes what it was made of with it, and none of the addresses.
+    assert equal_bits(*runs)
+    # The pickle contains the regressors, but no addresses.
     assert linked.__reduce__() == (LinkedModel, (chosen.regressors,))
 
 
-def test_a_linked_model_asks_for_more_samples_than_its_warm_up():
+def test_linked_model_needs_more_samples_than_its_warm_up():
     linked = LinkedModel(MODELS["deepest lag on u"].regressors)
     with pytest.raises(RecordError, match="the input has 11 samples and the warm-up takes 11"):
         linked.free_run(np.ones(3), np.zeros((11, 1)), np.zeros(11))
 
 
-# The true model.
+# True model.
 
 
 @every_model
 @pytest.mark.parametrize("interval", [1, 7, 64, None])
-def test_the_true_noise_free_model_returns_the_data(name, interval):
+def test_true_noise_free_model_reproduces_the_data(name, interval):
     chosen, noise = MODELS[name], record(MODELS[name], seed=3)
     made = recursion(chosen, noise)
     data = replace(noise, y=np.where(np.isnan(made), noise.y, made))

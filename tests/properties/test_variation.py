@@ -1,4 +1,4 @@
-"""Laws of variation: children of legal parents are legal, whoever they are."""
+"""Properties of variation: children of valid parents are valid."""
 
 from dataclasses import replace
 
@@ -29,18 +29,18 @@ from islands.model.primitives import PRIMITIVES
 from islands.model.rendering import plain
 from support.searches import SMALL, record
 
-# What is legal, said a second time and in other words than the source's.
+# Independent definition of valid genes.
 
 
 def input_behind(argument):
-    """The input under back-shifts alone, or None."""
+    """Return the channel of an input under back-shifts, or None."""
     while isinstance(argument, Shift):
         argument = argument.argument
     return argument.channel if isinstance(argument, Lagged) and argument.channel > 0 else None
 
 
 def bare_output(gene):
-    """The lag of an output under back-shifts alone, or None."""
+    """Return the lag of an output under back-shifts, or None."""
     lag = 0
     while isinstance(gene, Shift):
         lag, gene = lag + gene.samples, gene.argument
@@ -62,7 +62,7 @@ def deepest_lag(gene, above=0):
 
 
 def faults(genes, setting, inputs):
-    """Everything that is wrong with genes, as text."""
+    """Return descriptions of all faults of genes."""
     found = []
     if not 1 <= len(genes) <= setting.max_terms:
         found.append(f"{len(genes)} genes")
@@ -108,13 +108,13 @@ def setting_values(draw):
 
 
 @st.composite
-def legal_gene(draw, setting, inputs, limit=None):
-    """A legal tree that owes nothing to the source's own generator."""
+def valid_gene(draw, setting, inputs, limit=None):
+    """Draw a valid tree, independently of the generator in the package."""
     limit = setting.max_height if limit is None else limit
     kinds = (
         ["leaf"] + ["shift"] * bool(limit and setting.shifts) + ["apply"] * bool(limit and setting.primitives)
     )
-    below = legal_gene(setting, inputs, limit - 1)
+    below = valid_gene(setting, inputs, limit - 1)
     match draw(st.sampled_from(kinds)):
         case "leaf":
             gene = Lagged(draw(st.integers(0, inputs)))
@@ -139,11 +139,11 @@ def legal_gene(draw, setting, inputs, limit=None):
 
 @st.composite
 def parents(draw, count):
-    """Settings, a number of inputs, and legal individuals under them."""
+    """Draw settings, a number of inputs, and valid individuals."""
     setting, inputs = draw(setting_values()), draw(st.integers(1, 2))
     made = []
     for _ in range(count):
-        genes = draw(st.lists(legal_gene(setting, inputs), min_size=1, max_size=setting.max_terms))
+        genes = draw(st.lists(valid_gene(setting, inputs), min_size=1, max_size=setting.max_terms))
         if setting.constraints == "hysteresis" and all(bare_output(gene) is None for gene in genes):
             genes[0] = Lagged(0)
         assert not faults(genes, setting, inputs)
@@ -158,27 +158,27 @@ def stream(seed, purpose=Purpose.VARIATION):
     return Stream(seed, 0, 1, purpose)
 
 
-# Every child of legal parents is legal.
+# Children of valid parents are valid.
 
 
 @given(parents(2), seeds, st.sampled_from([low_level_crossover, high_level_crossover]))
-def test_children_of_a_crossover_are_legal(drawn, seed, crossover):
+def test_children_of_a_crossover_are_valid(drawn, seed, crossover):
     setting, inputs, (one, other) = drawn
     for child in crossover(one, other, setting, stream(seed)):
         assert faults(with_linear_output(child, setting), setting, inputs) == []
 
 
 @given(parents(1), seeds)
-def test_children_of_an_inner_mutation_are_legal(drawn, seed):
+def test_children_of_an_inner_mutation_are_valid(drawn, seed):
     setting, inputs, (genes,) = drawn
     child = inner_mutation(genes, setting, inputs, stream(seed))
     assert faults(with_linear_output(child, setting), setting, inputs) == []
 
 
 @given(parents(1), seeds)
-def test_children_of_an_outer_mutation_are_legal_with_a_pool_and_without(drawn, seed):
+def test_children_of_an_outer_mutation_are_valid(drawn, seed):
     setting, inputs, (genes,) = drawn
-    # Of every height that fits: the pool of a problem holds no higher ones.
+    # The pool of a problem has only genes within the height limit.
     pool = [Lagged(0), Lagged(inputs), *genes]
     for given_pool in ((), pool):
         child = outer_mutation(genes, setting, inputs, stream(seed), given_pool)
@@ -186,8 +186,8 @@ def test_children_of_an_outer_mutation_are_legal_with_a_pool_and_without(drawn, 
 
 
 @given(parents(1), seeds)
-def test_what_is_legal_is_left_as_it_is(drawn, seed):
-    """So a step mends what is new alone: mending everybody again would change nobody."""
+def test_repair_does_not_change_valid_genes(drawn, seed):
+    """A step therefore needs to repair only new genes."""
     setting, inputs, (genes,) = drawn
     assert repair_genes(genes, setting) == with_linear_output(genes, setting) == genes
     child = with_linear_output(outer_mutation(genes, setting, inputs, stream(seed), ()), setting)
@@ -195,17 +195,17 @@ def test_what_is_legal_is_left_as_it_is(drawn, seed):
 
 
 @given(parents(2), seeds)
-def test_genes_from_elsewhere_are_made_legal(drawn, seed):
-    """Those of settings that ask for nothing, under settings that do."""
+def test_repair_makes_genes_of_other_settings_valid(drawn, seed):
+    """The genes come from unconstrained settings."""
     setting, inputs, individuals = drawn
     for structure in ("phi", "increment"):
         for genes in individuals:
-            asked = replace(setting, structure=structure, constraints="hysteresis")
-            assert faults(repair_genes(genes, asked), asked, inputs) == []
+            constrained = replace(setting, structure=structure, constraints="hysteresis")
+            assert faults(repair_genes(genes, constrained), constrained, inputs) == []
 
 
 @given(setting_values(), st.integers(1, 2), seeds)
-def test_first_individuals_are_legal_and_no_higher_than_a_first_gene_may_be(setting, inputs, seed):
+def test_random_individuals_are_valid_up_to_the_initial_height(setting, inputs, seed):
     genes = random_genes(setting, inputs, stream(seed, Purpose.INITIAL))
     assert faults(genes, setting, inputs) == []
     gene = random_gene(setting, inputs, stream(seed))
@@ -218,8 +218,8 @@ def test_first_individuals_are_legal_and_no_higher_than_a_first_gene_may_be(sett
 @pytest.mark.parametrize("library", ["phi-polynomial", "polynomial"])
 @pytest.mark.parametrize("structure", ["phi", "increment"])
 @pytest.mark.parametrize("max_height", [0, 1, 2, 4])
-def test_a_library_s_genes_and_all_their_offspring_are_legal(library, structure, max_height):
-    """Their leaves have lags of their own; their differences are phi functions wherever they end up."""
+def test_offspring_of_library_genes_are_valid(library, structure, max_height):
+    """Library leaves have lags larger than one, and library differences are phi functions."""
     setting = replace(
         SMALL,
         max_height=max_height,
@@ -231,21 +231,21 @@ def test_a_library_s_genes_and_all_their_offspring_are_legal(library, structure,
         structure=structure,
         shifts=(5,),
     )
-    posed = problem(record(), setting)
-    assert posed.pool
-    assert [faults((gene, Lagged(0)), replace(setting, structure="phi"), 1) for gene in posed.pool] == [
-        [] for _ in posed.pool
-    ]
-    evaluator = Evaluator(posed.record, setting)
-    island, _ = first_generation(0, 5, evaluator, posed.seeds)
+    search_problem = problem(record(), setting)
+    assert search_problem.pool
+    assert [
+        faults((gene, Lagged(0)), replace(setting, structure="phi"), 1) for gene in search_problem.pool
+    ] == [[] for _ in search_problem.pool]
+    evaluator = Evaluator(search_problem.record, setting)
+    island, _ = first_generation(0, 5, evaluator, search_problem.seeds)
     for _ in range(6):
-        island, _ = step(island, evaluator, posed.pool)
+        island, _ = step(island, evaluator, search_problem.pool)
         for each in island.population:
-            # Pruning and the constraint only take genes away; what is left was legal before.
+            # Pruning and the constraint only remove genes.
             assert faults((Lagged(0), *each.genes)[: setting.max_terms], setting, 1) == []
 
 
-def test_a_leaf_of_a_library_under_the_deepest_back_shifts_is_still_read_from_the_record():
+def test_maximum_lag_includes_library_leaves_under_back_shifts():
     setting = replace(SMALL, library="phi-polynomial", library_lags=3, library_degree=1)
     assert setting.maximum_lag == 3 + 4 * 5
     deep = parse("q5(q5(q5(q5(u(k-3)))))")
@@ -258,9 +258,9 @@ def test_a_leaf_of_a_library_under_the_deepest_back_shifts_is_still_read_from_th
 
 
 @pytest.mark.parametrize(
-    ("broken", "mended"),
+    ("broken", "repaired"),
     [
-        # The figure: a multiplication and y are forbidden, the back-shifts over them stay, u(k-2) and u(k-5).
+        # Figure 3: multiplication and y are replaced, back-shifts are kept, giving u(k-2) and u(k-5).
         ("phi1(q1(u(k-1)*y(k-1)), q4(y(k-1)))", "phi1(q1(u(k-1)), q4(u(k-1)))"),
         ("phi2(q1(y(k-1)), q4(u(k-1)))", "phi2(q1(u(k-1)), q4(u(k-1)))"),
         ("phi1(y(k-1), q3(u(k-1)))", "phi1(u(k-1), q3(u(k-1)))"),
@@ -268,20 +268,20 @@ def test_a_leaf_of_a_library_under_the_deepest_back_shifts_is_still_read_from_th
         ("y(k-1)*phi2(q2(u(k-1)), y(k-1))", "y(k-1)*phi2(q2(u(k-1)), u(k-1))"),
         ("q3(phi1(q1(y(k-1)), u(k-1)))", "q3(phi1(q1(u(k-1)), u(k-1)))"),
         ("tanh(phi1(u(k-1), y(k-1)*y(k-1)))", "tanh(phi1(u(k-1), u(k-1)))"),
-        # Both arguments are lags of one input: the first one's, or the second's where the first has none.
+        # Both arguments become lags of the input of the first, or of the second if the first has none.
         ("phi1(q1(u2(k-1)), q4(u1(k-1)))", "phi1(q1(u2(k-1)), q4(u2(k-1)))"),
         ("phi2(q1(y(k-1)), q4(u2(k-1)))", "phi2(q1(u2(k-1)), q4(u2(k-1)))"),
-        # What is as it should be, or is no phi function, stays.
+        # Valid phi functions and other functions are not changed.
         ("phi1(q1(u2(k-1)), q4(u2(k-1)))", "phi1(q1(u2(k-1)), q4(u2(k-1)))"),
         ("y(k-1)*(y(k-1) - u(k-1))", "y(k-1)*(y(k-1) - u(k-1))"),
     ],
 )
-def test_a_phi_function_is_mended_as_in_figure_3(broken, mended):
-    assert phi(parse(broken)) == parse(mended)
-    assert phi(parse(mended)) == parse(mended)
+def test_phi_functions_are_repaired_as_in_figure_3(broken, repaired):
+    assert phi(parse(broken)) == parse(repaired)
+    assert phi(parse(repaired)) == parse(repaired)
 
 
-def test_the_figure_s_term_is_the_paper_s():
+def test_repaired_term_of_figure_3_is_that_of_the_paper():
     """Figure 3: "to form the model term phi(u(k-2), u(k-5))"."""
-    mended = phi(parse("phi1(q1(u(k-1)*y(k-1)), q4(y(k-1)))"))
-    assert make_regressor(mended).text == "u1(k-2) - u1(k-5)"
+    repaired = phi(parse("phi1(q1(u(k-1)*y(k-1)), q4(y(k-1)))"))
+    assert make_regressor(repaired).text == "u1(k-2) - u1(k-5)"

@@ -1,4 +1,4 @@
-"""Islands in the middle of a run, and who may leave them and arrive at them."""
+"""Generators of islands during a run, and of immigrants."""
 
 from dataclasses import replace
 from functools import cache
@@ -16,7 +16,7 @@ from islands.evolution.island import Island, select_elite
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
 from support.searches import SMALL, islands_of, record
 
-#: Individuals fail now and then, and copies get into the elite.
+#: Some individuals fail, and the elite may contain copies.
 SETTINGS = replace(
     SMALL,
     population=6,
@@ -28,11 +28,11 @@ SETTINGS = replace(
     primitives=("mul", "phi1", "phi2", "tanh", "cube"),
 )
 
-every_emigrants = pytest.mark.parametrize("leave", SELECTION_POLICIES)
-every_replaced = pytest.mark.parametrize("replaced", REPLACEMENT_POLICIES)
+every_selection_policy = pytest.mark.parametrize("policy", SELECTION_POLICIES)
+every_replacement_policy = pytest.mark.parametrize("replaced", REPLACEMENT_POLICIES)
 
 
-def never():
+def never_stop():
     return False
 
 
@@ -47,15 +47,15 @@ def evaluator():
 
 
 @cache
-def folk():
-    """Everybody who lived in two short runs: models, failures, and some who were abandoned."""
+def sample_individuals():
+    """Return all individuals of two short runs: models, failures and abandoned individuals."""
     larger = Evaluator(recorded(), replace(SETTINGS, population=40))
     found = chain(*(island.population for seed in (1, 2) for island in islands_of(larger, 4, seed)))
     return list({each.key: each for each in found}.values())
 
 
 def models():
-    return [each for each in folk() if isfinite(each.fitness)]
+    return [each for each in sample_individuals() if isfinite(each.fitness)]
 
 
 @cache
@@ -70,8 +70,10 @@ def keys(population):
 
 @st.composite
 def islands(draw, distinct=False):
-    """An island in the middle of a run, in whose elite and population are models and failures, and copies."""
-    several = st.lists(st.sampled_from(folk()), min_size=SETTINGS.population, max_size=SETTINGS.population)
+    """Draw an island during a run, with models, failures and copies in its population and elite."""
+    several = st.lists(
+        st.sampled_from(sample_individuals()), min_size=SETTINGS.population, max_size=SETTINGS.population
+    )
     population, others = draw(several), draw(several)
     elite = select_elite(others[: draw(st.integers(1, 6))], SETTINGS.elites, distinct)
     index, generation = draw(st.integers(0, 9)), draw(st.integers(0, 12))
@@ -80,10 +82,16 @@ def islands(draw, distinct=False):
 
 @st.composite
 def arrivals(draw):
-    """Populations as they come from several sources; each individual an object of its own."""
+    """Draw the emigrants of several sources; every individual is a separate object."""
     some = st.lists(st.sampled_from(models()), max_size=4)
     return [tuple(replace(each) for each in population) for population in draw(st.lists(some, max_size=4))]
 
 
-def advanced(island, posed, arriving=(), judge=None):
-    return run_epoch(island, arriving, judge or Evaluator(posed.record, posed.settings), posed, never)
+def run_next_epoch(island, search_problem, arriving=(), evaluator_of_run=None):
+    return run_epoch(
+        island,
+        arriving,
+        evaluator_of_run or Evaluator(search_problem.record, search_problem.settings),
+        search_problem,
+        never_stop,
+    )

@@ -1,4 +1,4 @@
-"""Random linear regressions, for the laws of estimation and of forward selection."""
+"""Random linear regressions, for the tests of estimation and of forward selection."""
 
 import numpy as np
 from hypothesis import strategies as st

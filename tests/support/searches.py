@@ -1,4 +1,4 @@
-"""Small searches: a record that takes milliseconds to search, settings for it, islands that evolve on it."""
+"""Small searches: a record and settings with which a generation takes milliseconds."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ SMALL = Settings(
 
 
 def record(samples=400, inputs=1, seed=0, rate=25, **changes):
-    """A noisy hysteresis, the same bits on every call and in every process."""
+    """Return a record of noisy hysteresis, with equal bits in every process."""
     rng = np.random.default_rng(seed)
     time = np.arange(samples) / rate
     u = np.column_stack([np.sin(time * (1 + 0.3 * i)) + 0.5 * np.sin(2.6 * time + i) for i in range(inputs)])
@@ -33,7 +33,7 @@ def record(samples=400, inputs=1, seed=0, rate=25, **changes):
 
 
 def islands_of(evaluator, generations, seed=3):
-    """One island after every generation, from the first population on."""
+    """Return the island after every generation, starting with the first population."""
     island, _ = first_generation(0, seed, evaluator)
     islands = [island]
     for _ in range(generations):
@@ -43,12 +43,12 @@ def islands_of(evaluator, generations, seed=3):
 
 
 def evolved(generations, setting=SMALL, seed=3, evaluator=None):
-    """One island after some generations."""
+    """Return one island after some generations."""
     return islands_of(evaluator or Evaluator(record(), setting), generations, seed)[-1]
 
 
 def exactly(island):
-    """All that a checkpoint would hold of an island: equality of regressors sees their text alone."""
+    """Return a text for exact comparison; equality of regressors compares only their text."""
     return repr(island)
 
 

@@ -95,7 +95,7 @@ class Evaluation:
         return self.outcome is not _ABANDONED or self.fitness >= allowed[len(self.numbers)]
 
     def exceeds(self, allowed: NDArray[np.float64]) -> bool:
-        """Return whether the error exceeds the threshold of its size, as after divergence if it is finite."""
+        """Return whether the error exceeds its threshold; after divergence, whether that is finite."""
         if self.outcome is _ABANDONED:
             return True
         simulated = self.outcome is OK or self.outcome is _DIVERGED
