@@ -19,7 +19,7 @@ Sources = list[set[int]]
 #: Maximum number of fully connected islands; the number of edges grows with its square.
 _MAX_FULLY_CONNECTED = 1_000
 
-#: Maximum number of edges of a random graph; each takes microseconds to rng.
+#: Maximum number of edges of a random graph; each takes microseconds.
 _MAX_RANDOM_EDGES = 50_000
 
 #: Attempted edge switches per edge, which make a regular graph random.
