@@ -71,7 +71,7 @@ def test_another_request_with_the_same_key_is_rejected(service, order, change):
     answer = service.submit({"Idempotency-Key": "k1"}, **{**order, **change})
     detail = problem_of(answer, 422, "idempotency-conflict")
     assert detail == (
-        f"the idempotency key 'k1' belongs to job {first}, which was asked for with another request: "
+        f"the idempotency key 'k1' belongs to job {first}, which was submitted with a different request: "
         "take a new key"
     )
     assert ids(service.client.get("/v1/jobs")) == [first]
