@@ -48,7 +48,7 @@ def _written(statement):
 
 
 @pytest.mark.parametrize("path", [path for path in SOURCES if path != READER])
-def test_nothing_else_reads_the_environment(path):
+def test_only_the_settings_module_reads_the_environment(path):
     assert reads((ROOT / path).read_text()) == []
 
 

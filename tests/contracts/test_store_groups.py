@@ -23,7 +23,7 @@ from support.stores import (
     one_group,
     several,
     submitted,
-    waiting,
+    wait_for_queued_writes,
 )
 
 
@@ -166,7 +166,7 @@ def test_closed_store_has_written_its_queue(database):
     store, answers = Store(database), []
 
     def close():
-        waiting(store, MANY)
+        wait_for_queued_writes(store, MANY)
         store.close()
 
     with one_group(store, MANY + 1):

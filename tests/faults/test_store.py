@@ -22,7 +22,7 @@ from support.stores import (
     child,
     claimed,
     kinds,
-    standing,
+    stopped_writer,
     submitted,
 )
 
@@ -149,7 +149,7 @@ def test_killed_coordinator_leaves_complete_reports(database, reports):
 def test_process_killed_during_a_write_blocks_no_other(database):
     with Store(database) as store:
         job = submitted(store)
-        with standing(database, seconds=60) as process:
+        with stopped_writer(database, seconds=60) as process:
             kill(process.pid)
         # PostgreSQL must first notice that the client has ended.
         lease = eventually(lambda: store.leases.claim("second", LONG))

@@ -14,17 +14,17 @@ from islands_service.domain.job import JobState, LeaseLostError
 from islands_service.store import Store
 from islands_service.store.database import StoreUnavailableError
 from islands_service.store.job_events import append_event, update_job
-from support.databases import answers, emptied, server
+from support.databases import emptied, is_available, server
 from support.processes import eventually
 from support.repository import ROOT
-from support.stores import ALICE, EXPIRED, LONG, brought_on, claimed, kinds, standing, submitted
+from support.stores import ALICE, EXPIRED, LONG, brought_on, claimed, kinds, stopped_writer, submitted
 
 
 def test_postgresql_claim_skips_a_job_that_is_being_written(prepared_postgres):
     database = emptied(prepared_postgres)
     with Store(database) as store:
         submitted(store)
-        with standing(database, seconds=60):
+        with stopped_writer(database, seconds=60):
             assert store.leases.claim("second", LONG) is None
             other = submitted(store)
             assert claimed(store).job.id == other.id
@@ -34,7 +34,7 @@ def test_postgresql_ends_the_transaction_of_a_stopped_process(prepared_postgres)
     database = emptied(prepared_postgres)
     with Store(database) as store:
         job = submitted(store)
-        with standing(database, seconds=1) as process:
+        with stopped_writer(database, seconds=1) as process:
             # The server ends the transaction of the suspended process.
             assert eventually(lambda: store.leases.claim("second", LONG)).job.id == job.id
             os.kill(process.pid, signal.SIGCONT)
@@ -84,7 +84,7 @@ def servers():
 @pytest.fixture
 def restartable(servers):
     """A running PostgreSQL server that may be stopped and started."""
-    if not answers(servers.url):
+    if not is_available(servers.url):
         servers.start()
     emptied(servers.url)
     return servers
@@ -115,7 +115,7 @@ def test_stopped_postgresql_raises_errors_and_is_used_after_a_restart(restartabl
                 assert time.monotonic() - began < 20
         with pytest.raises(StoreUnavailableError):
             Store(restartable.url)
-        assert not answers(restartable.url)
+        assert not is_available(restartable.url)
         restartable.start()
         assert store.jobs.get(ALICE, job.id) == lease.job
         store.leases.report(lease, brought_on(1))

@@ -1,4 +1,4 @@
-"""Files of records in which one thing is wrong, and the words in which they are refused."""
+"""Record files with one defect, and the messages of their errors."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,12 @@ HEADER = "t_s,u_V,y_um"
 
 
 def lines(samples=60):
-    """Lines of a sound record; line k + 1 of the file holds sample k - 1 (line 1 is the header)."""
+    """Return the lines of a valid record; the first line is the header, and line k + 2 holds sample k."""
     return [HEADER, *(f"{k / 100:g},{k % 7 - 3},{k * k % 11}.5" for k in range(samples))]
 
 
 def refusal(tmp_path, content, inputs=("u_V",), output="y_um", name="bad.csv", **options):
-    """Read what is written from the lines (or the bytes) and return the message of the refusal."""
+    """Write lines or bytes to a file, read it as a record and return the message of the error."""
     file = tmp_path / name
     if isinstance(content, bytes):
         file.write_bytes(content)
@@ -27,7 +27,7 @@ def refusal(tmp_path, content, inputs=("u_V",), output="y_um", name="bad.csv", *
 
 
 def changed(line, column, cell, samples=60):
-    """Return the sound record with one cell exchanged; the line is counted as a person does."""
+    """Return the valid record with one cell replaced; line numbers start at 1."""
     rows = lines(samples)
     cells = rows[line - 1].split(",")
     cells[column] = cell

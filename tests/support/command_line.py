@@ -1,4 +1,4 @@
-"""The command line in this process, and the records that its tests identify."""
+"""The command line in this process, and records for its tests."""
 
 import csv
 import json
@@ -11,8 +11,10 @@ from typer.testing import CliRunner, Result
 
 ISLANDS = Path(sysconfig.get_path("scripts")) / "islands"
 
-#: Options that go with `write_hysteresis`, and a search of it that takes a second.
+#: Columns of `write_hysteresis`.
 COLUMNS = ("--input", "u_V", "--output", "y_um")
+
+#: Settings of a search on that record that takes a second.
 BUDGET = ("--population", "30", "--max-terms", "5", "--shooting", "200", "--seed", "2")
 
 
@@ -46,32 +48,32 @@ def write_offset(path: Path) -> Path:
 
 
 def stored(folder: Path) -> dict[str, Any]:
-    """Return a folder's result."""
+    """Return the result document of a folder."""
     return json.loads((folder / "result.json").read_text())
 
 
 def found(folder: Path) -> dict[str, bytes]:
-    """Return what a search found, as bytes: the hall of fame and the models."""
+    """Return the hall of fame and the models of a result folder, as bytes."""
     paths = [folder / "hall.json", *sorted((folder / "models").iterdir())]
     return {path.name: path.read_bytes() for path in paths}
 
 
 def islands(*arguments: object) -> Result:
-    """Run a command in this process, where its kernels are loaded; `ISLANDS` is for tests of the process."""
+    """Run a command in this process, which has loaded the kernels; tests of processes use `ISLANDS`."""
     from islands_api.cli.app import app
 
     return CliRunner().invoke(app, [str(argument) for argument in arguments], catch_exceptions=False)
 
 
 def succeed(*arguments: object) -> str:
-    """Run a command that succeeds; return its standard output."""
+    """Run a command, check that it succeeds and return its standard output."""
     done = islands(*arguments)
     assert done.exit_code == 0, done.stderr
     return done.stdout
 
 
 def fail(*arguments: object) -> str:
-    """Run a command that refuses its arguments; return its standard error."""
+    """Run a command, check that it rejects its arguments and return its standard error."""
     done = islands(*arguments)
     assert done.exit_code == 2, (done.exit_code, done.stdout, done.stderr)
     assert "Traceback" not in done.stderr

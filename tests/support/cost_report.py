@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-#: Seconds of CPU that a test without a mark may take, its fixtures included.
+#: CPU time in seconds that a test without a mark may take, including its fixtures.
 LIMIT = 1.0
 
 _spent = 0.0
@@ -18,8 +18,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def _cpu() -> float:
-    """Return the CPU seconds of this process and of its children that have ended."""
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    """Return the CPU time in seconds of this process and of its ended child processes."""
+    used = [resource.getrusage(scope) for scope in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
@@ -30,7 +30,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Iterator[Any]:
-    """Add to the report of a phase the CPU seconds since the last one."""
+    """Add the CPU time in seconds since the last phase to the report of a phase."""
     global _spent
     report = yield
     before, _spent = _spent, _cpu()

@@ -1,8 +1,8 @@
-"""Databases for tests: SQLite files, and databases on a PostgreSQL server of our own where one is installed.
+"""PostgreSQL databases for tests, on a given server or on a temporary one.
 
-The server stands in a folder of its own under the system's temporary folder, listens on a socket there and
-nowhere else, and is ended by its process id. It does not wait for the disk: what it has acknowledged outlives
-its own death, not the machine's.
+The temporary server has a separate folder below the system's temporary folder, listens only on a socket in it
+and is stopped by its process id. It does not wait for the disk: acknowledged writes survive a crash of the
+server, but not a crash of the machine.
 """
 
 import os
@@ -25,19 +25,20 @@ from sqlalchemy.exc import OperationalError
 
 from islands_service.store.tables import metadata
 
-#: A database whose user may make others: ``postgresql+psycopg://user:password@host/database``.
+#: Environment variable with a database whose user may create others: ``postgresql+psycopg://user:password@host/database``.
 VARIABLE = "ISLANDS_TEST_POSTGRES"
 
-NONE = (
+#: Reason for skipping a test without PostgreSQL.
+NO_POSTGRES = (
     "no PostgreSQL: install it (Debian: apt install postgresql) and psycopg (the extra 'cluster'), "
-    f"or name in {VARIABLE} a database whose user may make others"
+    f"or name in {VARIABLE} a database whose user may create others"
 )
 
-#: Root may not run a PostgreSQL: one of these does it.
+#: Accounts that run the server if the tests run as root, which PostgreSQL does not allow.
 ACCOUNTS = ("postgres", "nobody")
 
-#: Seconds after which a server that does not answer never will.
-PATIENCE = 30.0
+#: Time limit in seconds for the start and the stop of a server.
+TIMEOUT = 30.0
 
 _INITDB = ("--no-sync", "--no-locale", "--encoding=UTF8", "--auth=trust", "--username=islands")
 
@@ -45,20 +46,20 @@ _SETTINGS = {"listen_addresses": "", "fsync": "off", "full_page_writes": "off", 
 
 
 class Server:
-    """A PostgreSQL of our own.
+    """Temporary PostgreSQL server.
 
     Parameters
     ----------
     binaries : Path
-        Where ``initdb`` and ``postgres`` are.
+        Folder of ``initdb`` and ``postgres``.
     settings : str
-        Of the server, besides those of every one.
+        Settings of the server in addition to the defaults.
     """
 
     def __init__(self, binaries: Path, **settings: str) -> None:
         self._binaries = binaries
         self._settings = _SETTINGS | settings
-        # Not in pytest's own folder: nobody but root may enter that one. And a socket's path has to be short.
+        # The folder of pytest may only be readable by root, and the path of a socket has to be short.
         self.folder = Path(tempfile.mkdtemp(prefix="islands-pg-"))
         self._process: subprocess.Popen[bytes] | None = None
         self._rights: dict[str, Any] = {"cwd": self.folder}
@@ -72,29 +73,29 @@ class Server:
 
     @property
     def url(self) -> str:
-        """The database that is there from the start."""
+        """URL of the initial database."""
         return f"postgresql+psycopg://islands@/postgres?host={self.folder}"
 
     def start(self) -> None:
         settings = self._settings | {"unix_socket_directories": self.folder}
         options = [word for name, value in settings.items() for word in ("-c", f"{name}={value}")]
-        # Should this process be killed, its server ends too.
-        mortal = [setpriv, "--pdeathsig", "INT"] if (setpriv := shutil.which("setpriv")) else []
-        command = [*mortal, self._binaries / "postgres", "-D", self.folder / "data", *options]
+        # The server ends with this process, also if this process is killed.
+        wrapper = [setpriv, "--pdeathsig", "INT"] if (setpriv := shutil.which("setpriv")) else []
+        command = [*wrapper, self._binaries / "postgres", "-D", self.folder / "data", *options]
         log = self.folder / "log"
         with log.open("ab") as stream:
             self._process = subprocess.Popen(command, stdout=stream, stderr=stream, **self._rights)
-        deadline = time.monotonic() + PATIENCE
-        while not answers(self.url):
+        deadline = time.monotonic() + TIMEOUT
+        while not is_available(self.url):
             assert self._process.poll() is None, log.read_text()
             assert time.monotonic() < deadline, log.read_text()
             time.sleep(0.02)
 
     def stop(self, how: signal.Signals = signal.SIGINT) -> None:
-        """End the server: SIGINT in good order, SIGQUIT as in a crash."""
+        """Stop the server: SIGINT shuts it down, SIGQUIT simulates a crash."""
         assert self._process is not None
         self._process.send_signal(how)
-        self._process.wait(PATIENCE)
+        self._process.wait(TIMEOUT)
         self._process = None
 
     def remove(self) -> None:
@@ -103,8 +104,8 @@ class Server:
         shutil.rmtree(self.folder)
 
 
-def answers(url: str) -> bool:
-    """Tell whether a database can be connected to."""
+def is_available(url: str) -> bool:
+    """Return whether a database accepts connections."""
     engine = create_engine(url)
     try:
         with engine.connect():
@@ -117,10 +118,10 @@ def answers(url: str) -> bool:
 
 @contextmanager
 def server(**settings: str) -> Iterator[Server]:
-    """Start a PostgreSQL of our own; where there is none the test skips."""
-    binaries = _binaries()
+    """Start a temporary PostgreSQL server; skip the test if PostgreSQL is not installed."""
+    binaries = _find_binaries()
     if binaries is None or find_spec("psycopg") is None:
-        pytest.skip(NONE)
+        pytest.skip(NO_POSTGRES)
     made = Server(binaries, **settings)
     try:
         made.start()
@@ -131,9 +132,9 @@ def server(**settings: str) -> Iterator[Server]:
 
 @contextmanager
 def databases() -> Iterator[Engine]:
-    """Yield what makes databases: a connection to the one that is named, or to a server of our own."""
+    """Yield an engine that can create databases: of the given server, or of a temporary one."""
     named = os.environ.get(VARIABLE)
-    with nullcontext(named) if named else _own() as url:
+    with nullcontext(named) if named else _temporary_server() as url:
         engine = create_engine(url, isolation_level="AUTOCOMMIT")
         try:
             yield engine
@@ -143,7 +144,7 @@ def databases() -> Iterator[Engine]:
 
 @contextmanager
 def database(maker: Engine) -> Iterator[str]:
-    """Make a database, and drop it in the end."""
+    """Create a database and drop it at the end."""
     name = f"islands_{uuid4().hex}"
     with maker.connect() as connection:
         connection.execute(text(f"CREATE DATABASE {name}"))
@@ -155,7 +156,7 @@ def database(maker: Engine) -> Iterator[str]:
 
 
 def emptied(url: str) -> str:
-    """Empty a database that has our tables, and end whatever a test before has left connected to it."""
+    """Empty the tables of a database and close connections that an earlier test has left open."""
     engine = create_engine(url, isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
         connection.execute(
@@ -170,13 +171,13 @@ def emptied(url: str) -> str:
 
 
 @contextmanager
-def _own() -> Iterator[str]:
-    with server() as own:
-        yield own.url
+def _temporary_server() -> Iterator[str]:
+    with server() as started:
+        yield started.url
 
 
-def _binaries() -> Path | None:
-    """Return where PostgreSQL is: on the path, or where Debian puts it, the newest."""
+def _find_binaries() -> Path | None:
+    """Return the folder of PostgreSQL: on the path, or the newest one that Debian has installed."""
     found = [Path(path)] if (path := shutil.which("postgres")) else []
     debian = sorted(Path("/usr/lib/postgresql").glob("*/bin/postgres"), key=lambda each: int(each.parts[4]))
     places = [each.resolve().parent for each in (*found, *reversed(debian))]

@@ -1,4 +1,4 @@
-"""Disks of a few megabytes, which a test can fill."""
+"""Disks of a few megabytes that a test can fill."""
 
 import os
 import shutil
@@ -12,9 +12,9 @@ import pytest
 
 @contextmanager
 def mounted(folder: Path, size: int, **options: object) -> Iterator[Path]:
-    """Mount a disk of so many bytes at a new folder; where nothing can be mounted the test skips."""
+    """Mount a disk of ``size`` bytes at a new folder; skip the test if mounting is impossible."""
     if os.getuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("a small disk takes root, to mount one: run these tests as root")
+        pytest.skip("mounting a small disk requires root: run these tests as root")
     folder.mkdir()
     settings = ",".join(f"{name}={value}" for name, value in {"size": size, **options}.items())
     command = ["mount", "-t", "tmpfs", "-o", settings, "islands-test", folder]
@@ -28,7 +28,7 @@ def mounted(folder: Path, size: int, **options: object) -> Iterator[Path]:
 
 
 def filled(disk: Path, leave: int = 0) -> Path:
-    """Fill a disk but for so many bytes; return the file that fills it."""
+    """Fill a disk except for ``leave`` bytes; return the file that fills it."""
     path = disk / "filler"
     with path.open("wb", buffering=0) as stream:
         free = os.statvfs(disk)

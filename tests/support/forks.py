@@ -1,8 +1,8 @@
-"""Python processes that begin with Numba loaded: they are forks of one server that has loaded it.
+"""Python processes with Numba already loaded, as forks of one server.
 
-To load Numba and to compile a first function takes 0.8 seconds; a fork of a process that has done both starts
-in milliseconds. Nothing of the project is loaded in the server, and a fork compiles, loads and saves as any
-process does.
+Loading Numba and compiling a first function take 0.8 seconds; a fork of a process that has done both starts
+in milliseconds. The server loads no module of the project. A fork compiles, loads and saves kernels like any
+other process.
 """
 
 import json
@@ -14,7 +14,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-#: Answers each line with a line: a request to start a process, or to say how one ended.
+#: Script of the server. Each line of its input is a JSON request: start a process, or return its exit status
+#: and output. It answers with one line.
 _SERVER = """
 import json, os, sys, traceback
 import numba
@@ -41,8 +42,8 @@ def run(code, arguments, variables, folder):
     return 0
 
 
-def all_of(pipe):
-    with os.fdopen(pipe) as file:  # which holds more than a process of a test prints
+def read_all(pipe):
+    with os.fdopen(pipe) as file:  # the buffer of a pipe is larger than the output of a test
         return file.read()
 
 
@@ -52,8 +53,8 @@ for line in requests:
     if "end" in request:
         pid = request["end"]
         ended, status = os.waitpid(pid, os.WNOHANG)
-        told = [os.waitstatus_to_exitcode(status), *map(all_of, outputs.pop(pid))] if ended else None
-        print(json.dumps(told), flush=True)
+        result = [os.waitstatus_to_exitcode(status), *map(read_all, outputs.pop(pid))] if ended else None
+        print(json.dumps(result), flush=True)
         continue
     (out, into_out), (err, into_err) = os.pipe(), os.pipe()
     pid = os.fork()
@@ -72,7 +73,7 @@ for line in requests:
 
 
 class Fork:
-    """A process of a server, with the part of the interface of ``subprocess.Popen`` that tests use."""
+    """Process forked by the server, with the methods of ``subprocess.Popen`` that tests use."""
 
     def __init__(self, ask, request):
         self._ask, self._printed = ask, ("", "")
@@ -105,7 +106,7 @@ class Fork:
 
 @contextmanager
 def fork_server() -> Iterator:
-    """Start a server; what it gives starts a process: ``start(code, arguments, variables, folder)``."""
+    """Start a server; yield ``start(code, arguments, variables, folder)``, which forks a process."""
     server = subprocess.Popen(
         [sys.executable, "-W", "error", "-c", _SERVER],
         stdin=subprocess.PIPE,

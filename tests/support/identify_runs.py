@@ -1,4 +1,4 @@
-"""Small runs of ``islands identify``: their options, their record, what they leave and refuse."""
+"""Small runs of ``islands identify``: options, a record, and checks of results and errors."""
 
 import numpy as np
 
@@ -18,10 +18,13 @@ SMALL = (
     "--max-height",
     "3",
 )
-#: Every generation is an epoch.
+#: Options with one generation per epoch.
 STEPWISE = (*SMALL, "--migrate-every", "1")
+#: Options with two islands in this process.
 TWO = (*STEPWISE, "--islands", "2", "--engine", "serial")
+#: Columns of the record.
 COLUMNS = ("--input", "u_V", "--output", "y_um")
+#: Largest lag with trees of height 12.
 DEEPEST = resolve_settings("hysteresis", {"max_height": 12}).maximum_lag
 
 
@@ -47,7 +50,7 @@ def models(folder):
 
 
 class Broken(SerialEngine):
-    """Fails behind the epoch that ends at generation 1."""
+    """Engine that fails after the epoch that ends at generation 1."""
 
     def run(self, problem, start, stop):
         for epoch in super().run(problem, start, stop):

@@ -1,4 +1,4 @@
-"""Reports with numbers made up by hand: every goal is met, unless a test changes one."""
+"""Benchmark reports with invented numbers that meet every target."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A damper as one would write it down first: viscous friction, a spring, and a preload."""
+"""Simple model of a damper: viscous friction, a spring and a preload."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What kernels are held against in several tests: the meaning of instructions, the arrangement of rows."""
+"""Reference implementations for tests of kernels: instructions and the order of rows."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ def sign(a):
     return float((a > 0.0) - (a < 0.0))
 
 
-#: What every instruction but a call does to single values; the sign takes one of them.
+#: Scalar operation of every instruction except calls; the sign has one argument.
 NUMBERS = {
     MULTIPLY: lambda a, b: a * b,
     ADD: lambda a, b: a + b,
@@ -21,7 +21,7 @@ NUMBERS = {
 
 
 def side_by_side(columns, rows):
-    """Lay 32 stretches of every segment side by side, zeros where there is no row; take them row by row."""
+    """Arrange 32 parts of every segment in parallel, padded with zeros, and return them row by row."""
     segments = []
     for part in np.split(columns, np.cumsum(rows)[:-1], axis=1):
         length = -(-part.shape[1] // 32)

@@ -1,4 +1,4 @@
-"""A coordinator that does what a test says: the page is shown states that a search would pass in a moment."""
+"""Simulated coordinator: a test reports progress step by step, so that the page shows every state."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,18 +14,18 @@ GENERATIONS = 500
 
 @contextmanager
 def stored(service: Service) -> Iterator[Store]:
-    """The service's own store."""
+    """Open the store of a service."""
     with Store(f"sqlite:///{service.folder / 'islands.db'}") as store:
         yield store
 
 
 def squared_error(generation: int, island: int) -> float:
-    """A mean squared error that falls as a search's does."""
+    """Return a mean squared error that decreases like that of a search."""
     return 1e-3 * (1 + island) / (1 + generation / 20)
 
 
 def advance(store: Store, lease: Lease, first: int, last: int, islands: int = 2) -> None:
-    """Report the generations from the first to the last one."""
+    """Report all generations from ``first`` to ``last``."""
     points = tuple(
         (
             at,

@@ -1,4 +1,4 @@
-"""Models that every exported program has to simulate as the kernel does, and records to do it on."""
+"""Models and records on which exported programs must equal the kernels."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from islands.systems.published_models import PUBLISHED
 
 SAMPLES = 60
 
-#: Primitives whose last bits are those of the machine's mathematical library.
+#: Primitives whose last bits depend on the mathematical library of the machine.
 OF_THE_LIBRARY = {"exp", "log", "sin", "cos", "tanh"}
 
-#: Columns' names that would end a comment, a string, a line or an encoding.
+#: Column names that would end a comment, a string or a line, or cannot be encoded.
 HOSTILE_NAMES = [
     'u"""',
     "u\\Nm",
@@ -73,12 +73,12 @@ CASES = {
 }
 
 
-#: Where primitives jump, are protected or clipped, and what lies beside it.
+#: Arguments at which primitives jump, are protected or clipped, and their neighbours.
 _EDGES = [0.0, -0.0, 1.0, -1.0, TINY, -TINY, 0.999 * TINY, -0.999 * TINY, 49.9, 50.1, 700.0, -700.0]
 
 
 def at_the_edges(name):
-    """Return a model that is one primitive, and a record on which it meets every pair of edges."""
+    """Return a model of one primitive, and a record with every pair of edge values."""
     pairs = np.array([(a, b) for a in _EDGES for b in _EDGES])
     u = np.vstack([pairs, [0.0, 0.0]])
     arguments = "u1(k-1), u2(k-1)" if PRIMITIVES[name].arity == 2 else "u1(k-1)"
@@ -86,10 +86,10 @@ def at_the_edges(name):
 
 
 def record_of(name):
-    """Return the record that a case is run on."""
+    """Return the record of a case."""
     return record(CASES[name].inputs)
 
 
 def bits(numbers):
-    """Return what tells two numbers apart, minus zero from zero, too."""
+    """Return the bits of numbers; they distinguish zero from minus zero."""
     return np.asarray(numbers, np.float64).view(np.int64).tolist()

@@ -1,4 +1,4 @@
-"""A Ray of a test session: a process of its own, which tests connect to by its address."""
+"""Ray head of a test session: a separate process that tests connect to by its address."""
 
 import os
 import secrets
@@ -14,13 +14,13 @@ from support.processes import eventually
 
 @contextmanager
 def ray_head(folder: Path) -> Iterator[str]:
-    """Start the head process of the service, and yield the address of its Ray."""
-    # Ray reads the token once in a process: every Ray that this process connects to has the same one.
+    """Start the Ray head process of the service and yield its address."""
+    # Ray reads the token once per process, so all clusters of this process have the same token.
     token = os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
     environment = {**os.environ, "ISLANDS_DATA_DIR": str(folder), "RAY_AUTH_TOKEN": token}
-    # The head ends with this process, also when this process is killed.
-    mortal = [setpriv, "--pdeathsig", "TERM"] if (setpriv := shutil.which("setpriv")) else []
-    command = [*mortal, sys.executable, "-m", "islands_service.runtime.ray_head"]
+    # The head ends with this process, also if this process is killed.
+    wrapper = [setpriv, "--pdeathsig", "TERM"] if (setpriv := shutil.which("setpriv")) else []
+    command = [*wrapper, sys.executable, "-m", "islands_service.runtime.ray_head"]
     address = folder / "ray-address"
     with (folder / "head.log").open("w") as log:
         head = subprocess.Popen(command, env=environment, stdout=log, stderr=log)

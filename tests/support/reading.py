@@ -1,19 +1,19 @@
-"""Whether a page can be read: how its texts stand out, and what a screen reader would stumble over."""
+"""Accessibility of a page: contrast of its texts, clipped content and missing labels."""
 
 from typing import Any
 
-#: The least contrast of a text that everybody can read.
+#: Minimum contrast of a text (WCAG 2.2, 1.4.3).
 _CONTRAST = 4.5
 
-#: The contrast of every text with what lies behind it (WCAG 2.2, 1.4.3), least first.
+#: Script that returns the contrast of every text with its background (WCAG 2.2, 1.4.3), lowest first.
 _CONTRASTS = """() => {
   const parsed = (text) => text.match(/[\\d.]+/g).map(Number);
-  const light = (rgb) => {
+  const luminance = (rgb) => {
     const linear = (v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
     const [r, g, b] = rgb.map((v) => linear(v / 255));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
-  const behind = (node) => {
+  const background = (node) => {
     for (let at = node; at; at = at.parentElement) {
       const [r, g, b, alpha = 1] = parsed(getComputedStyle(at).backgroundColor);
       if (alpha === 1) return [r, g, b];
@@ -25,37 +25,37 @@ _CONTRASTS = """() => {
   return texts.map((node) => {
     const style = getComputedStyle(node);
     const colour = node instanceof SVGElement ? style.fill : style.color;
-    const [a, b] = [light(parsed(colour).slice(0, 3)), light(behind(node))];
+    const [a, b] = [luminance(parsed(colour).slice(0, 3)), luminance(background(node))];
     return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), node.textContent.slice(0, 40), node.className];
   }).sort((a, b) => a[0] - b[0]);
 }"""
 
-#: What a screen reader would stumble over.
-_STUMBLES = """() => {
+#: Script that returns missing labels, wrong headings and clipped content.
+_DEFECTS = """() => {
   const all = (selector) => [...document.querySelectorAll(selector)].filter((node) => node.checkVisibility());
-  const said = (node) => (node.ariaLabel ?? node.textContent).trim();
+  const name = (node) => (node.ariaLabel ?? node.textContent).trim();
   const levels = all("h1, h2, h3, h4").map((node) => Number(node.tagName[1]));
   return [
     levels.filter((level) => level === 1).length === 1 ? null : `headings of the first level: ${levels}`,
-    ...levels.map((level, at) => at && level > levels[at - 1] + 1 ? `a level is left out: ${levels}` : null),
-    ...all("button, a").map((node) => said(node) ? null : "nameless"),
+    ...levels.map((level, at) => at && level > levels[at - 1] + 1 ? `a level is missing: ${levels}` : null),
+    ...all("button, a").map((node) => name(node) ? null : "a control without a name"),
     ...all("input").map((node) => node.labels.length ? null : "an input without a label"),
-    ...all("img").map((node) => node.hasAttribute("alt") ? null : "a picture without words"),
+    ...all("img").map((node) => node.hasAttribute("alt") ? null : "a picture without alternative text"),
     ...all("table").map((node) => node.caption ? null : "a table without a caption"),
     ...all("progress, [role=slider], [role=region]").map((node) => node.ariaLabel ? null : node.tagName),
     ...all("td, th, dd, h1, h2, h3, .progress").map((node) => node.scrollWidth > node.clientWidth + 1
-      ? `it juts out: ${node.textContent.slice(0, 40)}` : null),
-    document.documentElement.lang ? null : "no language",
+      ? `clipped: ${node.textContent.slice(0, 40)}` : null),
+    document.documentElement.lang ? null : "the document has no language",
   ].filter(Boolean);
 }"""
 
 
 def unreadable(page: Any) -> list[str]:
-    """Say what cannot be read on a page: what is cut off, too pale, or has no words."""
+    """Return the accessibility defects of a page: clipped content, low contrast and missing labels."""
     page.evaluate("document.fonts.ready")
     width, whole = page.evaluate("[innerWidth, document.documentElement.scrollWidth]")
-    cut = [f"the page is {whole} pixels wide, and the screen {width}"] if whole > width else []
+    cut = [f"the page is {whole} pixels wide, the screen {width}"] if whole > width else []
     contrasts = page.evaluate(_CONTRASTS)
-    assert contrasts, "there is no text at all"
+    assert contrasts, "the page has no text"
     pale = [str(each) for each in contrasts if each[0] < _CONTRAST]
-    return [*cut, *pale, *page.evaluate(_STUMBLES)]
+    return [*cut, *pale, *page.evaluate(_DEFECTS)]

@@ -1,4 +1,4 @@
-"""Paths of the repository, and of the measured records, which are not part of it."""
+"""Paths of the repository and of the measured records, which are not part of it."""
 
 import os
 from pathlib import Path
@@ -9,13 +9,13 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 BENCHMARKS = ROOT / "benchmarks"
 
-#: The folder of the measured records.
+#: Folder of the measured records.
 RECORDS = Path(os.environ.get("ISLANDS_DATA_DIR", ROOT.parent / "shared" / "data"))
 
 
 def measured_record(name: str) -> Path:
-    """Return the path of a measured record; skip the test where it is absent."""
+    """Return the path of a measured record; skip the test if it is absent."""
     file = RECORDS / name
     if not file.exists():
-        pytest.skip(f"needs the measured record {name}: set ISLANDS_DATA_DIR to the folder that has it")
+        pytest.skip(f"needs the measured record {name}: set ISLANDS_DATA_DIR to its folder")
     return file

@@ -1,4 +1,4 @@
-"""`islands serve` as processes: started on a free port, asked over HTTP, its roles found in /proc, ended."""
+"""`islands serve` as a process tree on a free port, with an HTTP client and its processes by role."""
 
 import os
 import signal
@@ -16,7 +16,7 @@ import httpx
 from support.command_line import ISLANDS, write_hysteresis
 from support.processes import alive, descendants, eventually
 
-#: What the command line of every role holds. The actors and the two servers are Ray's own processes.
+#: Part of the command line of each role. The actors, the raylet and the GCS are processes of Ray.
 ROLES = {
     "api": "-m islands_api",
     "coordinator": "-m islands_service.coordinator",
@@ -36,7 +36,7 @@ SPEC = {
     "settings": {"population": 30, "max_terms": 5, "shooting": 200, "islands": 2, "migrate_every": 1},
 }
 
-#: Frequent checkpoints: a test does not live long.
+#: Frequent checkpoints, because tests are short.
 QUICK = {"ISLANDS_CHECKPOINT_EVERY": "0.5", "ISLANDS_RATE": "0"}
 
 
@@ -48,7 +48,7 @@ def free_port() -> int:
 
 
 def started(*options: object, log: IO[str] | None = None, **environment: str) -> subprocess.Popen[str]:
-    """Start ``islands serve``: what it says goes to a file, or can be read from its ``stderr``."""
+    """Start ``islands serve``; its output goes to a file, or to a pipe at ``stderr``."""
     return subprocess.Popen(
         [ISLANDS, "serve", *map(str, options)],
         env={**os.environ, **QUICK, **environment},
@@ -59,7 +59,7 @@ def started(*options: object, log: IO[str] | None = None, **environment: str) ->
 
 
 class Service:
-    """A service that runs, and a client that comes back where it was cut off."""
+    """Running service with a client that retries after lost connections."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class Service:
         self._dataset = ""
 
     def ask(self, method: str, path: str, **asked: Any) -> httpx.Response:
-        """Ask until somebody answers: a connection that is refused or cut is tried again."""
+        """Send a request; retry while the connection is refused or lost, or the response is 503."""
         deadline = time.monotonic() + self.patience
         while True:
             try:
@@ -92,18 +92,18 @@ class Service:
         assert self.ask("GET", "/readyz").status_code == 200
 
     def pids(self, role: str) -> list[int]:
-        """The processes of a role that live, of this service alone, eldest first."""
+        """Return the living processes of a role of this service, oldest first."""
         found = descendants(self.process.pid)
         return alive(sorted(pid for pid, line in found.items() if ROLES[role] in line))
 
     def one(self, role: str) -> int:
-        """A process of a role, as soon as there is one."""
+        """Return a process of a role; wait until there is one."""
         found: list[int] = eventually(lambda: self.pids(role))  # type: ignore[assignment]
         return found[0]
 
     @property
     def dataset(self) -> str:
-        """The data set that all jobs are about."""
+        """Id of the data set of all jobs; uploaded at the first use."""
         if not self._dataset:
             path = self.folder.with_suffix(".csv")
             if not path.exists():
@@ -132,11 +132,11 @@ class Service:
         return int((self.job(job)["progress"] or {}).get("generation", 0))
 
     def under_way(self, job: str, generation: int = 10) -> int:
-        """Wait until a job is past a generation, and return where it is."""
+        """Wait until a job has reached a generation; return its current one."""
         return int(str(eventually(lambda: (at := self.generation(job)) >= generation and at)))
 
     def ended(self, job: str, seconds: float = 120.0) -> dict[str, Any]:
-        """Wait until a job has ended, and return it."""
+        """Wait until a job has ended and return it."""
         deadline, tag = time.monotonic() + seconds, ""
         while True:
             answer = self.ask(
@@ -150,19 +150,19 @@ class Service:
             assert time.monotonic() < deadline, (self.job(job), self.log.read_text())
 
     def models(self, job: str) -> bytes:
-        """What ``GET /v1/jobs/{id}/models`` answers, byte for byte."""
+        """Return the response of ``GET /v1/jobs/{id}/models``, byte for byte."""
         answer = self.ask("GET", f"/v1/jobs/{job}/models")
         assert answer.status_code == 200, answer.text
         return answer.content
 
     def found(self, job: str) -> bytes:
-        """Wait until a job has succeeded, and return its models."""
+        """Wait until a job has succeeded and return its models."""
         ended = self.ended(job)
         assert ended["state"] == "succeeded", ended
         return self.models(job)
 
     def stop(self, seconds: float = 60.0) -> int:
-        """End it by SIGTERM, and return its exit status."""
+        """Stop the service with SIGTERM and return its exit status."""
         self.process.terminate()
         return self.process.wait(seconds)
 
@@ -176,7 +176,7 @@ def serving(
     environment: Mapping[str, str] | None = None,
     patience: float = 60.0,
 ) -> Iterator[Service]:
-    """Run a service on a data folder; when the block ends, it and all that it has started are gone."""
+    """Run a service on a data folder; at the end, stop it and wait for all its processes."""
     port = port or free_port()
     with folder.with_suffix(".log").open("a") as log:
         process = started("--data-dir", folder, "--port", port, *options, log=log, **environment or {})

@@ -1,4 +1,4 @@
-"""Stores in tests: jobs in every state, all that a database holds, what happens at once, other processes."""
+"""Helpers for tests of the store: jobs in any state, table contents, concurrent calls, other processes."""
 
 import subprocess
 import sys
@@ -18,10 +18,13 @@ from support.processes import eventually
 
 ALICE, BOB = "alice", "bob"
 
-#: Seconds of a lease that a test does not outlive, and of one that has expired when it begins.
-LONG, EXPIRED = 3600.0, -1.0
+#: Duration of a lease in seconds, longer than any test.
+LONG = 3600.0
 
-#: Threads that come at the same time.
+#: Duration in seconds of a lease that has already expired when it is claimed.
+EXPIRED = -1.0
+
+#: Number of concurrent threads.
 MANY = 16
 
 BLOB = "b" * 64
@@ -45,18 +48,18 @@ def submitted(store: Store, owner: str = ALICE, /, **changes: Any) -> Job:
 
 
 def claimed(store: Store, seconds: float = LONG, owner: str | None = None) -> Lease:
-    """Claim a job, under a name that nobody has had before unless one is given."""
+    """Claim a job, by default under a new unique name."""
     lease = store.leases.claim(owner or uuid4().hex, seconds)
     assert lease is not None
     return lease
 
 
 def taken(store: Store, job: str) -> Lease:
-    """Claim a job, and before it all that wait in front of it."""
+    """Claim a job and all jobs ahead of it in the queue; return the lease of the job."""
     while (lease := store.leases.claim(uuid4().hex, LONG)) is not None:
         if lease.job.id == job:
             return lease
-    raise AssertionError(f"job {job} does not wait")
+    raise AssertionError(f"job {job} is not queued")
 
 
 def point(generation: int) -> tuple[int, int, dict[int, float], tuple[float | None, ...]]:
@@ -64,13 +67,13 @@ def point(generation: int) -> tuple[int, int, dict[int, float], tuple[float | No
 
 
 def brought_on(generation: int) -> ProgressReport:
-    """A report in which every part says the same generation."""
+    """Make a progress report in which every part has the same generation."""
     return ProgressReport(
         {"generation": generation}, (point(generation),), f"{generation:064x}", generation - 1
     )
 
 
-#: How a job gets to a state, from the queue.
+#: Steps that bring a queued job to a state.
 _REACH: dict[JobState, tuple[Callable[[Store], object], ...]] = {
     JobState.QUEUED: (),
     JobState.RUNNING: (claimed,),
@@ -81,7 +84,7 @@ _REACH: dict[JobState, tuple[Callable[[Store], object], ...]] = {
 
 
 def job_in(store: Store, state: JobState, owner: str = ALICE, /, **changes: Any) -> Job:
-    """Submit a job to a store in which none waits, and bring it to a state."""
+    """Submit a job and bring it to a state; the store has no other queued job."""
     job = submitted(store, owner, **changes)
     for step in _REACH[state]:
         step(store)
@@ -100,7 +103,7 @@ def contents(store: Store) -> dict[str, list[tuple[Any, ...]]]:
 
 
 def kinds(store: Store, job: str) -> list[str]:
-    """Return what happened to a job, after making sure that nothing is missing."""
+    """Return the kinds of the events of a job; check that none is missing."""
     events = store.jobs.events(job)
     assert [event.number for event in events] == list(range(1, len(events) + 1))
     assert store.jobs.versions([job]) == {job: len(events)}
@@ -108,7 +111,7 @@ def kinds(store: Store, job: str) -> list[str]:
 
 
 def at_once(actions: list[Callable[[], Any]]) -> list[Any]:
-    """Do things at the same time in a thread each; return what each returned, or raised."""
+    """Call functions concurrently, each in a thread; return their results or exceptions."""
     ready, results = threading.Barrier(len(actions)), [None] * len(actions)
 
     def act(index: int) -> None:
@@ -126,45 +129,48 @@ def at_once(actions: list[Callable[[], Any]]) -> list[Any]:
     return results
 
 
-#: Takes the first job, changes it, and stops in the middle of the transaction, until SIGCONT. A signal to the
-#: whole process is handled by any of its threads, and this one, the writer, might commit before.
-_STANDING = """
+#: Script that claims the first job, updates it and stops inside the transaction until SIGCONT. It stops the
+#: writer thread: another thread might handle a signal to the process, and the writer might commit before.
+_STOPPED_WRITER = """
 import signal, sys, threading
 from islands_service.store import Store, connections
 from islands_service.store.job_events import update_job
 connections.SETTINGS = (f"idle_in_transaction_session_timeout = '{sys.argv[2]}s'",)
 store = Store(sys.argv[1])
 lease = store.leases.claim("first", -1.0)
-def stand(connection):
+def update_and_stop(connection):
     update_job(connection, lease.job.id, progress='{"half": true}')
-    print("standing", flush=True)
+    print("stopped", flush=True)
     signal.pthread_kill(threading.get_ident(), signal.SIGSTOP)
 try:
-    store.database.write(stand)
+    store.database.write(update_and_stop)
 except Exception as error:
     print(repr(error), flush=True)
 """
 
 
 @contextmanager
-def standing(database: str, seconds: int) -> Iterator[subprocess.Popen[str]]:
-    """Run a process that has stopped inside a write; PostgreSQL ends its transaction after some seconds."""
-    with child(_STANDING, database, str(seconds)) as process:
+def stopped_writer(database: str, seconds: int) -> Iterator[subprocess.Popen[str]]:
+    """Run a process that is stopped inside a write.
+
+    PostgreSQL ends its transaction after the given seconds.
+    """
+    with child(_STOPPED_WRITER, database, str(seconds)) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() == "standing\n"
+        assert process.stdout.readline() == "stopped\n"
         yield process
 
 
 @contextmanager
 def several(database: str, count: int = 4) -> Iterator[list[Store]]:
-    """Open a database several times, as processes do: each store has a writer and connections of its own."""
+    """Open a database several times, like several processes: each store has a separate writer."""
     with ExitStack() as stack:
         yield [stack.enter_context(Store(database)) for _ in range(count)]
 
 
 @contextmanager
 def commits(store: Store) -> Iterator[list[float]]:
-    """Yield the list of times at which a store commits what it wrote."""
+    """Yield the list of times at which a store commits writes."""
     times: list[float] = []
 
     def committed(connection: Any) -> None:
@@ -178,29 +184,29 @@ def commits(store: Store) -> Iterator[list[float]]:
         event.remove(store.database.engine, "commit", committed)
 
 
-def waiting(store: Store, count: int) -> None:
-    """Wait until so many writes wait for a store's writer."""
+def wait_for_queued_writes(store: Store, count: int) -> None:
+    """Wait until at least ``count`` writes are queued for the writer of a store."""
     eventually(lambda: store.database._waiting.qsize() >= count)
 
 
 @contextmanager
 def one_group(store: Store, count: int) -> Iterator[None]:
-    """Keep a store's writer busy until so many writes wait: they make one group."""
+    """Keep the writer of a store busy until ``count`` writes are queued, so that they form one group."""
     busy, free = threading.Event(), threading.Event()
-    keeper = threading.Thread(target=store.database.write, args=(lambda _: (busy.set(), free.wait()),))
-    keeper.start()
+    blocker = threading.Thread(target=store.database.write, args=(lambda _: (busy.set(), free.wait()),))
+    blocker.start()
     busy.wait()
     try:
         yield
-        waiting(store, count)
+        wait_for_queued_writes(store, count)
     finally:
         free.set()
-        keeper.join()
+        blocker.join()
 
 
 @contextmanager
 def child(script: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Run a script in a process of its own."""
+    """Run a script in a separate process."""
     command = [sys.executable, "-W", "error", "-c", script, *arguments]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:

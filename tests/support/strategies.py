@@ -1,7 +1,7 @@
-"""Every generator of random values: expressions, signals, models, small records, topologies and schedules.
+"""Hypothesis strategies: expressions, signals, models, small records, topologies and schedules.
 
-Numbers of a *law of values* lie on a coarse grid of binary fractions, so that sums and products of a few of
-them are exact and a jump of sign, max or a protected division is met exactly or not at all.
+Tests that compare values draw numbers from a coarse grid of binary fractions. Sums and products of a few of
+them are exact: an argument is either exactly at a jump of sign, max or a protected division, or far from it.
 """
 
 import math
@@ -19,7 +19,10 @@ from islands.model.model import make_model
 from islands.model.primitives import ADD, MUL, PRIMITIVES
 from islands.model.regressor import regressor
 
+#: Number of inputs.
 INPUTS = 2
+
+#: Largest lag of a leaf.
 DEEPEST = 12
 
 #: Multiples of 1/8 up to 4 in size.
@@ -32,7 +35,7 @@ def leaves(inputs=INPUTS):
     return st.builds(Lagged, st.integers(0, inputs), st.integers(1, DEEPEST))
 
 
-#: Products, sums, equal factors and numbers in front are what canonical form is about: they come more often.
+#: Kinds of nodes. Those that canonical form changes (products, sums, powers, coefficients) are more frequent.
 _KINDS = (
     *("leaf", "leaf", "constant"),
     *("function", "function", "function"),
@@ -42,7 +45,7 @@ _KINDS = (
 
 @st.composite
 def expressions(draw, inputs=INPUTS, constants=numbers, height=4):
-    """Trees over y, u1 .. and every primitive of the table; sums and products of up to five arguments."""
+    """Draw trees over y, u1 .. and every primitive; sums and products have up to five arguments."""
     kind = draw(st.sampled_from(_KINDS)) if height else draw(st.sampled_from(["leaf", "leaf", "constant"]))
     below = expressions(inputs, constants, height - 1)
     match kind:
@@ -65,7 +68,7 @@ def expressions(draw, inputs=INPUTS, constants=numbers, height=4):
 
 
 def regressors(inputs=INPUTS, height=3):
-    """Canonical regressors; expressions that are identically zero are left out."""
+    """Return a strategy for canonical regressors that are not identically zero."""
     return (
         expressions(inputs, height=height)
         .map(lambda expression: regressor(expression)[1])
@@ -75,7 +78,7 @@ def regressors(inputs=INPUTS, height=3):
 
 @st.composite
 def phi_factors(draw):
-    """phi1 or phi2 of two lags of one input, as a factor of a product (the paper, section 3)."""
+    """Draw phi1 or phi2 of two lags of one input, as a factor of a product (the paper, section 3)."""
     channel = draw(st.integers(1, INPUTS))
     first, second = draw(st.lists(st.integers(1, DEEPEST), min_size=2, max_size=2, unique=True))
     name = draw(st.sampled_from(["phi1", "phi2"]))
@@ -84,14 +87,14 @@ def phi_factors(draw):
 
 @st.composite
 def signals(draw):
-    """A function (channel, lag) -> number on the grid, for every lag that an expression can reach."""
+    """Draw a function (channel, lag) -> number on the grid, for every lag that an expression can reach."""
     seed = draw(st.integers(0, 2**32 - 1))
     return lambda channel, lag: random.Random(seed + 1000 * channel + lag).randint(-32, 32) / 8
 
 
 @st.composite
 def models(draw, inputs=INPUTS, most=5):
-    """Models with parameters."""
+    """Draw models with parameters."""
     terms = draw(st.lists(st.tuples(regressors(inputs, 2), grid), min_size=1, max_size=most))
     names = ("u",) if inputs == 1 else tuple(f"u{index + 1}" for index in range(inputs))
     return make_model([(item.expression, theta) for item, theta in terms], names)
@@ -99,57 +102,59 @@ def models(draw, inputs=INPUTS, most=5):
 
 @st.composite
 def records(draw, inputs=INPUTS, shortest=1, longest=40):
-    """Small records of one to three segments, values of order one."""
+    """Draw small records of one to three segments with values of order one."""
     segments = tuple(draw(st.lists(st.integers(shortest, longest), min_size=1, max_size=3)))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     samples = sum(segments)
     return Dataset(rng.normal(size=(samples, inputs)), rng.normal(size=samples), 0.1, segments=segments)
 
 
-def settled_value(expression, signal, shakes=4):
-    """Return the value, or None where it hangs on its last digits: no tolerance fits it.
+def settled_value(expression, signal, perturbations=4):
+    """Return the value of an expression, or None if it depends on rounding errors.
 
-    Every node's result is shaken by 1e-10 of itself. A value that moves by much more stands at a jump of sign
-    or of a protected function, or is what a cancellation left over.
+    The result of every node is perturbed by 1e-10 of its size. A value that changes by much more is at a jump
+    of sign or of a protected function, or is the result of a cancellation.
     """
     try:
         plain = value(expression, signal)
-        shaken = [value(_shaken(expression, random.Random(seed)), signal) for seed in range(shakes)]
+        perturbed = [
+            value(_perturb(expression, random.Random(seed)), signal) for seed in range(perturbations)
+        ]
     except (OverflowError, ValueError):
         return None
     tolerance = 1e-7 * abs(plain)
-    calm = abs(plain) < 1e100 and all(abs(other - plain) <= tolerance for other in shaken)
-    return plain if calm else None
+    stable = abs(plain) < 1e100 and all(abs(other - plain) <= tolerance for other in perturbed)
+    return plain if stable else None
 
 
-def _shaken(expression, rng):
+def _perturb(expression, rng):
     match expression:
         case Shift(samples, argument):
-            return Shift(samples, _shaken(argument, rng))
+            return Shift(samples, _perturb(argument, rng))
         case Apply(primitive, arguments):
             scalar = primitive.scalar
             noisy = replace(
                 primitive, scalar=lambda *values: scalar(*values) * (1 + 1e-10 * rng.uniform(-1, 1))
             )
-            return Apply(noisy, tuple(_shaken(argument, rng) for argument in arguments))
+            return Apply(noisy, tuple(_perturb(argument, rng) for argument in arguments))
         case _:
             return expression
 
 
 def nearly(a, b):
-    """Equal but for rounding, in the sense of `settled_value`."""
+    """Return whether two values of `settled_value` are equal up to rounding."""
     return math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-280)
 
 
 def edges(islands):
-    """Edges between different islands, none twice."""
+    """Return a strategy for unique edges between different islands."""
     pairs = [(source, target) for source in range(islands) for target in range(islands) if source != target]
     return st.lists(st.sampled_from(pairs), min_size=1, max_size=3 * islands, unique=True)
 
 
 @st.composite
 def layouts(draw, most=12):
-    """The text of a topology, and a number of islands that it can be laid out over."""
+    """Draw the text of a topology and a number of islands that it supports."""
     islands = draw(st.integers(1, most))
     texts = [st.sampled_from([name for name in TOPOLOGIES if name not in WITH_DEGREE])]
     if islands > 1:
@@ -160,7 +165,7 @@ def layouts(draw, most=12):
 
 @st.composite
 def schedules(draw, least=1, most=9, latest=40):
-    """The pieces of a schedule: from which generation on, which value."""
+    """Draw the pieces of a schedule: first generation and value of each."""
     begins = draw(st.lists(st.integers(1, latest), max_size=3, unique=True).map(sorted))
     return tuple((begin, draw(st.integers(least, most))) for begin in (0, *begins))
 
@@ -171,5 +176,5 @@ def schedule_text(pieces):
 
 
 def part_of_the_examples(share):
-    """Settings of a costly property: one of so many examples of the profile, so that both profiles hold."""
+    """Return settings of a costly property: the number of examples of the profile, divided by ``share``."""
     return settings(max_examples=max(1, settings().max_examples // share))

@@ -1,4 +1,4 @@
-"""Figures that are made and not drawn: nine tenths of the time of a result's folder goes into drawing."""
+"""Figures that are not drawn: drawing takes nine tenths of the time to write a result folder."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,16 +7,16 @@ from typing import IO, Any
 
 import pytest
 
-#: What stands in a figure's file.
+#: Content of the file of a figure.
 EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg"></svg>'
 
 
 @contextmanager
 def undrawn_figures() -> Iterator[None]:
-    """Make figures in this process without laying them out; their files hold an empty picture."""
+    """Skip the layout of figures in this process and save empty pictures."""
     from matplotlib.figure import Figure
 
-    def save(_figure: Figure, to: str | Path | IO[bytes], **_asked: Any) -> None:
+    def save(_figure: Figure, to: str | Path | IO[bytes], **_options: Any) -> None:
         if isinstance(to, str | Path):
             Path(to).write_bytes(EMPTY)
         else:
