@@ -29,7 +29,7 @@ from support.stores import (
     contents,
     job_in,
     kinds,
-    several,
+    open_stores,
     submitted,
 )
 
@@ -71,7 +71,7 @@ def test_accepted_job_is_found_after_reopening_the_store(database):
 
 
 def test_accepted_job_is_visible_at_once_to_other_stores(database):
-    with several(database, 2) as (one, other):
+    with open_stores(database, 2) as (one, other):
         for _ in range(20):
             job = submitted(one)
             assert other.jobs.get(ALICE, job.id) == job
@@ -135,7 +135,7 @@ def test_key_of_a_deleted_job_can_be_reused(store):
 
 
 def test_concurrent_requests_with_the_same_key_get_one_job(database):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         for turn in range(5):
             submit = asked(idempotency_key=f"k{turn}")
             answers = at_once([partial(stores[i % 4].jobs.submit, submit) for i in range(MANY)])
@@ -145,7 +145,7 @@ def test_concurrent_requests_with_the_same_key_get_one_job(database):
 
 
 def test_different_concurrent_requests_with_one_key_get_conflicts(database):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         answers = at_once(
             [
                 lambda store=stores[i // 2 % 4], i=i: store.jobs.submit(
@@ -215,7 +215,7 @@ def test_replayed_request_is_answered_at_a_full_quota(store):
 
 @pytest.mark.parametrize("quota", [1, 7])
 def test_concurrent_requests_get_exactly_the_quota(database, quota):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         answers = at_once(
             [lambda store=stores[i % 4]: store.jobs.submit(asked(), quota) for i in range(MANY)]
         )

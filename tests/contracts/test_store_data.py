@@ -26,7 +26,7 @@ from support.stores import (
     claimed,
     contents,
     job_in,
-    several,
+    open_stores,
     submitted,
 )
 
@@ -96,14 +96,14 @@ def test_bytes_are_counted_exactly_for_huge_sizes(store):
 
 
 def test_concurrent_uploads_of_the_same_bytes_make_one_data_set(database):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         answers = at_once([partial(added, stores[i % 4]) for i in range(MANY)])
         assert sum(new for _, new in answers) == 1
         assert len({dataset.id for dataset, _ in answers}) == 1
 
 
 def test_concurrent_uploads_get_exactly_the_allowed_bytes(database):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         answers = at_once([partial(added, stores[i % 4], ALICE, i, 100, most_bytes=550) for i in range(MANY)])
         assert sum(isinstance(answer, QuotaError) for answer in answers) == MANY - 5
         assert len(stores[0].datasets.page(ALICE)[0]) == 5

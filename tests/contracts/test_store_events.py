@@ -20,7 +20,7 @@ from support.stores import (
     claimed,
     job_in,
     kinds,
-    several,
+    open_stores,
     submitted,
 )
 
@@ -72,7 +72,7 @@ def test_versions_of_many_jobs_are_returned_together(store):
 
 def test_reader_that_continues_from_the_last_number_misses_nothing(database):
     """The coordinator reports while the owner cancels and resumes, and both write at the same time."""
-    with several(database, 3) as (coordinator, owner, reader):
+    with open_stores(database, 3) as (coordinator, owner, reader):
         job = submitted(coordinator)
         over = threading.Event()
 
@@ -114,7 +114,7 @@ def test_reader_that_continues_from_the_last_number_misses_nothing(database):
 
 
 def test_reader_that_sees_a_version_finds_its_event(database):
-    with several(database, 2) as (writer, reader):
+    with open_stores(database, 2) as (writer, reader):
         job = submitted(writer)
         lease = claimed(writer)
         over = threading.Event()

@@ -17,7 +17,7 @@ from support.stores import (
     claimed,
     contents,
     kinds,
-    several,
+    open_stores,
     submitted,
 )
 
@@ -142,7 +142,7 @@ def test_epochs_of_a_job_rise_with_every_claim(store):
 
 def test_job_finished_twice_keeps_the_outcome_of_its_lease(database):
     """The old coordinator finishes while its successor claims and finishes: exactly one outcome is stored."""
-    with several(database, 2) as (one, other):
+    with open_stores(database, 2) as (one, other):
         for turn in range(20):
             job = submitted(one, name=f"{turn}")
             old = claimed(one, EXPIRED)

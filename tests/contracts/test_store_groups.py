@@ -21,7 +21,7 @@ from support.stores import (
     contents,
     kinds,
     one_group,
-    several,
+    open_stores,
     submitted,
     wait_for_queued_writes,
 )
@@ -121,7 +121,7 @@ def test_every_operation_returns_its_own_value(store):
 
 
 def test_write_in_a_group_with_failures_is_visible_after_its_return(database):
-    with several(database, 2) as (one, other):
+    with open_stores(database, 2) as (one, other):
         answers = in_one_group(
             one,
             [lambda: one.database.write(lambda _: raised(OwnFault())), lambda: submitted(one)],
@@ -130,7 +130,7 @@ def test_write_in_a_group_with_failures_is_visible_after_its_return(database):
 
 
 def test_writes_are_invisible_before_their_commit(database):
-    with several(database, 2) as (one, other):
+    with open_stores(database, 2) as (one, other):
         job = submitted(one)
         written, seen = threading.Event(), threading.Event()
 
@@ -197,7 +197,7 @@ def test_closed_store_raises_errors_and_keeps_no_thread(database):
 
 
 def test_deadlocked_transactions_both_succeed(database):
-    with several(database, 2) as stores:
+    with open_stores(database, 2) as stores:
         jobs = [submitted(stores[0]).id for _ in range(2)]
         both = threading.Barrier(2)
 

@@ -21,7 +21,7 @@ from support.stores import (
     contents,
     job_in,
     kinds,
-    several,
+    open_stores,
     submitted,
 )
 
@@ -75,7 +75,7 @@ def test_claims_follow_priority_and_age(store):
 
 
 def test_every_job_is_claimed_once_by_concurrent_claimers(database):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         jobs = [submitted(stores[0], priority=each % 3) for each in range(24)]
 
         def claim_all(store, name):
@@ -96,7 +96,7 @@ def test_every_job_is_claimed_once_by_concurrent_claimers(database):
 
 
 def test_single_job_goes_to_one_of_many_claimers(database):
-    with several(database) as stores:
+    with open_stores(database) as stores:
         for turn in range(10):
             job = submitted(stores[0])
             answers = at_once(

@@ -17,8 +17,8 @@ from support.stores import (
     claimed,
     contents,
     kinds,
+    open_stores,
     point,
-    several,
     submitted,
 )
 
@@ -60,7 +60,7 @@ def test_parts_of_a_report_appear_together(store, lease):
 
 
 def test_reader_never_sees_a_part_of_a_report(database):
-    with several(database, 2) as (writer, reader):
+    with open_stores(database, 2) as (writer, reader):
         job = submitted(writer)
         lease = claimed(writer)
         over = threading.Event()
@@ -296,7 +296,7 @@ def test_results_of_different_jobs_are_separate(store):
 
 
 def test_concurrent_artefacts_of_the_same_name_are_both_accepted(database):
-    with several(database, 2) as (first, second):
+    with open_stores(database, 2) as (first, second):
         job = submitted(first).id
         writing, late = (
             threading.Event(),

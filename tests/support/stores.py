@@ -162,7 +162,7 @@ def stopped_writer(database: str, seconds: int) -> Iterator[subprocess.Popen[str
 
 
 @contextmanager
-def several(database: str, count: int = 4) -> Iterator[list[Store]]:
+def open_stores(database: str, count: int = 4) -> Iterator[list[Store]]:
     """Open a database several times, like several processes: each store has a separate writer."""
     with ExitStack() as stack:
         yield [stack.enter_context(Store(database)) for _ in range(count)]
