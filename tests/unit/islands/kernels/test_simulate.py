@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
-from islands.kernels.simulate import BEYOND, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
+from islands.kernels.simulate import ABANDONED, CHUNK, COMPLETE, DIVERGED, WIDTHS, simulate
 from islands.kernels.summation import total
 from islands.model.expression import value
 from islands.model.model import make_model
@@ -251,7 +251,7 @@ def test_what_is_allowed_ends_a_simulation_only_beyond_it_and_changes_nothing_el
     allowed = share * error
     for patient in (True, False):
         ending, *found = run_on(model, cut, data.samples, patient=patient, allowed=allowed)
-        if ending == BEYOND:
+        if ending == ABANDONED:
             assert error > allowed
         else:
             assert ending == whole == COMPLETE
@@ -267,7 +267,7 @@ def test_a_simulation_that_is_beyond_what_is_allowed_stops_at_once(width):
     data = record(u=u, y=y)
     cut = layout(data, 1, None)
     ending, _, _, predicted = run_on(echo(), cut, SAMPLES, allowed=9999.0)
-    assert ending == BEYOND
+    assert ending == ABANDONED
     assert np.isfinite(predicted[1 : CHUNK + 1]).all()
     assert np.isnan(predicted[CHUNK + 1 :]).all()
     assert run_on(echo(), cut, SAMPLES, allowed=10000.0)[0] == COMPLETE
@@ -278,7 +278,7 @@ def test_the_error_of_earlier_blocks_counts_towards_what_is_allowed():
     u[[3, 500]] = 10.0
     cut = layout(record(u=u, y=y, segments=(1000,)), 1, 2)
     assert len(cut.block_lanes) > 1
-    assert run_on(echo(), cut, 0, allowed=199.0)[0] == BEYOND
+    assert run_on(echo(), cut, 0, allowed=199.0)[0] == ABANDONED
     assert run_on(echo(), cut, 0, allowed=200.0)[0] == COMPLETE
 
 
@@ -289,7 +289,7 @@ def test_the_error_of_earlier_blocks_stops_a_later_one_after_its_first_chunk(mon
     cut = layout(record(u=u, y=y, segments=(1001,)), 1, 100)
     assert cut.block_lanes.tolist() == [8, 2]
     ending, _, _, predicted = run_on(echo(), cut, 1001, allowed=199.0)
-    assert ending == BEYOND
+    assert ending == ABANDONED
     assert np.isfinite(predicted[801 : 801 + CHUNK]).all()
     assert np.isnan(predicted[801 + CHUNK : 901]).all()
 
