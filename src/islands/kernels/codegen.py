@@ -16,7 +16,7 @@ from islands.kernels.jit_cache import kernel
 LAGGED, CONSTANT = -1, -2
 
 
-class Nodes(NamedTuple):
+class NodeArrays(NamedTuple):
     """Expressions as nodes that refer to each other by number; equal expressions are one node.
 
     Attributes
@@ -45,7 +45,7 @@ class Nodes(NamedTuple):
 
 
 @kernel
-def link(
+def generate_program(
     nodes,
     terms,  # int64 [term]: numbers of the terms, in the order of the program's
     place,  # int64 [node]: room, -1 everywhere before and after

@@ -1,8 +1,8 @@
 """Evaluation of a whole population in one call (the paper, section 5.2): prune, estimate, simulate.
 
-First the inner products that the table of pairs still misses are computed together, each column once; then
-one individual after the other is evaluated. What comes out depends on the individuals alone: not on the
-table, not on each other.
+First, the inner products that the pair table lacks are computed together, each column once. Then the
+individuals are evaluated one after the other. The result of an individual depends on that individual alone,
+not on the table and not on the other individuals.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.kernels.codegen import link
+from islands.kernels.codegen import NodeArrays, generate_program
 from islands.kernels.constrained_lstsq import (
     ILL_CONDITIONED,
     SINGULAR,
@@ -24,117 +24,166 @@ from islands.kernels.constrained_lstsq import (
 from islands.kernels.err_selection import prune
 from islands.kernels.gram import gram, inner_products
 from islands.kernels.jit_cache import kernel
-from islands.kernels.pair_table import find_pair, pair_key
-from islands.kernels.simulate import COMPLETE, simulate
+from islands.kernels.pair_table import Pairs, find_pair, pair_key
+from islands.kernels.regressor_columns import Rows
+from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
 
-#: What became of an individual. The first three are those of `simulate`: complete, diverged, beyond what is
-#: allowed.
-OK, DIVERGED, ABANDONED, DEPENDENT, INFEASIBLE, NO_TERMS, OVERFLOW, TOO_FEW_ROWS = range(8)
+# The first three codes are the status codes of `simulate`.
+
+#: Status of an individual: simulated to the end.
+OK = 0
+
+#: Status of an individual: the simulation diverged.
+DIVERGED = 1
+
+#: Status of an individual: the squared error exceeds the allowed one.
+ABANDONED = 2
+
+#: Status of an individual: the columns are linearly dependent.
+DEPENDENT = 3
+
+#: Status of an individual: a required group has no member.
+INFEASIBLE = 4
+
+#: Status of an individual: pruning and constraints left no term.
+NO_TERMS = 5
+
+#: Status of an individual: an inner product is not finite.
+OVERFLOW = 6
+
+#: Status of an individual: the record has no more rows than there are parameters.
+TOO_FEW_ROWS = 7
 
 
 class Groups(NamedTuple):
-    """The constraint on the parameters of every term in the store.
+    """Constraint on the parameters of every term in the pool: the weighted sum of each group is fixed.
 
     Attributes
     ----------
     group : ndarray of int64, shape (terms,)
-        The group whose parameters' sum is fixed; -1: the parameter is free.
+        Group of the term; -1 if its parameter is free.
     weight : ndarray of float64, shape (terms,)
-        The term's weight in that sum.
-    wanted : ndarray of float64, shape (groups,)
-        The sums. A term that is alone in a group that sums to zero has the parameter zero: it is left out.
+        Weight of the term's parameter in the sum.
+    sums : ndarray of float64, shape (groups,)
+        Required sum of each group. A term that is the only member of a group whose sum is zero has the
+        parameter zero and is left out.
     required : int
-        So many groups, the first ones, have to be there.
+        Number of groups that need at least one member; these are the first ones.
     """
 
     group: NDArray[np.int64]
     weight: NDArray[np.float64]
-    wanted: NDArray[np.float64]
+    sums: NDArray[np.float64]
     required: int
+
+
+class PopulationContext(NamedTuple):
+    """Record, terms and settings that all individuals share.
+
+    Attributes
+    ----------
+    target : int
+        The term that is y(k).
+    tolerance : float
+        Smallest error reduction ratio that survives pruning.
+    nodes : NodeArrays
+        All terms.
+    groups : Groups
+    pairs : Pairs
+        Inner products that are known; updated. It has room for the pairs of all individuals.
+    rows : Rows
+        Rows of the record for the estimation.
+    layout : Layout
+        Intervals of the record for the simulation.
+    bound : float
+        A larger absolute prediction is a divergence.
+    """
+
+    target: int
+    tolerance: float
+    nodes: NodeArrays
+    groups: Groups
+    pairs: Pairs
+    rows: Rows
+    layout: Layout
+    bound: float
+
+
+class PopulationResults(NamedTuple):
+    """Arrays that `evaluate` writes.
+
+    Attributes
+    ----------
+    kept : ndarray of int64, shape (individuals, most terms)
+        Positions of the terms that are left, ascending.
+    lengths : ndarray of int64, shape (individuals,)
+        Number of terms that are left.
+    theta : ndarray of float64, shape (individuals, most terms)
+        Parameters of these terms.
+    error : ndarray of float64, shape (individuals,)
+        Sum of squared errors; infinite unless the status is `OK`.
+    status : ndarray of int64, shape (individuals,)
+        `OK` or the reason of the failure.
+    """
+
+    kept: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    theta: NDArray[np.float64]
+    error: NDArray[np.float64]
+    status: NDArray[np.int64]
+
+
+def empty_results(individuals: int, most: int) -> PopulationResults:
+    """Return uninitialised arrays for a number of individuals of at most ``most`` terms."""
+    return PopulationResults(
+        np.empty((individuals, most), np.int64),
+        np.empty(individuals, np.int64),
+        np.empty((individuals, most)),
+        np.empty(individuals),
+        np.empty(individuals, np.int64),
+    )
 
 
 @kernel
 def evaluate(
     structures,  # int64 [individual, most terms]: terms in the order of their content
     sizes,  # int64 [individual]
-    pruned,  # bool [individual]: whether it is pruned
-    target,  # the term that is y(k)
-    tolerance,  # smallest error reduction ratio that survives pruning
-    nodes,
-    groups,
-    pairs,
-    rows,
-    layout,
-    bound,
-    allowed,  # float64 [size]: a larger sum of squared errors of a model of that size need not be known
-    kept,  # out, int64 [individual, most terms]: positions of the terms that are left, ascending
-    lengths,  # out, int64 [individual]: how many are left
-    theta,  # out, float64 [individual, most terms]
-    error,  # out, float64 [individual]: sum of squared errors
-    ending,  # out, int64 [individual]: what became of it
+    pruned,  # bool [individual]: whether the individual is pruned
+    allowed,  # float64 [size]: a model of that size is abandoned if its sum of squared errors is larger
+    context,
+    results,  # out
 ):
-    """Evaluate individuals; the table has room for all their pairs."""
-    place = np.full(nodes.operation.size, -1, np.int64)
-    _fill(structures, sizes, target, nodes, pairs, rows, place)
+    """Evaluate individuals."""
+    nodes, layout, bound = context.nodes, context.layout, context.bound
+    operand_index = np.full(nodes.operation.size, -1, np.int64)
+    _complete_pairs(structures, sizes, context, operand_index)
     most = structures.shape[1]
     matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
-    squared, diverged, nothing = np.empty(lanes), np.empty(lanes, np.int64), np.empty(0)
-    patient = np.bool_(False)  # not the constant: the compiler would make another simulation of it
+    squared, diverged, predicted = np.empty(lanes), np.empty(lanes, np.int64), np.empty(0)
+    patient = np.bool_(False)  # a constant would make the compiler specialise the simulation once more
     for index in range(sizes.size):
-        terms, positions = structures[index], kept[index]
-        error[index] = np.inf
-        size = sizes[index]
-        positions[:size] = np.arange(size)
-        lengths[index] = size
-        if not _read(terms, positions, size, target, pairs, matrix):
-            ending[index] = OVERFLOW
-            continue
-        if pruned[index]:
-            size = prune(matrix, size, tolerance, positions)
-        if groups.wanted.size > 0:
-            size = _without_lone(terms, positions, size, groups)
-        lengths[index] = size
-        if size == 0:
-            ending[index] = NO_TERMS
-            continue
-        chosen = terms[positions[:size]]
-        group, weight, wanted, feasible = _constraint(chosen, groups)
-        if not feasible:
-            ending[index] = INFEASIBLE
-            continue
-        if rows.count <= size:
-            ending[index] = TOO_FEW_ROWS
-            continue
-        _read(terms, positions, size, target, pairs, matrix)
-        if not np.diag(matrix)[:size].all():  # zero on the record, and not pruned
-            ending[index] = DEPENDENT
-            continue
-        reduction = reduce(matrix, size, group, weight, wanted)
-        count = reduction.free.size
-        factor, eta = ConstrainedFactor(np.empty((count, count)), np.empty(count)), np.empty(count)
-        least = from_gram(matrix, size, reduction, factor, eta)
-        if least < ILL_CONDITIONED:
-            program = link(nodes, np.append(chosen, target), place)
-            if least < SINGULAR and from_columns(program, rows, size, reduction, factor, eta) < SINGULAR:
-                ending[index] = DEPENDENT
-                continue
-            correct(program, rows, size, reduction, factor, eta)
-        parameters = theta[index, :size]
-        expand(reduction, eta, parameters)
-        program = link(nodes, chosen, place)
-        limit = allowed[size]
-        ending[index] = simulate(
-            program, parameters, layout, bound, limit, patient, squared, diverged, nothing
-        )
-        if ending[index] == COMPLETE:
-            error[index] = total(squared)
+        terms, positions = structures[index], results.kept[index]
+        results.error[index] = np.inf
+        size, status = _select_terms(terms, sizes[index], pruned[index], context, matrix, positions)
+        results.lengths[index] = size
+        if status == OK:
+            chosen, theta = terms[positions[:size]], results.theta[index, :size]
+            status = _estimate(chosen, context, matrix, operand_index, theta)
+            if status == OK:
+                program = generate_program(nodes, chosen, operand_index)
+                limit = allowed[size]
+                status = simulate(program, theta, layout, bound, limit, patient, squared, diverged, predicted)
+                if status == OK:
+                    results.error[index] = total(squared)
+        results.status[index] = status
 
 
 @kernel
-def _fill(structures, sizes, target, nodes, pairs, rows, place):
-    """Compute the inner products that the table misses."""
+def _complete_pairs(structures, sizes, context, operand_index):
+    """Compute the inner products that the table lacks."""
+    nodes, pairs, rows = context.nodes, context.pairs, context.rows
     local = np.full(nodes.degree.size, -1, np.int64)
     terms = np.empty_like(local)
     most = np.sum((sizes + 1) * (sizes + 2) // 2)
@@ -143,9 +192,9 @@ def _fill(structures, sizes, target, nodes, pairs, rows, place):
     for index in range(sizes.size):
         size = sizes[index]
         for i in range(size + 1):
-            one = structures[index, i] if i < size else target
+            one = structures[index, i] if i < size else context.target
             for j in range(i, size + 1):
-                other = structures[index, j] if j < size else target
+                other = structures[index, j] if j < size else context.target
                 key = pair_key(one, other)
                 at = find_pair(pairs, key)
                 if pairs.keys[at] == key:
@@ -162,7 +211,7 @@ def _fill(structures, sizes, target, nodes, pairs, rows, place):
                 count += 1
     if count == 0:
         return
-    program = link(nodes, terms[:used], place)
+    program = generate_program(nodes, terms[:used], operand_index)
     if count == used * (used + 1) // 2:
         products = np.empty((used, used))
         gram(program, rows, products)
@@ -175,14 +224,59 @@ def _fill(structures, sizes, target, nodes, pairs, rows, place):
         pairs.values[places[index]] = numbers[index]
 
 
+@kernel(forceinline=True)
+def _select_terms(terms, size, pruned, context, matrix, positions):
+    """Prune an individual and leave out terms whose parameter must be zero; return the size and the status.
+
+    ``positions``, out, are the terms that are left. ``matrix`` is scratch memory.
+    """
+    positions[:size] = np.arange(size)
+    if not _read_gram(terms[:size], context.target, context.pairs, matrix):
+        return size, OVERFLOW
+    if pruned:
+        size = prune(matrix, size, context.tolerance, positions)
+    if context.groups.sums.size > 0:
+        size = _drop_single_members(terms, positions, size, context.groups)
+    return size, OK if size > 0 else NO_TERMS
+
+
+@kernel(forceinline=True)
+def _estimate(chosen, context, matrix, operand_index, theta):
+    """Estimate the parameters of the chosen terms under the constraint; return the status.
+
+    ``theta``, out, are the parameters. ``matrix`` is scratch memory.
+    """
+    size = chosen.size
+    group, weight, sums, feasible = _get_constraint(chosen, context.groups)
+    if not feasible:
+        return INFEASIBLE
+    if context.rows.count <= size:
+        return TOO_FEW_ROWS
+    _read_gram(chosen, context.target, context.pairs, matrix)
+    if not np.diag(matrix)[:size].all():  # a column is zero on the record, and was not pruned
+        return DEPENDENT
+    reduction = reduce(matrix, size, group, weight, sums)
+    count = reduction.free.size
+    factor, eta = ConstrainedFactor(np.empty((count, count)), np.empty(count)), np.empty(count)
+    least = from_gram(matrix, size, reduction, factor, eta)
+    if least < ILL_CONDITIONED:
+        program = generate_program(context.nodes, np.append(chosen, context.target), operand_index)
+        if least < SINGULAR and from_columns(program, context.rows, size, reduction, factor, eta) < SINGULAR:
+            return DEPENDENT
+        correct(program, context.rows, size, reduction, factor, eta)
+    expand(reduction, eta, theta)
+    return OK
+
+
 @kernel
-def _read(terms, positions, size, target, pairs, gram):
-    """Read a Gram matrix, the target last, from the table; False where a number of it is not finite."""
+def _read_gram(terms, target, pairs, gram):
+    """Read the Gram matrix of the terms, the target last, from the table; return whether it is finite."""
+    size = terms.size
     finite = True
     for i in range(size + 1):
-        one = terms[positions[i]] if i < size else target
+        one = terms[i] if i < size else target
         for j in range(i, size + 1):
-            other = terms[positions[j]] if j < size else target
+            other = terms[j] if j < size else target
             gram[i, j] = pairs.values[find_pair(pairs, pair_key(one, other))]
             gram[j, i] = gram[i, j]
             finite &= np.isfinite(gram[i, j])
@@ -190,33 +284,33 @@ def _read(terms, positions, size, target, pairs, gram):
 
 
 @kernel
-def _without_lone(terms, positions, size, groups):
-    """Leave out a term that is alone in a group whose sum is zero."""
-    lone = np.zeros(size, np.bool_)
+def _drop_single_members(terms, positions, size, groups):
+    """Leave out terms that are the only member of a group whose sum is zero; return the number of terms."""
+    single = np.zeros(size, np.bool_)
     for i in range(size):
         group = groups.group[terms[positions[i]]]
-        if group < 0 or groups.wanted[group] != 0.0:
+        if group < 0 or groups.sums[group] != 0.0:
             continue
-        lone[i] = True
+        single[i] = True
         for j in range(size):
             if j != i and groups.group[terms[positions[j]]] == group:
-                lone[i] = False
-    left = positions[:size][~lone]
+                single[i] = False
+    left = positions[:size][~single]
     positions[: left.size] = left
     return left.size
 
 
 @kernel
-def _constraint(chosen, groups):
-    """Return group, weight and wanted sum of every term, and whether the required group is there."""
+def _get_constraint(chosen, groups):
+    """Return group, weight and required sum of every term, and whether all required groups have a member."""
     group = np.empty(chosen.size, np.int64)
-    weight, wanted = np.zeros(chosen.size), np.zeros(chosen.size)
+    weight, sums = np.zeros(chosen.size), np.zeros(chosen.size)
     for i in range(chosen.size):
         group[i] = groups.group[chosen[i]]
         if group[i] >= 0:
             weight[i] = groups.weight[chosen[i]]
-            wanted[i] = groups.wanted[group[i]]
+            sums[i] = groups.sums[group[i]]
     feasible = True
-    for needed in range(groups.required):
-        feasible &= np.any(group == needed)
-    return group, weight, wanted, feasible
+    for required in range(groups.required):
+        feasible &= np.any(group == required)
+    return group, weight, sums, feasible

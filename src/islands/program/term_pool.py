@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.kernels import codegen, interpreter
-from islands.kernels.codegen import CONSTANT, LAGGED, Nodes
+from islands.kernels.codegen import CONSTANT, LAGGED, NodeArrays
 from islands.kernels.interpreter import CALL, MAX_FACTORS, MULTIPLY, Program
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive
 from islands.model.primitives import ADD, MUL, SIGN, SUB
@@ -115,13 +115,13 @@ def _operation(primitive: Primitive, operand: Expression) -> tuple[int, Expressi
     return _OPERATIONS[primitive], operand
 
 
-def _room(nodes: int, terms: int) -> Nodes:
+def _room(nodes: int, terms: int) -> NodeArrays:
     operation, first, second, address = np.zeros((4, nodes), np.int64)
     factors, degree = np.zeros((terms, MAX_FACTORS), np.int64), np.zeros(terms, np.int64)
-    return Nodes(operation, first, second, address, np.zeros(nodes), factors, degree)
+    return NodeArrays(operation, first, second, address, np.zeros(nodes), factors, degree)
 
 
-def _grown(old: Nodes, nodes: int = 0, terms: int = 0) -> Nodes:
+def _grown(old: NodeArrays, nodes: int = 0, terms: int = 0) -> NodeArrays:
     new = _room(nodes or old.operation.size, terms or old.degree.size)
     for column, before in zip(new, old, strict=True):
         column[: len(before)] = before
@@ -137,5 +137,5 @@ def link(terms: Sequence[Term]) -> Program:
     store = TermPool()
     numbers = store.terms(terms)
     nodes = store.nodes
-    program: Program = codegen.link(nodes, numbers, np.full(nodes.operation.size, -1, np.int64))
+    program: Program = codegen.generate_program(nodes, numbers, np.full(nodes.operation.size, -1, np.int64))
     return program

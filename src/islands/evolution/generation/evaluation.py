@@ -243,12 +243,7 @@ class Evaluator:
         numbers = np.zeros((count, largest), np.int64)
         for row, structure in zip(numbers, structures, strict=True):
             row[: len(structure)] = structure
-        kept, lengths = np.empty((count, largest), np.int64), np.empty(count, np.int64)
-        theta, error, ending = np.empty((count, largest)), np.empty(count), np.empty(count, np.int64)
-        kernel.evaluate(
-            numbers,
-            np.array([len(structure) for structure in structures], np.int64),
-            np.array(pruned, np.bool_),
+        context = kernel.PopulationContext(
             _TARGET,
             self.settings.tolerance,
             self._gene_index.nodes,
@@ -257,21 +252,20 @@ class Evaluator:
             self._rows,
             self._layout,
             self._bound,
+        )
+        results = kernel.empty_results(count, largest)
+        kernel.evaluate(
+            numbers,
+            np.array([len(structure) for structure in structures], np.int64),
+            np.array(pruned, np.bool_),
             allowed * self._predicted,
-            kept,
-            lengths,
-            theta,
-            error,
-            ending,
+            context,
+            results,
         )
         evaluations = []
         for structure, positions, length, parameters, squares, code in zip(
             structures,
-            kept.tolist(),
-            lengths.tolist(),
-            theta.tolist(),
-            error.tolist(),
-            ending.tolist(),
+            *(array.tolist() for array in results),
             strict=True,
         ):
             remaining = tuple([structure[position] for position in positions[:length]])

@@ -6,7 +6,7 @@ import numpy as np
 
 from islands.estimation.parameter_constraints import Constraint
 from islands.evolution.gp.individual import make_regressor
-from islands.kernels.codegen import Nodes
+from islands.kernels.codegen import NodeArrays
 from islands.kernels.population import Groups
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor
@@ -58,7 +58,7 @@ class GeneIndex:
         return self._store.deepest
 
     @property
-    def nodes(self) -> Nodes:
+    def nodes(self) -> NodeArrays:
         """Regressors in the layout of the kernels."""
         return self._store.nodes
 

@@ -19,7 +19,7 @@ from islands.evolution.gp.gene_index import GeneIndex
 from islands.kernels.gram import gram
 from islands.kernels.interpreter import Program
 from islands.kernels.pair_table import clear, pair_table
-from islands.kernels.population import evaluate
+from islands.kernels.population import PopulationContext, empty_results, evaluate
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
@@ -116,32 +116,16 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
     vocabulary = GeneIndex(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
     terms = np.array([[vocabulary.index_of(item.expression) for item in candidate.regressors]], np.int64)
     sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
-    kept, estimated = np.empty((1, size), np.int64), np.empty((1, size))
-    lengths, error, ending = np.empty(1, np.int64), np.empty(1), np.empty(1, np.int64)
     pairs, program, theta = pair_table(_TABLE), link(candidate.regressors), np.array(candidate.theta)
+    context = PopulationContext(
+        0, 0.0, vocabulary.nodes, vocabulary.groups, pairs, state.rows, state.step, state.bound
+    )
+    results = empty_results(1, size)
 
     def call() -> None:
         if not cached:
             clear(pairs)
-        evaluate(
-            terms,
-            sizes,
-            decided,
-            0,
-            0.0,
-            vocabulary.nodes,
-            vocabulary.groups,
-            pairs,
-            state.rows,
-            state.step,
-            state.bound,
-            allowed,
-            kept,
-            lengths,
-            estimated,
-            error,
-            ending,
-        )
+        evaluate(terms, sizes, decided, allowed, context, results)
         _squared_errors(state, program, theta)
 
     if not np.isfinite(_squared_errors(state, program, theta)).all():

@@ -21,6 +21,8 @@ from islands.kernels.population import (
     OVERFLOW,
     TOO_FEW_ROWS,
     Groups,
+    PopulationContext,
+    empty_results,
     evaluate,
 )
 from islands.model.clusters import OUTPUT_AT_REST, clusters, steady_state
@@ -91,13 +93,10 @@ def evaluated(
     numbers = np.full((len(structures), most), -1)
     for row, structure in zip(numbers, structures, strict=True):
         row[: len(structure)] = np.array(structure, np.int64) + 1
-    kept, lengths = np.full((len(structures), most), -7), np.full(len(structures), -7)
-    theta, error = np.full((len(structures), most), np.nan), np.full(len(structures), np.nan)
-    ending = np.full(len(structures), -7)
-    evaluate(
-        numbers,
-        np.array([len(structure) for structure in structures]),
-        np.array(pruned),
+    results = empty_results(len(structures), most)
+    for array in results:
+        array.fill(-7)
+    context = PopulationContext(
         0,
         TOLERANCE,
         store.nodes,
@@ -106,17 +105,18 @@ def evaluated(
         evaluate_terms(data, WARM_UP),
         layout(data, WARM_UP, INTERVAL),
         divergence_bound(data),
-        np.full(most + 1, allowed),
-        kept,
-        lengths,
-        theta,
-        error,
-        ending,
     )
+    sizes = np.array([len(structure) for structure in structures])
+    evaluate(numbers, sizes, np.array(pruned), np.full(most + 1, allowed), context, results)
     return [
         (tuple(positions[:length].tolist()), tuple(parameters[:length].tolist()), squares, end)
         for positions, length, parameters, squares, end in zip(
-            kept, lengths.tolist(), theta, error.tolist(), ending.tolist(), strict=True
+            results.kept,
+            results.lengths.tolist(),
+            results.theta,
+            results.error.tolist(),
+            results.status.tolist(),
+            strict=True,
         )
     ]
 

@@ -101,7 +101,9 @@ def test_a_program_does_not_depend_on_what_else_the_store_knows(terms, others):
     store.terms(others)
     numbers = store.terms(terms)
     place = np.full(store.nodes.operation.size, -1, np.int64)
-    for found, expected in zip(codegen.link(store.nodes, numbers, place), link(terms), strict=True):
+    for found, expected in zip(
+        codegen.generate_program(store.nodes, numbers, place), link(terms), strict=True
+    ):
         np.testing.assert_array_equal(found, expected)
     assert (place == -1).all()
 
