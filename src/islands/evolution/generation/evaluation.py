@@ -144,6 +144,13 @@ class Evaluator:
             "structures": (_STRUCTURE_BYTES * len(self._evaluations), self.limits.structures),
         }
 
+    def gene_indices(self, individual: Individual) -> frozenset[int]:
+        """Return the indices of an individual's genes: equal sets mean equal structures.
+
+        The indices are valid until the caches are cleared.
+        """
+        return frozenset(map(self._gene_index.index_of, individual.genes))
+
     def clear_caches(self) -> None:
         """Empty all caches."""
         clear(self._pairs)

@@ -6,6 +6,8 @@ an individual: walking trees in the loop would double its time and flatter whate
 """
 
 from collections.abc import Callable, Sequence
+from importlib.abc import InspectLoader
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -53,7 +55,7 @@ def columns(regressors: Sequence[Regressor], record: Dataset, warm_up: int) -> N
     signals = {"y": record.y, "u": record.u[:, 0]}
     first, end = warm_up, record.samples
     parts = [
-        _function(item, "y, u", lambda name, lag: f"{name}[{first - lag}:{end - lag}]")(**signals)
+        _make_function(item, "y, u", lambda name, lag: f"{name}[{first - lag}:{end - lag}]")(**signals)
         for item in regressors
     ]
     return np.column_stack([np.broadcast_to(part, end - first) for part in parts])
@@ -83,7 +85,7 @@ def simulate(
 ) -> float:
     """Simulate all whole intervals together; return the squared error, summed."""
     terms = [
-        (weight, _function(item, "y, u, k", lambda name, lag: f"{name}[k-{lag}]"))
+        (weight, _make_function(item, "y, u, k", lambda name, lag: f"{name}[k-{lag}]"))
         for weight, item in zip(theta, regressors, strict=True)
     ]
     lanes = (record.samples - warm_up) // interval
@@ -98,7 +100,29 @@ def simulate(
     return float(np.sum((y[warm_up:] - measured[warm_up:]) ** 2))
 
 
-def _function(item: Regressor, arguments: str, sample: Callable[[str, int], str]) -> Callable[..., Vector]:
+class _GeneratedSource(InspectLoader):
+    """Loader of a module whose source is a string."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+
+    def get_source(self, _fullname: str) -> str:
+        """Return the source."""
+        return self._source
+
+
+def _make_function(
+    item: Regressor, arguments: str, sample: Callable[[str, int], str]
+) -> Callable[..., Vector]:
+    """Make the Python function that a programmer would write for a regressor.
+
+    The function is imported from generated source, so that its bytecode is that of handwritten code. Closures
+    that call each other took 2 to 5 % more CPU time on products and 8 to 11 % more on random trees; such a
+    baseline would flatter the kernels.
+    """
     source = infix(item.expression, lambda channel, lag: sample("yu"[channel], lag))
-    made: Callable[..., Vector] = eval(f"lambda {arguments}: {source}", {"sign": np.sign})
-    return made
+    module = ModuleType("regressor")
+    vars(module)["sign"] = np.sign
+    _GeneratedSource(f"def term({arguments}): return {source}").exec_module(module)
+    term: Callable[..., Vector] = module.term
+    return term

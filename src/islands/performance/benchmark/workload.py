@@ -170,7 +170,7 @@ class _Logging(Evaluator):
         self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
     ) -> tuple[Population, int]:
         for individual, pruned in population:
-            key = frozenset(map(self._gene_index.index_of, individual.genes)), pruned
+            key = self.gene_indices(individual), pruned
             if key not in self._met:
                 self._met.add(key)
                 self.bred.append(individual)
