@@ -1,1 +1,4 @@
-"""Numba kernels on bare arrays: no domain names, no allocation per sample, every sum in a written order."""
+"""Numba kernels on bare arrays: no domain names, no allocation per sample, every sum in a fixed order.
+
+Read `simd` (vector type) and `interpreter` (programs) first, then `simulate` and `population`.
+"""

@@ -1,7 +1,7 @@
-"""The linker: terms of a store of nodes in, one flat three-address program out.
+"""Code generation: terms of a pool of nodes to one flat three-address program.
 
-Shared subexpressions are computed once, temporary rows are reused as soon as nobody reads them any more, and
-products stay lists of factors that the other kernels multiply on the fly.
+Shared subexpressions are computed once. A temporary row is reused after its last read. Products remain lists
+of factors, which the other kernels multiply without a temporary.
 """
 
 from typing import NamedTuple
@@ -12,27 +12,30 @@ from numpy.typing import NDArray
 from islands.kernels.interpreter import MAX_FACTORS, TEMPORARY, Program
 from islands.kernels.jit_cache import kernel
 
-#: Nodes that are no instruction: a signal some samples back, and a number.
-LAGGED, CONSTANT = -1, -2
+#: Operation of a node that is a lagged signal.
+LAGGED = -1
+
+#: Operation of a node that is a constant.
+CONSTANT = -2
 
 
 class NodeArrays(NamedTuple):
-    """Expressions as nodes that refer to each other by number; equal expressions are one node.
+    """Expressions as nodes that refer to each other by index; equal expressions share one node.
 
     Attributes
     ----------
     operation : ndarray of int64, shape (nodes,)
-        An instruction of the machine, `LAGGED` or `CONSTANT`.
+        Instruction of the interpreter, `LAGGED` or `CONSTANT`.
     first, second : ndarray of int64, shape (nodes,)
-        Operands, nodes themselves; of a signal its channel and lag.
+        Nodes of the operands; channel and lag of a signal.
     address : ndarray of int64, shape (nodes,)
-        Machine address of a CALL's row function.
+        Machine address of the row function of a CALL.
     value : ndarray of float64, shape (nodes,)
-        The number of a constant.
+        Value of a constant.
     factors : ndarray of int64, shape (terms, 4)
         Nodes whose product is the term.
     degree : ndarray of int64, shape (terms,)
-        How many factors a term has.
+        Number of factors of the term.
     """
 
     operation: NDArray[np.int64]
@@ -47,11 +50,11 @@ class NodeArrays(NamedTuple):
 @kernel
 def generate_program(
     nodes,
-    terms,  # int64 [term]: numbers of the terms, in the order of the program's
-    place,  # int64 [node]: room, -1 everywhere before and after
+    terms,  # int64 [term]: indices of the terms, in the order of the program
+    operand_index,  # int64 [node]: scratch memory, -1 everywhere before and after
 ):
-    """Link terms; a node is an operand of the program once it is needed."""
-    needed = _needed(nodes, terms, place)
+    """Generate the program of some terms; its operands are the nodes that these need."""
+    needed = _collect_nodes(nodes, terms, operand_index)
     count = needed.size
     instructions = constants = 0
     for index in range(count):
@@ -63,19 +66,19 @@ def generate_program(
     for index in range(count):
         node = needed[index]
         if nodes.operation[node] >= 0:
-            last_use[place[nodes.first[node]]] = index
-            last_use[place[nodes.second[node]]] = index
+            last_use[operand_index[nodes.first[node]]] = index
+            last_use[operand_index[nodes.second[node]]] = index
     factors = np.zeros((terms.size, MAX_FACTORS), np.int64)
     degree = np.empty(terms.size, np.int64)
     for term in range(terms.size):
         degree[term] = nodes.degree[terms[term]]
         for factor in range(degree[term]):
-            operand = place[nodes.factors[terms[term], factor]]
+            operand = operand_index[nodes.factors[terms[term], factor]]
             factors[term, factor] = operand
             last_use[operand] = count
 
-    # A row is taken again when its value is dead. A target never takes the row of an operand of the same
-    # instruction: a row function may not overlap.
+    # A row is reused after the last read of its value. The target of an instruction never has the row of one
+    # of its operands, because a row function may not overlap.
     code = np.empty((instructions, 4), np.int64)
     addresses = np.empty(instructions, np.int64)
     operands = np.empty((count, 2), np.int64)
@@ -101,7 +104,7 @@ def generate_program(
             row = rows
             rows += 1
         operands[index, 1] = row
-        a, b = place[first], place[second]
+        a, b = operand_index[first], operand_index[second]
         code[position] = operation, row, a, b
         addresses[position] = nodes.address[node]
         position += 1
@@ -110,13 +113,13 @@ def generate_program(
                 free[spare] = operands[operand, 1]
                 spare += 1
     for index in range(count):
-        place[needed[index]] = -1
+        operand_index[needed[index]] = -1
     return Program(code, addresses, operands, values, rows, factors, degree)
 
 
 @kernel
-def _needed(nodes, terms, place):
-    """Return the nodes that terms are made of, operands before what reads them, and number their places."""
+def _collect_nodes(nodes, terms, operand_index):
+    """Return the nodes of the terms, operands before their readers, and fill in ``operand_index``."""
     needed = np.empty(64, np.int64)
     stack = np.empty(64, np.int64)
     count = 0
@@ -127,20 +130,20 @@ def _needed(nodes, terms, place):
             while height > 0:
                 node = stack[height - 1]
                 waiting = height
-                if place[node] < 0 and nodes.operation[node] >= 0:
+                if operand_index[node] < 0 and nodes.operation[node] >= 0:
                     if height + 2 > stack.size:
                         stack = np.append(stack, np.empty_like(stack))
-                    # The second first: the first is then computed before it.
+                    # The second operand is pushed first, so that the first one is computed first.
                     for operand in (nodes.second[node], nodes.first[node]):
-                        if place[operand] < 0:
+                        if operand_index[operand] < 0:
                             stack[height] = operand
                             height += 1
                 if height == waiting:
                     height -= 1
-                    if place[node] < 0:
+                    if operand_index[node] < 0:
                         if count == needed.size:
                             needed = np.append(needed, np.empty_like(needed))
-                        place[node] = count
+                        operand_index[node] = count
                         needed[count] = node
                         count += 1
     return needed[:count]

@@ -1,11 +1,11 @@
 """Constrained least squares from inner products: every constraint fixes the sum of a group of parameters.
 
-``sum of w_j theta_j over a group = c``, and groups have no member in common (the clusters of the paper,
-section 3). One member of each group, the pivot, is eliminated: the others then stand for ``psi_j - (w_j /
-w_p) psi_p``, the target for ``y - (c / w_p) psi_p``, and what is left is free. That is equation (4) in the
-null space of its constraints, without an inverse.
+A constraint is ``sum of w_j theta_j over a group = c``; groups are disjoint (the clusters of the paper,
+section 3). One member p of each group, the pivot, is eliminated: the other members get the columns
+``psi_j - (w_j / w_p) psi_p``, the target becomes ``y - (c / w_p) psi_p``, and the remaining parameters are
+free. This is equation (4) in the null space of its constraints, without an inverse.
 
-Sums over columns that are differences belong to one individual alone: they are folded chunk by chunk.
+Sums over columns that are differences are used for one individual only, so they are folded chunk by chunk.
 """
 
 from typing import NamedTuple
@@ -14,26 +14,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
-from islands.kernels.regressor_columns import arena_for, evaluate
+from islands.kernels.regressor_columns import allocate_arena, evaluate
 from islands.kernels.simd import VECTOR, broadcast, fold, load, multiply, padded_size, store, subtract
 from islands.kernels.summation import CHUNK, dot_chunk
 
-#: Squared pivots under this, beside the regressors' own norms, leave fewer than about six digits of the
-#: parameters.
+#: Smallest squared pivot, relative to the squared norm of the regressor, that gives at least about six digits
+#: of the parameters.
 ILL_CONDITIONED = 1e-10
 
-#: Squared pivots under this are rounding.
+#: A smaller relative squared pivot is a rounding error.
 SINGULAR = 1e-13
 
 
 class ConstrainedFactor(NamedTuple):
-    """A Cholesky factor of an equilibrated matrix.
+    """Cholesky factor of an equilibrated matrix.
 
     Attributes
     ----------
     lower : ndarray of float64, shape (free, free)
     scale : ndarray of float64, shape (free,)
-        What the matrix was multiplied by from both sides.
+        Factors by which rows and columns of the matrix were multiplied.
     """
 
     lower: NDArray[np.float64]
@@ -41,18 +41,18 @@ class ConstrainedFactor(NamedTuple):
 
 
 class Reduction(NamedTuple):
-    """How the parameters follow from the free ones.
+    """Elimination of the pivots: how all parameters follow from the free ones.
 
     Attributes
     ----------
     pivot : ndarray of int64, shape (terms,)
-        The pivot of a term's group; -1: the term has no group.
+        Pivot of the term's group; -1 if the term has no group.
     share : ndarray of float64, shape (terms,)
         ``w_j / w_p``.
     fixed : ndarray of float64, shape (terms,)
-        ``c / w_p`` at a pivot, 0 elsewhere.
+        ``c / w_p`` for a pivot, otherwise 0.
     free : ndarray of int64, shape (free,)
-        Terms that are no pivot.
+        Terms that are not pivots.
     """
 
     pivot: NDArray[np.int64]
@@ -65,11 +65,11 @@ class Reduction(NamedTuple):
 def reduce(
     gram,  # float64 [term + 1, term + 1]: inner products of the terms and, last, the target
     terms,
-    group,  # int64 [term]: the group of each, -1 for none
+    group,  # int64 [term]: group of each, -1 for none
     weight,  # float64 [term]
-    wanted,  # float64 [term]: what the term's group sums to
+    sums,  # float64 [term]: required sum of the term's group
 ):
-    """Choose the pivots, of every group the member with the largest weight beside its norm."""
+    """Choose the pivots: of every group the member with the largest ratio of weight to norm."""
     pivot = np.full(terms, -1, np.int64)
     share = np.zeros(terms)
     fixed = np.zeros(terms)
@@ -82,7 +82,7 @@ def reduce(
                 size = abs(weight[i]) / np.sqrt(gram[i, i])
                 if size > largest:
                     best, largest = i, size
-        fixed[best] = wanted[j] / weight[best]
+        fixed[best] = sums[j] / weight[best]
         for i in range(j, terms):
             if group[i] == group[j]:
                 pivot[i] = best
@@ -92,10 +92,11 @@ def reduce(
 
 @kernel
 def from_gram(gram, terms, reduction, factor, eta):
-    """Estimate the free parameters from the Gram matrix; return the least squared pivot, 0 without a factor.
+    """Estimate the free parameters from the Gram matrix.
 
-    ``eta``, out, float64 [free]; ``factor``, out, is what `correct` takes. Under `ILL_CONDITIONED` the result
-    needs a correction, under `SINGULAR` it is none.
+    Return the smallest relative squared pivot, 0 if the factorisation fails. Below `ILL_CONDITIONED` the
+    result needs a correction, below `SINGULAR` it is unusable. ``eta``, out, float64 [free], are the
+    parameters; ``factor``, out, is an argument of `correct`.
     """
     free = reduction.free
     count = free.size
@@ -117,13 +118,14 @@ def from_gram(gram, terms, reduction, factor, eta):
 
 @kernel
 def from_columns(program, rows, terms, reduction, factor, eta):
-    """Do the same from the columns: the pivots' share is taken off them before they are squared.
+    """Estimate the free parameters from the columns, which are reduced before they are squared.
 
-    The program's last term is the target. The result needs a correction.
+    Arguments and return value are as in `from_gram`. The last term of the program is the target. The result
+    needs a correction.
     """
     free = reduction.free
     count = free.size
-    arena, place = arena_for(program)
+    arena, place = allocate_arena(program)
     chunk = padded_size((terms + 1) * CHUNK)
     reduced, right = np.zeros((count, count)), np.zeros(count)
     for index in range(rows.offset.size):
@@ -144,11 +146,10 @@ def from_columns(program, rows, terms, reduction, factor, eta):
 def correct(program, rows, terms, reduction, factor, eta):
     """Correct the free parameters by the corrected seminormal equations (Bjorck 1987).
 
-    What the residual still holds of the columns is solved for once more. The program's last term is the
-    target.
+    The residual is regressed on the columns once more. The last term of the program is the target.
     """
     free = reduction.free
-    arena, place = arena_for(program)
+    arena, place = allocate_arena(program)
     chunk = padded_size((terms + 1) * CHUNK)
     target = terms * CHUNK
     right, correction = np.zeros(free.size), np.empty(free.size)
@@ -156,7 +157,7 @@ def correct(program, rows, terms, reduction, factor, eta):
         evaluate(program, rows, index, arena, place, chunk)
         _reduce_columns(chunk, terms, reduction)
         for a in range(free.size):
-            _take_off(chunk, target, eta[a], free[a] * CHUNK)
+            _subtract_column(chunk, target, eta[a], free[a] * CHUNK)
         for a in range(free.size):
             right[a] += fold(dot_chunk(chunk, free[a] * CHUNK, chunk, target))
     _solve(factor, right, correction)
@@ -165,7 +166,7 @@ def correct(program, rows, terms, reduction, factor, eta):
 
 @kernel
 def expand(reduction, eta, theta):
-    """Return to all parameters, ``theta``: those of the pivots make up what their groups' sums still lack."""
+    """Compute all parameters ``theta`` from the free ones; the pivots complete the sums of their groups."""
     theta[:] = reduction.fixed
     for a in range(eta.size):
         j = reduction.free[a]
@@ -193,17 +194,18 @@ def _left(gram, reduction, i, column):
 
 @kernel
 def _reduce_columns(chunk, terms, reduction):
+    """Eliminate the pivots from the columns of a chunk and from the target, which follows them."""
     for j in range(terms):
         p = reduction.pivot[j]
         if reduction.fixed[j] != 0.0:
-            _take_off(chunk, terms * CHUNK, reduction.fixed[j], j * CHUNK)
+            _subtract_column(chunk, terms * CHUNK, reduction.fixed[j], j * CHUNK)
         if p >= 0 and p != j:
-            _take_off(chunk, j * CHUNK, reduction.share[j], p * CHUNK)
+            _subtract_column(chunk, j * CHUNK, reduction.share[j], p * CHUNK)
 
 
 @kernel(forceinline=True)
-def _take_off(chunk, at, share, other):
-    """``chunk[at] -= share * chunk[other]``, a column each."""
+def _subtract_column(chunk, at, share, other):
+    """Subtract columns in place: ``chunk[at] -= share * chunk[other]``."""
     for row in range(0, CHUNK, 4 * VECTOR):
         part = multiply(broadcast(share, 4), load(chunk, other + row, 4))
         store(chunk, at + row, subtract(load(chunk, at + row, 4), part))
@@ -213,7 +215,7 @@ def _take_off(chunk, at, share, other):
 def _factorise(matrix, norms, factor):
     """Factor the equilibrated matrix, ``lower lower' = scale matrix scale`` (Cholesky), given its lower half.
 
-    Return the least squared pivot beside the ``norms``, or 0 where one is not positive.
+    Return the smallest squared pivot relative to the squared ``norms``, or 0 if a pivot is not positive.
     """
     lower, scale = factor
     least = np.inf

@@ -1,28 +1,28 @@
-"""Forward orthogonal regression by error reduction ratio (FROE), equation (6), on inner products alone.
+"""Forward orthogonal regression by error reduction ratio (FROE), equation (6), from inner products only.
 
 Selecting the regressor with the largest error reduction ratio and orthogonalising the others against it is a
-Cholesky factorisation of the Gram matrix, pivoted by that ratio: rows of the record are never touched again.
+Cholesky factorisation of the Gram matrix, pivoted by that ratio. The rows of the record are not needed.
 """
 
 import numpy as np
 
 from islands.kernels.jit_cache import kernel
 
-#: A candidate whose squared norm has shrunk to this share can't be told from those selected: in float64 the
-#: Gram matrix knows sixteen digits of the squares, so less than six of what is left.
+#: A candidate whose squared norm has shrunk to this fraction counts as dependent on the selected ones: in
+#: float64 the Gram matrix has sixteen digits of the squares, so fewer than six of the remainder.
 DEPENDENT = 1e-10
 
 
 @kernel
 def select(
     gram,  # float64 [candidate + 1, candidate + 1]: inner products of the candidates and, last, the target
-    candidates,  # how many; gram may be larger, the target stands at this index
-    tolerance,  # stop when no candidate left has a larger error reduction ratio
-    limit,  # stop at this number
+    candidates,  # their number; gram may be larger, the target has this index
+    tolerance,  # stop when no remaining candidate has a larger error reduction ratio
+    limit,  # stop at this number of selected candidates
     order,  # out, int64 [limit]
-    err,  # out, float64 [limit]: error reduction ratio of each, on top of those before it
+    err,  # out, float64 [limit]: error reduction ratio of each, given those selected before it
 ):
-    """Select candidates one after the other and return how many; ties go to the first candidate."""
+    """Select candidates one after the other and return their number; ties go to the first candidate."""
     energy = gram[candidates, candidates]
     if not (energy > 0.0 and np.isfinite(energy)):
         return 0
@@ -30,7 +30,7 @@ def select(
     left = np.empty(candidates)
     correlation = np.empty(candidates)
     for j in range(candidates):
-        # What is zero, or too large for its square to be a number, explains nothing and spoils nothing.
+        # A column that is zero, or whose square overflows, is never selected and does not affect the others.
         usable = gram[j, j] > 0.0 and np.isfinite(gram[j, j])
         scale[j] = 1.0 / np.sqrt(gram[j, j]) if usable else 0.0
         left[j] = 1.0 if usable else 0.0
@@ -66,17 +66,17 @@ def select(
 
 @kernel
 def prune(gram, terms, tolerance, kept):
-    """Find the terms whose error reduction ratio exceeds the tolerance (section 5.2); return how many.
+    """Find the terms whose error reduction ratio exceeds the tolerance (section 5.2); return their number.
 
     ``kept``, out, int64 [term], are their positions, ascending.
     """
-    # All are orthogonalised before any leaves (section 2): one that explains little by itself may let the
-    # next explain much.
+    # All terms are orthogonalised before any is removed (section 2): a term that explains little alone may
+    # make the next one explain much.
     order, err = np.empty(terms, np.int64), np.empty(terms)
     selected = select(gram, terms, 0.0, terms, order, err)
-    stays = np.zeros(terms, np.bool_)
+    kept_terms = np.zeros(terms, np.bool_)
     for rank in range(selected):
-        stays[order[rank]] = err[rank] > tolerance
-    found = np.flatnonzero(stays)
+        kept_terms[order[rank]] = err[rank] > tolerance
+    found = np.flatnonzero(kept_terms)
     kept[: found.size] = found
     return found.size

@@ -1,14 +1,14 @@
-"""Inner products of columns, without ever holding the columns of the whole record.
+"""Inner products of columns, computed chunk by chunk without storing the columns of the whole record.
 
 The regressor matrix of a large library does not fit into memory (80 730 candidates of the paper's appendix on
-100 000 rows: 65 GB). Inner products are numbers, and selection and least squares need nothing else.
+100 000 rows: 65 GB). Selection and least squares need only the inner products.
 
-All sums have the written order of `sums` over the chunks of `Rows`. A number does not depend on which others
-are computed with it, nor on whether all pairs were asked for or a few.
+All sums have the fixed order of `islands.kernels.summation` over the chunks of `Rows`. An inner product does
+not depend on the other ones that are computed with it, nor on whether all pairs or only some are requested.
 """
 
 from islands.kernels.jit_cache import kernel
-from islands.kernels.regressor_columns import arena_for, evaluate
+from islands.kernels.regressor_columns import allocate_arena, evaluate
 from islands.kernels.simd import (
     VECTOR,
     add,
@@ -25,22 +25,25 @@ from islands.kernels.simd import (
 )
 from islands.kernels.summation import CHUNK
 
-#: Bytes of running sums that are held at a time; more take another pass over the record.
-_ROOM = 1 << 26
+#: Bytes of running sums per pass over the record; more sums take another pass.
+_PASS_BYTES = 1 << 26
 
-#: Pairs of a group, and tiles, that fit into it.
-_GROUPS, _TILES = _ROOM // (4 * 8 * VECTOR), _ROOM // (16 * 8 * VECTOR)
+#: Groups of four pairs per pass.
+_GROUPS = _PASS_BYTES // (4 * 8 * VECTOR)
+
+#: Tiles of four terms times four per pass.
+_TILES = _PASS_BYTES // (16 * 8 * VECTOR)
 
 
 @kernel
 def inner_products(
     program,
     rows,
-    pairs,  # int64 [pair, 2]: the terms of each pair; quick where four neighbours share the first
+    pairs,  # int64 [pair, 2]: the terms of each pair; fast if four neighbours share the first term
     out,  # out, float64 [pair]
 ):
     """Compute the inner products of some pairs of terms."""
-    arena, place = arena_for(program)
+    arena, place = allocate_arena(program)
     chunk = padded_size(program.degree.size * CHUNK)
     for begin in range(0, pairs.shape[0], 4 * _GROUPS):
         some = pairs[begin : begin + 4 * _GROUPS]
@@ -62,9 +65,9 @@ def gram(
     """Compute the inner products of all pairs of terms."""
     terms = program.degree.size
     blocks = -(-terms // 4)
-    arena, place = arena_for(program)
+    arena, place = allocate_arena(program)
     chunk = padded_size(4 * blocks * CHUNK)
-    chunk[:] = 0.0  # behind the last term as well
+    chunk[:] = 0.0  # also after the last term
     tiles = blocks * (blocks + 1) // 2
     for begin in range(0, tiles, _TILES):
         end = min(tiles, begin + _TILES)
@@ -125,6 +128,7 @@ def _add_tiles(chunk, blocks, begin, end, running):
 
 @kernel
 def _read_tiles(running, blocks, begin, end, terms, out):
+    """Fold the running sums of some tiles and write both halves of the symmetric matrix."""
     tile = 0
     for one in range(blocks):
         for other in range(one, blocks):

@@ -1,9 +1,9 @@
-"""The row machine: a flat program, and what one of its instructions does to a row of lanes.
+"""Interpreter of flat programs: one instruction works on a whole row of lanes.
 
-A program never touches single numbers. Its operands are rows of consecutive float64, given by their
-addresses, so the cost of decoding an instruction is shared by the whole row.
+The operands of an instruction are rows of consecutive float64 values, given by their addresses. The cost of
+decoding an instruction is therefore shared by the whole row.
 
-Nothing here is a reduction, so the processor's vector width cannot change a result.
+No instruction is a reduction, so the processor's vector width cannot change a result.
 """
 
 from typing import NamedTuple
@@ -17,35 +17,53 @@ from numpy.typing import NDArray
 from islands.kernels.jit_cache import kernel
 from islands.kernels.simd import VECTOR, add, multiply, read, sign, subtract, write
 
-#: Instructions built into the machine; every other one calls a row function through its address.
-ADD, SUBTRACT, MULTIPLY, SIGN, SIGN_OF_DIFFERENCE, SIGN_OF_PRODUCT, CALL = range(7)
+#: Instruction ``target = first + second``.
+ADD = 0
 
-#: The largest number of factors that one term multiplies on the fly.
+#: Instruction ``target = first - second``.
+SUBTRACT = 1
+
+#: Instruction ``target = first * second``.
+MULTIPLY = 2
+
+#: Instruction ``target = sign(first)``.
+SIGN = 3
+
+#: Instruction ``target = sign(first - second)``.
+SIGN_OF_DIFFERENCE = 4
+
+#: Instruction ``target = sign(first * second)``.
+SIGN_OF_PRODUCT = 5
+
+#: Instruction that calls a row function through its address.
+CALL = 6
+
+#: Largest number of factors of a term that the kernels multiply without a temporary.
 MAX_FACTORS = 4
 
-#: In the place of an operand's channel: it is no signal.
+#: Value of an operand's channel if the operand is a temporary and not a signal.
 TEMPORARY = -1
 
 
 class Program(NamedTuple):
-    """A flat three-address program over rows, and the terms that it prepares.
+    """Flat three-address program over rows, with the terms that are computed from its operands.
 
     Attributes
     ----------
     code : ndarray of int64, shape (instructions, 4)
         Operation, target temporary, first operand, second operand.
     addresses : ndarray of int64, shape (instructions,)
-        Machine address of the row function that a CALL calls, else 0.
+        Machine address of the row function of a CALL, otherwise 0.
     operands : ndarray of int64, shape (operands, 2)
         Channel and lag, or `TEMPORARY` and its index. Channel 0 is the output.
     constants : ndarray of float64
-        The first temporaries hold these.
+        Values of the first temporaries.
     temporaries : int
-        Rows of temporaries, those of the constants included.
+        Number of temporary rows, including those of the constants.
     factors : ndarray of int64, shape (terms, 4)
         Operands whose product is the term.
     degree : ndarray of int64, shape (terms,)
-        How many factors a term has.
+        Number of factors of the term.
     """
 
     code: NDArray[np.int64]
@@ -77,10 +95,10 @@ def call_row(_typingctx, address, target, first, second, lanes):
 
 @kernel(forceinline=True)
 def execute(operation, target, first, second, function, count, times):
-    """Carry out one instruction on rows: ``target = operation(first, second)``.
+    """Execute one instruction on rows: ``target = operation(first, second)``.
 
-    ``target``, ``first`` and ``second`` are addresses; ``function`` is that of a CALL. A row is ``times``
-    times ``count`` vectors, both constants, of which ``count`` are worked at once.
+    ``target``, ``first`` and ``second`` are addresses; ``function`` is the address of the function of a CALL.
+    A row consists of ``times * count`` vectors, both constants; ``count`` vectors are processed at a time.
     """
     step, size = 8 * VECTOR * count, 8 * VECTOR * count * times
     if operation == CALL:
@@ -107,7 +125,7 @@ def execute(operation, target, first, second, function, count, times):
 
 @kernel(forceinline=True)
 def multiply_factors(a, b, c, d, degree, count):
-    """Return the product of the first ``degree`` of four rows, from the left; they are given as addresses."""
+    """Return the product, from left to right, of the first ``degree`` of four rows, given as addresses."""
     product = read(a, count)
     if degree > 1:
         product = multiply(product, read(b, count))

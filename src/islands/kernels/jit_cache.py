@@ -1,15 +1,15 @@
-"""Where compiled kernels are kept, and how they get there before a search starts.
+"""Cache of compiled kernels on disk, and their compilation before a search starts.
 
-Numba compiles a kernel when it is first called, which takes seconds, and can keep the machine code in files.
-They lie in the user's cache folder and not beside the sources, because an installed package is often
-read-only. The folder is ``<user's cache>/islands/kernels/<islands>-<numba>-<processor>-<hash>``; all of it
-may be deleted at any time.
+Numba compiles a kernel at its first call, which takes seconds, and can store the machine code in files. The
+files are in the user's cache folder and not next to the sources, because an installed package is often
+read-only. The folder is ``<user's cache>/islands/kernels/<islands>-<numba>-<processor>-<hash>``. It may be
+deleted at any time.
 
-The environment variable ``ISLANDS_CACHE_DIR`` takes the place of ``<user's cache>/islands``. This is an
-exception to the rule that the core knows no environment: kernels are made while modules are imported, so
-there is no call that a setting could come in by, and no result depends on it. It is read once, when the first
-kernel is made. Numba's own ``NUMBA_CACHE_DIR`` keeps its meaning for everybody else's functions; kernels do
-not follow it.
+The environment variable ``ISLANDS_CACHE_DIR`` replaces ``<user's cache>/islands``. This is an exception to
+the rule that the core reads no environment variables: kernels are created while modules are imported, so
+there is no call that could take a setting, and no result depends on it. The variable is read once, when the
+first kernel is created. Numba's ``NUMBA_CACHE_DIR`` keeps its meaning for all other functions; kernels ignore
+it.
 """
 
 import os
@@ -30,20 +30,20 @@ from numba.core.caching import FunctionCache
 from numba.core.codegen import get_host_cpu_features
 from platformdirs import user_cache_path
 
-#: Its presence in the folder says that every kernel has been compiled into it.
+#: File in the cache folder that marks it as complete: every kernel has been compiled.
 STAMP = "complete"
 
-#: Folders of the package that hold compiled functions.
+#: Folders of the package that contain compiled functions.
 COMPILED = ("kernels", "systems")
 
 
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile a function as a kernel: without the interpreter's lock, and 1/0 is inf, not an exception.
+    """Compile a function as a kernel, which releases the GIL; 1/0 is inf and not an exception.
 
-    Use it bare, ``@kernel``, or with more of Numba's options, ``@kernel(forceinline=True)``.
+    Use it as ``@kernel``, or with more Numba options as ``@kernel(forceinline=True)``.
 
-    Functions of one factory are told apart in the cache by the numbers that they enclose. They may not
-    enclose a kernel: it looks different in every process, and nothing would be found again.
+    The cache distinguishes functions of one factory by the numbers that they enclose. They must not enclose a
+    kernel: its representation differs in every process, so the cache would never find the function.
     """
     if function is None:
         return partial(kernel, **options)
@@ -57,39 +57,40 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 @cache
 def cache_folder() -> Path | None:
-    """Return the folder of the compiled kernels, or None: it cannot be written, every start compiles anew."""
+    """Return the folder of the compiled kernels; None if it is not writable, so that every start compiles."""
     try:
         chosen = os.environ.get("ISLANDS_CACHE_DIR")
         base = Path(chosen).expanduser().absolute() if chosen else user_cache_path("islands", appauthor=False)
         folder = base / "kernels" / _key()
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as probe:
-            probe.write(bytes(4096))  # on a full disk an empty file can still be made
-    except (OSError, RuntimeError):  # RuntimeError: this user has no home
+            probe.write(bytes(4096))  # on a full disk an empty file can still be created
+    except (OSError, RuntimeError):  # RuntimeError: the user has no home folder
         return None
     return folder
 
 
 def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
-    """Make sure that all kernels are compiled, by one process if several start at once.
+    """Ensure that all kernels are compiled, by one process if several start at the same time.
 
     Parameters
     ----------
     compile_all : callable
-        Calls every kernel once with each combination of types that is used.
+        Calls every kernel once with each combination of argument types.
     tell : callable
-        Takes a line for the user before anything that takes long.
+        Receives a line for the user before each long step.
 
     Returns
     -------
     bool
-        Whether this process compiled. If not, it loads each kernel from the folder at its first call.
+        Whether this process compiled the kernels. If not, it loads each kernel from the folder at its first
+        call.
     """
     folder = cache_folder()
     if folder is None:
         tell(
-            "compiling the kernels for this processor, as at every start: they cannot be kept;"
-            " set ISLANDS_CACHE_DIR to a folder that can be written"
+            "compiling the kernels for this processor at every start, because they cannot be stored;"
+            " set ISLANDS_CACHE_DIR to a writable folder"
         )
         compile_all()
         return True
@@ -98,16 +99,16 @@ def ready(compile_all: Callable[[], None], tell: Callable[[str], None]) -> bool:
     with _lock(folder / "compiling.lock", lambda: tell("waiting for another process to compile the kernels")):
         if (folder / STAMP).exists():
             return False
-        tell(f"compiling the kernels for this processor, once: they are kept in {folder}")
+        tell(f"compiling the kernels for this processor once; they are stored in {folder}")
         compile_all()
         _stamp(folder)
     return True
 
 
 class _Cache(FunctionCache):
-    """Numba's cache of one function, safe against other processes and against a folder that goes away.
+    """Numba's cache of one function, safe against concurrent processes and a deleted folder.
 
-    A kernel that cannot be loaded or saved (deleted folder, full disk) is compiled and serves this process.
+    A kernel that cannot be loaded or saved (deleted folder, full disk) is compiled for this process only.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -116,15 +117,15 @@ class _Cache(FunctionCache):
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        # Numba reads the function's index, picks a free file name and writes both. Two processes that do so
-        # at once can pick one name for two signatures, and the next one to load gets the wrong code.
+        # Numba reads the function's index, chooses a free file name and writes both. Two processes that do
+        # so at the same time can choose one name for two signatures; a later process then loads wrong code.
         with suppress(OSError), _lock(Path(self.cache_path).parent / "saving.lock"):
             super().save_overload(sig, data)
 
 
 @contextmanager
 def _numba_caches_in(folder: Path) -> Iterator[None]:
-    """Let the caches made meanwhile lie in a folder: Numba asks its setting once, when it makes one."""
+    """Set the folder of the caches created in this context; Numba reads its setting at their creation."""
     before = config.CACHE_DIR
     config.CACHE_DIR = str(folder)
     try:
@@ -135,10 +136,10 @@ def _numba_caches_in(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _lock(path: Path, when_taken: Callable[[], None] | None = None) -> Iterator[None]:
-    """Hold a lock that the operating system frees when the process dies."""
-    from filelock import FileLock, Timeout  # noqa: PLC0415 - takes 20 ms, and only whoever compiles needs it
+    """Hold a lock that the operating system releases when the process dies."""
+    from filelock import FileLock, Timeout  # noqa: PLC0415 - takes 20 ms, needed for compilation only
 
-    lock = FileLock(path)  # makes the folder if it is gone
+    lock = FileLock(path)  # creates the folder if it was deleted
     try:
         lock.acquire(blocking=False)
     except Timeout:
@@ -152,8 +153,8 @@ def _lock(path: Path, when_taken: Callable[[], None] | None = None) -> Iterator[
 
 
 def _stamp(folder: Path) -> None:
-    with suppress(OSError):  # without a stamp the next start looks again
-        # Whoever deleted the folder meanwhile deleted the lock file and the first kernels with it.
+    with suppress(OSError):  # without a stamp the next start compiles again
+        # If the folder was deleted meanwhile, the lock file and the first kernels are gone too.
         if (folder / "compiling.lock").exists():
             draft = folder / f"{STAMP}.part"
             draft.write_text("All kernels are compiled. This folder may be deleted.\n", encoding="utf-8")
@@ -166,10 +167,11 @@ def _key() -> str:
 
 
 def _hash(processor: str) -> str:
-    """Hash what the names do not say, so that a stamp holds for the very kernels that its reader will load.
+    """Hash everything else that the compiled kernels depend on, so that the stamp is valid for them.
 
-    Numba looks at a function's own file alone and misses a change in what it inlines from another one. It
-    does tell apart the Python, the processor's features and the place of the sources.
+    Numba checks only the file of a function itself and misses a change of a function that is inlined from
+    another file. The hash also contains the Python version, the processor's features and the path of the
+    sources.
     """
     features = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
     hashed = sha256(repr((sys.implementation.cache_tag, processor, features)).encode())

@@ -22,9 +22,8 @@ from islands.kernels.constrained_lstsq import (
     reduce,
 )
 from islands.kernels.err_selection import prune
-from islands.kernels.gram import gram, inner_products
 from islands.kernels.jit_cache import kernel
-from islands.kernels.pair_table import Pairs, find_pair, pair_key
+from islands.kernels.pair_table import Pairs, complete_pairs, read_gram
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
@@ -157,7 +156,7 @@ def evaluate(
     """Evaluate individuals."""
     nodes, layout, bound = context.nodes, context.layout, context.bound
     operand_index = np.full(nodes.operation.size, -1, np.int64)
-    _complete_pairs(structures, sizes, context, operand_index)
+    complete_pairs(structures, sizes, context.target, nodes, context.pairs, context.rows, operand_index)
     most = structures.shape[1]
     matrix = np.empty((most + 1, most + 1))
     lanes = layout.start.size
@@ -180,50 +179,6 @@ def evaluate(
         results.status[index] = status
 
 
-@kernel
-def _complete_pairs(structures, sizes, context, operand_index):
-    """Compute the inner products that the table lacks."""
-    nodes, pairs, rows = context.nodes, context.pairs, context.rows
-    local = np.full(nodes.degree.size, -1, np.int64)
-    terms = np.empty_like(local)
-    most = np.sum((sizes + 1) * (sizes + 2) // 2)
-    missing, places = np.empty((most, 2), np.int64), np.empty(most, np.int64)
-    count = used = 0
-    for index in range(sizes.size):
-        size = sizes[index]
-        for i in range(size + 1):
-            one = structures[index, i] if i < size else context.target
-            for j in range(i, size + 1):
-                other = structures[index, j] if j < size else context.target
-                key = pair_key(one, other)
-                at = find_pair(pairs, key)
-                if pairs.keys[at] == key:
-                    continue
-                pairs.keys[at] = key
-                pairs.taken[0] += 1
-                for term in (one, other):
-                    if local[term] < 0:
-                        local[term] = used
-                        terms[used] = term
-                        used += 1
-                places[count] = at
-                missing[count] = local[one], local[other]
-                count += 1
-    if count == 0:
-        return
-    program = generate_program(nodes, terms[:used], operand_index)
-    if count == used * (used + 1) // 2:
-        products = np.empty((used, used))
-        gram(program, rows, products)
-        for index in range(count):
-            pairs.values[places[index]] = products[missing[index, 0], missing[index, 1]]
-        return
-    numbers = np.empty(count)
-    inner_products(program, rows, missing[:count], numbers)
-    for index in range(count):
-        pairs.values[places[index]] = numbers[index]
-
-
 @kernel(forceinline=True)
 def _select_terms(terms, size, pruned, context, matrix, positions):
     """Prune an individual and leave out terms whose parameter must be zero; return the size and the status.
@@ -231,7 +186,7 @@ def _select_terms(terms, size, pruned, context, matrix, positions):
     ``positions``, out, are the terms that are left. ``matrix`` is scratch memory.
     """
     positions[:size] = np.arange(size)
-    if not _read_gram(terms[:size], context.target, context.pairs, matrix):
+    if not read_gram(terms[:size], context.target, context.pairs, matrix):
         return size, OVERFLOW
     if pruned:
         size = prune(matrix, size, context.tolerance, positions)
@@ -252,7 +207,7 @@ def _estimate(chosen, context, matrix, operand_index, theta):
         return INFEASIBLE
     if context.rows.count <= size:
         return TOO_FEW_ROWS
-    _read_gram(chosen, context.target, context.pairs, matrix)
+    read_gram(chosen, context.target, context.pairs, matrix)
     if not np.diag(matrix)[:size].all():  # a column is zero on the record, and was not pruned
         return DEPENDENT
     reduction = reduce(matrix, size, group, weight, sums)
@@ -266,21 +221,6 @@ def _estimate(chosen, context, matrix, operand_index, theta):
         correct(program, context.rows, size, reduction, factor, eta)
     expand(reduction, eta, theta)
     return OK
-
-
-@kernel
-def _read_gram(terms, target, pairs, gram):
-    """Read the Gram matrix of the terms, the target last, from the table; return whether it is finite."""
-    size = terms.size
-    finite = True
-    for i in range(size + 1):
-        one = terms[i] if i < size else target
-        for j in range(i, size + 1):
-            other = terms[j] if j < size else target
-            gram[i, j] = pairs.values[find_pair(pairs, pair_key(one, other))]
-            gram[j, i] = gram[i, j]
-            finite &= np.isfinite(gram[i, j])
-    return finite
 
 
 @kernel

@@ -1,8 +1,8 @@
-"""Orthogonal triangular factorisation of a tall matrix, summed in the written order of `sums`.
+"""QR factorisation of a tall matrix, with the sums in the order of `islands.kernels.summation`.
 
 Modified Gram-Schmidt, every column orthogonalised twice ("twice is enough": Giraud, Langou and Rozloznik
-2005). It is as accurate as Householder's reflections, and its long sums do not depend on how many threads a
-linear algebra library happens to use.
+2005). It is as accurate as Householder reflections, and its sums do not depend on the number of threads of a
+linear algebra library.
 """
 
 import numpy as np
@@ -13,15 +13,15 @@ from islands.kernels.summation import dot
 
 @kernel
 def orthogonalise(
-    matrix,  # in and out, float64 [column, row]: becomes Q, its columns of norm 1
+    matrix,  # in and out, float64 [column, row]: becomes Q, with columns of norm 1
     target,  # in and out, float64 [row]: becomes the residual, orthogonal to Q
     triangle,  # out, float64 [column, column]: R, upper
     projection,  # out, float64 [column]: Q'y
-    tolerance,  # a column that keeps less than this share of its norm depends on those before it
+    tolerance,  # a column that keeps at most this fraction of its norm depends on the columns before it
 ):
-    """Factor ``matrix = Q R`` and return the number of the first dependent column, or -1.
+    """Factor ``matrix = Q R`` and return the index of the first dependent column, or -1.
 
-    A dependent column ends the factorisation: the outputs are then of no use.
+    A dependent column ends the factorisation; the outputs are then undefined.
     """
     columns, rows = matrix.shape
     flat = matrix.reshape(-1)
@@ -51,6 +51,6 @@ def orthogonalise(
 
 @kernel
 def _subtract(x, x_at, weight, y, y_at, rows):
-    """``x -= weight * y``."""
+    """Subtract in place: ``x -= weight * y``."""
     for index in range(np.uint64(rows)):
         x[np.uint64(x_at) + index] -= weight * y[np.uint64(y_at) + index]

@@ -1,8 +1,7 @@
-"""Columns of the regressor matrix: the same program as in a simulation, over measured rows alone.
+"""Columns of the regressor matrix: the program of a simulation, evaluated on measured rows only.
 
-A recording is cut into 32 stretches of equal length that lie side by side, a lane each, so that a lag is an
-earlier row and every vector begins at a line of the cache: read along the record, most lags would lie across
-two lines.
+A segment is cut into 32 stretches of equal length, one lane each. A lag is then an earlier row, and every
+vector starts at a cache line. In the order of the record, most lagged vectors would cross two cache lines.
 """
 
 from typing import NamedTuple
@@ -15,33 +14,37 @@ from islands.kernels.jit_cache import kernel
 from islands.kernels.simd import VECTOR, address, padded_size, write
 from islands.kernels.summation import CHUNK
 
-#: Lanes of a row, and rows of a chunk.
+#: Lanes per time.
 LANES = 32
+
+#: Times per chunk.
 TIMES = CHUNK // LANES
 
-#: A chunk of rows is worked through in this many strides of so many vectors.
+#: Vectors that one instruction processes at a time.
 _COUNT = 4
+
+#: Repetitions that an instruction needs for a chunk.
 _STRIDES = CHUNK // (VECTOR * _COUNT)
 
 
 class Rows(NamedTuple):
-    """The rows of a record that estimate, in chunks of eight times 32 lanes.
+    """Rows of a record that are used for the estimation, in chunks of eight times 32 lanes.
 
     Attributes
     ----------
     signals : ndarray of float64, shape (channel, flat)
-        Channel 0 is the output, then come the inputs: [time][lane], the warm-up first, one segment after the
-        other.
+        Channel 0 is the output; the inputs follow. Memory layout [time][lane], the warm-up first, one segment
+        after the other.
     offset : ndarray of int64, shape (chunk,)
-        Where in a channel the chunk's first time stands.
+        Offset within a channel of the chunk's first time.
     lanes : ndarray of int64, shape (chunk, 8)
-        How many lanes of every time are rows; what is behind them is not.
+        Number of lanes of each time that are rows; the remaining lanes are padding.
     row : ndarray of int64, shape (chunk, 8)
-        The row of the first lane, counted through all segments.
+        Row of the first lane, counted over all segments.
     apart : ndarray of int64, shape (chunk,)
-        How many rows the next lane is further.
+        Distance in rows between neighbouring lanes.
     count : int
-        Rows of all segments.
+        Number of rows of all segments.
     """
 
     signals: NDArray[np.float64]
@@ -59,7 +62,7 @@ def columns(
     out,  # out, float64 [term, row of all segments]
 ):
     """Evaluate every term on every row."""
-    arena, place = arena_for(program)
+    arena, place = allocate_arena(program)
     chunk = padded_size(program.degree.size * CHUNK)
     for index in range(rows.offset.size):
         evaluate(program, rows, index, arena, place, chunk)
@@ -71,10 +74,10 @@ def columns(
 
 
 @kernel
-def arena_for(program):
-    """Return room for the temporaries, and the addresses of the operands.
+def allocate_arena(program):
+    """Return memory for the temporaries, and the addresses of the operands.
 
-    Those of signals are filled in by `evaluate`.
+    `evaluate` fills in the addresses of the signals.
     """
     arena = padded_size(program.temporaries * CHUNK)
     for index in range(program.constants.size):
@@ -90,13 +93,13 @@ def arena_for(program):
 def evaluate(
     program,
     rows,
-    index,  # of the chunk
+    index,  # index of the chunk
     arena,
-    place,  # as `arena_for` made them
-    chunk,  # out, float64 [term * 256]: zero where there is no row
+    place,  # as returned by `allocate_arena`
+    chunk,  # out, float64 [term * 256]: zero in lanes that are no rows
 ):
     """Evaluate every term on a chunk of rows."""
-    # Fields are taken out of their tuples once: each time costs as much as a row.
+    # Fields are read from their tuples once: each access costs as much as a row.
     signals, offset, lanes = rows.signals, rows.offset, rows.lanes
     code, addresses, operands = program.code, program.addresses, program.operands
     factors, degree = program.factors, program.degree
@@ -115,7 +118,7 @@ def evaluate(
         c, d = place[factors[term, 2]], place[factors[term, 3]]
         for at in range(0, 8 * CHUNK, 8 * VECTOR * _COUNT):
             write(target + at, multiply_factors(a + at, b + at, c + at, d + at, degree[term], _COUNT))
-        if lanes[index, TIMES - 1] < LANES:  # a later time has no more rows than an earlier one
+        if lanes[index, TIMES - 1] < LANES:  # the number of rows does not increase with the time
             for time in range(TIMES):
                 for lane in range(lanes[index, time], LANES):
                     chunk[term * CHUNK + time * LANES + lane] = 0.0

@@ -1,13 +1,13 @@
-"""The vector type: so many numbers side by side, and what can be done to all of them at once.
+"""SIMD vector type for Numba, with its operations.
 
-``Lanes(count)`` is ``count`` vectors of eight float64. Numba knows no such type; here LLVM's own,
-``[count x <8 x double>]``, is made one, with a function for every operation. The compiler turns it into
-whatever registers the processor has: eight lanes are one register of AVX-512, two of AVX2, four of SSE2.
-Because the eight stand in the source, so does the order of every sum over them, and no result depends on the
-processor. Nothing here is contracted into a fused multiply-add, for the same reason.
+``SimdVector(count)`` is ``count`` vectors of eight float64 values. Numba has no such type; this module wraps
+LLVM's ``[count x <8 x double>]`` and defines one function per operation. The compiler maps it to the
+registers of the processor: eight lanes are one register of AVX-512, two of AVX2, four of SSE2. The source
+fixes the number of lanes and with it the order of every sum over them, so no result depends on the processor.
+For the same reason no operation is contracted into a fused multiply-add.
 
-A count is written as a constant: ``load(arena, offset, 4)``. Offsets count numbers, not bytes; nothing is
-checked.
+A count is a constant: ``load(arena, offset, 4)``. Offsets are in values, not in bytes. There are no bounds
+checks.
 """
 
 import numpy as np
@@ -27,9 +27,9 @@ _INDEX = ir.IntType(32)
 
 @kernel
 def padded_size(size):
-    """Return an array of ``size`` numbers that begins where a line of the processor's cache does.
+    """Return an array of ``size`` values that starts at a cache line of the processor.
 
-    A vector that lies across two lines costs two reads.
+    A vector that crosses two cache lines costs two reads.
     """
     array = np.empty(size + VECTOR)
     behind = array.ctypes.data // 8 % VECTOR
@@ -38,63 +38,63 @@ def padded_size(size):
 
 
 class SimdVector(types.Type):
-    """``count`` vectors of eight numbers."""
+    """Numba type of ``count`` vectors of eight values."""
 
     def __init__(self, count):
         self.count = count
-        super().__init__(name=f"Lanes({count})")
+        super().__init__(name=f"SimdVector({count})")
 
 
 @register_model(SimdVector)
-class _LanesModel(models.PrimitiveModel):
+class _SimdVectorModel(models.PrimitiveModel):
     def __init__(self, manager, lanes):
         super().__init__(manager, lanes, ir.ArrayType(_VECTOR, lanes.count))
 
 
 @intrinsic(prefer_literal=True)
 def load(_typingctx, array, offset, count):
-    """Return ``8 * count`` numbers of a contiguous array, from an offset on."""
-    return SimdVector(count.literal_value)(array, types.int64, count), _reading(_in_array)
+    """Read ``8 * count`` values of a contiguous array, starting at an offset."""
+    return SimdVector(count.literal_value)(array, types.int64, count), _generate_read(_pointer_in_array)
 
 
 @intrinsic
 def store(_typingctx, array, offset, lanes):
-    """Write lanes into a contiguous array, from an offset on."""
-    return types.void(array, types.int64, lanes), _writing(_in_array)
+    """Write a vector into a contiguous array, starting at an offset."""
+    return types.void(array, types.int64, lanes), _generate_write(_pointer_in_array)
 
 
 @intrinsic
 def address(_typingctx, array, offset):
-    """Return where a number of an array stands in memory, in bytes.
+    """Return the address in memory, in bytes, of a value of an array.
 
-    Whoever works with addresses keeps the array by its name until the last of them is used.
+    The caller must keep a reference to the array until the last use of the address.
     """
 
     def generate(context, builder, signature, arguments):
-        return builder.ptrtoint(_in_array(context, builder, signature, arguments), ir.IntType(64))
+        return builder.ptrtoint(_pointer_in_array(context, builder, signature, arguments), ir.IntType(64))
 
     return types.int64(array, types.int64), generate
 
 
 @intrinsic(prefer_literal=True)
 def read(_typingctx, place, count):
-    """Return ``8 * count`` numbers from an address on."""
-    return SimdVector(count.literal_value)(types.int64, count), _reading(_at_address)
+    """Read ``8 * count`` values, starting at an address."""
+    return SimdVector(count.literal_value)(types.int64, count), _generate_read(_pointer_to_address)
 
 
 @intrinsic
 def write(_typingctx, place, lanes):
-    """Write lanes from an address on."""
-    return types.void(types.int64, lanes), _writing(_at_address)
+    """Write a vector, starting at an address."""
+    return types.void(types.int64, lanes), _generate_write(_pointer_to_address)
 
 
 @intrinsic(prefer_literal=True)
 def broadcast(_typingctx, number, count):
-    """Return lanes that all hold one number."""
+    """Return a vector with the same value in every lane."""
 
     def generate(_context, builder, signature, arguments):
-        vector = _splat(builder, arguments[0])
-        return _made(builder, signature.return_type.count, lambda _i: vector)
+        vector = _broadcast(builder, arguments[0])
+        return _build(builder, signature.return_type.count, lambda _i: vector)
 
     return SimdVector(count.literal_value)(types.float64, count), generate
 
@@ -102,39 +102,39 @@ def broadcast(_typingctx, number, count):
 @intrinsic
 def add(_typingctx, a, b):
     """Return ``a + b``."""
-    return a(a, b), _each(lambda builder, x, y: builder.fadd(x, y))
+    return a(a, b), _elementwise(lambda builder, x, y: builder.fadd(x, y))
 
 
 @intrinsic
 def subtract(_typingctx, a, b):
     """Return ``a - b``."""
-    return a(a, b), _each(lambda builder, x, y: builder.fsub(x, y))
+    return a(a, b), _elementwise(lambda builder, x, y: builder.fsub(x, y))
 
 
 @intrinsic
 def multiply(_typingctx, a, b):
     """Return ``a * b``."""
-    return a(a, b), _each(lambda builder, x, y: builder.fmul(x, y))
+    return a(a, b), _elementwise(lambda builder, x, y: builder.fmul(x, y))
 
 
 @intrinsic
 def sign(_typingctx, a):
-    """Return 1, -1 or 0 (for a NaN, too)."""
+    """Return 1, -1 or 0 per lane; 0 for a NaN."""
 
     def one(builder, x):
         zero, plus, minus = (ir.Constant(_VECTOR, [value] * VECTOR) for value in (0.0, 1.0, -1.0))
         negative = builder.select(builder.fcmp_ordered("<", x, zero), minus, zero)
         return builder.select(builder.fcmp_ordered(">", x, zero), plus, negative)
 
-    return a(a), _each(one)
+    return a(a), _elementwise(one)
 
 
 @intrinsic
 def any_outside(_typingctx, a, bound):
-    """Return 0 where every lane lies between ``-bound`` and ``bound``; a NaN does not."""
+    """Return 0 if every lane is between ``-bound`` and ``bound``; a NaN is outside."""
 
     def generate(_context, builder, signature, arguments):
-        lanes, upper = arguments[0], _splat(builder, arguments[1])
+        lanes, upper = arguments[0], _broadcast(builder, arguments[1])
         lower = builder.fneg(upper)
         found = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR), [0] * VECTOR)
         for i in range(signature.args[0].count):
@@ -148,41 +148,43 @@ def any_outside(_typingctx, a, bound):
 
 @intrinsic
 def gather(_typingctx, array, a, b, c, d):
-    """Return four vectors, eight numbers each from four offsets on."""
+    """Return four vectors: eight values starting at each of four offsets."""
 
     def generate(context, builder, signature, arguments):
-        firsts = [_in_array(context, builder, signature, (arguments[0], offset)) for offset in arguments[1:]]
-        return _made(builder, 4, lambda i: _read(builder, firsts[i], 0))
+        firsts = [
+            _pointer_in_array(context, builder, signature, (arguments[0], offset)) for offset in arguments[1:]
+        ]
+        return _build(builder, 4, lambda i: _load_vector(builder, firsts[i], 0))
 
     return SimdVector(4)(array, types.int64, types.int64, types.int64, types.int64), generate
 
 
 @intrinsic
 def repeat(_typingctx, a):
-    """Return four times the same vector."""
+    """Return one vector repeated four times."""
 
     def generate(_context, builder, _signature, arguments):
-        return _made(builder, 4, lambda _i: builder.extract_value(arguments[0], 0))
+        return _build(builder, 4, lambda _i: builder.extract_value(arguments[0], 0))
 
     return SimdVector(4)(a), generate
 
 
 @intrinsic
 def outer(_typingctx, a, b):
-    """Return the products of four vectors with four others, the first with all, the second with all, ..."""
-    return SimdVector(16)(a, b), _products([(i, j) for i in range(4) for j in range(4)])
+    """Return the products of four vectors with four others: the first with all, the second with all, ..."""
+    return SimdVector(16)(a, b), _generate_products([(i, j) for i in range(4) for j in range(4)])
 
 
 @intrinsic
 def outer_upper(_typingctx, a):
-    """Return the products of four vectors among themselves: each with itself and those behind it."""
-    return SimdVector(10)(a), _products([(i, j) for i in range(4) for j in range(i, 4)])
+    """Return the products of four vectors with each other: each with itself and with those after it."""
+    return SimdVector(10)(a), _generate_products([(i, j) for i in range(4) for j in range(i, 4)])
 
 
-def _products(places):
+def _generate_products(places):
     def generate(_context, builder, _signature, arguments):
         one, other = arguments[0], arguments[-1]
-        return _made(
+        return _build(
             builder,
             len(places),
             lambda k: builder.fmul(
@@ -195,7 +197,7 @@ def _products(places):
 
 @intrinsic
 def fold(_typingctx, a):
-    """Return the sum of the eight lanes of one vector: the second half is added to the first, and again."""
+    """Return the sum of the eight lanes of one vector: the second half is added to the first, repeatedly."""
 
     def generate(_context, builder, _signature, arguments):
         vector = builder.extract_value(arguments[0], 0)
@@ -208,11 +210,11 @@ def fold(_typingctx, a):
     return types.float64(a), generate
 
 
-def _each(operation):
-    """Return the code of an operation that treats every vector alike."""
+def _elementwise(operation):
+    """Return the code generator of an operation that is applied to every vector."""
 
     def generate(_context, builder, signature, arguments):
-        return _made(
+        return _build(
             builder,
             signature.return_type.count,
             lambda i: operation(builder, *(builder.extract_value(argument, i) for argument in arguments)),
@@ -221,60 +223,62 @@ def _each(operation):
     return generate
 
 
-def _made(builder, count, vector):
+def _build(builder, count, vector):
     lanes = ir.Constant(ir.ArrayType(_VECTOR, count), ir.Undefined)
     for i in range(count):
         lanes = builder.insert_value(lanes, vector(i), i)
     return lanes
 
 
-def _reading(first):
-    """Return the code that reads lanes; ``first`` points at their first number."""
+def _generate_read(first):
+    """Return the code generator of a read; ``first`` generates the pointer to the first value."""
 
     def generate(context, builder, signature, arguments):
         begin = first(context, builder, signature, arguments)
-        return _made(builder, signature.return_type.count, lambda i: _read(builder, begin, i))
+        return _build(builder, signature.return_type.count, lambda i: _load_vector(builder, begin, i))
 
     return generate
 
 
-def _writing(first):
-    """Return the code that writes lanes, the last argument."""
+def _generate_write(first):
+    """Return the code generator of a write; the vector is the last argument."""
 
     def generate(context, builder, signature, arguments):
         begin = first(context, builder, signature, arguments)
         for i in range(signature.args[-1].count):
-            _align(builder.store(builder.extract_value(arguments[-1], i), _vector_at(builder, begin, i)))
+            _set_alignment(
+                builder.store(builder.extract_value(arguments[-1], i), _vector_pointer(builder, begin, i))
+            )
         return context.get_dummy_value()
 
     return generate
 
 
-def _in_array(context, builder, signature, arguments):
+def _pointer_in_array(context, builder, signature, arguments):
     array = context.make_array(signature.args[0])(context, builder, arguments[0])
     return builder.gep(array.data, [arguments[1]])
 
 
-def _at_address(_context, builder, _signature, arguments):
+def _pointer_to_address(_context, builder, _signature, arguments):
     return builder.inttoptr(arguments[0], _DOUBLE.as_pointer())
 
 
-def _vector_at(builder, first, i):
+def _vector_pointer(builder, first, i):
     place = builder.gep(first, [ir.Constant(_INDEX, VECTOR * i)])
     return builder.bitcast(place, _VECTOR.as_pointer())
 
 
-def _read(builder, first, i):
-    return _align(builder.load(_vector_at(builder, first, i)))
+def _load_vector(builder, first, i):
+    return _set_alignment(builder.load(_vector_pointer(builder, first, i)))
 
 
-def _align(instruction):
-    # Rows begin where they begin: numbers are aligned, vectors need not be.
+def _set_alignment(instruction):
+    # A row may start at any value: values are aligned to 8 bytes, vectors need not be aligned.
     instruction.align = 8
     return instruction
 
 
-def _splat(builder, number):
+def _broadcast(builder, number):
     undefined = ir.Constant(_VECTOR, ir.Undefined)
     one = builder.insert_element(undefined, number, ir.Constant(_INDEX, 0))
     return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_INDEX, VECTOR), [0] * VECTOR))

@@ -1,11 +1,14 @@
-"""Long sums in a written order.
+"""Fixed-order summation of long vectors.
 
-A loop that adds into one number can only be vectorised by adding in another order, and that order would
-depend on the processor. Here it stands in the source. Rows are taken 256 at a time: of these, lane j of eight
-adds rows j, j + 8, ... from first to last. The eight lanes are added to eight running sums, from the first
-256 rows to the last, and at the end the eight are folded to one number: the second half is added to the
-first, and again. Every kernel whose inner products are compared or kept uses this order, so a number does
-not depend on which of them computed it.
+A loop that adds to one number can be vectorised only by changing the order of the additions, and that order
+would depend on the processor. Here the source defines the order:
+
+1. Rows are processed in chunks of 256. Lane j of eight adds the rows j, j + 8, ... from first to last.
+2. The eight lanes are added to eight running sums, from the first chunk to the last.
+3. The eight running sums are folded to one number: the second half is added to the first half, repeatedly.
+
+Every kernel whose inner products are compared or stored uses this order, so an inner product does not depend
+on the kernel that computed it.
 """
 
 import numpy as np
@@ -13,7 +16,7 @@ import numpy as np
 from islands.kernels.jit_cache import kernel
 from islands.kernels.simd import VECTOR, add, broadcast, fold, load, multiply
 
-#: Rows that are taken together; a short last chunk is filled with zeros.
+#: Rows of a chunk; a short last chunk is filled with zeros.
 CHUNK = 256
 
 
@@ -28,7 +31,7 @@ def dot_chunk(x, x_at, y, y_at):
 
 @kernel
 def dot(x, x_at, y, y_at, rows):
-    """Return the inner product of ``rows`` rows of two flat arrays, from offsets ``x_at`` and ``y_at`` on."""
+    """Return the inner product of ``rows`` rows of two flat arrays from offsets ``x_at`` and ``y_at`` on."""
     running = broadcast(0.0, 1)
     done = 0
     while done + CHUNK <= rows:

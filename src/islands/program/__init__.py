@@ -1,1 +1,1 @@
-"""Where regressors meet kernels: expressions are linked to the flat programs that the kernels run."""
+"""Translation of expressions to the flat programs that the kernels execute. Read `term_pool` first."""

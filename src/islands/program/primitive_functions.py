@@ -1,7 +1,7 @@
 """Row functions: a primitive's scalar function, compiled for a whole row and called through its address.
 
-So the machine need not know the primitives: an entry in their table is enough, and a user's own function runs
-at the speed of a built-in one.
+The interpreter therefore does not depend on the table of primitives, and a user-defined function is as fast
+as a built-in one.
 """
 
 from functools import cache
@@ -26,11 +26,11 @@ def row_address(primitive: Primitive) -> int:
     ModelError
         The scalar function does not compile.
     """
-    return int(_compiled(primitive.scalar, primitive.arity, primitive.name).address)
+    return int(_compile(primitive.scalar, primitive.arity, primitive.name).address)
 
 
 @cache
-def _compiled(scalar: Any, arity: int, name: str) -> Any:
+def _compile(scalar: Any, arity: int, name: str) -> Any:
     scalar = register_jitable(scalar)
 
     def unary(target: Any, first: Any, _second: Any, lanes: Any) -> None:

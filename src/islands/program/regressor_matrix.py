@@ -1,4 +1,4 @@
-"""The regressor matrix and its Gram matrix over the rows of a record."""
+"""Regressor matrix and Gram matrix over the rows of a record."""
 
 from collections.abc import Sequence
 
@@ -16,20 +16,20 @@ from islands.program.term_pool import Term, link
 
 
 def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray[np.float64]:
-    """Return Psi transposed, shape (terms, rows): each term on every row of every segment after its warm-up.
+    """Return Psi transposed, shape (terms, rows): each term on every row after the warm-up of every segment.
 
-    A term may be a bare canonical expression of lag 0 and more: the target y(k) is ``Lagged(0, 0)``.
+    A term may be a canonical expression, which may have lag 0: the target y(k) is ``Lagged(0, 0)``.
 
     Raises
     ------
     RecordError
-        An output is missing, no segment is longer than the warm-up, or a term reads an input that the
-        record does not have.
+        If an output is missing, if no segment is longer than the warm-up, or if a term reads an input that
+        the record does not have.
     SettingsError
-        The warm-up is shorter than the deepest lag of the terms.
+        If the warm-up is shorter than the largest lag of the terms.
     """
     program = link(terms)
-    _refuse_unreadable(program, record, warm_up)
+    _check_readable(program, record, warm_up)
     rows = evaluate_terms(record, warm_up)
     out = np.empty((len(terms), rows.count))
     column_kernel.columns(program, rows, out)
@@ -37,7 +37,7 @@ def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> ND
 
 
 def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray[np.float64]:
-    """Return the inner products of all pairs of terms, shape (terms, terms), without holding the columns.
+    """Return the inner products of all pairs of terms, shape (terms, terms), without storing the columns.
 
     Raises
     ------
@@ -45,14 +45,14 @@ def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray
         As in `regressor_matrix`.
     """
     program = link(terms)
-    _refuse_unreadable(program, record, warm_up)
+    _check_readable(program, record, warm_up)
     out = np.empty((len(terms), len(terms)))
     gram_kernel.gram(program, evaluate_terms(record, warm_up), out)
     return out
 
 
-def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
-    # The kernel does not check: it would read another signal's samples, or none of the record's.
+def _check_readable(program: Program, record: Dataset, warm_up: int) -> None:
+    # The kernel has no bounds checks: it would read another signal, or memory outside the record.
     read = program.operands[program.operands[:, 0] >= 0]
     channel, lag = read.max(axis=0, initial=0)
     if channel > record.inputs:
@@ -62,12 +62,12 @@ def _refuse_unreadable(program: Program, record: Dataset, warm_up: int) -> None:
 
 
 def evaluate_terms(record: Dataset, warm_up: int) -> Rows:
-    """Return the rows that estimate: those of every segment after its warm-up.
+    """Return the rows that are used for the estimation: those of every segment after its warm-up.
 
     Raises
     ------
     RecordError
-        An output is missing, or no segment is longer than the warm-up.
+        If an output is missing, or if no segment is longer than the warm-up.
     """
     missing = np.flatnonzero(np.isnan(record.y))
     if missing.size:
@@ -83,19 +83,19 @@ def evaluate_terms(record: Dataset, warm_up: int) -> Rows:
             f"the longest recording has {max(record.segments)} samples and {warm_up} are needed before the "
             "first row: take a longer recording or smaller lags"
         )
-    return arranged(np.vstack([record.y, record.u.T]), spans, warm_up)
+    return arrange_rows(np.vstack([record.y, record.u.T]), spans, warm_up)
 
 
-def arranged(signals: NDArray[np.float64], spans: Sequence[tuple[int, int]], warm_up: int) -> Rows:
-    """Arrange signals in chunks of times and lanes.
+def arrange_rows(signals: NDArray[np.float64], spans: Sequence[tuple[int, int]], warm_up: int) -> Rows:
+    """Arrange signals in chunks of times and lanes; see `Rows` for the layout.
 
     Parameters
     ----------
     signals : ndarray, shape (channel, sample)
     spans : sequence of pairs of int
-        Of every segment the sample of its first row, and how many rows it has.
+        Sample of the first row and number of rows of every segment.
     warm_up : int
-        Samples before each first row that may be read.
+        Number of samples before each first row that may be read.
     """
     samples, chunks = [], []
     flat = count = 0
@@ -108,7 +108,7 @@ def arranged(signals: NDArray[np.float64], spans: Sequence[tuple[int, int]], war
         full = np.where(time < length, -(-(rows - time) // length), 0).reshape(-1, TIMES)
         chunks.append((begin, full, (count + time).reshape(-1, TIMES), np.full(begin.size, length)))
         flat, count = flat + (warm_up + times) * LANES, count + rows
-    # What stands behind a segment's last row is read and never counted.
+    # Samples after the last row of a segment are read, but never counted.
     places = np.minimum(np.concatenate(samples), signals.shape[1] - 1).reshape(-1)
     gathered = padded_size(len(signals) * flat).reshape(-1, flat)
     gathered[:] = signals[:, places]

@@ -1,4 +1,4 @@
-"""The store: expressions as numbers, so that kernels can tell them apart, share and link them."""
+"""Pool of expressions as nodes and terms with integer indices, from which the kernels generate programs."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,11 @@ from islands.model.primitives import ADD, MUL, SIGN, SUB
 from islands.model.regressor import Regressor
 from islands.program.primitive_functions import row_address
 
-#: Primitives that the machine carries out itself; every other one is called through an address.
+#: Primitives that are instructions of the interpreter; all others are called through an address.
 _OPERATIONS = {ADD: interpreter.ADD, SUB: interpreter.SUBTRACT, MUL: MULTIPLY, SIGN: interpreter.SIGN}
 
-#: The sign of a difference is phi2 of the paper, the most frequent of all functions.
+#: Instructions for the sign of a result. The sign of a difference is phi2 of the paper, the most frequent
+#: function.
 _SIGNS = {SUB: interpreter.SIGN_OF_DIFFERENCE, MUL: interpreter.SIGN_OF_PRODUCT}
 
 Term = Regressor | Expression
@@ -25,23 +26,23 @@ Term = Regressor | Expression
 class TermPool:
     """Hash-consed canonical expressions: a node for every subexpression, a term for every regressor.
 
-    The numbers follow the order of arrival, so nothing that is a result may depend on them.
+    The indices follow the order of insertion; no result may depend on them.
     """
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[int, int, int, int, float], int] = {}
+        self._indices: dict[tuple[int, int, int, int, float], int] = {}
         self._known: dict[Expression, int] = {}
         self._terms: dict[Expression, int] = {}
-        #: The deepest lag of every channel that anything reads.
+        #: Largest lag of every channel that an expression reads.
         self.deepest: dict[int, int] = {}
-        #: Rows of these arrays that nobody has taken are room to grow.
-        self.nodes = _room(256, 256)
+        #: Arrays of nodes and terms; unused elements at the end are reserve.
+        self.nodes = _allocate_nodes(256, 256)
 
     def __len__(self) -> int:
         return len(self._terms)
 
     def term(self, term: Term) -> int:
-        """Return the number of a regressor, or of a bare canonical expression."""
+        """Return the index of a regressor or canonical expression; add it if it is new."""
         expression = term.expression if isinstance(term, Regressor) else term
         known = self._terms.get(expression)
         if known is not None:
@@ -51,25 +52,25 @@ class TermPool:
         factors = [self._node(part) for part in parts]
         while len(factors) > MAX_FACTORS:
             factors[:2] = [self._add(MULTIPLY, factors[0], factors[1])]
-        number = len(self._terms)
-        if number == self.nodes.degree.size:
-            self.nodes = _grown(self.nodes, terms=2 * number)
-        self.nodes.factors[number, : len(factors)] = factors
-        self.nodes.degree[number] = len(factors)
-        self._terms[expression] = number
-        return number
+        index = len(self._terms)
+        if index == self.nodes.degree.size:
+            self.nodes = _grow(self.nodes, terms=2 * index)
+        self.nodes.factors[index, : len(factors)] = factors
+        self.nodes.degree[index] = len(factors)
+        self._terms[expression] = index
+        return index
 
     def terms(self, terms: Sequence[Term]) -> NDArray[np.int64]:
-        """Return the numbers of several."""
+        """Return the indices of several terms."""
         return np.array([self.term(term) for term in terms], np.int64)
 
     def _node(self, expression: Expression) -> int:
         known = self._known.get(expression)
         if known is None:
-            known = self._known[expression] = self._made(expression)
+            known = self._known[expression] = self._make_node(expression)
         return known
 
-    def _made(self, expression: Expression) -> int:
+    def _make_node(self, expression: Expression) -> int:
         match expression:
             case Lagged(channel, lag):
                 self.deepest[channel] = max(lag, self.deepest.get(channel, 0))
@@ -95,47 +96,47 @@ class TermPool:
         self, operation: int, first: int = 0, second: int = 0, address: int = 0, value: float = 0.0
     ) -> int:
         key = (operation, first, second, address, value)
-        known = self._numbers.get(key)
+        known = self._indices.get(key)
         if known is not None:
             return known
-        number = self._numbers[key] = len(self._numbers)
-        if number == self.nodes.operation.size:
-            self.nodes = _grown(self.nodes, nodes=2 * number)
+        index = self._indices[key] = len(self._indices)
+        if index == self.nodes.operation.size:
+            self.nodes = _grow(self.nodes, nodes=2 * index)
         for column, entry in zip(self.nodes, key, strict=False):
-            column[number] = entry
-        return number
+            column[index] = entry
+        return index
 
 
 def _operation(primitive: Primitive, operand: Expression) -> tuple[int, Expression]:
-    """Return the instruction that takes an operand in, and what is left of the operand."""
+    """Return the instruction that combines an operand with the result so far, and the operand it reads."""
     match primitive, operand:
         case _, Apply(inner, (Constant(-1.0), *rest)) if primitive == ADD and inner == MUL:
-            # Canonical form writes a - b + c as a + (-1)*b + c; a difference has the same bits.
+            # Canonical form is a + (-1)*b + c for a - b + c; a difference has the same bits.
             return interpreter.SUBTRACT, rest[0] if len(rest) == 1 else Apply(MUL, tuple(rest))
     return _OPERATIONS[primitive], operand
 
 
-def _room(nodes: int, terms: int) -> NodeArrays:
+def _allocate_nodes(nodes: int, terms: int) -> NodeArrays:
     operation, first, second, address = np.zeros((4, nodes), np.int64)
     factors, degree = np.zeros((terms, MAX_FACTORS), np.int64), np.zeros(terms, np.int64)
     return NodeArrays(operation, first, second, address, np.zeros(nodes), factors, degree)
 
 
-def _grown(old: NodeArrays, nodes: int = 0, terms: int = 0) -> NodeArrays:
-    new = _room(nodes or old.operation.size, terms or old.degree.size)
+def _grow(old: NodeArrays, nodes: int = 0, terms: int = 0) -> NodeArrays:
+    new = _allocate_nodes(nodes or old.operation.size, terms or old.degree.size)
     for column, before in zip(new, old, strict=True):
         column[: len(before)] = before
     return new
 
 
 def link(terms: Sequence[Term]) -> Program:
-    """Link regressors, one term each and in the order given.
+    """Generate the program of some regressors, one term each and in the given order.
 
-    A term may also be a bare canonical expression of lag 0, the target y(k) for instance: the kernel of
-    columns allows it, a simulation does not.
+    A term may also be a canonical expression with lag 0, for example the target y(k). The kernel of columns
+    allows this, a simulation does not.
     """
-    store = TermPool()
-    numbers = store.terms(terms)
-    nodes = store.nodes
-    program: Program = codegen.generate_program(nodes, numbers, np.full(nodes.operation.size, -1, np.int64))
+    pool = TermPool()
+    indices = pool.terms(terms)
+    nodes = pool.nodes
+    program: Program = codegen.generate_program(nodes, indices, np.full(nodes.operation.size, -1, np.int64))
     return program

@@ -1,1 +1,1 @@
-"""How fast the search is: ours beside plain numpy and compiled C, in one run and on the same data."""
+"""Speed measurements of the kernels against plain numpy and compiled C. Read `run` first."""

@@ -1,4 +1,4 @@
-"""Clocks. Time is what a benchmark is about, so here alone the core reads one."""
+"""Clocks of the benchmark: the only module of the core that reads the time."""
 
 import time
 from collections.abc import Callable
@@ -8,24 +8,24 @@ import numpy as np
 
 from islands.errors import SettingsError
 
-#: Milliseconds of CPU time that one measurement takes at least: far more than the clock's own call.
-_LEAST = 4.0
+#: Minimum CPU time of one measurement in milliseconds: far longer than the call of the clock.
+_MIN_MS = 4.0
 
 
 def cpu() -> float:
-    """Return the CPU time of this process in seconds, all its threads together."""
+    """Return the CPU time of this process in seconds, including all its threads."""
     return time.process_time()
 
 
 def wall() -> float:
-    """Return the time on the wall in seconds, from an arbitrary moment."""
+    """Return the wall-clock time in seconds since an arbitrary moment."""
     return time.perf_counter()
 
 
 def milliseconds(call: Callable[[], Any]) -> float:
-    """Return the CPU time of one call: repeated where it is short, and with warm caches.
+    """Return the CPU time of one call in milliseconds, with warm caches; short calls are repeated.
 
-    The first call is not measured: a search has its data in the caches, and compiled what it runs.
+    The first call is not measured: in a search the data are in the caches and the kernels are compiled.
     """
     call()
     calls, began = 0, cpu()
@@ -33,19 +33,19 @@ def milliseconds(call: Callable[[], Any]) -> float:
         call()
         calls += 1
         spent = 1e3 * (cpu() - began)
-        if spent >= _LEAST:
+        if spent >= _MIN_MS:
             return spent / calls
 
 
 def refuse_threads() -> None:
-    """Refuse to measure where the linear algebra runs in several threads.
+    """Refuse to measure if the linear algebra library uses several threads.
 
-    Their waiting would be counted as CPU time of plain numpy, and flatter us.
+    Their waiting would count as CPU time of plain numpy and make the kernels look faster.
 
     Raises
     ------
     SettingsError
-        It does.
+        If the library uses several threads.
     """
     matrix = np.ones((600, 600))
     own, every = -time.thread_time(), -time.process_time()
@@ -54,6 +54,6 @@ def refuse_threads() -> None:
     own, every = own + time.thread_time(), every + time.process_time()
     if every > 1.3 * own:
         raise SettingsError(
-            "the linear algebra library runs in several threads and the times would not compare: set "
+            "the linear algebra library uses several threads, so the times would not be comparable: set "
             "OPENBLAS_NUM_THREADS=1, OMP_NUM_THREADS=1 and MKL_NUM_THREADS=1 before Python starts"
         )

@@ -1,4 +1,4 @@
-"""The sides beside each other on one kind of individual: plain numpy, ours, and C compiled for each."""
+"""Comparison on one kind of individual: plain numpy, the kernels, and C compiled for each individual."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,32 +12,32 @@ from islands.performance.benchmark.clock import milliseconds
 from islands.performance.benchmark.compiled_c import find_compiler
 from islands.performance.benchmark.workload import CASE1, INTERVAL, WARM_UP, WorkloadModel
 
-#: Part by which the errors of two sides may differ: they add in different orders.
+#: Relative tolerance between the errors of two implementations, which add in different orders.
 _SAME = 1e-9
 
-#: A side's times of one individual.
+#: Times of one individual in milliseconds, by name.
 _Times = dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """CPU milliseconds of one individual: medians over the individuals of a kind.
+    """CPU time of one individual in milliseconds: medians over the individuals of a kind.
 
     Attributes
     ----------
     numpy_ms, uncached_ms, cached_ms : float
         A whole evaluation, pruned by forward selection as often as in the paper's case 1: by plain numpy, by
-        us with nothing known, and by us with every inner product known.
+        the kernels with an empty cache, and by the kernels with all inner products cached.
     numpy_simulation_ms, simulation_ms : float
         Multiple shooting alone.
     c_simulation_ms : float or None
-        By C compiled for the individual; None where there is no compiler.
+        By C compiled for the individual; None if there is no compiler.
     simulation_fraction_of_c : float or None
-        Median over the individuals of C's time over ours.
+        Median over the individuals of the time of C divided by the time of the kernels.
     gram_ms : float
-        The Gram matrix of terms and target, columns made in the same call.
+        The Gram matrix of terms and target, including the evaluation of the columns.
     gram_flops : float
-        Median of two operations for each pair and row, over that time, in operations per second.
+        Median of two operations per pair and row, divided by that time, in operations per second.
     """
 
     numpy_ms: float
@@ -56,23 +56,23 @@ def compare(
     state: kernel_evaluator.Prepared,
     rounds: int,
     folder: Path,
-    tell: Callable[[float], None],
+    progress: Callable[[float], None],
 ) -> Comparison:
-    """Measure every side on every individual, one side after the other, so that drift hits all alike.
+    """Measure every implementation on every individual, in turns, so that drift affects all equally.
 
     Parameters
     ----------
     rounds : int
-        How often; an individual's time is the median.
+        Number of measurements; the time of an individual is their median.
     folder : Path
-        Where C is compiled.
-    tell : callable
-        Is told the share done.
+        Folder for the compilation of C.
+    progress : callable
+        Receives the completed fraction.
 
     Raises
     ------
     ModelError
-        Two sides come to different errors, or the compiler fails.
+        If two implementations give different errors, or if the compiler fails.
     """
     rows = compiled_c.row_pointers(state.record, WARM_UP, INTERVAL)
     measured: list[_Times] = []
@@ -86,7 +86,7 @@ def compare(
         if compiled:
             times["simulation_fraction_of_c"] = times["c_simulation_ms"] / times["simulation_ms"]
         measured.append(times)
-        tell((place + 1) / len(candidates))
+        progress((place + 1) / len(candidates))
     medians = {name: median(each[name] for each in measured) for name in measured[0]}
     return Comparison(
         numpy_ms=medians["numpy_ms"],
@@ -125,7 +125,7 @@ def _times(
 
 
 def _evaluation(time: Callable[[bool], float]) -> float:
-    """Weigh evaluations with and without pruning as the paper's case 1 has them."""
+    """Weight evaluations with and without pruning by their frequency in the paper's case 1."""
     return CASE1.prune * time(True) + (1.0 - CASE1.prune) * time(False)
 
 
@@ -146,6 +146,7 @@ def _check(
     for side, error in (("plain numpy", plain), *(("compiled C", simulate()) for simulate in compiled)):
         if not isclose(own, error, rel_tol=_SAME):
             raise ModelError(
-                f"{side} simulates another model: its squared error is {error}, ours {own}; times of "
-                f"different work can't be compared, look at {[item.text for item in candidate.regressors]}"
+                f"{side} simulates another model: its squared error is {error}, that of the kernels {own}; "
+                "times of different work can't be compared, look at "
+                f"{[item.text for item in candidate.regressors]}"
             )

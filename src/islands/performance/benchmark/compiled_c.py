@@ -1,8 +1,8 @@
-"""The floor of a simulation: C written and compiled for one individual.
+"""Lower bound of the time of a simulation: C generated and compiled for one individual.
 
-It does what the kernel does and nothing else: shooting intervals side by side in rows, expressions inlined,
-every number of rows and lanes known to the compiler. Compiling takes far longer than simulating, so it is no
-way to search; it tells how much a general kernel loses.
+The C code does the same work as the kernel: shooting intervals as lanes of rows, with inlined expressions and
+all numbers of rows and lanes known to the compiler. Compiling takes far longer than simulating, so a search
+cannot use it; it shows the cost of a general kernel.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ from islands.performance.benchmark.expression_source import infix
 
 
 def find_compiler() -> str | None:
-    """Return the C compiler's path, None where there is none."""
+    """Return the path of the C compiler, or None."""
     return shutil.which("cc")
 
 
@@ -35,16 +35,16 @@ def compile_model(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDL
     Parameters
     ----------
     folder : Path
-        Where source and library are written, under a name that their content gives them.
+        Folder for source and library; the file names are a hash of the content.
 
     Raises
     ------
     ModelError
-        There is no compiler, or it refuses the source or a flag: the message is the compiler's.
+        If there is no compiler, or if it rejects the source or a flag; the message is the compiler's.
     """
     command = find_compiler()
     if command is None:
-        raise ModelError("no C compiler is called cc: install one, or leave C out of the comparison")
+        raise ModelError("there is no C compiler named cc: install one, or leave C out of the comparison")
     name = hashlib.sha256("\n".join((source, *flags)).encode()).hexdigest()
     written, library = folder / f"{name}.c", folder / f"{name}.so"
     written.write_text(source, encoding="ascii")
@@ -59,10 +59,10 @@ def compile_model(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDL
     return ctypes.CDLL(str(library))
 
 
-#: Intervals in a row.
+#: Intervals per row.
 LANES = 104
 
-#: Ways to compile; the fastest counts. The first one rounds as our kernels do.
+#: Sets of compiler flags; the fastest result counts. The first set rounds as the kernels do.
 FLAGS = (
     ("-O3", "-march=native", "-ffp-contract=off"),
     ("-O3", "-march=native"),
@@ -85,7 +85,7 @@ void simulate(const double *restrict input, const double *restrict measured, lon
         memcpy(y, m, sizeof(double) * WARM_UP * LANES);
         memset(error, 0, sizeof(double) * LANES);
         for (long k = WARM_UP; k < WARM_UP + STEPS; ++k) {{
-            /* A row is written and earlier ones are read: no two lanes meet. */
+            /* A row is written and earlier rows are read: lanes are independent. */
             #pragma GCC ivdep
             for (long lane = 0; lane < LANES; ++lane) {{
                 double value = 0.0;
@@ -102,9 +102,9 @@ void simulate(const double *restrict input, const double *restrict measured, lon
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsPointer:
-    """A record of one input in rows, shape (blocks, warm_up + interval, `LANES`).
+    """Record of one input in rows, shape (blocks, warm_up + interval, `LANES`).
 
-    Lanes that the last block has too many repeat the first interval; whole intervals alone are simulated.
+    Surplus lanes of the last block repeat the first interval. Only whole intervals are simulated.
     """
 
     u: NDArray[np.float64]
@@ -121,12 +121,12 @@ def row_pointers(record: Dataset, warm_up: int, interval: int) -> RowsPointer:
     start = np.zeros(blocks * LANES, np.int64)
     start[:lanes] = interval * np.arange(lanes)
     samples = start.reshape(blocks, 1, LANES) + np.arange(warm_up + interval)[:, None]
-    u, y = (_aligned(signal[samples]) for signal in (record.u[:, 0], record.y))
+    u, y = (_copy_aligned(signal[samples]) for signal in (record.u[:, 0], record.y))
     return RowsPointer(u, y, lanes, warm_up, interval)
 
 
 def c_source_of_model(regressors: Sequence[Regressor], warm_up: int, interval: int) -> str:
-    """Write the C of an individual's simulation."""
+    """Return the C source of the simulation of an individual."""
 
     def sample(channel: int, lag: int) -> str:
         return f"{'yu'[channel]}[(k - {lag}) * LANES + lane]"
@@ -152,16 +152,16 @@ def simulation(
     flags: Sequence[str],
     folder: Path,
 ) -> Callable[[], float]:
-    """Compile an individual's simulation; calling it returns the squared error, summed.
+    """Compile the simulation of an individual; the function returns the sum of squared errors.
 
     Raises
     ------
     ModelError
-        There is no compiler, or it refuses.
+        If there is no compiler, or if it fails.
     """
     library = compile_model(c_source_of_model(regressors, rows.warm_up, rows.interval), flags, folder)
-    squared = _aligned(np.zeros((len(rows.u), LANES)))
-    arrays = (np.array(theta), _aligned(np.zeros(rows.u.shape[1:])), squared)
+    squared = _copy_aligned(np.zeros((len(rows.u), LANES)))
+    arrays = (np.array(theta), _copy_aligned(np.zeros(rows.u.shape[1:])), squared)
     weights, y, error = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
     u, measured = (array.ctypes.data_as(ctypes.c_void_p) for array in (rows.u, rows.y))
     blocks = ctypes.c_long(len(rows.u))
@@ -170,16 +170,16 @@ def simulation(
 
     def call() -> float:
         simulate(u, measured, blocks, weights, y, error)
-        # Named here, the arrays live as long as the function that writes into them.
+        # The closure refers to the arrays, so that they live as long as the function that writes them.
         return float(arrays[2].reshape(-1)[: rows.lanes].sum())
 
     return call
 
 
-def _aligned(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Copy values to where a line of the cache begins: a vector across two lines costs two loads."""
-    room = np.empty(values.nbytes + 64, np.uint8)
-    begin = -room.ctypes.data % 64
-    copy = room[begin : begin + values.nbytes].view(np.float64).reshape(values.shape)
+def _copy_aligned(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Copy values to the start of a cache line: a vector that crosses two lines costs two loads."""
+    buffer = np.empty(values.nbytes + 64, np.uint8)
+    begin = -buffer.ctypes.data % 64
+    copy = buffer[begin : begin + values.nbytes].view(np.float64).reshape(values.shape)
     copy[:] = values
     return copy

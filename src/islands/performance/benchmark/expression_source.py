@@ -1,32 +1,32 @@
-"""Expressions as the yardsticks read them: the infix text of exported programs, with a sign alone."""
+"""Infix source of expressions for the baselines; the only function in it is the sign."""
 
 from collections.abc import Callable
 
 from islands.errors import ModelError
-from islands.io.export.infix import infix as exported
+from islands.io.export.infix import infix as exported_infix
 from islands.model.expression import Expression, Primitive
 from islands.model.primitives import SIGN
 
 
 def infix(expression: Expression, signal: Callable[[int, int], str]) -> str:
-    """Write an expression with a ``sign`` that the reader defines.
+    """Return the source of an expression; the code that uses it defines ``sign``.
 
     Parameters
     ----------
     expression : Expression
-        In canonical form, so that phi1 and phi2 are differences and their signs.
+        Expression in canonical form, in which phi1 and phi2 are differences and signs.
     signal : callable
-        ``signal(channel, lag)`` writes a sample.
+        ``signal(channel, lag)`` returns the source of a sample.
 
     Raises
     ------
     ModelError
-        It has a function other than products, sums, differences and signs.
+        If it contains a function other than products, sums, differences and signs.
     """
-    return exported(expression, signal, _sign)
+    return exported_infix(expression, signal, _get_sign_name)
 
 
-def _sign(primitive: Primitive) -> str:
+def _get_sign_name(primitive: Primitive) -> str:
     if primitive != SIGN:
         raise ModelError(
             f"the benchmark measures products, sums, differences and signs, got {primitive.name!r}"

@@ -1,4 +1,4 @@
-"""Whole searches of the paper's case 1, timed: one island in this process, or several in one process each."""
+"""Timed searches of the paper's case 1: one island in this process, or several in one process each."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -17,18 +17,18 @@ from islands.performance.benchmark.clock import cpu, wall
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What an island's search took.
+    """Cost of the search of one island.
 
     Attributes
     ----------
     evaluations, duplicates : int
-        Individuals, and those among them whose structure was known.
+        Number of individuals, and number of those with a structure that was known before.
     cpu_s, wall_s : float
-        Of the whole search, from the first population on.
+        CPU time and wall-clock time of the whole search, from the first population on.
     evaluating_cpu_s : float
-        Of that, in the evaluator: the rest is breeding.
+        Part of the CPU time that is spent in the evaluator; the rest is breeding.
     caches : mapping
-        What the caches hold at the end.
+        Bytes that each cache uses at the end.
     """
 
     evaluations: int
@@ -40,24 +40,27 @@ class Run:
 
     @property
     def amortised_ms(self) -> float:
-        """CPU milliseconds of the evaluator for every structure that was not known."""
+        """CPU time of the evaluator in milliseconds per new structure."""
         return 1e3 * self.evaluating_cpu_s / (self.evaluations - self.duplicates)
 
     @property
     def per_cpu_second(self) -> float:
-        """Individuals per second of CPU time, breeding included."""
+        """Individuals per second of CPU time, including breeding."""
         return self.evaluations / self.cpu_s
 
     @property
     def per_second(self) -> float:
-        """Individuals per second on the wall."""
+        """Individuals per second of wall-clock time."""
         return self.evaluations / self.wall_s
 
 
 def run_island(
-    record: Dataset, settings: Settings, index: int, tell: Callable[[float], None] = lambda _share: None
+    record: Dataset,
+    settings: Settings,
+    index: int,
+    progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Run:
-    """Run one island from its first population to the settings' last generation."""
+    """Run one island from its first population to the last generation of the settings."""
     evaluator = _Timed(record, settings)
     began_cpu, began = cpu(), wall()
     island, info = first_generation(index, 0, evaluator)
@@ -65,7 +68,7 @@ def run_island(
     while island.generation < settings.generations:
         island, info = step(island, evaluator)
         evaluations += info.evaluations
-        tell(island.generation / settings.generations)
+        progress(island.generation / settings.generations)
     return Run(
         evaluations,
         evaluator.duplicates,
@@ -79,14 +82,14 @@ def run_island(
 def run_in_processes(
     record: Dataset, settings: Settings, indices: Sequence[int], warm: bool = False
 ) -> tuple[float, tuple[Run, ...]]:
-    """Run islands at the same time, each in a new process; return the seconds on the wall, and every run.
+    """Run islands at the same time, each in a new process; return the wall-clock seconds and every run.
 
-    The seconds begin before the processes do.
+    The seconds include the start of the processes.
 
     Parameters
     ----------
     warm : bool
-        Go through two generations before a run is timed, so that it holds no loading of kernels.
+        Whether to run two generations before the timed run, so that its time excludes the loading of kernels.
     """
     began = wall()
     with ProcessPoolExecutor(len(indices), get_context("spawn")) as processes:
@@ -101,7 +104,7 @@ def _warm_run(record: Dataset, settings: Settings, index: int) -> Run:
 
 
 class _Timed(Evaluator):
-    """An evaluator that knows how much CPU time it took, in seconds, and how much it knew already."""
+    """Evaluator that measures its CPU time in seconds and counts known structures."""
 
     def __init__(self, record: Dataset, settings: Settings) -> None:
         super().__init__(record, settings)
@@ -114,6 +117,6 @@ class _Timed(Evaluator):
         began = cpu()
         evaluated, duplicates = super().evaluate(population, bars)
         self.spent += cpu() - began
-        # Without bars nobody is new: an individual of before is evaluated to its end.
+        # A call without bars has no new individuals: it evaluates abandoned ones to the end.
         self.duplicates += duplicates if bars is not None else 0
         return evaluated, duplicates

@@ -1,7 +1,7 @@
-"""Our side of the comparison: the one module of the benchmark that calls the kernels.
+"""Measurement of the kernels: the only module of the benchmark that calls them.
 
-Every time is the CPU milliseconds of one individual with warm caches of the processor. An individual is a
-call of its own, and pays for it: a search shares one call in a generation.
+Every time is the CPU time in milliseconds of one individual, with warm processor caches. Each individual is a
+separate call and includes its overhead; a search needs one call per generation.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,19 +30,19 @@ from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
 
-#: Bytes of a table of inner products for one individual: emptied as often as nothing shall be known.
-_TABLE = 1 << 14
+#: Size in bytes of a table of inner products for one individual.
+_TABLE_BYTES = 1 << 14
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """A record as the kernels want it: made once for a run, and not measured.
+    """Record in the form of the kernels; made once per run and not part of any measurement.
 
     Attributes
     ----------
     record : Dataset
     cut, step : Layout
-        All shooting intervals, and the first step of the first one alone.
+        All shooting intervals, and the first step of the first interval only.
     rows : Rows
     bound : float
     """
@@ -54,7 +54,7 @@ class Prepared:
     bound: float
 
 
-def prepared(record: Dataset) -> Prepared:
+def prepare_record(record: Dataset) -> Prepared:
     """Prepare a record."""
     return Prepared(
         record,
@@ -66,60 +66,58 @@ def prepared(record: Dataset) -> Prepared:
 
 
 def uncached_ms(state: Prepared, candidate: WorkloadModel, pruned: bool) -> float:
-    """Time an evaluation to which nothing is known: inner products, selection, estimate, simulation."""
+    """Time an evaluation with an empty cache: inner products, selection, estimation, simulation."""
     return milliseconds(_evaluation(state, candidate, pruned, cached=False))
 
 
 def cached_ms(state: Prepared, candidate: WorkloadModel, pruned: bool) -> float:
-    """Time an evaluation to which every inner product is known."""
+    """Time an evaluation with all inner products cached."""
     return milliseconds(_evaluation(state, candidate, pruned, cached=True))
 
 
 def simulation_ms(state: Prepared, candidate: WorkloadModel) -> float:
-    """Time the simulation alone, the individual linked already."""
+    """Time the simulation alone; the program is generated beforehand."""
     program, theta = link(candidate.regressors), np.array(candidate.theta)
     return milliseconds(lambda: _squared_errors(state, program, theta))
 
 
 def gram_ms(state: Prepared, candidate: WorkloadModel) -> float:
-    """Time the inner products of all terms and the target, columns made in the same call."""
+    """Time the inner products of all terms and the target, including the evaluation of the columns."""
     program = link([*candidate.regressors, Lagged(0, 0)])
     numbers = np.empty((program.degree.size, program.degree.size))
     return milliseconds(lambda: gram(program, state.rows, numbers))
 
 
 def squared_error(state: Prepared, candidate: WorkloadModel) -> float:
-    """Return the squared error of a simulation, summed over all whole intervals."""
+    """Return the sum of squared errors of a simulation over all whole intervals."""
     squared = _squared_errors(state, link(candidate.regressors), np.array(candidate.theta))
     return float(squared[state.cut.length == INTERVAL].sum())
 
 
 def cache_statistics(evaluator: Evaluator) -> Mapping[str, int]:
-    """Return the bytes that an evaluator's caches take."""
+    """Return the bytes that each cache of an evaluator uses."""
     return {f"{name}_bytes": taken for name, (taken, _) in evaluator.memory.items()}
 
 
 def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached: bool) -> Callable[[], None]:
-    """Return a call that evaluates an individual, but simulates with the parameters given.
+    """Return a function that evaluates an individual, but simulates it with the given parameters.
 
-    Those that least squares finds may diverge, and what selection drops is not simulated: either would make
-    our work less than that of the other sides. So the kernel of a search simulates a single step with what it
-    found, and the whole simulation is a call of its own. The tolerance of selection is zero: all is estimated
-    that does not depend on the rest.
+    Estimated parameters may diverge, and terms that selection drops are not simulated. In both cases the
+    kernels would do less work than the other implementations. The kernel of a search therefore simulates a
+    single step with the estimated parameters, and the whole simulation is a separate call. The tolerance of
+    the selection is zero, so that every independent term is estimated.
 
     Raises
     ------
     ModelError
-        The simulation ends early.
+        If the simulation ends early.
     """
     size = len(candidate.regressors)
-    vocabulary = GeneIndex(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
-    terms = np.array([[vocabulary.index_of(item.expression) for item in candidate.regressors]], np.int64)
+    index = GeneIndex(CONSTRAINTS[candidate.constraints], [Lagged(0, 0)])
+    terms = np.array([[index.index_of(item.expression) for item in candidate.regressors]], np.int64)
     sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
-    pairs, program, theta = pair_table(_TABLE), link(candidate.regressors), np.array(candidate.theta)
-    context = PopulationContext(
-        0, 0.0, vocabulary.nodes, vocabulary.groups, pairs, state.rows, state.step, state.bound
-    )
+    pairs, program, theta = pair_table(_TABLE_BYTES), link(candidate.regressors), np.array(candidate.theta)
+    context = PopulationContext(0, 0.0, index.nodes, index.groups, pairs, state.rows, state.step, state.bound)
     results = empty_results(1, size)
 
     def call() -> None:
@@ -130,14 +128,14 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
 
     if not np.isfinite(_squared_errors(state, program, theta)).all():
         raise ModelError(
-            "the simulation ends early and would take less time than plain numpy's: give other parameters to "
+            "the simulation ends early and would do less work than plain numpy: choose other parameters for "
             f"{[item.text for item in candidate.regressors]}"
         )
     return call
 
 
 def _squared_errors(state: Prepared, program: Program, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the squared error of every interval; all are infinite where one diverges."""
+    """Return the squared error of every interval; all are infinite if one interval diverges."""
     squared = np.empty(len(state.cut.start))
     diverged = np.empty(len(state.cut.start), np.int64)
     ending = simulate(program, theta, state.cut, state.bound, inf, False, squared, diverged, np.empty(0))

@@ -1,4 +1,4 @@
-"""The machine that a benchmark ran on: figures of two machines compare as ratios alone."""
+"""Description of the machine that a benchmark ran on; between machines only ratios are comparable."""
 
 import ctypes
 import multiprocessing
@@ -11,25 +11,25 @@ from pathlib import Path
 from islands.performance.benchmark.clock import cpu
 from islands.performance.benchmark.compiled_c import compile_model, find_compiler
 
-#: Packages whose version a time depends on.
+#: Packages whose versions influence the times.
 _PACKAGES = ("islands", "numpy", "numba", "llvmlite", "scipy")
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What a benchmark ran on.
+    """Machine and software of a benchmark.
 
     Attributes
     ----------
     processor : str
-        Its name as the system gives it.
+        Name of the processor as reported by the system.
     cores : int
-        That the system has; others may use them as well.
+        Number of cores of the system; other processes may use them as well.
     system, python : str
     compiler : str or None
-        First line of what the C compiler says of itself; None where there is none.
+        First line of the version text of the C compiler; None if there is no compiler.
     packages : dict of str to str
-        Versions.
+        Versions of the packages.
     """
 
     processor: str
@@ -41,7 +41,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """Describe the machine that this runs on."""
+    """Describe the machine that runs this process."""
     return Machine(
         _processor(),
         multiprocessing.cpu_count(),
@@ -70,7 +70,8 @@ def _compiler() -> str | None:
     return (done.stdout.splitlines() or [command])[0]
 
 
-#: Each chain waits for itself alone; so many of them fill every pipe, and fit into the registers.
+#: C source of the peak measurement. The chains are independent of each other; their number fills every
+#: pipeline and fits into the registers.
 _SOURCE = """\
 #if defined(__AVX512F__)
 enum { BYTES = 64, CHAINS = 16 };
@@ -101,14 +102,20 @@ double multiply_add(long rounds, double factor, double *result)
 }
 """
 
+#: Compiler flags of the peak measurement.
 _FLAGS = ("-O2", "-march=native", "-ffp-contract=off")
-_ROUNDS, _REPEATS = 2_000_000, 7
+
+#: Rounds of one measurement.
+_ROUNDS = 2_000_000
+
+#: Measurements; the fastest counts.
+_REPEATS = 7
 
 
 def peak(folder: Path) -> float | None:
-    """Return multiplications and additions per second of one core, None where there is no compiler.
+    """Return the multiplications and additions per second of one core; None if there is no compiler.
 
-    Fused multiply-add is left out, as in the kernels: it would make bits depend on the processor.
+    Fused multiply-add is disabled as in the kernels, because it would make bits depend on the processor.
     """
     if find_compiler() is None:
         return None

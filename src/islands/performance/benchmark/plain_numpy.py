@@ -1,8 +1,8 @@
-"""The yardstick: what a good programmer writes in plain numpy, and no more.
+"""Baseline of the benchmark: an evaluation as a good programmer writes it in plain numpy.
 
-Stacked columns, forward selection by modified Gram-Schmidt as in the textbook, lstsq, and a Python loop over
-the steps of a shooting interval on vectors of all intervals. Expressions are Python functions, made once for
-an individual: walking trees in the loop would double its time and flatter whatever stands beside it.
+It stacks columns, selects forward by textbook modified Gram-Schmidt, calls lstsq, and loops in Python over
+the steps of a shooting interval on vectors of all intervals. Expressions are Python functions that are made
+once per individual. Walking the trees in the loop would double its time and flatter the kernels.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from islands.performance.benchmark.expression_source import infix
 
 Vector = NDArray[np.float64]
 
-#: Of forward selection: so small that nearly every regressor has its turn.
+#: Tolerance of forward selection: so small that nearly every regressor is selected.
 TOLERANCE = 1e-9
 
 
@@ -31,17 +31,17 @@ def evaluate(
     interval: int,
     pruned: bool,
 ) -> tuple[NDArray[np.floating[Any]], float]:
-    """Evaluate an individual of one input.
+    """Evaluate an individual with one input.
 
-    What forward selection chooses and lstsq estimates is left aside, here as in our own side: so both
-    simulate the same model, with the parameters given.
+    The results of forward selection and lstsq are not used for the simulation, as in the measurement of the
+    kernels: both simulate the same model with the given parameters.
 
     Returns
     -------
     estimated : ndarray, shape (terms,)
-        By least squares.
+        Least-squares estimate of the parameters.
     squared_error : float
-        Summed over all whole intervals.
+        Sum of squared errors over all whole intervals.
     """
     matrix, target = columns(regressors, record, warm_up), record.y[warm_up:]
     if pruned:
@@ -83,7 +83,7 @@ def select(matrix: NDArray[np.float64], target: Vector, tolerance: float = TOLER
 def simulate(
     regressors: Sequence[Regressor], theta: Sequence[float], record: Dataset, warm_up: int, interval: int
 ) -> float:
-    """Simulate all whole intervals together; return the squared error, summed."""
+    """Simulate all whole intervals together; return the sum of squared errors."""
     terms = [
         (weight, _make_function(item, "y, u, k", lambda name, lag: f"{name}[k-{lag}]"))
         for weight, item in zip(theta, regressors, strict=True)

@@ -1,4 +1,4 @@
-"""The result of a benchmark: what was measured, its JSON document, and the goals beside it."""
+"""Result of a benchmark, its JSON document, and the goals of the design."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -10,35 +10,36 @@ from islands.performance.benchmark.machine import Machine
 from islands.performance.benchmark.scaling import Scaling, line_through
 
 #: Individuals per second and core of the authors' toolbox, mean over an evolved run on the same record: 19 to
-#: 32 were measured beside the first design of these kernels. It is not measured here.
+#: 32 were measured together with the first design of these kernels. It is not measured here.
 AUTHORS_PER_SECOND = 32.0
 
-#: A cost is called linear where a line explains this share of its variance.
+#: A cost counts as linear if a line explains this fraction of its variance.
 LINEAR = 0.98
 
 
 @dataclass(frozen=True, slots=True)
 class BenchmarkReport:
-    """Everything that a benchmark measured.
+    """All results of a benchmark.
 
     Attributes
     ----------
     quick : bool
-        Fewer individuals and generations, and no whole run of the paper's case 1.
+        Whether there were fewer individuals and generations and no full run of the paper's case 1.
     workload : str
-        SHA-256 of the individuals' text: two reports compare where it is the same.
+        SHA-256 of the individuals' text; two reports are comparable if it is equal.
     samples, individuals : int
-        Of the record, and of every kind.
+        Samples of the record, and individuals of every kind.
     kinds : mapping of str to Comparison
         For ``poly``, ``general`` and ``gp``.
     peak_flops : float or None
-        Multiplications and additions per second of one core, unfused; None where there is no compiler.
+        Multiplications and additions per second of one core, unfused; None if there is no compiler.
     runs : mapping of str to Run
         One island of 250, on ``n100000`` and ``n10000`` samples.
     case1_wall_s : float or None
-        Two islands of 250 through 500 generations in two processes, their start included.
+        Time of two islands of 250 over 500 generations in two processes, including their start; None if
+        not measured.
     parallel_efficiency_2 : float
-        Individuals per second of two processes at the same time over twice that of one.
+        Individuals per second of two simultaneous processes, divided by twice that of one process.
     scalings : tuple of Scaling
     machine : Machine
     """
@@ -56,35 +57,35 @@ class BenchmarkReport:
     machine: Machine
 
     def amortised_ms(self, kind: str) -> float:
-        """Return the milliseconds of an evaluation whose inner products are known as they are in a search.
+        """Return the CPU time in milliseconds of an evaluation with the cache of a search.
 
-        For ``gp`` it is a real search's mean for every new structure; the other two kinds come from no
-        search, and every inner product is known.
+        For ``gp`` it is the mean per new structure of a real search. The other two kinds come from no search;
+        for them all inner products are cached.
         """
         return self.runs["n100000"].amortised_ms if kind == "gp" else self.kinds[kind].cached_ms
 
     def uncached_ratio(self, kind: str) -> float:
-        """Return how many times as long plain numpy takes where nothing is cached."""
+        """Return the time of plain numpy divided by that of the kernels with an empty cache."""
         return self.kinds[kind].numpy_ms / self.kinds[kind].uncached_ms
 
     def amortised_ratio(self, kind: str) -> float:
-        """Return how many times as long plain numpy takes, amortised over a search."""
+        """Return the time of plain numpy divided by that of the kernels, amortised over a search."""
         return self.kinds[kind].numpy_ms / self.amortised_ms(kind)
 
     def gram_fraction_of_peak(self, kind: str) -> float | None:
-        """Return the share of the peak that the Gram matrix reaches, columns made in the same call."""
+        """Return the fraction of the peak that the Gram matrix reaches, including the columns."""
         return None if self.peak_flops is None else self.kinds[kind].gram_flops / self.peak_flops
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A goal beside what was measured.
+    """Goal with its measured value.
 
     Attributes
     ----------
     text, wanted, measured : str
     met : bool or None
-        None where it was not measured.
+        None if it was not measured.
     """
 
     text: str
@@ -94,10 +95,10 @@ class Goal:
 
 
 def to_document(report: BenchmarkReport) -> dict[str, Any]:
-    """Return a report as JSON has it.
+    """Return a report as a JSON document.
 
-    A ratio or fraction that is one number is that of ``gp``, the individuals of a real search; ``kinds`` has
-    those of all three. What needs a compiler is null where there is none.
+    A ratio or fraction that is a single number belongs to ``gp``, the individuals of a real search; ``kinds``
+    contains those of all three kinds. Values that need a compiler are null if there is none.
     """
     kinds = report.kinds
     return {
@@ -146,7 +147,7 @@ def to_document(report: BenchmarkReport) -> dict[str, Any]:
 
 
 def check_goals(report: BenchmarkReport) -> tuple[Goal, ...]:
-    """Return every goal of the design with what was measured."""
+    """Return every goal of the design with its measured value."""
     kinds = report.kinds
     rows = [
         _at_least(

@@ -1,4 +1,4 @@
-"""The whole benchmark, from the record to the report."""
+"""Complete benchmark, from the record to the report."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -31,20 +31,20 @@ from islands.performance.benchmark.workload import (
 
 @dataclass(frozen=True, slots=True)
 class BenchmarkSize:
-    """How much is measured.
+    """Amount of work of a benchmark.
 
     Attributes
     ----------
     individuals, rounds : int
-        Of every kind, and how often each is measured.
+        Number of individuals of every kind, and number of measurements of each.
     scaling : int
-        Individuals at every point of a scaling.
+        Number of individuals at every point of a scaling.
     generations : int
-        Of the searches that count individuals per second.
+        Generations of the searches that measure individuals per second.
     parallel : int
         Generations of the searches that compare one process with two.
     case1 : bool
-        Carry out the whole case 1.
+        Whether to run the whole case 1.
     """
 
     individuals: int
@@ -55,24 +55,27 @@ class BenchmarkSize:
     case1: bool
 
 
+#: Size of the full benchmark.
 FULL = BenchmarkSize(30, 3, 7, ISLAND.generations, 100, True)
+
+#: Size of the quick benchmark.
 QUICK = BenchmarkSize(4, 1, 2, 10, 10, False)
 
 
 def measure(quick: bool, progress: ProgressCallback) -> BenchmarkReport:
-    """Carry out the benchmark.
+    """Run the benchmark.
 
     Parameters
     ----------
     progress : ProgressCallback
-        Is told what is measured, and which share of everything is done.
+        Receives the current measurement and the completed fraction.
 
     Raises
     ------
     SettingsError
-        The linear algebra runs in several threads.
+        If the linear algebra library uses several threads.
     ModelError
-        Two sides come to different results, or the compiler fails.
+        If two implementations give different results, or if the compiler fails.
     """
     refuse_threads()
     effort = QUICK if quick else FULL
@@ -80,12 +83,12 @@ def measure(quick: bool, progress: ProgressCallback) -> BenchmarkReport:
     record = benchmark_record()
     searched = replace(ISLAND, generations=effort.generations)
     individuals = workload(record, effort.individuals, searched)
-    state = kernel_evaluator.prepared(record)
+    state = kernel_evaluator.prepare_record(record)
     with TemporaryDirectory() as folder:
         kinds: dict[str, Comparison] = {}
         for kind, candidates in individuals.items():
-            told = _part(progress, f"evaluations: {kind}", 0.05 + 0.1 * len(kinds), 0.1)
-            kinds[kind] = compare(candidates, state, effort.rounds, Path(folder), told)
+            report = _part(progress, f"evaluations: {kind}", 0.05 + 0.1 * len(kinds), 0.1)
+            kinds[kind] = compare(candidates, state, effort.rounds, Path(folder), report)
         peak_flops = peak(Path(folder))
     scalings = [
         against_samples(record, effort.scaling, _part(progress, "cost against samples", 0.35, 0.04)),
@@ -94,8 +97,8 @@ def measure(quick: bool, progress: ProgressCallback) -> BenchmarkReport:
     ]
     runs = {}
     for share, samples in ((0.47, SAMPLES), (0.65, SAMPLES // 10)):
-        told = _part(progress, f"search on {samples} samples", share, 0.15)
-        runs[f"n{samples}"] = run_island(record[:samples], searched, 0, told)
+        report = _part(progress, f"search on {samples} samples", share, 0.15)
+        runs[f"n{samples}"] = run_island(record[:samples], searched, 0, report)
     progress("search in one process, then in two", 0.8)
     together = _processes(record, effort.parallel)
     alone, pair = (sum(run.per_second for run in each) for each in together.values())
@@ -120,12 +123,12 @@ def measure(quick: bool, progress: ProgressCallback) -> BenchmarkReport:
 
 
 def _processes(record: Dataset, generations: int) -> dict[int, tuple[Run, ...]]:
-    """Run the same island in one process, and in two at the same time: each has the same work."""
+    """Run the same island in one process, and in two processes at the same time."""
     settings = replace(ISLAND, generations=generations)
     return {count: run_in_processes(record, settings, [0] * count, warm=True)[1] for count in (1, 2)}
 
 
 def _part(progress: ProgressCallback, text: str, begin: float, share: float) -> Callable[[float], None]:
-    """Tell of a part of the benchmark; what is returned takes the share of the part that is done."""
+    """Report the start of a part of the benchmark; return a callback for the completed fraction of it."""
     progress(text, begin)
     return lambda done: progress(text, begin + share * done)

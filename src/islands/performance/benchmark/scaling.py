@@ -1,4 +1,4 @@
-"""How the cost grows: with samples, terms, the size of trees, and islands."""
+"""Cost as a function of samples, terms, size of trees and islands."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,9 +18,13 @@ from islands.performance.benchmark import kernel_evaluator
 from islands.performance.benchmark.full_runs import Run
 from islands.performance.benchmark.workload import WorkloadModel, full_tree, monomial, random_workload
 
-#: Where the cost is measured.
+#: Samples at which the cost is measured.
 SAMPLES = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000)
+
+#: Terms at which the cost is measured.
 TERMS = (2, 5, 10, 15, 20)
+
+#: Heights of trees at which the cost is measured.
 HEIGHTS = (1, 2, 3, 4, 5)
 
 Points = tuple[tuple[float, float], ...]
@@ -28,12 +32,12 @@ Points = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The least-squares line through points, ``y = intercept + slope x``.
+    """Least-squares line through points, ``y = intercept + slope x``.
 
     Attributes
     ----------
     r2 : float
-        Share of the variance of y that it explains; 1 where y does not vary.
+        Fraction of the variance of y that the line explains; 1 if y is constant.
     """
 
     intercept: float
@@ -43,14 +47,14 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """A cost against what it grows with.
+    """Cost as a function of one quantity.
 
     Attributes
     ----------
     name : str
-        What it grows with, as a key: ``samples``.
+        Key of the quantity, for example ``samples``.
     x_label, y_label : str
-        With units.
+        Axis labels with units.
     curves : mapping of str to points
         Pairs (x, y) in ascending order of x.
     """
@@ -70,42 +74,42 @@ def line_through(points: Points) -> Line:
     return Line(float(intercept), float(slope), 1.0 - left / spread if spread else 1.0)
 
 
-def against_samples(record: Dataset, individuals: int, tell: Callable[[float], None]) -> Scaling:
-    """Measure products of lagged signals on the first samples of a record."""
+def against_samples(record: Dataset, individuals: int, progress: Callable[[float], None]) -> Scaling:
+    """Measure products of lagged signals on more and more of the first samples of a record."""
     candidates = random_workload(monomial, individuals)
     sizes = [size for size in SAMPLES if size <= record.samples]
     costs = []
     for place, size in enumerate(sizes):
-        costs.append((float(size), _cost(kernel_evaluator.prepared(record[:size]), candidates)))
-        tell((place + 1) / len(sizes))
+        costs.append((float(size), _cost(kernel_evaluator.prepare_record(record[:size]), candidates)))
+        progress((place + 1) / len(sizes))
     return _evaluation("samples", "samples of the record", costs)
 
 
 def against_terms(
-    state: kernel_evaluator.Prepared, individuals: int, tell: Callable[[float], None]
+    state: kernel_evaluator.Prepared, individuals: int, progress: Callable[[float], None]
 ) -> Scaling:
-    """Measure individuals of more and more products of lagged signals."""
+    """Measure individuals with an increasing number of products of lagged signals."""
     costs = []
     for place, terms in enumerate(TERMS):
         costs.append((float(terms), _cost(state, random_workload(monomial, individuals, terms))))
-        tell((place + 1) / len(TERMS))
+        progress((place + 1) / len(TERMS))
     return _evaluation("terms", "terms of an individual", costs)
 
 
 def against_tree_size(
-    state: kernel_evaluator.Prepared, individuals: int, tell: Callable[[float], None]
+    state: kernel_evaluator.Prepared, individuals: int, progress: Callable[[float], None]
 ) -> Scaling:
-    """Measure individuals of ten full trees, higher and higher; their size is counted in nodes."""
+    """Measure individuals of ten full trees of increasing height; their size is the number of nodes."""
     costs = []
     for place, height in enumerate(HEIGHTS):
         candidates = random_workload(partial(full_tree, height=height), individuals)
         costs.append((_nodes(candidates), _cost(state, candidates)))
-        tell((place + 1) / len(HEIGHTS))
+        progress((place + 1) / len(HEIGHTS))
     return _evaluation("tree_size", "nodes of an individual, ten full trees of height 1 to 5", costs)
 
 
 def against_islands(runs: Mapping[int, Sequence[Run]]) -> Scaling:
-    """Gather individuals per second of searches of several islands at the same time, by their number."""
+    """Return the individuals per second of simultaneous searches, by the number of islands."""
     points = tuple(
         (float(islands), sum(run.per_second for run in each)) for islands, each in sorted(runs.items())
     )
@@ -115,7 +119,7 @@ def against_islands(runs: Mapping[int, Sequence[Run]]) -> Scaling:
 
 
 def _cost(state: kernel_evaluator.Prepared, candidates: Sequence[WorkloadModel]) -> dict[str, float]:
-    """Return the median milliseconds of evaluations with pruning, by what is known."""
+    """Return the median time in milliseconds of evaluations with pruning, by the state of the cache."""
     return {
         "nothing cached": median(
             kernel_evaluator.uncached_ms(state, each, pruned=True) for each in candidates
@@ -140,15 +144,15 @@ _LOOKS = ((SIMULATED, "o"), (RESIDUAL, "s"), (MEASURED, "^"))
 
 @house_style()
 def draw_scaling(scaling: Scaling) -> Figure:
-    """Draw a cost against what it grows with; the legend tells how well a line explains each curve."""
+    """Draw a scaling; the legend shows how well a line fits each curve."""
     figure = blank(3.2)
     axes = figure.subplots()
     for (name, points), (colour, marker) in zip(scaling.curves.items(), cycle(_LOOKS), strict=False):
         x, y = np.array(points).T
         line = line_through(points)
-        # Two points are always on a line.
-        told = f"{name}, line with R² = {line.r2:.4f}" if len(points) > 2 else name
-        axes.plot(x, y, marker, color=colour, markersize=4, label=told)
+        # A line through two points is always exact.
+        label = f"{name}, line with R² = {line.r2:.4f}" if len(points) > 2 else name
+        axes.plot(x, y, marker, color=colour, markersize=4, label=label)
         ends = np.array([x[0], x[-1]])
         axes.plot(ends, line.intercept + line.slope * ends, color=colour, lw=0.8)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -161,7 +165,7 @@ def draw_scaling(scaling: Scaling) -> Figure:
 
 
 def save_scalings(scalings: Iterable[Scaling], folder: Path) -> tuple[Path, ...]:
-    """Write a figure of every scaling as SVG; return the files."""
+    """Write one SVG figure per scaling; return the files."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for scaling in scalings:

@@ -1,7 +1,7 @@
-"""What is measured: a record, and three kinds of individuals on it.
+"""Workload of the benchmark: a record and three kinds of individuals.
 
-``poly`` are products of lagged signals, ``general`` random trees, ``gp`` individuals of a real run. All are
-drawn from fixed seeds; a hash of their text tells whether two benchmarks measured the same.
+``poly`` are products of lagged signals, ``general`` random trees, ``gp`` individuals of a real search. All
+are drawn from fixed seeds. A hash of their text shows whether two benchmarks measured the same workload.
 """
 
 import hashlib
@@ -23,35 +23,43 @@ from islands.model.primitives import MUL, SIGN, SUB
 from islands.model.regressor import Regressor, regressor
 from islands.systems.catalogue import make_record
 
-#: The paper's case 1: what is searched, and how.
+#: Settings of the paper's case 1.
 CASE1 = PRESETS["paper-case1"]
 
-#: Samples before the first row, and of a shooting interval.
-WARM_UP, INTERVAL = CASE1.maximum_lag, CASE1.shooting
+#: Number of samples before the first row.
+WARM_UP = CASE1.maximum_lag
 
-#: Samples of the record.
+#: Number of samples of a shooting interval.
+INTERVAL = CASE1.shooting
+
+#: Number of samples of the record.
 SAMPLES = 100_000
 
-#: Terms of an individual of the two drawn kinds, and their deepest lag.
-TERMS, DEEPEST = 10, 25
+#: Number of terms of a random individual.
+TERMS = 10
 
-#: The paper's population of 500, on two islands.
+#: Largest lag of a random individual.
+MAX_LAG = 25
+
+#: Number of islands of the paper's population of 500.
 ISLANDS = 2
+
+#: Settings of one of these islands.
 ISLAND = replace(CASE1, population=CASE1.population // ISLANDS)
 
 
 @dataclass(frozen=True, slots=True)
 class WorkloadModel:
-    """A model to evaluate.
+    """Model to evaluate.
 
     Attributes
     ----------
     regressors : tuple of Regressor
         In canonical order.
     theta : tuple of float
-        Parameters with which it stays bounded on the record, so that every simulation runs to its end.
+        Parameters with which the model stays bounded on the record, so that every simulation is complete.
     constraints : str
-        An entry of the parameter constraints, under which our side estimates them anew.
+        Name of the parameter constraint under which the kernels estimate the parameters.
     """
 
     regressors: tuple[Regressor, ...]
@@ -60,9 +68,9 @@ class WorkloadModel:
 
 
 def benchmark_record(samples: int = SAMPLES) -> Dataset:
-    """Return the first samples of the piezo's record, in units of three times its spread.
+    """Return the first samples of the piezo record, in units of three standard deviations.
 
-    So scaled, products of many factors keep their size.
+    With this scaling, products of many factors neither vanish nor grow.
     """
     whole = make_record("bouc-wen-piezo", "consistent", "estimation")
     scaled = Dataset(whole.u / (3 * whole.u.std()), whole.y / (3 * whole.y.std()), whole.dt)
@@ -70,7 +78,7 @@ def benchmark_record(samples: int = SAMPLES) -> Dataset:
 
 
 def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple[WorkloadModel, ...]]:
-    """Return so many individuals of every kind: ``poly``, ``general``, and ``gp`` of a run with settings."""
+    """Return ``count`` individuals of each kind: ``poly``, ``general``, and ``gp`` of a search."""
     return {
         "poly": random_workload(monomial, count),
         "general": random_workload(tree, count),
@@ -79,7 +87,7 @@ def workload(record: Dataset, count: int, settings: Settings) -> dict[str, tuple
 
 
 def candidate_text(individuals: Mapping[str, Sequence[WorkloadModel]]) -> str:
-    """Return a workload as text: a line for the record's length, a kind, an individual, or a term."""
+    """Return a workload as text: one line each for the record length, a kind, an individual and a term."""
     lines = [f"{SAMPLES} samples"]
     for kind, candidates in individuals.items():
         lines.append(kind)
@@ -89,20 +97,20 @@ def candidate_text(individuals: Mapping[str, Sequence[WorkloadModel]]) -> str:
 
 
 def fingerprint(individuals: Mapping[str, Sequence[WorkloadModel]]) -> str:
-    """Return the SHA-256 of a workload's text, in hexadecimal."""
+    """Return the SHA-256 of the text of a workload, in hexadecimal."""
     return hashlib.sha256(candidate_text(individuals).encode()).hexdigest()
 
 
 def monomial(draw: random.Random) -> Expression:
     """Draw a product of one to five lagged signals."""
     degree = draw.choices([1, 2, 3, 4, 5], [20, 25, 25, 18, 12])[0]
-    return Apply(MUL, (*(_leaf(draw) for _ in range(degree)), Constant(1.0)))
+    return Apply(MUL, (*(_draw_leaf(draw) for _ in range(degree)), Constant(1.0)))
 
 
 def tree(draw: random.Random, height: int = 4) -> Expression:
-    """Draw a tree of products, differences and signs, of at most a height."""
+    """Draw a tree of products, differences and signs with a maximum height."""
     if height == 0 or draw.random() < 0.15:
-        return _leaf(draw)
+        return _draw_leaf(draw)
     match draw.choices("*-sq", [35, 25, 15, 25])[0]:
         case "*":
             return Apply(MUL, (tree(draw, height - 1), tree(draw, height - 1)))
@@ -114,21 +122,21 @@ def tree(draw: random.Random, height: int = 4) -> Expression:
 
 
 def full_tree(draw: random.Random, height: int) -> Expression:
-    """Draw a tree of products and differences whose every leaf lies at a height."""
+    """Draw a tree of products and differences in which every leaf is at the given height."""
     if height == 0:
-        return _leaf(draw)
+        return _draw_leaf(draw)
     arguments = (full_tree(draw, height - 1), full_tree(draw, height - 1))
     return Apply(MUL if draw.random() < 0.5 else SUB, arguments)
 
 
-def _leaf(draw: random.Random) -> Lagged:
-    return Lagged(draw.choice((0, 1)), 1 + min(int(draw.expovariate(0.25)), DEEPEST - 1))
+def _draw_leaf(draw: random.Random) -> Lagged:
+    return Lagged(draw.choice((0, 1)), 1 + min(int(draw.expovariate(0.25)), MAX_LAG - 1))
 
 
 def random_workload(
     make: Callable[[random.Random], Expression], count: int, terms: int = TERMS
 ) -> tuple[WorkloadModel, ...]:
-    """Draw individuals: y(k-1) and others, so many different regressors each, with small parameters."""
+    """Draw individuals of y(k-1) and other, distinct regressors with small parameters."""
     draw, weigh = random.Random(1), random.Random(2)
     candidates: list[WorkloadModel] = []
     while len(candidates) < count:
@@ -138,49 +146,51 @@ def random_workload(
             if candidate is not None and candidate.lags and candidate not in chosen:
                 chosen.append(candidate)
         regressors = tuple(canonical_order(item for item in chosen if item is not None))
-        # y(k-1) comes first in canonical order: with this weight the rest can't let it grow.
+        # y(k-1) is first in canonical order; with this parameter the other terms cannot let the model grow.
         theta = (0.97, *((weigh.random() - 0.5) * 0.004 for _ in regressors[1:]))
         candidates.append(WorkloadModel(regressors, theta, "none"))
     return tuple(candidates)
 
 
 def evolved_workload(record: Dataset, count: int, settings: Settings) -> tuple[WorkloadModel, ...]:
-    """Return individuals whose structure is new to a run, evenly spread over its course: island 0, seed 0.
+    """Return individuals with structures that were new to a search, evenly spread over it (island 0, seed 0).
 
-    They have every gene that they were bred with: pruning is a part of their evaluation.
+    They have all genes with which they were bred, since pruning is a part of the evaluation.
     """
-    logging = _Logging(record, settings)
-    island, _ = first_generation(0, 0, logging)
+    recorder = _RecordingEvaluator(record, settings)
+    island, _ = first_generation(0, 0, recorder)
     while island.generation < settings.generations:
-        island, _ = step(island, logging)
+        island, _ = step(island, recorder)
     evaluator = Evaluator(record, settings)
-    last = [(1 + place) * len(logging.bred) // count - 1 for place in range(count)]
-    return tuple(_bounded(logging.bred[position::-1], evaluator) for position in last)
+    last = [(1 + place) * len(recorder.bred) // count - 1 for place in range(count)]
+    return tuple(_find_bounded(recorder.bred[position::-1], evaluator) for position in last)
 
 
-class _Logging(Evaluator):
-    """Keeps what it has to evaluate: the first individual of every structure."""
+class _RecordingEvaluator(Evaluator):
+    """Evaluator that records the first individual of every structure."""
 
     def __init__(self, record: Dataset, settings: Settings) -> None:
         super().__init__(record, settings)
         self.bred: list[Individual] = []
-        self._met: set[tuple[frozenset[int], bool]] = set()
+        self._seen_structures: set[tuple[frozenset[int], bool]] = set()
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], bars: Sequence[float] | None = None
     ) -> tuple[Population, int]:
         for individual, pruned in population:
             key = self.gene_indices(individual), pruned
-            if key not in self._met:
-                self._met.add(key)
+            if key not in self._seen_structures:
+                self._seen_structures.add(key)
                 self.bred.append(individual)
         return super().evaluate(population, bars)
 
 
-def _bounded(individuals: Sequence[Individual], evaluator: Evaluator) -> WorkloadModel:
-    """Return the first individual whose whole model, unpruned, stays bounded."""
+def _find_bounded(individuals: Sequence[Individual], evaluator: Evaluator) -> WorkloadModel:
+    """Return the first individual whose unpruned model stays bounded."""
     for individual in individuals:
         ((evaluated,), _) = evaluator.evaluate([(individual, False)])
         if isfinite(evaluated.fitness):
             return WorkloadModel(evaluated.regressors, evaluated.theta, evaluator.settings.constraints)
-    raise ModelError("every individual of the search diverges on the record: something is broken")
+    raise ModelError(
+        "every individual of the search diverges on the record: check the kernels and the record"
+    )

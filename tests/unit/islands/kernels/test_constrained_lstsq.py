@@ -26,7 +26,7 @@ from islands.kernels.constrained_lstsq import (
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import arranged, evaluate_terms, gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import arrange_rows, evaluate_terms, gram_matrix, regressor_matrix
 from islands.program.term_pool import link
 from islands.simulation.outcome import OK
 
@@ -93,7 +93,7 @@ def columns_as_record(psi, y):
     terms = len(psi)
     signals = np.vstack([np.append(0.0, y), np.append(psi, np.zeros((terms, 1)), axis=1)])
     program = link([*(Lagged(index + 1, 1) for index in range(terms)), Lagged(0, 0)])
-    return program, arranged(signals, [(1, len(y))], 1)
+    return program, arrange_rows(signals, [(1, len(y))], 1)
 
 
 def estimated(route, psi, y, group=None, weight=None):

@@ -13,7 +13,7 @@ from islands.kernels.summation import CHUNK, dot
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import arranged
+from islands.program.regressor_matrix import arrange_rows
 from islands.program.term_pool import link
 from support.oracles import side_by_side
 
@@ -47,7 +47,7 @@ def record(rows, seed=7):
     """Signals of segments with so many rows, each behind a warm-up of its own."""
     begin = np.cumsum((0, *(count + WARM_UP for count in rows)))
     signals = np.random.default_rng(seed).normal(size=(2, int(begin[-1])))
-    return arranged(signals, list(zip(begin[:-1] + WARM_UP, rows, strict=True)), WARM_UP)
+    return arrange_rows(signals, list(zip(begin[:-1] + WARM_UP, rows, strict=True)), WARM_UP)
 
 
 def products_of(terms, rows, pairs):

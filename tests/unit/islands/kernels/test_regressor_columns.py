@@ -9,7 +9,7 @@ from islands.model.expression import Constant, Lagged, value
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import arranged
+from islands.program.regressor_matrix import arrange_rows
 from islands.program.term_pool import link
 
 TERMS = [
@@ -34,7 +34,7 @@ def made(text):
 
 def evaluated(terms, signals, first, rows, warm_up):
     out = np.full((len(terms), sum(rows)), np.nan)
-    columns(link(terms), arranged(signals, list(zip(first, rows, strict=True)), warm_up), out)
+    columns(link(terms), arrange_rows(signals, list(zip(first, rows, strict=True)), warm_up), out)
     return out
 
 

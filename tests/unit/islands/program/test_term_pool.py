@@ -32,7 +32,7 @@ def made(text, table=PRIMITIVES):
 def taken(store):
     """Return the store's nodes as tuples; nodes that nobody has taken are left out."""
     nodes = store.nodes
-    count = len(store._numbers)
+    count = len(store._indices)
     columns = (nodes.operation, nodes.first, nodes.second, nodes.address, nodes.value)
     return list(zip(*(column[:count].tolist() for column in columns), strict=True))
 
@@ -100,12 +100,12 @@ def test_a_program_does_not_depend_on_what_else_the_store_knows(terms, others):
     store = TermPool()
     store.terms(others)
     numbers = store.terms(terms)
-    place = np.full(store.nodes.operation.size, -1, np.int64)
+    operand_index = np.full(store.nodes.operation.size, -1, np.int64)
     for found, expected in zip(
-        codegen.generate_program(store.nodes, numbers, place), link(terms), strict=True
+        codegen.generate_program(store.nodes, numbers, operand_index), link(terms), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
-    assert (place == -1).all()
+    assert (operand_index == -1).all()
 
 
 def test_a_store_grows_and_keeps_what_it_knows():

@@ -21,7 +21,7 @@ from islands.simulation.predictors import multiple_shooting
 
 @pytest.fixture(scope="module")
 def state():
-    return kernel_evaluator.prepared(benchmark_record(3_000))
+    return kernel_evaluator.prepare_record(benchmark_record(3_000))
 
 
 def test_our_error_counts_whole_intervals_alone(state):

@@ -49,7 +49,7 @@ def piezo():
 def test_every_cost_is_measured_at_every_point(piezo, monkeypatch):
     monkeypatch.setattr(scaling, "TERMS", (2, 4))
     monkeypatch.setattr(scaling, "HEIGHTS", (1, 2))
-    state, told = kernel_evaluator.prepared(piezo), []
+    state, told = kernel_evaluator.prepare_record(piezo), []
     found = [
         scaling.against_samples(piezo, 1, told.append),
         scaling.against_terms(state, 1, told.append),

@@ -13,9 +13,9 @@ from islands.model.model import Model
 from islands.model.parsing import parse
 from islands.performance.benchmark import workload as module
 from islands.performance.benchmark.workload import (
-    DEEPEST,
     INTERVAL,
     ISLAND,
+    MAX_LAG,
     WARM_UP,
     WorkloadModel,
     benchmark_record,
@@ -67,7 +67,7 @@ def test_drawn_individuals_have_so_many_different_terms_and_y(make, terms):
         assert each.regressors[0].text == "y(k-1)"
         assert each.theta[0] == 0.97
         assert each.constraints == "none"
-        assert max(item.maximum_lag for item in each.regressors) <= DEEPEST
+        assert max(item.maximum_lag for item in each.regressors) <= MAX_LAG
         Model(each.regressors, each.theta)
 
 
@@ -115,7 +115,7 @@ def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo):
 
 def test_individuals_of_a_search_come_from_its_whole_course(piezo, monkeypatch):
     asked = []
-    monkeypatch.setattr(module, "_bounded", lambda individuals, _evaluator: asked.append(individuals))
+    monkeypatch.setattr(module, "_find_bounded", lambda individuals, _evaluator: asked.append(individuals))
     evolved_workload(piezo, 3, replace(ISLAND, population=12, generations=8))
     bred = asked[-1][::-1]
     # Nine populations, less those whose structure was known.
@@ -129,7 +129,7 @@ def test_an_individual_that_diverges_gives_way_to_the_next(piezo):
     # Without y(k-1) the parameters' sum can't be one.
     infeasible = Individual((parse("u(k-1)"),))
     usable = Individual((parse("y(k-1)"), parse("y(k-1)*phi1(u(k-1), u(k-2))")))
-    found = module._bounded([infeasible, usable, infeasible], evaluator)
+    found = module._find_bounded([infeasible, usable, infeasible], evaluator)
     assert next(item.text for item in found.regressors) == "y(k-1)"
     with pytest.raises(ModelError, match="every individual"):
-        module._bounded([infeasible], evaluator)
+        module._find_bounded([infeasible], evaluator)
