@@ -1,6 +1,6 @@
-"""Least squares from inner products: by one of three routes, or a word that they have no digits.
+"""Least squares from inner products by each of three routes, which refuse a result without digits.
 
-The error grows as the least squared pivot falls: see `ERROR`. Seven digits are left well away from the
+The error grows as the smallest squared pivot decreases: see `ERROR`. Seven digits are left well away from the
 thresholds, three at worst.
 
 The oracle is `constrained_least_squares`, an orthogonal factorisation of the columns.
@@ -32,12 +32,12 @@ from islands.simulation.outcome import OK
 
 seeds = st.integers(0, 2**32 - 1)
 
-#: A group of every term, -1 for none; the groups of a term's weights sum to `WANTED`.
+#: Required sums of the groups.
 WANTED = (1.0, 0.0, -0.5)
 
 
 def gram_of(psi, y):
-    """All inner products of the regressors and, last, the target."""
+    """Return all inner products of the regressors and, last, the target."""
     rows = np.vstack([psi, y])
     return rows @ rows.T
 
@@ -56,7 +56,7 @@ def sums(group, weight):
 
 
 def reduced(gram, group=None, weight=None):
-    """Choose the pivots; without groups every term is free."""
+    """Return the reduction; without groups every term is free."""
     terms = len(gram) - 1
     group = np.full(terms, -1) if group is None else np.array(group)
     weight = np.ones(terms) if weight is None else np.array(weight)
@@ -64,12 +64,12 @@ def reduced(gram, group=None, weight=None):
     return constrained_lstsq.reduce(gram, terms, group, weight, wanted)
 
 
-#: The least squared pivot that each route is trusted with.
+#: Smallest relative squared pivot for which each route is trusted.
 LEAST = {"gram": ILL_CONDITIONED, "corrected": SINGULAR, "columns": SINGULAR}
 
 
 def solved(route, gram, program, rows, reduction):
-    """Return theta by the Gram matrix, by it and a correction, or by the columns and one; None: refused."""
+    """Return theta from the Gram matrix, with a correction, or from the columns; None if it is refused."""
     terms, count = len(gram) - 1, reduction.free.size
     factor, eta = (
         ConstrainedFactor(np.full((count, count), np.nan), np.full(count, np.nan)),
@@ -111,8 +111,8 @@ every_route = pytest.mark.parametrize("route", LEAST)
     seeds,
     st.lists(st.floats(-6, 6), min_size=6, max_size=6),
 )
-def test_it_equals_constrained_least_squares_on_well_conditioned_data(route, terms, group, seed, orders):
-    """With groups and without, and whatever the regressors' sizes: twelve orders of magnitude."""
+def test_estimate_equals_constrained_least_squares_if_well_conditioned(route, terms, group, seed, orders):
+    """The sizes of the regressors differ by up to twelve orders of magnitude."""
     rng = np.random.default_rng(seed)
     psi, y = regression(terms, seed=seed)
     psi = psi * 10.0 ** np.array(orders[:terms])[:, None]
@@ -126,7 +126,7 @@ def test_it_equals_constrained_least_squares_on_well_conditioned_data(route, ter
 
 
 @every_route
-def test_the_constraints_hold_to_rounding(route):
+def test_constraints_hold_up_to_rounding(route):
     psi, y = regression(5)
     group, weight = [0, 1, -1, 1, 0], [1.0, 2.0, 1.0, -1.0, 0.5]
     S, c = sums(group, weight)
@@ -135,14 +135,14 @@ def test_the_constraints_hold_to_rounding(route):
 
 
 @every_route
-def test_as_many_groups_as_terms_leave_nothing_to_the_data(route):
+def test_estimate_ignores_the_data_if_every_term_is_a_pivot(route):
     psi, y = regression(3)
     assert estimated(route, psi, y, [2, 0, 1], [0.5, 4.0, 1.0]).tolist() == [-1.0, 0.25, 0.0]
 
 
 @every_route
 @given(st.permutations(range(5)), seeds)
-def test_the_order_of_the_terms_does_not_matter(route, order, seed):
+def test_estimate_does_not_depend_on_the_order_of_the_terms(route, order, seed):
     psi, y = regression(5, seed=seed)
     group, weight = np.array([0, 1, -1, 1, 0]), np.array([1.0, 2.0, 1.0, -1.0, 0.5])
     order = list(order)
@@ -156,7 +156,7 @@ def test_the_order_of_the_terms_does_not_matter(route, order, seed):
 # The pivots.
 
 
-def test_the_pivot_of_a_group_is_the_member_with_the_largest_weight_beside_its_norm():
+def test_pivot_of_a_group_has_the_largest_ratio_of_weight_to_norm():
     gram = np.diag([1.0, 4.0, 9.0, 0.01, 100.0, 5.0])
     found = reduced(gram, [0, -1, 0, 0, 1], [1.0, 1.0, -6.0, 0.1, 3.0])
     assert found.pivot.tolist() == [2, -1, 2, 2, 4]
@@ -165,14 +165,14 @@ def test_the_pivot_of_a_group_is_the_member_with_the_largest_weight_beside_its_n
     assert found.free.tolist() == [0, 1, 3]
 
 
-def test_without_groups_all_is_free():
+def test_all_terms_are_free_without_groups():
     found = reduced(np.eye(5))
     assert found.pivot.tolist() == [-1] * 4
     assert found.free.tolist() == [0, 1, 2, 3]
     assert found.fixed.tolist() == [0.0] * 4
 
 
-def test_of_equals_the_first_is_the_pivot():
+def test_first_of_equal_members_is_the_pivot():
     assert reduced(np.eye(4), [1, 1, 1], [2.0, -2.0, 2.0]).pivot.tolist() == [0, 0, 0]
 
 
@@ -181,7 +181,7 @@ def test_of_equals_the_first_is_the_pivot():
 
 @every_route
 @pytest.mark.parametrize("group", [None, [0, -1, 0]])
-def test_a_regressor_that_is_zero_is_refused(route, group):
+def test_zero_regressor_is_refused(route, group):
     psi, y = regression()
     psi[1] = 0.0
     assert estimated(route, psi, y, group) is None
@@ -190,7 +190,7 @@ def test_a_regressor_that_is_zero_is_refused(route, group):
 @every_route
 @pytest.mark.parametrize("value", [1e200, np.inf, np.nan])
 @pytest.mark.parametrize("group", [None, [0, -1, 0], [0, 0, 0]])
-def test_a_regressor_that_overflows_is_refused(route, value, group):
+def test_overflowing_regressor_is_refused(route, value, group):
     psi, y = regression()
     psi[1, 50] = value
     with np.errstate(all="ignore"):
@@ -198,24 +198,24 @@ def test_a_regressor_that_overflows_is_refused(route, value, group):
 
 
 def nearly_dependent(distance, seed=1):
-    """Two regressors of norm one whose difference has a squared norm of about ``distance``, and another."""
+    """Return three regressors of norm one; the first and last differ by a squared norm of ``distance``."""
     rng = np.random.default_rng(seed)
     one, other, third = np.linalg.qr(rng.normal(size=(300, 3)))[0].T
     psi = np.array([one, third, np.sqrt(1 - distance) * one + np.sqrt(distance) * other])
     return psi, psi.sum(axis=0) + 1e-3 * rng.normal(size=300)
 
 
-#: Bounds of the relative error of a trusted result: a factor, and the power of ``eps / distance`` that it
-#: multiplies. A correction squares the error of the Gram matrix. The data, and so the error, depend on the
-#: processor: over 60 seeds on two processors the largest errors were a quarter of these bounds.
+#: Bounds of the relative error of a trusted result: a factor and the power of ``eps / distance``. A
+#: correction squares the error of the Gram matrix. The data, and so the error, depend on the processor: over
+#: 60 seeds on two processors the largest errors were a quarter of these bounds.
 ERROR = {"gram": (100.0, 1), "corrected": (1000.0, 2), "columns": (1e-4, 0)}
 
 
 @pytest.mark.parametrize("distance", [1e-6, 1e-9, 1.2e-10, 1e-11, 1e-12, 3e-13, 1.5e-13])
 @pytest.mark.parametrize("group", [None, [0, 1, 0]])
 @every_route
-def test_a_result_that_is_trusted_has_its_digits(distance, group, route):
-    """With a group one direction is left of the two, their difference: beside itself it is of full size."""
+def test_trusted_result_has_its_digits(distance, group, route):
+    """A group leaves only the difference of the two regressors, which is well-conditioned by itself."""
     for seed in range(5):
         psi, y = nearly_dependent(distance, seed)
         found = estimated(route, psi, y, group)
@@ -229,14 +229,14 @@ def test_a_result_that_is_trusted_has_its_digits(distance, group, route):
 
 @pytest.mark.parametrize(("distance", "group"), [(1e-15, None), (0.0, None), (0.0, [0, 1, 0])])
 @every_route
-def test_a_result_without_digits_is_refused(distance, group, route):
+def test_result_without_digits_is_refused(distance, group, route):
     psi, y = nearly_dependent(distance)
     assert estimated(route, psi, y, group) is None
 
 
 @pytest.mark.parametrize("distance", [1e-6, 1e-12, 1e-15, 1e-18])
-def test_a_difference_that_a_group_leaves_is_made_before_it_is_squared(distance):
-    """Beside itself it is no small number: nothing but the rounding of the columns is left in it."""
+def test_columns_are_reduced_before_they_are_squared(distance):
+    """The error of the difference relative to itself is the rounding of the columns."""
     psi, y = nearly_dependent(distance)
     difference, rest = psi[2] - psi[0], y - psi[0]
     eta = (difference @ rest) / (difference @ difference)
@@ -245,7 +245,7 @@ def test_a_difference_that_a_group_leaves_is_made_before_it_is_squared(distance)
     assert (estimated("corrected", psi, y, [0, 1, 0]) is None) == (distance < SINGULAR)
 
 
-#: A slow input: neighbouring lags differ little, and their differences still less.
+#: A slow input: neighbouring lags differ little, and their differences even less.
 LAGS = ["y(k-1)", "y(k-2)", "y(k-3)", "u(k-1)", "u(k-2)", "u(k-3)"]
 
 
@@ -268,7 +268,7 @@ def slow(frequency, segments):
         (["y(k-1)", "u(k-1)", "u(k-2)", "u(k-3)"], [0, 1, 1, 1]),
     ],
 )
-def test_lags_of_a_slow_input_need_the_columns_which_keep_six_digits(texts, group, segments):
+def test_columns_keep_six_digits_for_lags_of_a_slow_input(texts, group, segments):
     record, count = slow(0.003, segments), len(texts)
     terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]
     gram, program, rows = gram_matrix(terms, record, 3), link(terms), evaluate_terms(record, 3)
@@ -283,12 +283,12 @@ def test_lags_of_a_slow_input_need_the_columns_which_keep_six_digits(texts, grou
 
 
 @pytest.mark.parametrize("route", ["corrected", "columns"])
-def test_lags_of_an_input_that_hardly_moves_are_refused(route):
+def test_lags_of_a_nearly_constant_input_are_refused(route):
     record = slow(0.001, (4000,))
     terms = [*(regressor(parse(text))[1] for text in LAGS), Lagged(0, 0)]
     gram, program, rows = gram_matrix(terms, record, 3), link(terms), evaluate_terms(record, 3)
     assert solved(route, gram, program, rows, reduced(gram)) is None
-    # Their sums fixed, what is left has digits again.
+    # With fixed sums, the remaining directions have digits again.
     assert solved(route, gram, program, rows, reduced(gram, [0, 0, 0, 1, 1, 1])) is not None
 
 
@@ -317,7 +317,7 @@ def test_fewer_rows_than_free_parameters_are_refused(route):
 
 
 @every_route
-def test_nothing_that_is_given_is_changed(route):
+def test_inputs_are_not_changed(route):
     psi, y = regression(4)
     gram = gram_of(psi, y)
     program, rows = columns_as_record(psi, y)
@@ -329,8 +329,8 @@ def test_nothing_that_is_given_is_changed(route):
 
 
 @every_route
-def test_as_good_a_result_is_corrected_to_itself(route):
-    """The residual of a good result holds nothing more of the columns."""
+def test_correction_does_not_change_an_accurate_result(route):
+    """The residual of an accurate result is orthogonal to the columns."""
     psi, y = regression(4, rows=700)
     group, weight = [0, -1, 0, -1], [1.0, 1.0, -2.0, 1.0]
     theta = estimated(route, psi, y, group, weight)
@@ -339,7 +339,7 @@ def test_as_good_a_result_is_corrected_to_itself(route):
     assert np.abs(normal - S.T @ np.linalg.lstsq(S.T, normal, rcond=None)[0]).max() < 1e-11
 
 
-def test_a_gram_matrix_may_be_larger_than_the_terms():
+def test_gram_matrix_may_be_larger_than_the_terms():
     psi, y = regression(3)
     gram, larger = gram_of(psi, y), np.full((7, 7), np.nan)
     larger[:4, :4] = gram

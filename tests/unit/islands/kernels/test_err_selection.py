@@ -1,6 +1,6 @@
 """Selection and pruning by error reduction ratio; the oracle is Gram-Schmidt in extended precision.
 
-The laws of what is selected stand with `froe`; here is the kernels' own contract.
+The tests of `froe` check properties of the selection; this file checks the contract of the kernels.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ def problem(seed, terms=6, rows=150):
 
 
 def gram_of(psi, y, spare=0):
-    """All inner products of the columns and, last, the target, in a matrix that has room left."""
+    """Return all inner products of the columns and, last, the target, in a larger matrix."""
     rows = np.vstack([psi, y])
     gram = np.full((len(rows) + spare,) * 2, np.nan)
     gram[: len(rows), : len(rows)] = rows @ rows.T
@@ -27,7 +27,7 @@ def gram_of(psi, y, spare=0):
 
 
 def gram_schmidt(psi, y):
-    """Select forward on the columns, in extended precision; stop at what is left of no column."""
+    """Select forward on the columns in extended precision; stop if no independent column is left."""
     left = dict(enumerate(psi.astype(np.longdouble)))
     norms = {position: column @ column for position, column in left.items()}
     target, chosen = y.astype(np.longdouble), []
@@ -71,7 +71,7 @@ def same(found, expected):
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3), st.integers(0, 9)
 )
-def test_selection_is_gram_schmidt_on_the_columns(seed, terms, spare, tolerance, limit):
+def test_selection_equals_gram_schmidt_on_the_columns(seed, terms, spare, tolerance, limit):
     psi, y = problem(seed, terms)
     expected = gram_schmidt(psi, y)
     end = next((rank for rank, (_, err) in enumerate(expected) if err <= tolerance), terms)
@@ -80,15 +80,15 @@ def test_selection_is_gram_schmidt_on_the_columns(seed, terms, spare, tolerance,
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(0, 3), st.floats(0.0, 0.3))
-def test_pruning_keeps_what_gram_schmidt_says_in_the_order_of_the_terms(seed, terms, spare, tolerance):
+def test_pruning_keeps_the_terms_of_gram_schmidt_in_their_order(seed, terms, spare, tolerance):
     psi, y = problem(seed, terms)
     expected = sorted(position for position, err in gram_schmidt(psi, y) if err > tolerance)
     assert pruned(gram_of(psi, y, spare), terms, tolerance) == expected
 
 
 @pytest.mark.parametrize(("share", "count"), [(3e-5, 2), (3e-6, 1), (0.0, 1)])
-def test_a_candidate_of_which_nothing_is_left_is_not_selected(share, count):
-    """It is to keep 1e-5 of its norm, 1e-10 of its square."""
+def test_dependent_candidate_is_not_selected(share, count):
+    """A candidate must keep 1e-5 of its norm, 1e-10 of its squared norm."""
     one, other, noise = np.linalg.qr(np.random.default_rng(1).normal(size=(200, 3)))[0].T
     psi = np.array([one, one + share * other])
     gram = gram_of(psi, one + 0.1 * other + 0.5 * noise)
@@ -96,8 +96,8 @@ def test_a_candidate_of_which_nothing_is_left_is_not_selected(share, count):
     assert len(pruned(gram, 2, 0.0)) == count
 
 
-def test_candidates_that_differ_little_keep_their_order_and_six_digits():
-    """What selects is left of them after the first: a thousandth, in squares a millionth."""
+def test_similar_candidates_keep_their_order_and_six_digits():
+    """After the first selection a thousandth of each norm is left, a millionth of its square."""
     for seed in range(20):
         generator = np.random.default_rng(seed)
         psi = generator.normal(size=(5, 150))
@@ -109,14 +109,14 @@ def test_candidates_that_differ_little_keep_their_order_and_six_digits():
 
 
 @given(st.integers(0, 2**32 - 1), st.permutations(range(6)))
-def test_the_order_of_the_candidates_changes_their_numbers_alone(seed, order):
+def test_order_of_the_candidates_changes_only_their_indices(seed, order):
     psi, y = problem(seed)
     here = selected(gram_of(psi, y), 6)
     there = selected(gram_of(psi[list(order)], y), 6)
     same([(order[position], err) for position, err in there], here)
 
 
-def test_nothing_of_the_gram_matrix_is_changed():
+def test_selection_does_not_change_the_gram_matrix():
     gram = gram_of(*problem(2))
     before = gram.copy()
     selected(gram, 6)
@@ -124,7 +124,7 @@ def test_nothing_of_the_gram_matrix_is_changed():
     assert np.array_equal(gram, before)
 
 
-def test_no_candidates_and_no_room_select_nothing():
+def test_selection_is_empty_without_candidates_or_limit():
     gram = gram_of(*problem(3))
     assert selected(gram, 6, limit=0) == []
     assert selected(np.array([[4.0]]), 0) == []

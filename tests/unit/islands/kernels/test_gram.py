@@ -1,4 +1,4 @@
-"""Inner products are those of the columns, to the last bit, and the columns are never held."""
+"""Inner products equal those of the columns to the last bit."""
 
 import math
 
@@ -17,7 +17,7 @@ from islands.program.regressor_matrix import arrange_rows
 from islands.program.term_pool import link
 from support.oracles import side_by_side
 
-#: The constant is one on rows behind a segment's end, too: they must not count.
+#: The constant is also one on padding rows after the end of a segment, which must not count.
 TEXTS = [
     "1",
     "y(k-1)",
@@ -44,7 +44,7 @@ ROWS = [
 
 
 def record(rows, seed=7):
-    """Signals of segments with so many rows, each behind a warm-up of its own."""
+    """Return signals of segments with the given rows, each after a separate warm-up."""
     begin = np.cumsum((0, *(count + WARM_UP for count in rows)))
     signals = np.random.default_rng(seed).normal(size=(2, int(begin[-1])))
     return arrange_rows(signals, list(zip(begin[:-1] + WARM_UP, rows, strict=True)), WARM_UP)
@@ -70,14 +70,14 @@ def columns_of(terms, rows):
 
 @pytest.mark.parametrize("terms", [TERMS[:count] for count in range(1, len(TERMS) + 1)])
 @pytest.mark.parametrize("rows", ROWS)
-def test_some_pairs_have_the_numbers_that_all_together_have(rows, terms):
+def test_inner_products_of_some_pairs_equal_the_gram_matrix(rows, terms):
     square = np.array([(i, j) for i in range(len(terms)) for j in range(len(terms))])
     some = products_of(terms, record(rows), square[::-1])[::-1]
     assert np.array_equal(some.reshape(len(terms), len(terms)), gram_of(terms, record(rows)))
 
 
 @pytest.mark.parametrize("rows", ROWS)
-def test_every_entry_is_the_inner_product_of_two_filled_columns_bit_for_bit(rows):
+def test_every_entry_is_the_inner_product_of_padded_columns_bit_for_bit(rows):
     found, psi = gram_of(TERMS, record(rows)), side_by_side(columns_of(TERMS, record(rows)), rows)
     for i, one in enumerate(psi):
         for j, other in enumerate(psi):
@@ -85,7 +85,7 @@ def test_every_entry_is_the_inner_product_of_two_filled_columns_bit_for_bit(rows
 
 
 @given(st.lists(st.integers(1, 600), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
-def test_the_order_begins_anew_in_every_segment_whatever_their_lengths(rows, seed):
+def test_summation_order_restarts_in_every_segment(rows, seed):
     data = record(rows, seed)
     psi = side_by_side(columns_of(TERMS, data), rows)
     expected = [[dot(one, 0, other, 0, one.size) for other in psi] for one in psi]
@@ -101,13 +101,13 @@ def test_entries_are_exact_to_1e_15_of_their_absolute_sum(rows):
             assert abs(found[i, j] - math.fsum(products)) <= 1e-15 * math.fsum(map(abs, products))
 
 
-def test_a_gram_matrix_is_symmetric_and_has_no_negative_direction():
+def test_gram_matrix_is_symmetric_and_positive_semidefinite():
     found = gram_of(TERMS, record((10, 1, 700, 3)))
     assert np.array_equal(found, found.T)
     assert np.linalg.eigvalsh(found).min() > 0
 
 
-def test_an_entry_does_not_depend_on_the_terms_beside_it():
+def test_entry_does_not_depend_on_the_other_terms():
     data = record((300, 500))
     together = gram_of(TERMS, data)
     for i in range(len(TERMS)):
@@ -119,7 +119,7 @@ place = st.integers(0, len(TERMS) - 1)
 
 
 @given(st.lists(st.tuples(place, st.lists(place, min_size=1, max_size=9)), min_size=1, max_size=6))
-def test_an_entry_does_not_depend_on_the_pairs_beside_it(drawn):
+def test_entry_does_not_depend_on_the_other_pairs(drawn):
     """Neighbours that share their first term are computed four at a time, others alone."""
     data = record((300, 40))
     pairs = [(one, other) for one, others in drawn for other in others]
@@ -127,7 +127,7 @@ def test_an_entry_does_not_depend_on_the_pairs_beside_it(drawn):
     assert products_of(TERMS, data, pairs).tolist() == [together[pair] for pair in pairs]
 
 
-def test_more_pairs_than_a_pass_over_the_record_takes_are_all_computed():
+def test_all_pairs_are_computed_if_several_passes_are_needed():
     data = record((5, 2))
     one = products_of(TERMS, data, SQUARE)
     repeats = (1 << 20) // len(SQUARE) + 2
@@ -136,5 +136,5 @@ def test_more_pairs_than_a_pass_over_the_record_takes_are_all_computed():
     assert np.array_equal(many, np.tile(one, repeats))
 
 
-def test_no_pairs_are_no_numbers():
+def test_empty_list_of_pairs_gives_no_inner_products():
     assert products_of(TERMS, record((5,)), np.empty((0, 2), np.int64)).size == 0

@@ -1,4 +1,4 @@
-"""The table of inner products is a dictionary, however full it is."""
+"""The table of inner products behaves as a dictionary, even if nearly full."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from islands.kernels.pair_table import FREE, PLACE_BYTES, Pairs, clear, find_pair, pair_key, pair_table
 
 term = st.integers(0, 2**31 - 1)
-#: Small numbers meet each other more often, and their keys differ in few bits.
+#: Small indices form the same pair more often, and their keys differ in few bits.
 pair = st.tuples(st.integers(0, 6), st.integers(0, 6)) | st.tuples(term, term)
 
 
@@ -23,7 +23,7 @@ def put(pairs, key, number):
 
 
 @given(pair, pair)
-def test_a_key_says_which_two_terms_in_whatever_order(one, other):
+def test_pair_key_identifies_an_unordered_pair_of_terms(one, other):
     assert pair_key(*one) == pair_key(*reversed(one))
     assert (pair_key(*one) == pair_key(*other)) == (sorted(one) == sorted(other))
     assert pair_key(*one) != FREE
@@ -31,12 +31,12 @@ def test_a_key_says_which_two_terms_in_whatever_order(one, other):
 
 @pytest.mark.parametrize("places", [2, 16, 64])
 @given(st.data())
-def test_the_table_is_a_dictionary_even_when_nearly_full(places, data):
+def test_table_behaves_as_a_dictionary_even_if_nearly_full(places, data):
     pairs, known = table(places), {}
     for number, drawn in enumerate(data.draw(st.lists(pair, max_size=3 * places))):
         key = pair_key(*drawn)
         if key not in known and len(known) == places - 1:
-            continue  # One place is always free.
+            continue  # one place is always free
         known[key] = float(number)
         put(pairs, key, float(number))
     assert pairs.taken[0] == len(known) == np.count_nonzero(pairs.keys != FREE)
@@ -46,7 +46,7 @@ def test_the_table_is_a_dictionary_even_when_nearly_full(places, data):
             assert pairs.keys[find_pair(pairs, key)] == FREE
 
 
-def test_a_table_is_filled_to_its_last_place_but_one():
+def test_table_can_be_filled_except_for_one_place():
     pairs = table(1024)
     keys = [pair_key(one, other) for one in range(200) for other in range(one, 200)][: 1024 - 1]
     for key in keys:
@@ -56,8 +56,8 @@ def test_a_table_is_filled_to_its_last_place_but_one():
 
 
 @pytest.mark.parametrize(("terms", "places"), [(128, 1 << 14), (360, 1 << 17)])
-def test_the_pairs_of_a_search_seldom_meet(terms, places):
-    """At half load a key is found after less than one step on average, whatever the table's size."""
+def test_pairs_of_a_search_rarely_collide(terms, places):
+    """At half load a key is found after less than one step on average, for every size of the table."""
     pairs, steps = table(places), []
     empty = table(places)
     for key in (pair_key(one, other) for one in range(terms) for other in range(one, terms)):
@@ -68,7 +68,7 @@ def test_the_pairs_of_a_search_seldom_meet(terms, places):
     assert np.mean(steps) < 1.0
 
 
-def test_a_table_is_emptied():
+def test_clear_empties_a_table():
     pairs = table(64)
     for one in range(9):
         put(pairs, pair_key(one, one + 1), 1.0)
@@ -78,7 +78,7 @@ def test_a_table_is_emptied():
 
 
 @pytest.mark.parametrize("limit", [0, 15, 16, 1000, 16 * 1024, 16 * 1025, 10**6, 1 << 20])
-def test_the_table_takes_a_power_of_two_of_places_and_no_more_room_than_it_is_given(limit):
+def test_table_has_a_power_of_two_of_places_within_the_limit(limit):
     pairs = pair_table(limit)
     places = pairs.keys.size
     assert places & (places - 1) == 0

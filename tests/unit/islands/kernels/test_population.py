@@ -1,4 +1,4 @@
-"""A population is evaluated in one call as each individual is on its own, step by step on columns."""
+"""The evaluation of a population equals that of each individual, step by step on columns."""
 
 import math
 
@@ -65,8 +65,8 @@ def record(seed=0, segments=(400, 150)):
 RECORD = record()
 
 
-def groups_of(terms, constrained):
-    """Return the clusters of the terms (the target first), that of y in front, as the kernel reads them."""
+def make_groups(terms, constrained):
+    """Return the clusters of the target and the terms as groups; the cluster of y is the first."""
     group, weight = np.full(len(terms) + 1, -1), np.zeros(len(terms) + 1)
     if not constrained:
         return Groups(group, weight, np.empty(0), 0)
@@ -85,7 +85,7 @@ def table(places=1 << 12):
 def evaluated(
     structures, pruned, data=RECORD, terms=TERMS, constrained=False, pairs=None, allowed=math.inf, before=()
 ):
-    """Return kept positions, theta, error and ending of every structure, a list of positions in ``terms``."""
+    """Return kept positions, theta, error and status of every structure, a list of positions in ``terms``."""
     store = TermPool()
     store.terms([Lagged(0, 0), *terms])
     store.terms(before)
@@ -100,7 +100,7 @@ def evaluated(
         0,
         TOLERANCE,
         store.nodes,
-        groups_of(terms, constrained),
+        make_groups(terms, constrained),
         table() if pairs is None else pairs,
         evaluate_terms(data, WARM_UP),
         layout(data, WARM_UP, INTERVAL),
@@ -122,7 +122,7 @@ def evaluated(
 
 
 def step_by_step(structure, pruned, constrained):
-    """Prune, constrain, estimate and simulate on columns; return kept positions, theta, ending, error."""
+    """Prune, constrain, estimate and simulate on columns; return kept positions, theta, status, error."""
     left = list(range(len(structure)))
     terms = [TERMS[position] for position in structure]
     if pruned:
@@ -160,12 +160,12 @@ population = st.lists(st.tuples(positions, st.booleans()), min_size=1, max_size=
 
 @pytest.mark.parametrize("constrained", [False, True])
 @given(drawn=population)
-def test_it_is_pruning_constraining_estimating_and_simulating(constrained, drawn):
+def test_evaluation_equals_its_separate_steps_on_columns(constrained, drawn):
     found = evaluated(*zip(*drawn, strict=True), constrained=constrained)
-    for (structure, pruned), (kept, theta, error, ending) in zip(drawn, found, strict=True):
+    for (structure, pruned), (kept, theta, error, status) in zip(drawn, found, strict=True):
         left, parameters, expected, *squares = step_by_step(structure, pruned, constrained)
-        assert (kept, ending) == (left, expected)
-        if ending == OK:
+        assert (kept, status) == (left, expected)
+        if status == OK:
             np.testing.assert_allclose(theta, parameters, rtol=1e-8, atol=1e-10)
             assert error == pytest.approx(squares[0], rel=1e-8)
         else:
@@ -173,9 +173,9 @@ def test_it_is_pruning_constraining_estimating_and_simulating(constrained, drawn
 
 
 def same(left, right):
-    """Equal to the last bit; what a failure leaves in theta is nobody's business."""
+    """Return whether results are equal to the last bit; theta after a failure is ignored."""
     strip = [
-        [(kept, theta if ending == OK else (), error, ending) for kept, theta, error, ending in found]
+        [(kept, theta if status == OK else (), error, status) for kept, theta, error, status in found]
         for found in (left, right)
     ]
     return strip[0] == strip[1]
@@ -183,7 +183,7 @@ def same(left, right):
 
 @pytest.mark.parametrize("constrained", [False, True])
 @given(drawn=population, earlier=population)
-def test_no_bit_depends_on_the_table_or_on_one_another(constrained, drawn, earlier):
+def test_results_do_not_depend_on_the_table_or_on_other_individuals(constrained, drawn, earlier):
     structures, pruned = zip(*drawn, strict=True)
     together = evaluated(structures, pruned, constrained=constrained)
     alone = [evaluated([one], [each], constrained=constrained)[0] for one, each in drawn]
@@ -198,17 +198,17 @@ def test_no_bit_depends_on_the_table_or_on_one_another(constrained, drawn, earli
 
 
 @given(population)
-def test_no_bit_depends_on_what_else_the_store_knows(drawn):
+def test_results_do_not_depend_on_other_terms_of_the_pool(drawn):
     structures, pruned = zip(*drawn, strict=True)
     others = [regressor(parse(f"exp(u(k-{lag}))*y(k-1)^{lag}"))[1] for lag in range(1, 4)]
     assert same(evaluated(structures, pruned), evaluated(structures, pruned, before=others))
 
 
 @given(positions, st.booleans(), st.floats(0.0, 2.0))
-def test_what_is_allowed_abandons_only_what_is_beyond_it(structure, pruned, share):
+def test_allowed_error_abandons_only_larger_errors(structure, pruned, share):
     (whole,) = evaluated([structure], [pruned])
-    (_, _, error, ending) = whole
-    if ending != OK:
+    (_, _, error, status) = whole
+    if status != OK:
         return
     (found,) = evaluated([structure], [pruned], allowed=share * error)
     if found[-1] == ABANDONED:
@@ -219,15 +219,15 @@ def test_what_is_allowed_abandons_only_what_is_beyond_it(structure, pruned, shar
         assert same([found], [whole])
 
 
-def ending_of(texts, data=RECORD, constrained=False, pruned=False):
+def get_status(texts, data=RECORD, constrained=False, pruned=False):
     terms = sorted((regressor(parse(text))[1] for text in texts), key=lambda item: item.content)
-    ((*_, error, ending),) = evaluated([range(len(terms))], [pruned], data, terms, constrained)
-    assert (error == math.inf) == (ending != OK)
-    return ending
+    ((*_, error, status),) = evaluated([range(len(terms))], [pruned], data, terms, constrained)
+    assert (error == math.inf) == (status != OK)
+    return status
 
 
 @pytest.mark.parametrize(
-    ("texts", "ending"),
+    ("texts", "status"),
     [
         (["y(k-1)", "u(k-1)"], OK),
         (["u(k-1)", "u(k-2)", "u(k-1) + u(k-2)"], DEPENDENT),
@@ -235,44 +235,44 @@ def ending_of(texts, data=RECORD, constrained=False, pruned=False):
         (["y(k-1)", "y(k-2)", "exp(50 + u(k-1))^9"], OVERFLOW),
     ],
 )
-def test_a_structure_ends_as_its_columns_let_it(texts, ending):
-    assert ending_of(texts) == ending
+def test_status_of_a_structure_follows_from_its_columns(texts, status):
+    assert get_status(texts) == status
 
 
-def test_a_structure_that_runs_away_has_diverged():
-    # One segment triples with every sample and fixes the parameter, which is too large for the other one.
+def test_unstable_structure_diverges():
+    # The output of one segment triples with every sample; the estimate is unstable for the other segment.
     y = np.concatenate([3.0 ** np.arange(15), np.full(60, 1e5)])
-    assert ending_of(["y(k-1)"], Dataset(np.zeros(75), y, 0.1, segments=(15, 60))) == DIVERGED
-    assert ending_of(["y(k-1)"], Dataset(np.zeros(15), y[:15], 0.1)) == OK
+    assert get_status(["y(k-1)"], Dataset(np.zeros(75), y, 0.1, segments=(15, 60))) == DIVERGED
+    assert get_status(["y(k-1)"], Dataset(np.zeros(15), y[:15], 0.1)) == OK
 
 
-def test_a_structure_without_y_cannot_meet_the_constraint():
-    assert ending_of(["u(k-1)", "u(k-2)"], constrained=True) == INFEASIBLE
-    assert ending_of(["u(k-1)"], constrained=True) == NO_TERMS
-    assert ending_of(["y(k-1)", "u(k-1)"], constrained=True) == OK
+def test_structure_without_y_is_infeasible():
+    assert get_status(["u(k-1)", "u(k-2)"], constrained=True) == INFEASIBLE
+    assert get_status(["u(k-1)"], constrained=True) == NO_TERMS
+    assert get_status(["y(k-1)", "u(k-1)"], constrained=True) == OK
 
 
-def test_what_explains_nothing_leaves_no_terms():
+def test_pruning_of_unrelated_terms_leaves_none():
     noise = np.random.default_rng(2).normal(size=(2, 3000))
-    assert ending_of(["sign(u(k-1))"], Dataset(noise[0], noise[1], 0.1), pruned=True) == NO_TERMS
+    assert get_status(["sign(u(k-1))"], Dataset(noise[0], noise[1], 0.1), pruned=True) == NO_TERMS
 
 
-@pytest.mark.parametrize(("rows", "ending"), [(1, TOO_FEW_ROWS), (3, TOO_FEW_ROWS), (6, OK)])
-def test_more_parameters_than_rows_are_said_to_be_too_many(rows, ending):
+@pytest.mark.parametrize(("rows", "status"), [(1, TOO_FEW_ROWS), (3, TOO_FEW_ROWS), (6, OK)])
+def test_as_many_parameters_as_rows_are_refused(rows, status):
     texts = ["y(k-1)", "u(k-1)", "u(k-2)", "u(k-3)"]
     data = record(segments=(WARM_UP + rows,))
-    assert ending_of(texts, data) == ending
+    assert get_status(texts, data) == status
 
 
-def test_a_slow_record_is_estimated_to_six_digits():
+def test_slow_record_is_estimated_to_six_digits():
     k = np.arange(4000)
     u = np.sin(0.003 * k) + 0.3 * np.sin(0.0011 * k + 1)
     y = np.convolve(u, [0.0, 0.05, 0.02, 0.01])[:4000] + 1e-4 * np.random.default_rng(3).normal(size=4000)
     data = Dataset(u, y, 0.01)
     terms = [regressor(parse(text))[1] for text in ("u(k-1)", "u(k-2)", "u(k-3)")]
-    ((_, theta, error, ending),) = evaluated([[0, 1, 2]], [False], data, terms)
+    ((_, theta, error, status),) = evaluated([[0, 1, 2]], [False], data, terms)
     psi = regressor_matrix([*terms, Lagged(0, 0)], data, WARM_UP)
     expected = constrained_least_squares(psi[:-1], psi[-1], np.empty((0, 3)), np.empty(0)).theta
-    assert ending == OK
+    assert status == OK
     np.testing.assert_allclose(theta, expected, rtol=1e-6)
     assert error == pytest.approx(float(np.sum((psi[-1] - expected @ psi[:-1]) ** 2)), rel=1e-9)

@@ -1,4 +1,4 @@
-"""The factorisation is orthogonal to the last digits, however near to dependent the columns are."""
+"""The factorisation is orthogonal to the last digits, even for nearly dependent columns."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ SHAPES = [(1, 1), (1, 10), (3, 3), (4, 255), (5, 256), (6, 257), (12, 1000)]
 
 
 def factored(matrix, target=None, tolerance=1e-11):
-    """Return Q, R, Q'y, the residual and the number of the first dependent column; columns are rows here."""
+    """Return Q, R, Q'y, the residual and the first dependent column; each row of an array is a column."""
     q = np.array(matrix, dtype=np.float64, order="C")
     columns, rows = q.shape
     residual = np.zeros(rows) if target is None else np.array(target)
@@ -24,21 +24,21 @@ def random(columns, rows, seed=0):
 
 
 def nearly_parallel(condition, columns=6, rows=800, seed=1):
-    """Columns that all point along the first, apart from a share of 1 / condition."""
+    """Return columns that are parallel to the first, except for a fraction of 1 / condition."""
     matrix, target = random(columns, rows, seed)
     matrix[1:] = matrix[0] + matrix[1:] / condition
     return matrix, target
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_the_columns_become_orthonormal(shape):
+def test_columns_become_orthonormal(shape):
     q, *_, dependent = factored(random(*shape)[0])
     assert dependent == -1
     np.testing.assert_allclose(q @ q.T, np.eye(shape[0]), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_the_factors_multiply_to_the_matrix(shape):
+def test_product_of_the_factors_is_the_matrix(shape):
     matrix, _ = random(*shape)
     q, triangle, *_ = factored(matrix)
     assert np.array_equal(triangle, np.triu(triangle))
@@ -47,7 +47,7 @@ def test_the_factors_multiply_to_the_matrix(shape):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_the_triangle_is_that_of_householders_reflections(shape):
+def test_triangle_equals_that_of_householder_reflections(shape):
     matrix, _ = random(*shape)
     reference = np.linalg.qr(matrix.T)[1]
     reference *= np.sign(np.diag(reference))[:, None]
@@ -55,7 +55,7 @@ def test_the_triangle_is_that_of_householders_reflections(shape):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_the_residual_is_what_the_columns_cannot_explain(shape):
+def test_residual_equals_that_of_least_squares(shape):
     matrix, target = random(*shape)
     q, _, projection, residual, _ = factored(matrix, target)
     np.testing.assert_allclose(q @ residual, 0, rtol=0, atol=1e-14)
@@ -64,7 +64,7 @@ def test_the_residual_is_what_the_columns_cannot_explain(shape):
 
 
 @pytest.mark.parametrize("left", [1e-6, 1e-10])
-def test_the_residual_of_a_target_that_is_nearly_explained_is_orthogonal_to_its_last_digits(left):
+def test_small_residual_is_orthogonal_to_its_last_digits(left):
     matrix, noise = random(6, 800)
     q, _, _, residual, _ = factored(matrix, np.arange(1.0, 7.0) @ matrix + left * noise)
     assert np.linalg.norm(residual) < 2 * left * np.linalg.norm(noise)
@@ -83,7 +83,7 @@ def test_nearly_parallel_columns_stay_orthogonal(condition):
 
 
 @pytest.mark.parametrize("size", [2.0**-300, 2.0**-40, 2.0**200])
-def test_the_unit_of_a_column_changes_the_triangle_alone(size):
+def test_unit_of_a_column_changes_only_the_triangle(size):
     matrix, target = random(5, 400)
     matrix[2] *= 1 / 3
     here = factored(matrix, target)
@@ -95,13 +95,13 @@ def test_the_unit_of_a_column_changes_the_triangle_alone(size):
 
 
 @pytest.mark.parametrize("position", [0, 1, 4])
-def test_a_column_of_zeros_is_reported(position):
+def test_zero_column_is_reported(position):
     matrix, target = random(5, 300)
     matrix[position] = 0.0
     assert factored(matrix, target)[-1] == position
 
 
-def test_the_first_column_that_depends_on_those_before_it_is_reported():
+def test_first_dependent_column_is_reported():
     matrix, target = random(6, 300)
     matrix[3] = 2.0 * matrix[0] - 1e-3 * matrix[2]
     matrix[5] = matrix[1]
@@ -113,14 +113,14 @@ def test_more_columns_than_rows_depend_on_each_other():
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_column_that_is_not_finite_is_reported(value):
+def test_non_finite_column_is_reported(value):
     matrix, target = random(4, 300)
     matrix[2, 17] = value
     assert factored(matrix, target)[-1] == 2
 
 
 @pytest.mark.parametrize(("share", "dependent"), [(0.5e-6, 1), (2e-6, -1)])
-def test_the_tolerance_is_the_share_of_its_norm_that_a_column_has_to_keep(share, dependent):
+def test_tolerance_is_the_fraction_of_the_norm_that_a_column_must_keep(share, dependent):
     first, other = np.linalg.qr(random(2, 500)[0].T)[0].T
     matrix = 1e3 * np.array([first, first + share * other])
     assert factored(matrix, tolerance=1e-6)[-1] == dependent

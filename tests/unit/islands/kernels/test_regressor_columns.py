@@ -1,4 +1,4 @@
-"""A column holds what the algebra says a term is, on every row of every segment."""
+"""A column contains the value of its term on every row of every segment."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ TERMS = [
     "sqrt(y(k-1))*min(u1(k-1), u2(k-1))",
 ]
 
-#: Segments around the kernel's 256 rows, with 9 samples before each first row.
+#: Segments of about 256 rows, the chunk of the kernel, with 9 samples before each first row.
 LENGTHS = (10, 9 + CHUNK - 1, 9 + CHUNK, 9 + CHUNK + 1, 9 + 3 * CHUNK + 5)
 
 
@@ -62,24 +62,24 @@ def test_every_row_of_every_segment_is_the_value_of_the_expression(signals):
     assert np.array_equal(found, oracle([term.expression for term in terms], signals, first, rows))
 
 
-def test_a_longer_warm_up_only_leaves_rows_out(signals):
+def test_longer_warm_up_only_omits_rows(signals):
     terms = [made(text) for text in TERMS]
     short, long = (evaluated(terms, signals, [first], [600 - first], first) for first in (9, 40))
     assert np.array_equal(short[:, 31:], long)
 
 
-def test_the_present_may_be_a_term(signals):
+def test_term_may_read_the_present(signals):
     target = Lagged(0, 0)
     assert np.array_equal(evaluated([target, made("y(k-1)")], signals, [1], [500], 1)[0], signals[0, 1:501])
     assert np.array_equal(evaluated([target], signals, [0], [500], 0)[0], signals[0, :500])
 
 
-def test_a_constant_term_is_a_column_of_ones(signals):
+def test_constant_term_is_a_column_of_ones(signals):
     assert np.array_equal(evaluated([made("1"), made("y(k-1)")], signals, [1], [300], 1)[0], np.ones(300))
     assert made("1").expression == Constant(1.0)
 
 
-def test_a_term_does_not_depend_on_the_terms_beside_it(signals):
+def test_term_does_not_depend_on_the_other_terms(signals):
     terms = [made(text) for text in TERMS]
     together = evaluated(terms, signals, [9], [400], 9)
     for position, term in enumerate(terms):
@@ -87,8 +87,8 @@ def test_a_term_does_not_depend_on_the_terms_beside_it(signals):
 
 
 @pytest.mark.parametrize("name", [name for name in PRIMITIVES if name not in ("phi1", "phi2")])
-def test_every_primitive_of_the_table_is_what_its_scalar_function_says(name):
-    # Arguments that are not simplified away: of several sizes and signs, and exactly zero.
+def test_every_primitive_equals_its_scalar_function(name):
+    # Arguments that simplification keeps: of several sizes and signs, and exactly zero.
     axis = np.array([0.0, 1e-12, -1e-12, 0.3, -0.3, 1.0, -2.0, 7.5, -60.0, 1e3])
     signals = np.zeros((3, 100))
     signals[1], signals[2] = np.repeat(axis, 10), np.tile(axis, 10)

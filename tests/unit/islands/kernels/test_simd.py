@@ -1,4 +1,4 @@
-"""Every operation on lanes is numpy's, number by number: NaN, infinities and both zeros included."""
+"""Every operation equals that of numpy in each lane, including NaN, infinities and both zeros."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ from islands.kernels.simd import (
     write,
 )
 
-#: How many vectors an operation takes at once; each is compiled for itself.
+#: Numbers of vectors for which the operations are compiled.
 COUNTS = (1, 13, *(pytest.param(count, marks=pytest.mark.nightly) for count in (3, 4)))
 
 
@@ -38,7 +38,7 @@ def compiled(function):
 
 
 def njit(function):
-    """Compile a function when it is first called."""
+    """Compile a function at its first call."""
 
     def run(*arguments):
         return compiled(function)(*arguments)
@@ -51,13 +51,13 @@ every_number = st.sampled_from(SPECIAL) | st.floats()
 
 
 def rows(count, several=2):
-    """Rows of numbers, as many as lanes, with what is special among them."""
+    """Return a strategy for rows of as many values as lanes, including special values."""
     row = st.lists(every_number, min_size=VECTOR * count, max_size=VECTOR * count).map(np.array)
     return st.tuples(*[row] * several)
 
 
 def same(found, expected):
-    """Tell whether two arrays agree in every bit, but for what a NaN carries."""
+    """Return whether two arrays agree in every bit, except for the payload of a NaN."""
     nan = np.isnan(expected)
     return np.array_equal(np.isnan(found), nan) and found[~nan].tobytes() == expected[~nan].tobytes()
 
@@ -126,14 +126,14 @@ def filled(number, out, at):
 @njit
 def moved_by_address(x, x_at, out, out_at):
     write(address(out, out_at), read(address(x, x_at), 3))
-    # Both arrays are named once more, so that they live until here.
+    # The arrays are used once more, so that they live until here.
     return x.size + out.size
 
 
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("name", ["add", "subtract", "multiply"])
 @given(st.data())
-def test_arithmetic_is_that_of_every_lane(name, count, data):
+def test_arithmetic_applies_to_every_lane(name, count, data):
     x, y = data.draw(rows(count))
     out = np.empty_like(x)
     pairwise(name, count)(x, y, out)
@@ -143,21 +143,21 @@ def test_arithmetic_is_that_of_every_lane(name, count, data):
 
 @pytest.mark.parametrize("count", COUNTS)
 @given(st.data())
-def test_the_sign_is_one_minus_one_or_zero(count, data):
+def test_sign_is_one_minus_one_or_zero(count, data):
     (x,) = data.draw(rows(count, 1))
     out = np.empty_like(x)
     signs(count)(x, out)
     assert same(out, np.where(x > 0, 1.0, np.where(x < 0, -1.0, 0.0)))
 
 
-def test_gathered_vectors_are_those_that_begin_at_the_offsets():
+def test_gathered_vectors_start_at_the_offsets():
     x, out = np.arange(100.0), np.empty(32)
     gathered(x, 3, 50, 0, 17, out)
     assert out.tolist() == [*range(3, 11), *range(50, 58), *range(8), *range(17, 25)]
 
 
 @given(st.data())
-def test_products_of_four_vectors_with_four_others_stand_row_by_row(data):
+def test_outer_products_are_ordered_row_by_row(data):
     x, y = data.draw(rows(4, 2))
     whole, upper, four = np.empty(128), np.empty(80), np.empty(32)
     products(x, y, whole, upper)
@@ -171,7 +171,7 @@ def test_products_of_four_vectors_with_four_others_stand_row_by_row(data):
 
 
 @given(rows(1, 1))
-def test_a_fold_halves_until_one_number_is_left(drawn):
+def test_fold_adds_halves_until_one_value_is_left(drawn):
     (x,) = drawn
     with np.errstate(all="ignore"):
         a, b, c, d = x[:4] + x[4:]
@@ -181,14 +181,14 @@ def test_a_fold_halves_until_one_number_is_left(drawn):
 
 @pytest.mark.parametrize("count", COUNTS)
 @given(st.data())
-def test_outside_finds_a_lane_that_is_not_between_the_bounds(count, data):
+def test_any_outside_finds_a_lane_outside_the_bounds(count, data):
     (x,) = data.draw(rows(count, 1))
     bound = data.draw(st.floats(0.0, allow_nan=False))
     assert (bounded(count)(x, bound) != 0) == (not np.all(np.abs(x) <= bound))
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_outside_looks_at_every_lane(count):
+def test_any_outside_checks_every_lane(count):
     for lane in range(VECTOR * count):
         for value in (2.0000001, -2.0000001, np.nan, np.inf, -np.inf):
             x = np.full(VECTOR * count, 2.0)
@@ -197,13 +197,13 @@ def test_outside_looks_at_every_lane(count):
             assert bounded(count)(x, 2.0) != 0
 
 
-def test_nothing_is_below_a_bound_that_is_negative():
+def test_every_lane_is_outside_a_negative_bound():
     assert bounded(1)(np.zeros(VECTOR), -1.0) != 0
 
 
 @pytest.mark.parametrize("move", [moved, moved_by_address], ids=["offset", "address"])
 @given(st.integers(0, 20), st.integers(0, 20))
-def test_lanes_are_read_and_written_from_anywhere_and_nothing_beside_them(move, x_at, out_at):
+def test_loads_and_stores_at_any_offset_touch_nothing_else(move, x_at, out_at):
     x, out = np.arange(50.0), np.full(50, -1.0)
     move(x, x_at, out, out_at)
     expected = np.full(50, -1.0)
@@ -212,7 +212,7 @@ def test_lanes_are_read_and_written_from_anywhere_and_nothing_beside_them(move, 
 
 
 @given(every_number, st.integers(0, 20))
-def test_a_splat_fills_every_lane(number, at):
+def test_broadcast_fills_every_lane(number, at):
     out, expected = np.full(50, -1.0), np.full(50, -1.0)
     filled(number, out, at)
     expected[at : at + 24] = number
@@ -220,7 +220,7 @@ def test_a_splat_fills_every_lane(number, at):
 
 
 @pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 1000])
-def test_a_room_has_its_size_and_begins_at_a_line_of_the_cache(size):
+def test_padded_array_has_its_size_and_starts_at_a_cache_line(size):
     rooms = [padded_size(size) for _ in range(20)]
     for found in rooms:
         assert found.shape == (size,)

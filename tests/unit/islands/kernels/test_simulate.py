@@ -1,4 +1,4 @@
-"""The simulation kernel's own contract: a plain recursion on every lane, at every width of a row."""
+"""Contract of the simulation kernel: a plain recursion on every lane, at every width of a row."""
 
 import math
 
@@ -18,18 +18,18 @@ from islands.simulation.layout import layout
 
 SAMPLES = 3 * CHUNK + 12
 
-#: Of several chunks, shorter than a warm-up, of a few samples: lanes end at different times.
+#: Segments of several chunks, shorter than a warm-up, and of a few samples: lanes end at different times.
 SEGMENTS = (SAMPLES, 2, 70, 9, CHUNK + 3, 30)
 
 
 def run_on(model, cut, samples, bound=1e6, patient=True, allowed=math.inf):
-    """Return ending, squared error, step of divergence and prediction; before, they hold rubbish."""
+    """Return status, squared error, step of divergence and prediction, all preset with other values."""
     squared_error = np.full(len(cut.start), 12345.0)
     diverged = np.full(len(cut.start), 12345)
     predicted = np.full(samples, np.nan)
     theta, program = np.array(model.parameters), link(model.regressors)
-    ending = simulate(program, theta, cut, bound, allowed, patient, squared_error, diverged, predicted)
-    return ending, squared_error, diverged, predicted
+    status = simulate(program, theta, cut, bound, allowed, patient, squared_error, diverged, predicted)
+    return status, squared_error, diverged, predicted
 
 
 def run(model, record, interval, bound=1e6, patient=True, wanted=True):
@@ -40,7 +40,7 @@ def run(model, record, interval, bound=1e6, patient=True, wanted=True):
 
 
 def echo():
-    """A model that predicts the input one sample back, so that a test writes its predictions into u."""
+    """Return a model that predicts the previous input, so that a test chooses the predictions by u."""
     return make_model([(parse("u(k-1)"), 1.0)])
 
 
@@ -69,7 +69,7 @@ def recursion(model, data, start, length, bound):
 
 @pytest.fixture(params=WIDTHS)
 def width(request, monkeypatch):
-    """Every width of a row that the kernel is compiled for, whatever the layout would have chosen."""
+    """Return every row width of the kernel in turn, instead of the one that the layout chooses."""
     monkeypatch.setattr("islands.simulation.layout.WIDTHS", (request.param,))
     return request.param
 
@@ -80,7 +80,7 @@ def damped():
 
 
 @pytest.mark.parametrize("interval", [1, 2, 7, CHUNK, CHUNK + 1, None])
-def test_every_lane_is_a_recursion_in_plain_floats_at_every_width(damped, interval, width):
+def test_every_lane_equals_a_recursion_in_plain_floats_at_every_width(damped, interval, width):
     data = record(segments=SEGMENTS)
     cut, squared_error, diverged, predicted = run(damped, data, interval)
     assert cut.width == width
@@ -94,7 +94,7 @@ def test_every_lane_is_a_recursion_in_plain_floats_at_every_width(damped, interv
 
 @pytest.mark.parametrize("interval", [1, 2, 7, CHUNK, None])
 @pytest.mark.parametrize("bound", [1.0, 2.5])
-def test_every_lane_diverges_where_the_recursion_does(damped, interval, bound, width):
+def test_every_lane_diverges_at_the_step_of_the_recursion(damped, interval, bound, width):
     data = record(segments=SEGMENTS)
     cut, squared_error, diverged, _ = run(damped, data, interval, bound)
     found = 0
@@ -107,7 +107,7 @@ def test_every_lane_diverges_where_the_recursion_does(damped, interval, bound, w
 
 @pytest.mark.parametrize("interval", [2, 7, CHUNK + 1, None])
 @pytest.mark.parametrize("poison", [math.nan, 1e300])
-def test_what_stands_in_lanes_that_nobody_asked_for_is_never_counted(damped, interval, poison, width):
+def test_padding_lanes_do_not_affect_the_results(damped, interval, poison, width):
     data = record(segments=SEGMENTS)
     cut = layout(data, damped.maximum_lag, interval)
     signals = cut.signals.copy()
@@ -115,9 +115,9 @@ def test_what_stands_in_lanes_that_nobody_asked_for_is_never_counted(damped, int
     for offset, lanes in zip(cut.block_offset, cut.block_lanes, strict=True):
         rows = cut.warm_up + cut.length[base]
         block = signals[:, offset : offset + rows * width].reshape(len(signals), rows, width)
-        block[:, :, lanes:] = poison  # behind the block's last lane
+        block[:, :, lanes:] = poison  # after the block's last lane
         for lane in range(lanes):
-            block[:, cut.warm_up + cut.length[base + lane] :, lane] = poison  # behind a lane's end
+            block[:, cut.warm_up + cut.length[base + lane] :, lane] = poison  # after the end of a lane
         poisoned += np.count_nonzero(~(np.abs(block) < 1e299))
         base += lanes
     assert poisoned > 0
@@ -129,7 +129,7 @@ def test_what_stands_in_lanes_that_nobody_asked_for_is_never_counted(damped, int
             assert np.array_equal(left, right, equal_nan=True)
 
 
-def test_one_step_ahead_reads_nothing_behind_a_blocks_last_lane(damped, width):
+def test_one_step_ahead_ignores_samples_after_the_last_lane(damped, width):
     data = record(segments=SEGMENTS)
     cut = layout(data, damped.maximum_lag, 1)
     signals = cut.signals.copy()
@@ -143,7 +143,7 @@ def test_one_step_ahead_reads_nothing_behind_a_blocks_last_lane(damped, width):
 
 
 @pytest.mark.parametrize("interval", [1, 7, CHUNK, CHUNK + 1, None])
-def test_a_lanes_squared_error_is_summed_in_the_order_of_time(damped, interval):
+def test_squared_error_of_a_lane_is_summed_in_the_order_of_time(damped, interval):
     data = record()
     cut, squared_error, diverged, predicted = run(damped, data, interval)
     assert (diverged == -1).all()
@@ -155,7 +155,7 @@ def test_a_lanes_squared_error_is_summed_in_the_order_of_time(damped, interval):
 
 
 @pytest.mark.parametrize("interval", [1, 7, None])
-def test_not_asking_for_predictions_changes_no_other_output(damped, interval):
+def test_omitting_predictions_changes_no_other_output(damped, interval):
     _, squared_error, diverged, _ = run(damped, record(), interval)
     _, alone, without, nothing = run(damped, record(), interval, wanted=False)
     assert np.array_equal(squared_error, alone)
@@ -164,14 +164,14 @@ def test_not_asking_for_predictions_changes_no_other_output(damped, interval):
 
 
 @pytest.mark.parametrize(("prediction", "step"), [(8.0, -1), (-8.0, -1), (np.nextafter(8.0, 9.0), 0)])
-def test_the_bound_itself_is_still_inside(prediction, step):
+def test_bound_itself_is_inside(prediction, step):
     u = np.zeros(SAMPLES)
     u[0] = prediction
     assert run(echo(), record(u=u), None, bound=8.0)[2].tolist() == [step]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_prediction_just_outside_is_found_where_its_error_alone_would_be_small(sign, width):
+def test_prediction_outside_the_bound_is_found_despite_a_small_error(sign, width):
     u, y = np.zeros(SAMPLES), np.zeros(SAMPLES)
     u[5] = sign * np.nextafter(8.0, 9.0)
     assert run(echo(), record(u=u, y=y), None, bound=8.0)[2].tolist() == [5]
@@ -180,22 +180,22 @@ def test_a_prediction_just_outside_is_found_where_its_error_alone_would_be_small
 
 
 @pytest.mark.parametrize("step", [0, 1, CHUNK - 1, CHUNK, 2 * CHUNK + 3, SAMPLES - 2])
-def test_a_single_sample_outside_the_bound_is_found_wherever_it_stands(step):
+def test_single_sample_outside_the_bound_is_found_at_any_step(step):
     u = np.zeros(SAMPLES)
     u[step] = 9.0
     _, _, diverged, predicted = run(echo(), record(u=u), None, bound=8.0)
     assert diverged.tolist() == [step]
-    # The kernel hands out all that it computed; to judge it is its caller's.
+    # The kernel returns all predictions, also those after the divergence.
     assert np.array_equal(predicted[1:], u[:-1])
 
 
-def test_the_first_of_several_samples_outside_is_reported():
+def test_first_of_several_samples_outside_is_reported():
     u = np.zeros(SAMPLES)
     u[[20, 30, CHUNK + 5]] = 9.0
     assert run(echo(), record(u=u), None, bound=8.0)[2].tolist() == [20]
 
 
-def test_every_lane_reports_its_own_step():
+def test_every_lane_reports_its_step_of_divergence():
     u = np.zeros(SAMPLES)
     u[[5, 27, 28]] = 9.0
     cut, _, diverged, _ = run(echo(), record(u=u), 10, bound=8.0)
@@ -203,7 +203,7 @@ def test_every_lane_reports_its_own_step():
     assert found == {1: 5, 21: 7}
 
 
-def test_an_impatient_run_stops_at_the_end_of_the_chunk_in_which_a_lane_diverged():
+def test_impatient_run_stops_after_the_chunk_with_a_divergence():
     u = np.zeros(SAMPLES)
     u[CHUNK + 1] = u[2 * CHUNK + 1] = 9.0
     _, _, diverged, predicted = run(echo(), record(u=u), None, bound=8.0, patient=False)
@@ -213,18 +213,18 @@ def test_an_impatient_run_stops_at_the_end_of_the_chunk_in_which_a_lane_diverged
 
 
 @pytest.mark.parametrize("interval", [1, 7, None])
-def test_impatience_changes_nothing_where_nothing_diverges(damped, interval):
+def test_impatience_changes_nothing_without_a_divergence(damped, interval):
     patient, hasty = (run(damped, record(), interval, patient=patient)[1:] for patient in (True, False))
     for left, right in zip(patient, hasty, strict=True):
         assert np.array_equal(left, right, equal_nan=True)
 
 
-# How a simulation ends.
+# Status of a simulation.
 
 
 @pytest.mark.parametrize("patient", [True, False])
 @pytest.mark.parametrize("step", [-1, 0, CHUNK, SAMPLES - 2])
-def test_the_ending_tells_of_a_divergence(patient, step, width):
+def test_status_reports_a_divergence(patient, step, width):
     u = np.zeros(SAMPLES)
     if step >= 0:
         u[step] = 9.0
@@ -238,9 +238,7 @@ def test_the_ending_tells_of_a_divergence(patient, step, width):
     st.sampled_from(WIDTHS),
     st.integers(0, 2**32 - 1),
 )
-def test_what_is_allowed_ends_a_simulation_only_beyond_it_and_changes_nothing_else(
-    interval, share, chosen, seed
-):
+def test_allowed_error_stops_only_larger_errors(interval, share, chosen, seed):
     model = make_model([(parse("y(k-2)"), 0.5), (parse("u(k-1)*y(k-1)"), 0.1), (parse("u(k-3)"), 1.0)])
     data = record(segments=SEGMENTS, seed=seed)
     with pytest.MonkeyPatch.context() as patch:
@@ -250,30 +248,30 @@ def test_what_is_allowed_ends_a_simulation_only_beyond_it_and_changes_nothing_el
     error = total(expected[0])
     allowed = share * error
     for patient in (True, False):
-        ending, *found = run_on(model, cut, data.samples, patient=patient, allowed=allowed)
-        if ending == ABANDONED:
+        status, *found = run_on(model, cut, data.samples, patient=patient, allowed=allowed)
+        if status == ABANDONED:
             assert error > allowed
         else:
-            assert ending == whole == COMPLETE
+            assert status == whole == COMPLETE
             assert error <= allowed * (1 + 2e-9)
             for left, right in zip(expected, found, strict=True):
                 assert np.array_equal(left, right, equal_nan=True)
 
 
-def test_a_simulation_that_is_beyond_what_is_allowed_stops_at_once(width):
-    """After the first chunk nothing is predicted any more."""
+def test_simulation_stops_after_the_chunk_that_exceeds_the_limit(width):
+    """There are no predictions after the first chunk."""
     y, u = np.zeros(SAMPLES), np.zeros(SAMPLES)
     u[3] = 100.0
     data = record(u=u, y=y)
     cut = layout(data, 1, None)
-    ending, _, _, predicted = run_on(echo(), cut, SAMPLES, allowed=9999.0)
-    assert ending == ABANDONED
+    status, _, _, predicted = run_on(echo(), cut, SAMPLES, allowed=9999.0)
+    assert status == ABANDONED
     assert np.isfinite(predicted[1 : CHUNK + 1]).all()
     assert np.isnan(predicted[CHUNK + 1 :]).all()
     assert run_on(echo(), cut, SAMPLES, allowed=10000.0)[0] == COMPLETE
 
 
-def test_the_error_of_earlier_blocks_counts_towards_what_is_allowed():
+def test_error_of_earlier_blocks_counts_towards_the_limit():
     u, y = np.zeros(1000), np.zeros(1000)
     u[[3, 500]] = 10.0
     cut = layout(record(u=u, y=y, segments=(1000,)), 1, 2)
@@ -282,41 +280,41 @@ def test_the_error_of_earlier_blocks_counts_towards_what_is_allowed():
     assert run_on(echo(), cut, 0, allowed=200.0)[0] == COMPLETE
 
 
-def test_the_error_of_earlier_blocks_stops_a_later_one_after_its_first_chunk(monkeypatch):
+def test_error_of_earlier_blocks_stops_a_later_block_early(monkeypatch):
     monkeypatch.setattr("islands.simulation.layout.WIDTHS", (8,))
     u, y = np.zeros(1001), np.zeros(1001)
     u[[3, 810]] = 10.0
     cut = layout(record(u=u, y=y, segments=(1001,)), 1, 100)
     assert cut.block_lanes.tolist() == [8, 2]
-    ending, _, _, predicted = run_on(echo(), cut, 1001, allowed=199.0)
-    assert ending == ABANDONED
+    status, _, _, predicted = run_on(echo(), cut, 1001, allowed=199.0)
+    assert status == ABANDONED
     assert np.isfinite(predicted[801 : 801 + CHUNK]).all()
     assert np.isnan(predicted[801 + CHUNK : 901]).all()
 
 
-def test_an_error_that_is_no_number_is_not_beyond_what_is_allowed(damped, width):
+def test_nan_error_does_not_exceed_the_limit(damped, width):
     y = record().y.copy()
     y[10] = math.nan
     cut = layout(record(y=y), damped.maximum_lag, None)
-    ending, squared_error, diverged, predicted = run_on(damped, cut, SAMPLES, allowed=1e-3)
-    assert ending == COMPLETE
+    status, squared_error, diverged, predicted = run_on(damped, cut, SAMPLES, allowed=1e-3)
+    assert status == COMPLETE
     assert np.isnan(squared_error).all()
     assert (diverged == -1).all()
     assert np.isfinite(predicted[damped.maximum_lag :]).all()
 
 
 @pytest.mark.parametrize(("bound", "prediction"), [(1e200, 1e250), (1e-170, 1e-168), (1e-160, -1e-159)])
-def test_a_bound_whose_square_is_no_number_is_still_a_bound(bound, prediction, width):
+def test_bound_without_a_finite_nonzero_square_is_respected(bound, prediction, width):
     u, y = np.zeros(SAMPLES), np.zeros(SAMPLES)
     u[10] = prediction
     assert run(echo(), record(u=u, y=y), None, bound=bound)[2].tolist() == [10]
 
 
-def test_no_terms_predict_zero(width):
+def test_prediction_without_terms_is_zero(width):
     data = record()
     cut = layout(data, 0, 50)
     squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
     predicted = np.full(SAMPLES, np.nan)
-    ending = simulate(link([]), np.empty(0), cut, 1e6, math.inf, True, squared_error, diverged, predicted)
-    assert ending == COMPLETE
+    status = simulate(link([]), np.empty(0), cut, 1e6, math.inf, True, squared_error, diverged, predicted)
+    assert status == COMPLETE
     assert np.array_equal(predicted, np.zeros(SAMPLES))

@@ -1,4 +1,4 @@
-"""Long sums keep the order that stands in the source, and the order is a good one."""
+"""Long sums have the documented order, which is accurate."""
 
 import math
 
@@ -13,7 +13,7 @@ LENGTHS = [1, 2, 31, 32, 33, 127, 128, 129, 255, 256, 257, 511, 512, 513, 1000, 
 
 
 def folded(numbers):
-    """Add the second half to the first until one is left."""
+    """Add the second half to the first half until one value is left."""
     while len(numbers) > 1:
         middle = len(numbers) // 2
         numbers = [a + b for a, b in zip(numbers[:middle], numbers[middle:], strict=True)]
@@ -21,7 +21,7 @@ def folded(numbers):
 
 
 def written_order(x, y):
-    """The docstring of `sums` in plain floats."""
+    """Return the sum in the order of the docstring of `summation`, in plain floats."""
     products = [a * b for a, b in zip(x.tolist(), y.tolist(), strict=True)]
     products += [0.0] * (-len(products) % 256)
     running = [0.0] * 8
@@ -43,13 +43,13 @@ def inner(x, y, x_at=0, y_at=0, rows=None):
 
 @pytest.mark.parametrize("length", LENGTHS)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_an_inner_product_is_summed_in_the_written_order(seed, length):
+def test_inner_product_is_summed_in_the_documented_order(seed, length):
     x, y = pair(seed, length)
     assert inner(x, y) == written_order(x, y)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 900), st.integers(0, 40), st.integers(0, 40))
-def test_the_order_is_the_same_wherever_the_rows_begin(seed, rows, x_at, y_at):
+def test_summation_order_does_not_depend_on_the_offsets(seed, rows, x_at, y_at):
     x, y = pair(seed, rows + 80)
     expected = written_order(x[x_at : x_at + rows], y[y_at : y_at + rows])
     assert inner(x, y, x_at, y_at, rows) == expected
@@ -57,14 +57,14 @@ def test_the_order_is_the_same_wherever_the_rows_begin(seed, rows, x_at, y_at):
 
 @pytest.mark.parametrize("length", LENGTHS)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_an_inner_product_is_exact_to_1e_15_of_the_sum_of_its_absolute_products(seed, length):
+def test_inner_product_is_exact_to_1e_15_of_the_absolute_sum(seed, length):
     x, y = pair(seed, length)
     products = [a * b for a, b in zip(x.tolist(), y.tolist(), strict=True)]
     assert abs(inner(x, y) - math.fsum(products)) <= 1e-15 * math.fsum(map(abs, products))
 
 
-def test_the_order_is_not_that_of_a_plain_loop():
-    # 1e16 meets -1e16 in its own lane, before the ones are added: a loop from first to last loses them.
+def test_summation_order_differs_from_a_plain_loop():
+    # 1e16 and -1e16 cancel in their lane before the ones are added; a loop from first to last loses the ones.
     x = np.zeros(CHUNK)
     x[0], x[8], x[1:8] = 1e16, -1e16, 1.0
     assert inner(x, np.ones(CHUNK)) == 7.0
@@ -73,7 +73,7 @@ def test_the_order_is_not_that_of_a_plain_loop():
 
 
 def test_products_are_rounded_before_they_are_added():
-    # A fused multiply-add would keep what is left of the square of 1 + 2^-30.
+    # A fused multiply-add would keep the last bits of the square of 1 + 2^-30.
     x = np.zeros(CHUNK)
     x[0], x[32] = 1 + 2.0**-30, 1.0
     y = x.copy()
@@ -81,35 +81,35 @@ def test_products_are_rounded_before_they_are_added():
     assert inner(x, y) == 0.0
 
 
-def test_a_sum_begins_at_its_offsets_and_reads_no_further_than_its_rows():
+def test_sum_reads_only_its_rows():
     x, y = np.full(700, np.nan), np.full(900, np.nan)
     x[100:400], y[555:855] = pair(2, 300)
     assert inner(x, y, 100, 555, 300) == written_order(x[100:400], y[555:855])
 
 
-def test_no_rows_sum_to_zero():
+def test_sum_of_no_rows_is_zero():
     assert inner(np.full(3, np.nan), np.full(3, np.nan), rows=0) == 0.0
 
 
-def test_adding_zeros_at_the_end_changes_nothing():
+def test_trailing_zeros_do_not_change_a_sum():
     x, y = pair(4, 300)
     longer = np.concatenate([x, np.zeros(1000)])
     assert inner(longer, np.concatenate([y, np.ones(1000)])) == inner(x, y)
 
 
 @pytest.mark.parametrize("length", [1, 256, 777])
-def test_a_total_is_the_inner_product_with_ones(length):
+def test_total_is_the_inner_product_with_ones(length):
     x, _ = pair(5, length)
     assert total(x) == written_order(x, np.ones(length))
 
 
-def test_the_total_of_nothing_is_zero():
+def test_total_of_an_empty_array_is_zero():
     assert total(np.empty(0)) == 0.0
 
 
 @pytest.mark.parametrize("place", [0, 300, 399])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_not_finite_is_not_lost(value, place):
+def test_non_finite_values_propagate(value, place):
     x, y = pair(6, 400)
     x[place] = value
     assert not math.isfinite(inner(x, y))

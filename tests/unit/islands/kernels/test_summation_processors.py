@@ -1,4 +1,4 @@
-"""Every sum has an order written in the source: no bit depends on the width of the processor's registers."""
+"""The source fixes the order of every sum: no bit depends on the width of the processor's registers."""
 
 import os
 import platform
@@ -8,14 +8,14 @@ import sys
 import pytest
 from llvmlite.binding import get_host_cpu_features
 
-#: Processors to compile for, and what the host has to have to run their code.
+#: Target processors, and the features that the host needs to run their code.
 PROCESSORS = {
     "nehalem": {"sse4.2", "popcnt"},
     "haswell": {"avx2", "fma", "bmi", "bmi2", "f16c", "lzcnt", "movbe"},
     "skylake-avx512": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl", "clwb", "adx"},
 }
 
-#: The registers that they have, the widest of them.
+#: Widest registers of each processor.
 REGISTERS = {"nehalem": "xmm", "haswell": "ymm", "skylake-avx512": "zmm"}
 
 DIGEST = """
@@ -85,10 +85,10 @@ print(max((name for name in ("xmm", "ymm", "zmm") if f"%{name}" in code), defaul
 
 
 def digest(folder, processor=None):
-    """Return the digest of every result, and the widest registers of the code that made them."""
+    """Return the digest of every result, and the widest registers of the code that computed them."""
     environment = os.environ | {"ISLANDS_CACHE_DIR": str(folder / (processor or "host"))}
     if processor:
-        # Without a list of features Numba would add the host's to those of the named processor.
+        # Without a list of features Numba would add those of the host.
         environment |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
     done = subprocess.run(
         [sys.executable, "-c", DIGEST], env=environment, capture_output=True, text=True, check=False
@@ -103,7 +103,7 @@ def digest(folder, processor=None):
 @pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="names of x86 processors")
 def test_bits_do_not_depend_on_the_processor(tmp_path):
     expected, _ = digest(tmp_path)
-    # The lags of u alone cannot meet the constraint; all else is well.
+    # The structure with lags of u only is infeasible; all others succeed.
     assert expected[0] == "clusters 1 width 104 status [0 0 0 4]"
     assert expected[5] == "free 1000 width 8 status [0 0 0 0]"
     assert len(expected) == 46

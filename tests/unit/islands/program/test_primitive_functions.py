@@ -1,4 +1,4 @@
-"""A primitive's row function is its Python function on every lane."""
+"""The row function of a primitive equals its Python function on every lane."""
 
 import ctypes
 import decimal
@@ -17,7 +17,7 @@ PROBES = [0.0, 1.0, -1.0, 0.3, -0.7, 2.5, -41.0, 60.0, 1e3, 1e-10, -1e-12]
 
 
 def run(entry, *arguments):
-    """Call the machine address on whole rows; returns the target row, one lane longer than was asked for."""
+    """Call the machine address on whole rows; return the target row, which has one additional lane."""
     function = ctypes.CFUNCTYPE(None, ROW, ROW, ROW, ctypes.c_int64)(row_address(entry))
     rows = [np.array(values) for values in (arguments[0], arguments[-1])]
     target = np.full(len(rows[0]) + 1, 99.0)
@@ -30,7 +30,7 @@ def expected(entry, *arguments):
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
-def test_every_row_function_is_its_scalar_function_on_every_lane(entry):
+def test_row_function_equals_its_scalar_function_on_every_lane(entry):
     pairs = [PROBES] if entry.arity == 1 else zip(*[(a, b) for a in PROBES for b in PROBES], strict=True)
     arguments = [list(values) for values in pairs]
     found = run(entry, *arguments)
@@ -38,7 +38,7 @@ def test_every_row_function_is_its_scalar_function_on_every_lane(entry):
     assert found[-1] == 99.0
 
 
-def test_a_users_function_runs_through_its_address():
+def test_user_defined_function_runs_through_its_address():
     def dead_zone(a, b):
         width = abs(b)
         return math.copysign(abs(a) - width, a) if abs(a) > width else 0.0
@@ -49,22 +49,22 @@ def test_a_users_function_runs_through_its_address():
     assert expected(entry, first, second) == [2.0, -2.0, 0.0, -4.5]
 
 
-def test_a_users_function_of_the_math_module_runs_through_its_address():
+def test_user_defined_math_function_runs_through_its_address():
     entry = primitive("arc", math.atan, parity=-1)
     np.testing.assert_allclose(run(entry, PROBES)[:-1], expected(entry, PROBES), rtol=4e-16)
 
 
-def test_a_users_function_may_give_whole_numbers():
+def test_user_defined_function_may_return_integers():
     entry = primitive("step", lambda a: 1 if a > 0 else 0)
     assert run(entry, [2.0, -2.0])[:-1].tolist() == [1.0, 0.0]
 
 
-def test_a_division_by_zero_that_no_probe_met_is_not_a_number_and_no_crash():
+def test_division_by_zero_gives_nan_without_a_crash():
     entry = primitive("pole", lambda a: (a - 0.125) / (a - 0.125))
     assert np.isnan(run(entry, [0.125, 3.0])[0])
 
 
-def test_a_function_that_does_not_compile_is_an_error_that_says_so():
+def test_uncompilable_function_is_refused():
     entry = primitive("slow", lambda a: float(decimal.Decimal(a)))
     with pytest.raises(
         ModelError, match="primitive 'slow' does not compile; use arithmetic, comparisons and math"
@@ -72,7 +72,7 @@ def test_a_function_that_does_not_compile_is_an_error_that_says_so():
         row_address(entry)
 
 
-def test_a_function_is_compiled_once_and_two_of_one_name_are_two():
+def test_functions_are_compiled_once_and_identified_by_object():
     entry = primitive("twice", lambda a: 2.0 * a)
     assert row_address(entry) == row_address(replace(entry, latex="2 {0}"))
     other = primitive("twice", lambda a: a + a + 1.0)

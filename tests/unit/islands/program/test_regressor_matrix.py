@@ -1,4 +1,4 @@
-"""The regressor matrix is the expressions' value row by row; the Gram matrix is its inner products."""
+"""The regressor matrix has the value of each expression per row; the Gram matrix its inner products."""
 
 import math
 
@@ -24,7 +24,7 @@ def of(text, table=PRIMITIVES):
 
 
 def ramp(segments):
-    """Sample numbers as the output, a hundred times them as the input."""
+    """Return a record with the sample index as output and a hundred times the index as input."""
     numbers = np.arange(sum(segments), dtype=float)
     return Dataset(100.0 * numbers, numbers, 0.1, segments=segments)
 
@@ -35,7 +35,7 @@ def noise(samples, segments=(), inputs=1):
 
 
 @given(records(longest=30), st.lists(regressors(), min_size=1, max_size=3))
-def test_the_regressor_matrix_is_the_terms_value_on_every_row(record, terms):
+def test_regressor_matrix_has_the_value_of_each_term_on_every_row(record, terms):
     warm_up = max(item.maximum_lag for item in terms)
     spans = [(begin + warm_up, end) for begin, end in record.bounds]
     samples = [sample for first, end in spans for sample in range(first, end)]
@@ -51,7 +51,7 @@ def test_the_regressor_matrix_is_the_terms_value_on_every_row(record, terms):
             assert expected is None or nearly(number, expected)
 
 
-def test_rows_begin_after_the_warm_up_of_every_segment():
+def test_rows_start_after_the_warm_up_of_every_segment():
     found = regressor_matrix([of("u(k-2)"), of("y(k-1)"), Lagged(0, 0)], ramp((5, 4)), 3)
     assert found.tolist() == [[100.0, 200.0, 600.0], [2.0, 3.0, 7.0], [3.0, 4.0, 8.0]]
 
@@ -60,7 +60,7 @@ def test_segments_no_longer_than_the_warm_up_have_no_rows():
     assert regressor_matrix([Lagged(0, 0)], ramp((3, 5, 2, 4)), 3).tolist() == [[6.0, 7.0, 13.0]]
 
 
-def test_a_row_reads_nothing_of_another_segment():
+def test_row_reads_nothing_of_another_segment():
     record = noise(60, (20, 40))
     terms = [of("y(k-1)*u(k-3)"), of("exp(u(k-5))")]
     spoiled = Dataset(
@@ -74,7 +74,7 @@ def test_a_row_reads_nothing_of_another_segment():
     assert not np.any(before[:, :15] == after[:, :15])
 
 
-def test_no_row_reads_the_present_or_the_future():
+def test_rows_do_not_read_the_present_or_the_future():
     record, terms = noise(40), [of("y(k-1)*u(k-2)"), of("tanh(u(k-1) - y(k-4))")]
     later = Dataset(
         np.append(record.u[:30, 0], record.u[30:, 0] + 9.0),
@@ -87,21 +87,21 @@ def test_no_row_reads_the_present_or_the_future():
 
 
 @pytest.mark.parametrize("samples", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK + 5])
-def test_stretches_of_rows_join_without_a_seam(samples):
+def test_stretches_of_rows_are_contiguous(samples):
     record = noise(samples + 2)
     found = regressor_matrix([of("y(k-1)*u(k-2)"), of("u(k-1) - u(k-2)"), of("3")], record, 2)
     y, u = record.y, record.u[:, 0]
     np.testing.assert_array_equal(found, [y[1:-1] * u[:-2], u[1:-1] - u[:-2], np.ones(samples)])
 
 
-def test_more_than_four_factors_and_constants_within():
+def test_terms_may_have_many_factors_and_constants():
     record = noise(30)
     found = regressor_matrix([of("y(k-1)^3*u(k-1)^3"), of("abs(2*y(k-1) + 0.5)")], record, 1)
     y, u = record.y[:-1], record.u[:-1, 0]
     np.testing.assert_allclose(found, [(y * u) ** 3, 2.0 * np.abs(y + 0.25) / 2.0], rtol=1e-14)
 
 
-def test_a_users_primitive_gives_the_numbers_of_its_python_function():
+def test_user_defined_primitive_equals_its_python_function():
     def backlash(a, b):
         return a - math.tanh(b) if a > b else a * b
 
@@ -121,7 +121,7 @@ SEGMENTS = ((1000,), (100, 300, 7, 593), (CHUNK + 3, CHUNK + 3, CHUNK + 3), (3 +
 
 
 def products(terms, record, warm_up):
-    """Return the columns' inner products, 32 stretches of every segment side by side, filled with zeros."""
+    """Return the inner products of the columns, in the order of 32 padded stretches per segment."""
     columns = regressor_matrix(terms, record, warm_up)
     rows = [end - begin - warm_up for begin, end in record.bounds if end - begin > warm_up]
     filled = side_by_side(columns, rows)
@@ -129,7 +129,7 @@ def products(terms, record, warm_up):
 
 
 @pytest.mark.parametrize("segments", SEGMENTS)
-def test_the_gram_matrix_is_the_inner_products_of_the_columns_bit_for_bit(segments):
+def test_gram_matrix_equals_the_inner_products_bit_for_bit(segments):
     record = noise(sum(segments), segments, inputs=2)
     terms = [
         of("y(k-1)"),
@@ -143,16 +143,16 @@ def test_the_gram_matrix_is_the_inner_products_of_the_columns_bit_for_bit(segmen
 
 
 @given(records(longest=400), st.lists(regressors(height=2), min_size=1, max_size=3))
-def test_the_gram_matrix_is_the_inner_products_whatever_the_segments(record, terms):
+def test_gram_matrix_equals_the_inner_products_for_any_segments(record, terms):
     warm_up = max(item.maximum_lag for item in terms)
     assume(max(record.segments) > warm_up)
     np.testing.assert_array_equal(gram_matrix(terms, record, warm_up), products(terms, record, warm_up))
 
 
-def test_the_rows_of_a_record_are_those_of_every_segment_after_its_warm_up():
+def test_estimation_rows_follow_the_warm_up_of_every_segment():
     found = evaluate_terms(ramp((3, 5, 2, 4)), 3)
     assert found.count == 3
-    # One stretch is at most one row long: two rows side by side, and one; a chunk for each segment.
+    # A stretch has at most one row: two rows in two lanes, and one; a chunk per segment.
     assert found.apart.tolist() == [1, 1]
     assert found.lanes.tolist() == [[2, *[0] * 7], [1, *[0] * 7]]
     assert found.row[:, 0].tolist() == [0, 2]
@@ -164,7 +164,7 @@ def test_the_rows_of_a_record_are_those_of_every_segment_after_its_warm_up():
     assert found.signals[0, found.offset[0] + 1] == 7.0
 
 
-def test_the_gram_matrix_of_a_ramp_worked_by_hand():
+def test_gram_matrix_of_a_ramp_equals_a_hand_calculation():
     # Rows 1 .. 3: y(k) = 1, 2, 3 and u(k-1) = 0, 100, 200.
     assert gram_matrix([of("u(k-1)"), Lagged(0, 0)], ramp((4,)), 1).tolist() == [
         [50000.0, 800.0],
@@ -173,7 +173,7 @@ def test_the_gram_matrix_of_a_ramp_worked_by_hand():
 
 
 @pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
-def test_a_missing_output_is_an_error_that_names_the_sample(matrix):
+def test_missing_output_is_refused_with_its_sample(matrix):
     y = np.arange(10.0)
     y[[6, 8]] = np.nan
     with pytest.raises(
@@ -183,7 +183,7 @@ def test_a_missing_output_is_an_error_that_names_the_sample(matrix):
 
 
 @pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
-def test_a_record_shorter_than_the_warm_up_is_an_error_that_names_both(matrix):
+def test_record_shorter_than_the_warm_up_is_refused_with_both_lengths(matrix):
     with pytest.raises(
         RecordError, match="the longest recording has 5 samples and 5 are needed before the first row"
     ):
@@ -192,21 +192,21 @@ def test_a_record_shorter_than_the_warm_up_is_an_error_that_names_both(matrix):
 
 @pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
 @pytest.mark.parametrize("warm_up", [-1, 0, 4])
-def test_a_warm_up_shorter_than_the_deepest_lag_is_refused(matrix, warm_up):
+def test_warm_up_shorter_than_the_largest_lag_is_refused(matrix, warm_up):
     with pytest.raises(SettingsError, match=f"the terms read 5 samples back, the warm-up has {warm_up}"):
         matrix([of("y(k-1)"), of("exp(u(k-5))")], ramp((20,)), warm_up)
 
 
 @pytest.mark.parametrize("matrix", [regressor_matrix, gram_matrix])
-def test_an_input_that_the_record_does_not_have_is_refused(matrix):
+def test_missing_input_is_refused(matrix):
     with pytest.raises(RecordError, match=f"the terms read input {INPUTS}, the record has 1"):
         matrix([of(f"y(k-1)*u{INPUTS}(k-1)")], ramp((20,)), 1)
 
 
-def test_a_constant_needs_no_warm_up():
+def test_constant_needs_no_warm_up():
     assert regressor_matrix([Constant(2.5)], ramp((2, 1)), 0).tolist() == [[2.5, 2.5, 2.5]]
 
 
-def test_no_terms_are_no_columns():
+def test_empty_list_of_terms_gives_no_columns():
     assert regressor_matrix([], ramp((4,)), 1).shape == (0, 3)
     assert gram_matrix([], ramp((4,)), 1).shape == (0, 0)

@@ -1,4 +1,4 @@
-"""The store knows an expression when it meets it again, and so computes it once."""
+"""The pool recognises equal expressions, so that each is computed once."""
 
 import math
 
@@ -29,19 +29,19 @@ def made(text, table=PRIMITIVES):
     return regressor(parse(text, table))[1]
 
 
-def taken(store):
-    """Return the store's nodes as tuples; nodes that nobody has taken are left out."""
-    nodes = store.nodes
-    count = len(store._indices)
+def used_nodes(pool):
+    """Return the nodes of the pool as tuples, without unused ones."""
+    nodes = pool.nodes
+    count = len(pool._indices)
     columns = (nodes.operation, nodes.first, nodes.second, nodes.address, nodes.value)
     return list(zip(*(column[:count].tolist() for column in columns), strict=True))
 
 
-def node_values(store, signal):
-    """Evaluate every node on single values, by the meaning of its operation."""
+def node_values(pool, signal):
+    """Evaluate every node on single values."""
     called = {row_address(entry): entry for entry in PRIMITIVES.values()}
     found = []
-    for operation, first, second, address, number in taken(store):
+    for operation, first, second, address, number in used_nodes(pool):
         if operation == LAGGED:
             found.append(signal(first, second))
         elif operation == CONSTANT:
@@ -55,26 +55,26 @@ def node_values(store, signal):
 
 
 @given(several, signals())
-def test_the_factors_of_a_term_multiply_to_the_value_of_the_expression(terms, signal):
+def test_factors_of_a_term_multiply_to_the_value_of_the_expression(terms, signal):
     try:
         expected = [value(item.expression, signal) for item in terms]
-    except ValueError:  # The sine of an infinite number.
+    except ValueError:  # the sine of an infinite value
         assume(False)
-    store = TermPool()
-    numbers = store.terms(terms)
-    nodes = node_values(store, signal)
-    for number, wanted in zip(numbers, expected, strict=True):
-        degree = store.nodes.degree[number]
+    pool = TermPool()
+    indices = pool.terms(terms)
+    nodes = node_values(pool, signal)
+    for number, wanted in zip(indices, expected, strict=True):
+        degree = pool.nodes.degree[number]
         assert 1 <= degree <= MAX_FACTORS
-        found = math.prod(nodes[factor] for factor in store.nodes.factors[number, :degree])
+        found = math.prod(nodes[factor] for factor in pool.nodes.factors[number, :degree])
         np.testing.assert_array_equal(found, wanted)
 
 
 @given(several)
-def test_equal_expressions_are_one_node_and_operands_stand_before_what_reads_them(terms):
-    store = TermPool()
-    store.terms(terms)
-    nodes = taken(store)
+def test_equal_expressions_share_a_node_and_operands_precede_readers(terms):
+    pool = TermPool()
+    pool.terms(terms)
+    nodes = used_nodes(pool)
     assert len(set(nodes)) == len(nodes)
     for number, (operation, first, second, *_) in enumerate(nodes):
         if operation >= 0:
@@ -82,47 +82,47 @@ def test_equal_expressions_are_one_node_and_operands_stand_before_what_reads_the
 
 
 @given(several, several)
-def test_what_is_known_keeps_its_number_and_adds_no_node(terms, others):
-    store = TermPool()
-    numbers = store.terms(terms).tolist()
-    store.terms(others)
-    size, nodes = len(store), len(taken(store))
-    assert store.terms(terms).tolist() == numbers
-    assert (len(store), len(taken(store))) == (size, nodes)
+def test_known_terms_keep_their_index_and_add_no_node(terms, others):
+    pool = TermPool()
+    indices = pool.terms(terms).tolist()
+    pool.terms(others)
+    size, nodes = len(pool), len(used_nodes(pool))
+    assert pool.terms(terms).tolist() == indices
+    assert (len(pool), len(used_nodes(pool))) == (size, nodes)
     texts = [item.text for item in terms]
-    assert len(set(numbers)) == len(set(texts))
+    assert len(set(indices)) == len(set(texts))
     assert size == len({item.text for item in (*terms, *others)})
 
 
 @given(several, several)
-def test_a_program_does_not_depend_on_what_else_the_store_knows(terms, others):
-    """Whatever came before: the nodes have other numbers, the program is the same."""
-    store = TermPool()
-    store.terms(others)
-    numbers = store.terms(terms)
-    operand_index = np.full(store.nodes.operation.size, -1, np.int64)
+def test_program_does_not_depend_on_other_terms_of_the_pool(terms, others):
+    """The nodes have other indices, the program is the same."""
+    pool = TermPool()
+    pool.terms(others)
+    indices = pool.terms(terms)
+    operand_index = np.full(pool.nodes.operation.size, -1, np.int64)
     for found, expected in zip(
-        codegen.generate_program(store.nodes, numbers, operand_index), link(terms), strict=True
+        codegen.generate_program(pool.nodes, indices, operand_index), link(terms), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
     assert (operand_index == -1).all()
 
 
-def test_a_store_grows_and_keeps_what_it_knows():
-    store = TermPool()
+def test_pool_grows_and_keeps_its_terms():
+    pool = TermPool()
     texts = [f"exp({factor}*u(k-{lag})) + y(k-1)" for factor in range(2, 30) for lag in range(1, 40)]
-    numbers = store.terms([made(text) for text in texts]).tolist()
-    assert numbers == list(range(len(texts)))
-    assert len(store) == len(texts) > 1024
-    assert len(taken(store)) > 4 * 256
-    values = node_values(store, lambda channel, lag: 1.0 / lag if channel else 2.0)
+    indices = pool.terms([made(text) for text in texts]).tolist()
+    assert indices == list(range(len(texts)))
+    assert len(pool) == len(texts) > 1024
+    assert len(used_nodes(pool)) > 4 * 256
+    values = node_values(pool, lambda channel, lag: 1.0 / lag if channel else 2.0)
     for number, text in ((0, texts[0]), (500, texts[500]), (len(texts) - 1, texts[-1])):
         expected = value(made(text).expression, lambda channel, lag: 1.0 / lag if channel else 2.0)
-        assert values[store.nodes.factors[number, 0]] == expected
+        assert values[pool.nodes.factors[number, 0]] == expected
 
 
-def test_a_deep_expression_and_many_nodes_are_linked():
-    """Deeper than the linker's stack is at first, and of more nodes than it has room for at first."""
+def test_deep_expression_and_many_nodes_give_a_program():
+    """The expression is deeper than the initial stack, and has more nodes than the initial array."""
     text = "u(k-1)"
     for lag in range(1, 60):
         text = f"tanh({text} - y(k-{lag}))"
@@ -131,15 +131,15 @@ def test_a_deep_expression_and_many_nodes_are_linked():
     assert len(wide.code) == 199 + 199 + 198
 
 
-def test_a_number_of_the_store_is_found_for_an_expression_as_for_its_regressor():
-    store, item = TermPool(), made("y(k-1)*exp(u(k-1))")
-    assert store.term(item) == store.term(item.expression) == 0
-    assert store.term(Lagged(0, 0)) == 1
-    assert store.term(Constant(2.5)) == 2
-    assert store.terms([]).shape == (0,)
+def test_expression_and_its_regressor_have_the_same_index():
+    pool, item = TermPool(), made("y(k-1)*exp(u(k-1))")
+    assert pool.term(item) == pool.term(item.expression) == 0
+    assert pool.term(Lagged(0, 0)) == 1
+    assert pool.term(Constant(2.5)) == 2
+    assert pool.terms([]).shape == (0,)
 
 
-def test_two_functions_of_one_name_in_two_stores_are_called_each_at_its_own_address():
+def test_functions_with_one_name_in_two_pools_keep_their_addresses():
     one, other = primitive("own", lambda a: a + 1.0), primitive("own", lambda a: a + 2.0)
     found = [
         link([made("own(u(k-1))", {**PRIMITIVES, "own": entry})]).addresses.tolist() for entry in (one, other)

@@ -1,4 +1,4 @@
-"""The linker's programs, read by an interpreter of ten lines."""
+"""Generated programs, executed by an interpreter of ten lines."""
 
 import math
 
@@ -36,7 +36,7 @@ def called():
 
 
 def interpreted(program, signal, operations, called, product=math.prod):
-    """Carry a program out on single values; returns the terms and, in order, what was computed."""
+    """Execute a program on single values; return the terms and the computed values in order."""
     rows = [*program.constants.tolist(), *[None] * (program.temporaries - len(program.constants))]
     computed = []
 
@@ -54,17 +54,17 @@ def interpreted(program, signal, operations, called, product=math.prod):
 
 
 @given(several, signals())
-def test_a_program_computes_its_terms_whatever_rows_are_reused(called, terms, signal):
+def test_program_computes_its_terms_despite_reused_rows(called, terms, signal):
     try:
         expected = [value(item.expression, signal) for item in terms]
-    except ValueError:  # The sine of an infinite number.
+    except ValueError:  # the sine of an infinite value
         assume(False)
     found, _ = interpreted(link(terms), signal, NUMBERS, called)
     np.testing.assert_array_equal(found, expected)
 
 
 @given(several)
-def test_nothing_is_computed_twice(called, terms):
+def test_no_expression_is_computed_twice(called, terms):
     def written(name):
         return lambda *arguments: f"{name}({', '.join(map(str, arguments))})"
 
@@ -80,7 +80,7 @@ def test_nothing_is_computed_twice(called, terms):
 
 
 @given(several)
-def test_a_target_is_never_the_row_of_an_operand_or_of_a_constant(terms):
+def test_target_is_never_the_row_of_an_operand_or_constant(terms):
     program = link(terms)
     for _, target, first, second in program.code:
         assert target >= len(program.constants)
@@ -109,7 +109,7 @@ def operations(program):
     return program.code[:, 0].tolist()
 
 
-def test_a_shared_subexpression_is_computed_once():
+def test_shared_subexpression_is_computed_once():
     alone = linked("exp(u(k-1) - u(k-2))*y(k-1)")
     both = linked("exp(u(k-1) - u(k-2))*y(k-1)", "tanh(exp(u(k-1) - u(k-2)))", "u(k-1) - u(k-2)")
     assert operations(alone) == [SUBTRACT, CALL]
@@ -117,19 +117,19 @@ def test_a_shared_subexpression_is_computed_once():
 
 
 @pytest.mark.parametrize("text", ["sign(u(k-1) - u(k-2))", "phi2(u(k-1), u(k-2))"])
-def test_the_sign_of_a_difference_is_one_instruction(text):
+def test_sign_of_a_difference_is_one_instruction(text):
     assert operations(linked(text)) == [SIGN_OF_DIFFERENCE]
     assert operations(linked("sign(u(k-1)*y(k-2))")) == [SIGN_OF_PRODUCT]
     assert operations(linked("sign(u(k-1)*u(k-2)*y(k-2))")) == [MULTIPLY, SIGN_OF_PRODUCT]
     assert operations(linked("sign(u(k-1) + u(k-2))")) == [ADD, SIGN]
 
 
-def test_a_negative_summand_is_subtracted():
+def test_negative_summand_is_subtracted():
     assert operations(linked("u(k-1) - u(k-2) + u(k-3)")) == [SUBTRACT, ADD]
     assert operations(linked("u(k-1) - u(k-2)*y(k-1) + u(k-3)")) == [ADD, MULTIPLY, SUBTRACT]
 
 
-def test_long_products_share_what_they_have_in_common():
+def test_long_products_share_common_factors():
     program = linked("y(k-1)^6", "y(k-1)^7")
     assert operations(program) == [MULTIPLY] * 3
 
@@ -154,14 +154,14 @@ def test_more_than_four_factors_are_multiplied_beforehand(power):
     assert found == [3.0**power]
 
 
-def test_constants_stand_in_the_first_rows_each_once():
+def test_constants_occupy_the_first_rows_once_each():
     program = linked("exp(2*u(k-1))", "tanh(2*y(k-1) + 10)", "1")
     assert program.constants.tolist() == [2.0, 5.0, 1.0]
     assert program.temporaries > 3
     assert program.operands[program.factors[2, 0]].tolist() == [TEMPORARY, 2]
 
 
-def test_a_row_is_taken_again_when_its_value_is_dead():
+def test_row_is_reused_after_the_last_read_of_its_value():
     text = "u(k-1)"
     for _ in range(10):
         text = f"tanh({text} + y(k-1))"
@@ -170,18 +170,18 @@ def test_a_row_is_taken_again_when_its_value_is_dead():
     assert program.temporaries == 2
 
 
-def test_terms_stand_in_the_order_given():
+def test_terms_keep_the_given_order():
     program = linked("u(k-3)", "y(k-1)", "u(k-3)", "u2(k-1)")
     heads = program.operands[program.factors[:, 0]].tolist()
     assert heads == [[1, 3], [0, 1], [1, 3], [2, 1]]
 
 
-def test_a_bare_expression_may_be_the_present():
+def test_expression_may_read_the_present():
     program = link([Lagged(0, 0)])
     assert program.operands[program.factors[0, 0]].tolist() == [0, 0]
 
 
-def test_no_terms_are_an_empty_program():
+def test_empty_list_of_terms_gives_an_empty_program():
     program = link([])
     assert [array.shape for array in (program.code, program.operands, program.factors, program.degree)] == [
         (0, 4),
@@ -191,7 +191,7 @@ def test_no_terms_are_an_empty_program():
     ]
 
 
-def test_the_same_terms_give_the_same_program():
+def test_same_terms_give_the_same_program():
     texts = ("exp(u(k-1))*y(k-2)", "sign(u(k-1) - u(k-2))*u(k-1)", "max(y(k-1), 2)")
     for one, other in zip(linked(*texts), linked(*texts), strict=True):
         np.testing.assert_array_equal(one, other)

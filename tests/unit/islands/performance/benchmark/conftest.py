@@ -1,4 +1,4 @@
-"""A small record and a few individuals of every drawn kind."""
+"""A small record and a few individuals of each random kind."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ WARM_UP, INTERVAL = 26, 20
 
 @pytest.fixture(scope="session")
 def record():
-    """Whole intervals alone, and more of them than a row of compiled C has lanes."""
+    """Return a record of whole intervals only, more of them than a row of compiled C has lanes."""
     rng = np.random.default_rng(5)
     samples = WARM_UP + 130 * INTERVAL
     u = np.cumsum(rng.normal(size=samples)) / 20

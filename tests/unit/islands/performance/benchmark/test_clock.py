@@ -1,4 +1,4 @@
-"""Clocks: what a time is of, and that threads of the linear algebra are refused."""
+"""Clocks, and the refusal of a multithreaded linear algebra library."""
 
 import multiprocessing
 import os
@@ -20,11 +20,11 @@ def busy(seconds):
 
 
 @pytest.mark.parametrize("seconds", [0.0005, 0.01])
-def test_milliseconds_are_of_one_call(seconds):
+def test_milliseconds_returns_the_time_of_one_call(seconds):
     assert milliseconds(lambda: busy(seconds)) == pytest.approx(1e3 * seconds, rel=0.5)
 
 
-def test_the_first_call_is_not_measured():
+def test_first_call_is_not_measured():
     waits = [0.2]
     calls = []
 
@@ -36,7 +36,7 @@ def test_the_first_call_is_not_measured():
     assert len(calls) >= 4
 
 
-def test_waiting_takes_time_on_the_wall_alone():
+def test_waiting_takes_only_wall_clock_time():
     began_cpu, began = cpu(), wall()
     time.sleep(0.05)
     assert wall() - began >= 0.05

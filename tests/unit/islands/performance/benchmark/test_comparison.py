@@ -1,4 +1,4 @@
-"""The comparison: every side is measured, and sides that do different work are refused."""
+"""Comparison: every implementation is measured, and different work is refused."""
 
 from dataclasses import asdict, replace
 
@@ -24,7 +24,7 @@ def state():
     return kernel_evaluator.prepare_record(benchmark_record(3_000))
 
 
-def test_our_error_counts_whole_intervals_alone(state):
+def test_kernel_error_counts_only_whole_intervals(state):
     (one,) = random_workload(monomial, 1)
     whole = state.record[: WARM_UP + 5 * INTERVAL]
     simulated = multiple_shooting(Model(one.regressors, one.theta), whole, INTERVAL, WARM_UP)
@@ -36,8 +36,8 @@ def test_our_error_counts_whole_intervals_alone(state):
 
 @pytest.mark.parametrize("cached", [False, True])
 @pytest.mark.parametrize("pruned", [False, True])
-def test_our_evaluation_simulates_the_parameters_given(state, pruned, cached):
-    """Those of least squares may diverge, and a simulation that ends early would flatter us."""
+def test_kernel_evaluation_simulates_the_given_parameters(state, pruned, cached):
+    """Estimated parameters may diverge, and a simulation that ends early would flatter the kernels."""
     (one,) = random_workload(monomial, 1)
     kernel_evaluator._evaluation(state, one, pruned, cached)()
     growing = replace(one, theta=(1.5, *one.theta[1:]))
@@ -46,27 +46,27 @@ def test_our_evaluation_simulates_the_parameters_given(state, pruned, cached):
 
 
 def test_every_time_of_every_side_is_measured(state, tmp_path):
-    told = []
-    found = comparison.compare(random_workload(monomial, 2, terms=3), state, 1, tmp_path, told.append)
-    assert told == [0.5, 1.0]
+    fractions = []
+    found = comparison.compare(random_workload(monomial, 2, terms=3), state, 1, tmp_path, fractions.append)
+    assert fractions == [0.5, 1.0]
     times = asdict(found)
     without = {"c_simulation_ms", "simulation_fraction_of_c"} if find_compiler() is None else set()
     assert {name for name, time in times.items() if time is None} == without
     assert all(time > 0.0 for name, time in times.items() if name not in without)
 
 
-def test_without_a_compiler_its_times_are_absent(state, tmp_path, monkeypatch):
+def test_times_of_c_are_absent_without_a_compiler(state, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     found = comparison.compare(random_workload(monomial, 1, terms=2), state, 1, tmp_path, lambda _share: None)
     assert found.c_simulation_ms is None
     assert found.simulation_fraction_of_c is None
     assert found.simulation_ms > 0.0
-    # Of one individual the rate belongs to the time: three columns, six pairs, two operations for each row.
+    # Rate of one individual: three columns, six pairs, two operations per row.
     assert found.gram_flops * found.gram_ms == pytest.approx(1e3 * 2 * 6 * (3_000 - WARM_UP), rel=1e-9)
 
 
 @pytest.mark.parametrize("side", ["plain numpy", "compiled C"])
-def test_a_side_that_simulates_another_model_is_refused(state, tmp_path, monkeypatch, side):
+def test_implementation_that_simulates_another_model_is_refused(state, tmp_path, monkeypatch, side):
     if side == "compiled C" and find_compiler() is None:
         pytest.skip("no C compiler is called cc")
     module = comparison.plain_numpy if side == "plain numpy" else comparison.compiled_c

@@ -1,4 +1,4 @@
-"""Infix text says what the expression says."""
+"""Infix source has the value of the expression."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def _over(below):
 
 
 @given(expression=st.recursive(_LEAVES, _over, max_leaves=12), signal=signals())
-def test_python_reads_the_value_of_every_canonical_expression(expression, signal):
+def test_python_source_has_the_value_of_the_expression(expression, signal):
     _, item = regressor(expression)
     if item is None:
         return
@@ -38,12 +38,12 @@ def test_python_reads_the_value_of_every_canonical_expression(expression, signal
     assert read == value(item.expression, signal)
 
 
-def test_a_negative_number_and_a_difference_keep_their_brackets():
+def test_negative_number_and_difference_keep_their_brackets():
     expression = Apply(MUL, (Constant(-0.5), Apply(SUB, (Lagged(0), Lagged(1, 2)))))
     assert infix(expression, lambda channel, lag: f"{'yu'[channel]}{lag}") == "((-0.5)*(y1 - u2))"
 
 
 @pytest.mark.parametrize("text", ["tanh(y(k-1))", "y(k-1)*max(u(k-1), u(k-2))"])
-def test_a_function_that_the_yardsticks_do_not_know_is_refused(text):
+def test_function_unknown_to_the_baselines_is_refused(text):
     with pytest.raises(ModelError, match="products, sums, differences and signs"):
         infix(regressor(parse(text))[1].expression, lambda _channel, lag: f"s{lag}")

@@ -1,4 +1,4 @@
-"""Timed searches: they are the search itself, and count what it did."""
+"""Timed searches evaluate the same individuals as a search and count them."""
 
 from dataclasses import replace
 
@@ -20,26 +20,26 @@ def piezo():
     return benchmark_record(2_000)
 
 
-def test_two_islands_are_the_papers_population():
+def test_two_islands_have_the_papers_population():
     assert (ISLAND.population, ISLAND.generations) == (250, 500)
 
 
-def test_a_timed_search_evaluates_what_the_engine_does(piezo):
-    told = []
-    found = run_island(piezo, SMALL, 0, told.append)
+def test_timed_search_evaluates_the_individuals_of_the_engine(piezo):
+    fractions = []
+    found = run_island(piezo, SMALL, 0, fractions.append)
     epochs = SerialEngine().run(Problem(piezo, SMALL), empty_archipelago(1, 0), lambda: False)
     assert found.evaluations == sum(info.evaluations for epoch in epochs for info in epoch.steps[0]) == 40
-    assert told == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert fractions == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert 0.0 < found.evaluating_cpu_s < found.cpu_s
     assert found.wall_s > 0.0
     assert all(size > 0 for size in found.caches.values())
     assert found.caches
 
 
-def test_duplicates_are_offspring_that_the_evaluator_knew_already(piezo):
-    """What a benchmark saves by a cache is not what an island says of its offspring.
+def test_duplicates_are_offspring_with_a_known_structure(piezo):
+    """The duplicates of a benchmark differ from those that an island reports.
 
-    Nor is an individual of before that is evaluated to its end one of the offspring.
+    Abandoned individuals that are evaluated to the end are not offspring.
     """
 
     class Counting(Evaluator):
@@ -51,17 +51,17 @@ def test_duplicates_are_offspring_that_the_evaluator_knew_already(piezo):
             self.others += known if bars is None else 0
             return found, known
 
-    # Where anyone may win, those who were abandoned do, some of them again and again.
+    # In tournaments of size one abandoned individuals win as well, some of them repeatedly.
     setting = replace(SMALL, population=20, generations=12, tournament=1)
     evaluator = Counting(piezo, setting)
     island, info = first_generation(0, 0, evaluator)
-    told = info.duplicates
+    reported = info.duplicates
     while island.generation < setting.generations:
         island, info = step(island, evaluator)
-        told += info.duplicates
+        reported += info.duplicates
     assert evaluator.others > 0
     found = run_island(piezo, setting, 0)
-    assert found.duplicates == evaluator.offspring != told
+    assert found.duplicates == evaluator.offspring != reported
     assert found.evaluations == 13 * 20
 
 
@@ -71,13 +71,13 @@ def test_rates_are_counts_over_times():
     )
     assert run.per_cpu_second == 500.0
     assert run.per_second == 250.0
-    # Duplicates are no evaluations: what they save is not counted for the kernels.
+    # Duplicates are not evaluated: they do not count for the kernels.
     assert run.amortised_ms == 2.0
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("warm", [False, True])
-def test_processes_run_the_same_searches_as_this_one(piezo, warm):
+def test_separate_processes_run_the_same_searches(piezo, warm):
     seconds, runs = run_in_processes(piezo, SMALL, [0, 1], warm)
     here = [run_island(piezo, SMALL, index) for index in (0, 1)]
     assert [(run.evaluations, run.duplicates) for run in runs] == [

@@ -1,4 +1,4 @@
-"""The yardstick does the same work as ours: same columns, same selection, same estimate, same error."""
+"""The baseline does the same work as the kernels: same columns, selection, estimate and error."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ from islands.simulation.predictors import multiple_shooting
 WARM_UP, INTERVAL = 26, 20
 
 
-def test_columns_are_those_of_the_regressor_matrix(record, candidates):
+def test_columns_equal_the_regressor_matrix(record, candidates):
     for each in candidates:
         matrix = plain_numpy.columns(each.regressors, record, WARM_UP)
         assert_allclose(matrix, regressor_matrix(each.regressors, record, WARM_UP).T, rtol=1e-12, atol=1e-300)
 
 
-def test_the_simulation_is_that_of_multiple_shooting(record, candidates):
+def test_simulation_equals_multiple_shooting(record, candidates):
     predicted = record.samples - WARM_UP
     for each in candidates:
         model = Model(each.regressors, each.theta)
@@ -29,7 +29,7 @@ def test_the_simulation_is_that_of_multiple_shooting(record, candidates):
         assert error == pytest.approx(expected, rel=1e-10)
 
 
-def test_an_interval_that_is_not_whole_is_left_out(record, candidates):
+def test_incomplete_interval_is_omitted(record, candidates):
     one = candidates[0]
     whole = plain_numpy.simulate(
         one.regressors, one.theta, record[: WARM_UP + 2 * INTERVAL], WARM_UP, INTERVAL
@@ -40,7 +40,7 @@ def test_an_interval_that_is_not_whole_is_left_out(record, candidates):
     assert cut == whole
 
 
-def test_the_selection_is_that_of_froe(record, candidates):
+def test_selection_equals_froe(record, candidates):
     for each in candidates[:3]:
         matrix = plain_numpy.columns(each.regressors, record, WARM_UP)
         gram = gram_matrix([*each.regressors, Lagged(0, 0)], record, WARM_UP)
@@ -50,7 +50,7 @@ def test_the_selection_is_that_of_froe(record, candidates):
         assert 0 < len(selected) < len(each.regressors)
 
 
-def test_selection_leaves_the_matrix_as_it_was(record, candidates):
+def test_selection_does_not_change_the_matrix(record, candidates):
     matrix = plain_numpy.columns(candidates[0].regressors, record, WARM_UP)
     before = matrix.copy()
     plain_numpy.select(matrix, record.y[WARM_UP:])
@@ -58,9 +58,7 @@ def test_selection_leaves_the_matrix_as_it_was(record, candidates):
 
 
 @pytest.mark.parametrize("pruned", [False, True])
-def test_an_evaluation_estimates_by_least_squares_and_simulates_the_parameters_given(
-    record, candidates, pruned
-):
+def test_evaluation_uses_least_squares_and_the_given_parameters(record, candidates, pruned):
     one = candidates[0]
     estimated, error = plain_numpy.evaluate(one.regressors, one.theta, record, WARM_UP, INTERVAL, pruned)
     psi = regressor_matrix(one.regressors, record, WARM_UP)

@@ -1,4 +1,4 @@
-"""The report: the document has every key that is asked for, and goals are met or not."""
+"""Report: keys of the document, and goals that are met or missed."""
 
 import json
 from dataclasses import replace
@@ -12,7 +12,7 @@ from islands.performance.benchmark.scaling import Scaling
 from support.made_reports import KINDS, POINTS, comparison, report
 
 
-def test_the_document_has_every_key_and_is_json():
+def test_document_has_every_key_and_is_json():
     found = json.loads(json.dumps(to_document(report())))
     assert found["evaluation_ratio_numpy_uncached"] == pytest.approx(80.0)
     # The search took 8 s for 100 000 new structures.
@@ -36,7 +36,7 @@ def test_the_document_has_every_key_and_is_json():
     assert set(found["kinds"]) == set(KINDS)
 
 
-def test_the_single_numbers_are_those_of_a_search():
+def test_single_values_are_those_of_a_search():
     kinds = {
         "poly": comparison(uncached_ms=1.0, simulation_fraction_of_c=0.1, gram_flops=1e10),
         "general": comparison(uncached_ms=1.0, simulation_fraction_of_c=0.1, gram_flops=1e10),
@@ -82,17 +82,17 @@ def kinds(**changed):
         ({"scalings": (BENT,)}, "against samples is a line"),
     ],
 )
-def test_a_figure_that_is_short_misses_its_goal_and_no_other(changes, missed):
+def test_insufficient_value_misses_only_its_goal(changes, missed):
     short = [text for text, reached in met(report(**changes)).items() if reached is False]
     assert len(short) == 1
     assert missed in short[0]
 
 
-def test_the_goal_for_general_trees_is_lower():
+def test_goal_for_general_trees_is_lower():
     assert set(met(report(kinds=kinds(general=comparison(uncached_ms=24.0 / 46)))).values()) == {True}
 
 
-def test_what_was_not_measured_is_neither_met_nor_missed():
+def test_goal_without_a_measurement_is_neither_met_nor_missed():
     without = {kind: comparison(c_simulation_ms=None, simulation_fraction_of_c=None) for kind in KINDS}
     changed = report(kinds=without, peak_flops=None, case1_wall_s=None)
     unknown = [text for text, reached in met(changed).items() if reached is None]
@@ -104,7 +104,7 @@ def test_what_was_not_measured_is_neither_met_nor_missed():
     assert shown == {"no C compiler", "not measured"}
 
 
-def test_a_machine_is_described():
+def test_machine_is_described():
     found = this_machine()
     assert found.processor
     assert found.cores >= 1

@@ -1,4 +1,4 @@
-"""Scalings: lines, points in order, and figures that say what they show."""
+"""Scalings: lines, ordered points, and labelled figures."""
 
 import itertools
 
@@ -22,14 +22,14 @@ numbers = st.floats(-100.0, 100.0)
 
 
 @given(intercept=numbers, slope=st.floats(0.1, 100.0))
-def test_points_on_a_line_give_that_line(intercept, slope):
+def test_line_through_collinear_points_is_exact(intercept, slope):
     found = line_through(tuple((x, intercept + slope * x) for x in (1.0, 2.0, 5.0, 9.0)))
     assert found.slope == pytest.approx(slope, rel=1e-9)
     assert found.intercept == pytest.approx(intercept, abs=1e-9 * (100.0 + abs(intercept)))
     assert found.r2 == pytest.approx(1.0, abs=1e-9)
 
 
-def test_a_line_explains_what_it_can():
+def test_line_has_the_expected_r2():
     # y = x**2 on 0, 1, 2: the line 2 x - 1/3 leaves 2/3 of 26/3.
     found = line_through(((0.0, 0.0), (1.0, 1.0), (2.0, 4.0)))
     assert found.slope == pytest.approx(2.0)
@@ -37,7 +37,7 @@ def test_a_line_explains_what_it_can():
     assert found.r2 == pytest.approx(1 - (2 / 3) / (26 / 3))
 
 
-def test_a_cost_that_never_changes_is_a_line():
+def test_constant_cost_is_a_line():
     assert line_through(((1.0, 3.0), (2.0, 3.0), (5.0, 3.0))).r2 == 1.0
 
 
@@ -49,13 +49,13 @@ def piezo():
 def test_every_cost_is_measured_at_every_point(piezo, monkeypatch):
     monkeypatch.setattr(scaling, "TERMS", (2, 4))
     monkeypatch.setattr(scaling, "HEIGHTS", (1, 2))
-    state, told = kernel_evaluator.prepare_record(piezo), []
+    state, fractions = kernel_evaluator.prepare_record(piezo), []
     found = [
-        scaling.against_samples(piezo, 1, told.append),
-        scaling.against_terms(state, 1, told.append),
-        scaling.against_tree_size(state, 1, told.append),
+        scaling.against_samples(piezo, 1, fractions.append),
+        scaling.against_terms(state, 1, fractions.append),
+        scaling.against_tree_size(state, 1, fractions.append),
     ]
-    assert told == [0.5, 1.0] * 3
+    assert fractions == [0.5, 1.0] * 3
     assert [each.name for each in found] == ["samples", "terms", "tree_size"]
     for each in found:
         assert set(each.curves) == {"nothing cached", "inner products cached"}
@@ -73,7 +73,7 @@ def run(evaluations, wall_s):
     return Run(evaluations, 0, 1.0, wall_s, 0.5, {})
 
 
-def test_islands_add_up_their_individuals_per_second():
+def test_individuals_per_second_of_islands_are_added():
     found = against_islands({2: (run(100, 2.0), run(100, 4.0)), 1: (run(100, 1.0),)})
     assert found.curves == {"all islands together": ((1.0, 100.0), (2.0, 75.0))}
 
@@ -97,7 +97,7 @@ def example(request):
     return EXAMPLES[request.param]
 
 
-def test_a_figure_shows_points_line_and_units(example):
+def test_figure_shows_points_line_and_units(example):
     (axes,) = draw_scaling(example).axes
     assert axes.get_xlabel() == example.x_label
     assert axes.get_ylabel() == example.y_label
@@ -113,7 +113,7 @@ def test_a_figure_shows_points_line_and_units(example):
     assert axes.get_xlim()[0] == axes.get_ylim()[0] == 0.0
 
 
-def test_figures_are_files_named_by_what_a_cost_grows_with(tmp_path):
+def test_figures_are_files_named_after_the_scaling(tmp_path):
     written = save_scalings(EXAMPLES.values(), tmp_path / "new" / "folder")
     assert [path.name for path in written] == ["samples.svg", "islands.svg"]
     for path in written:

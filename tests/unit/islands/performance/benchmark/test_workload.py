@@ -1,4 +1,4 @@
-"""The workload: the same individuals in every run, and a hash that tells when they are not."""
+"""Workload: reproducible individuals and their hash."""
 
 from dataclasses import replace
 from math import isfinite
@@ -34,13 +34,13 @@ def kinds(count=2):
     return {"poly": random_workload(monomial, count), "general": random_workload(tree, count)}
 
 
-def test_a_hash_is_the_same_twice_and_pinned():
-    # A change here makes every earlier report incomparable: the yardstick's work is another one.
+def test_workload_hash_is_reproducible_and_pinned():
+    # A change here makes all earlier reports incomparable, because the baseline does other work.
     assert fingerprint(kinds()) == fingerprint(kinds())
     assert fingerprint(kinds(30)).startswith("0023c13333ef")
 
 
-def test_a_hash_knows_every_kind_every_individual_and_every_term():
+def test_workload_hash_depends_on_kinds_individuals_and_terms():
     one = kinds()
     first = one["poly"][0]
     fewer = WorkloadModel(first.regressors[:-1], first.theta[:-1], first.constraints)
@@ -54,14 +54,14 @@ def test_a_hash_knows_every_kind_every_individual_and_every_term():
     assert len(hashes) == 1 + len(others)
 
 
-def test_text_names_what_is_measured():
+def test_workload_text_lists_kinds_individuals_and_terms():
     text = candidate_text({"poly": random_workload(monomial, 1, terms=1)})
     assert text.splitlines() == ["100000 samples", "poly", "individual", "y(k-1)"]
 
 
 @pytest.mark.parametrize("make", [monomial, tree])
 @pytest.mark.parametrize("terms", [1, 10])
-def test_drawn_individuals_have_so_many_different_terms_and_y(make, terms):
+def test_random_individuals_have_distinct_terms_and_y(make, terms):
     for each in random_workload(make, 4, terms):
         assert len(each.regressors) == len(set(each.regressors)) == len(each.theta) == terms
         assert each.regressors[0].text == "y(k-1)"
@@ -71,12 +71,12 @@ def test_drawn_individuals_have_so_many_different_terms_and_y(make, terms):
         Model(each.regressors, each.theta)
 
 
-def test_more_individuals_begin_with_the_same_ones():
+def test_larger_workload_starts_with_the_same_individuals():
     assert random_workload(tree, 5)[:2] == random_workload(tree, 2)
 
 
 @pytest.mark.parametrize("edges", [0, 1, 3])
-def test_a_full_tree_has_every_leaf_at_its_height(edges):
+def test_full_tree_has_every_leaf_at_its_height(edges):
     import random
 
     def depths(expression, depth=0):
@@ -95,13 +95,13 @@ def piezo():
     return benchmark_record(12_000)
 
 
-def test_the_record_is_in_units_of_three_times_its_spread(piezo):
+def test_record_is_in_units_of_three_standard_deviations(piezo):
     assert piezo.samples == 12_000
     assert piezo.y.std() == pytest.approx(1 / 3, rel=0.2)
     assert benchmark_record(500).y.tolist() == piezo.y[:500].tolist()
 
 
-def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo):
+def test_evolved_individuals_are_reproducible_and_bounded(piezo):
     short = replace(ISLAND, population=12, generations=6)
     found = evolved_workload(piezo, 4, short)
     assert found == evolved_workload(piezo, 4, short)
@@ -113,20 +113,20 @@ def test_individuals_of_a_search_are_the_same_twice_and_stay_bounded(piezo):
         assert isfinite(simulated.mean_squared_error)
 
 
-def test_individuals_of_a_search_come_from_its_whole_course(piezo, monkeypatch):
+def test_evolved_individuals_are_spread_over_the_search(piezo, monkeypatch):
     asked = []
     monkeypatch.setattr(module, "_find_bounded", lambda individuals, _evaluator: asked.append(individuals))
     evolved_workload(piezo, 3, replace(ISLAND, population=12, generations=8))
     bred = asked[-1][::-1]
-    # Nine populations, less those whose structure was known.
+    # Nine populations without the duplicates.
     assert 12 < len(bred) <= 9 * 12
     assert [each[0] for each in asked] == [bred[len(bred) // 3 - 1], bred[2 * len(bred) // 3 - 1], bred[-1]]
     assert all(genes.genes for genes in bred)
 
 
-def test_an_individual_that_diverges_gives_way_to_the_next(piezo):
+def test_diverging_individual_is_replaced_by_the_next(piezo):
     evaluator = Evaluator(piezo, ISLAND)
-    # Without y(k-1) the parameters' sum can't be one.
+    # Without y(k-1) the sum of the parameters can't be one.
     infeasible = Individual((parse("u(k-1)"),))
     usable = Individual((parse("y(k-1)"), parse("y(k-1)*phi1(u(k-1), u(k-2))")))
     found = module._find_bounded([infeasible, usable, infeasible], evaluator)
