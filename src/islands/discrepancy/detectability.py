@@ -50,7 +50,7 @@ class SurrogateOutcome:
     recognised : bool
         Whether the injected effect is among the named causes or their equivalents.
     score : float
-        Score of the best candidate.
+        Score of the best candidate; minus infinity if there is none.
     """
 
     named: str
@@ -78,7 +78,7 @@ class SelfTest:
     false_alarm_rate : DetectionRate
         Proportion of clean surrogates for which a cause is named.
     p_value : float
-        Probability under the null hypothesis of a candidate as good as the best one of the record.
+        Probability under the null hypothesis of a candidate at least as good as the best one of the record.
     confusion : mapping of (str, str) to int
         Counts of ``(injected cause, first named cause)``.
     """
@@ -131,7 +131,8 @@ def self_test(
     clean_surrogates : int
         Number of clean surrogates.
     progress : ProgressCallback
-        Takes the number of completed analyses and an upper bound of their total.
+        Takes a message with the number of completed analyses and an upper bound of their total, and the ratio
+        of both.
     """
     surrogates = make_surrogates(diagnosis, simulator, dict(tolerance or {}))
     strengths = {

@@ -146,10 +146,11 @@ def diagnose(
     Raises
     ------
     RecordError
-        The record is too short, has gaps or a constant signal, or the simulation diverges on it.
+        The record is too short, has several segments, gaps, a constant signal or a channel equal to the
+        input, or the simulation diverges on it.
     SettingsError
-        A tolerance is not positive or belongs to no parameter of the simulator, two effects have the same
-        name, or an effect is invalid.
+        A tolerance is not between 0 and 1 or belongs to no parameter of the simulator, two effects have the
+        same name, or an effect is invalid.
     """
     prior_std = validate_prior(tolerance or {}, simulator)
     fitted = count_fitted_samples(record)

@@ -40,7 +40,7 @@ class Injection:
     values : tuple of float
         Values of its parameters.
     strength, unit : float, str
-        Magnitude of the effect in its own unit.
+        Magnitude of the parameters that scale the effect, and their unit.
     misfit : float
         RMS change of the output over the estimation part, in standard deviations of the residual.
     """
@@ -82,6 +82,7 @@ class Surrogates:
     values : ndarray, shape (parameters,)
         Values of the simulation.
     noise : NoiseModel
+        Noise model of the residual, with limited time constants.
     sigma : float
         Standard deviation of the residual.
     estimation_samples : int

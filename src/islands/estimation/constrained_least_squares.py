@@ -35,8 +35,8 @@ def constrained_least_squares(
     Returns
     -------
     Estimate
-        INFEASIBLE if a constraint is redundant or contradicts the others, or if there are more constraints
-        than terms.
+        INFEASIBLE if a constraint is zero or redundant or contradicts the others, or if there are more
+        constraints than terms. TOO_FEW_ROWS or SINGULAR as in `factor`.
     """
     factors = factor(psi, y)
     if isinstance(factors, EvaluationOutcome):

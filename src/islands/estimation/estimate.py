@@ -41,6 +41,15 @@ def estimate(
     -------
     FittedStructure or EvaluationOutcome
         An outcome INFEASIBLE, SINGULAR or TOO_FEW_ROWS after a failure.
+
+    Raises
+    ------
+    ModelError
+        There is no regressor, or a regressor reads an input that the record does not have.
+    RecordError
+        An output is missing, or no segment is longer than the warm-up.
+    SettingsError
+        The constraint is unknown, or the warm-up is shorter than the largest lag.
     """
     constrained = constraint(constraints).constrain(canonical_order(regressors))
     if isinstance(constrained, EvaluationOutcome):

@@ -24,6 +24,8 @@ def forward_selection(
 ) -> tuple[Structure, ...] | EvaluationOutcome:
     """Return nested structures; each adds the candidate with the largest ERR to the previous one.
 
+    Under a constraint, a candidate may consist of two regressors.
+
     Parameters
     ----------
     library : sequence of Regressor

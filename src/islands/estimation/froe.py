@@ -41,6 +41,7 @@ def froe(gram: NDArray[np.float64], tolerance: float = 0.0, max_terms: int | Non
     -------
     Selection
         A selection of n terms is a prefix of the selection of n + 1 terms. Ties go to the first candidate.
+        Candidates that depend linearly on those selected before are not selected.
     """
     candidates = len(gram) - 1
     limit = candidates if max_terms is None else min(max_terms, candidates)

@@ -17,12 +17,11 @@ DEPENDENT = 1e-11
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """Estimated parameters.
+    """Estimated parameters. All numbers are NaN after a failure.
 
     Attributes
     ----------
     theta : ndarray, shape (terms,)
-        NaN after a failure.
     standard_errors : ndarray, shape (terms,)
         Square roots of the diagonal of the parameter covariance, under the assumption of a white equation
         error.

@@ -80,7 +80,7 @@ class Constraint:
     Attributes
     ----------
     group : callable
-        Maps a regressor to its weight in the sum and the key of its group. With weight 0 it is in no group.
+        Maps a regressor to its weight in the sum and the key of its group. A weight of 0 means no group.
     sums : mapping
         Nonzero sums of the weighted parameters by group. A structure must contain these groups.
     lacking : str

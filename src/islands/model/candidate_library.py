@@ -99,6 +99,11 @@ def phi_polynomial(degree: int, lags: int, inputs: int) -> list[Expression]:
     is at most ``degree``. Increments are first differences down to lag ``lags``. Levels have lag 1 only. If
     the input is slow, the lags of a level are interchangeable, and the selection would choose a difference
     of outputs for its one-step-ahead fit; such a model diverges in a free run.
+
+    Raises
+    ------
+    SettingsError
+        ``lags`` is less than 2.
     """
     if lags < 2:
         raise SettingsError("phi-polynomial needs lags of at least 2: a first difference uses two samples")

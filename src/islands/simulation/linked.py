@@ -54,8 +54,8 @@ class LinkedModel:
         Returns
         -------
         ndarray, shape (samples,)
-            Predictions, NaN during the warm-up and after a divergence. Bit-identical to `free_run` on a
-            record whose output is missing after the warm-up.
+            Predictions, NaN during the warm-up and after a divergence. Bit-identical to
+            `predictors.free_run` on a record whose output is missing after the warm-up.
 
         Raises
         ------

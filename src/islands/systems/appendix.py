@@ -27,7 +27,7 @@ from islands.errors import RecordError, SettingsError
 #: Length of a training or validation record in samples.
 SAMPLES = 500
 
-#: Variance of the white noise that is filtered to the soft input, and of the rescaled soft input.
+#: Variance of the white noise that is filtered into the soft input, and of the rescaled soft input.
 SOFT_VARIANCE = 0.20
 
 #: Poles of the low-pass filter of the soft input.

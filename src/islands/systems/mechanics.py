@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from islands.kernels.jit_cache import kernel
 
-#: Maximum number of parameters of an element: its values, followed by its constants.
+#: Maximum size of the numbers of an element: its values, followed by its constants.
 WIDTH = 8
 
 #: Arguments: coordinate, its rate, the element's state, pointer to the element's numbers.

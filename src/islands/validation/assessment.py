@@ -25,7 +25,7 @@ MODES = ("one_step_ahead", "multiple_shooting", "free_run")
 #: Metrics of a diverged simulation.
 _UNDEFINED = Metrics(nan, nan, nan, nan)
 
-#: Number of residuals that a test at one lag requires.
+#: Minimum number of residuals for a test at one lag.
 _MIN_RESIDUALS = 3
 
 
@@ -40,7 +40,8 @@ class Assessment:
     outcomes : mapping
         ``outcomes[part][mode]``.
     information : InformationCriteria
-        Information criteria of the one-step-ahead residual on the estimation data. NaN if it diverged.
+        Information criteria of the one-step-ahead residual on the estimation data. NaN if it diverged. Every
+        term counts as a parameter; constraints are not subtracted.
     residual_tests : ResidualTests
         Tests of the one-step-ahead residual on the longest recording of the validation data. If the
         prediction diverged, all tests failed and their notes give the reason.
@@ -71,8 +72,14 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
 
     Raises
     ------
+    ModelError
+        The model has no parameters.
     RecordError
-        A part is too short for a prediction, or the validation data is too short for the residual tests.
+        A part has a different number of inputs, missing outputs, or is too short for a prediction, or the
+        validation data is too short for the residual tests.
+    SettingsError
+        The warm-up is shorter than the model's largest lag, the interval is less than 1, or the estimation
+        data has too few samples for the number of terms.
     """
     intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}

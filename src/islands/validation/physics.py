@@ -92,9 +92,9 @@ class ExcursionTest:
         Whether the output stayed within the bound.
     closure_percent : float
         Difference of the output between the last two maxima of the input, in per cent of the record's output
-        range. 0 for a closed loop.
+        range. 0 for a closed loop, infinite after a divergence.
     range_percent : float
-        Range of the output, in per cent of the record's output range.
+        Range of the output, in per cent of the record's output range. Infinite after a divergence.
     """
 
     name: str
@@ -276,6 +276,6 @@ def _evaluate_excursion(
 
 
 def percent_of_range(distance: float, output_range: float) -> float:
-    """Return a distance in per cent of a range. If the range is 0, return 0 or infinity."""
+    """Return a distance in per cent of a range. If the range is 0: 0 for a distance of 0, else infinity."""
     fraction = abs(float(distance)) / output_range if output_range > 0 else np.inf
     return 100 * fraction if distance else 0.0

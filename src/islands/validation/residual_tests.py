@@ -60,7 +60,8 @@ class CorrelationTest:
     label : str
         Name of the function for a figure, in LaTeX: ``$\phi_{u\xi}(\tau)$``.
     note : str
-        Reason why the test has no data: all values are 0. Such a test passes. Empty otherwise.
+        Reason why there is nothing to correlate; all values are then 0 and the test passes. In an
+        `Assessment` also the reason of a divergence; the test then fails. Empty otherwise.
     """
 
     name: str
@@ -210,7 +211,8 @@ def _test_input(
     source = _normalise(u, name)
     power = _normalise(source.values**2, f"the square of {name}")
     noise_power = _normalise(noise.values**2, "the square of the residual")
-    # Delay the product by one sample, so that lag tau correlates xi(k-1-tau) u(k-1-tau) with xi(k).
+    # Delay the product by one sample, so that lag tau correlates xi(k-1-tau) u(k-1-tau) with xi(k): white
+    # noise at k is independent of that product.
     product = _normalise(noise.values * source.values, f"the residual times {name}")
     delayed = _Signal(np.concatenate(([0.0], product.values[:-1])), product.name)
     both_signs, not_negative = np.arange(-max_lag, max_lag + 1), np.arange(max_lag + 1)

@@ -85,7 +85,7 @@ class CalibrationResult:
 
     @property
     def score(self) -> float:
-        """Minus twice the log-likelihood under the noise model plus the prior; without penalty on effects."""
+        """Minus twice the log-likelihood of the noise model plus `penalty`; effects have no BIC penalty here."""
         return self.noise.minus_twice_log_likelihood + self.penalty
 
 

@@ -14,7 +14,7 @@ from islands.discrepancy.simulators.coordinates import peak_amplitude
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.errors import RecordError, SettingsError
 
-#: Fraction of the record, at its end, that is used for nothing but the hold-out gain.
+#: Fraction of the record, at its end, that is reserved for hold-out validation.
 HOLDOUT_FRACTION = 0.25
 
 #: Minimum number of samples of a record.
@@ -27,7 +27,12 @@ def select_effects(
     tolerance: Mapping[str, float],
     catalogue: Sequence[Effect] = EFFECTS,
 ) -> list[Effect]:
-    """Return the effects of a catalogue that the simulator supports and the record can show.
+    """Return the effects to search for.
+
+    They are the effects of the catalogue that the simulator supports and the record can show, the effects on
+    the states of the simulator, and a wrong value of each parameter with a tolerance. Effects already
+    modelled by the simulator are left out, as are gains unless every parameter except initial states has a
+    tolerance.
 
     Raises
     ------
@@ -90,7 +95,7 @@ def count_fitted_samples(record: Dataset) -> int:
     """
     if record.samples < MIN_SAMPLES:
         raise RecordError(
-            f"the record has {record.samples} samples, and a diagnosis takes {MIN_SAMPLES} at least: give a "
+            f"the record has {record.samples} samples, and a diagnosis needs at least {MIN_SAMPLES}: give a "
             "longer one"
         )
     if len(record.segments) > 1:

@@ -33,7 +33,7 @@ OFFSET = Effect(
 
 
 def input_offset(state: str) -> Effect:
-    """Return the effect on the balance of one state, in the unit of the input."""
+    """Return the offset in the balance of one state as an effect; its value has the unit of the input."""
     label = f"{INPUT_OFFSET.name}:{state}"
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:

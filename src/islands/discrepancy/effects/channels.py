@@ -9,12 +9,12 @@ TEMPERATURES = ("K", "degC", "C", "°C", "mK", "degF")
 
 
 def has_channel(context: SimulationContext, thermal: bool) -> bool:
-    """Return whether there is a channel that varies and is (``thermal``) or is not a temperature."""
+    """Return whether a channel varies: a temperature if ``thermal``, otherwise any other signal."""
     return _name(context, thermal) is not None
 
 
 def channel(context: SimulationContext, thermal: bool) -> Signal:
-    """Return the channel; a temperature relative to its first value, since its zero is arbitrary."""
+    """Return the first such channel; a temperature relative to its first value, as its zero is arbitrary."""
     signal = context.channels[_name(context, thermal) or ""]
     return signal - signal[0] if thermal else signal
 

@@ -80,7 +80,7 @@ class MissingTerm:
     has_distance: bool
 
     def with_slope(self, slope: float) -> Expression:
-        """Return the term with a value in place of the slope."""
+        """Return the term with a number for the slope."""
         return _insert_slope(self.regressor.expression, slope)
 
 
@@ -88,8 +88,14 @@ def missing_terms(model: Model, indices: Sequence[int]) -> tuple[MissingTerm, ..
     """Return the terms that a model may lack, made of the regressors with the given indices.
 
     The width of a hysteresis loop depends on the absolute distance of the output from a line over the input,
-    which a polynomial in both cannot represent. A delayed regressor may exceed the maximum
-    lag of the search that found the model.
+    which a polynomial in both cannot represent. A delayed regressor may exceed the maximum lag of the search
+    that found the model.
+
+    Parameters
+    ----------
+    model : Model
+    indices : sequence of int
+        Indices of regressors of the model. Constants are skipped.
     """
     ordered = sorted(
         (place for place in indices if model.regressors[place].lags),

@@ -86,7 +86,7 @@ EVEN_NONLINEARITY = Effect(
     distinguished_by="a parabola over the coordinate",
 )
 
-#: Largest distance of the input from zero, relative to its peak, at which a dead zone is searched for.
+#: A dead zone is searched for only if the input comes closer to zero than this fraction of its peak.
 _DEAD_ZONE_NEAR = 0.05
 
 
@@ -218,7 +218,7 @@ ABSOLUTE_VALUE_SENSOR = Effect(
 
 
 def outflow_law(state: str) -> Effect:
-    """Return the effect on the outflow of one state, in 1/s."""
+    """Return the linear outflow of one state as an effect; its value is in 1/s."""
     label = f"{OUTFLOW_LAW.name}:{state}"
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:
@@ -258,7 +258,7 @@ _MAX_LEVEL = 4.0
 
 
 def state_clip(state: str) -> Effect:
-    """Return the effect on one state; the overflow of the last state of a chain is lost."""
+    """Return the limit on one state as an effect; the overflow of the last state of a chain is lost."""
     label = f"{STATE_CLIP.name}:{state}"
 
     def parameters(context: SimulationContext) -> tuple[Parameter, ...]:

@@ -11,8 +11,8 @@ from islands.discrepancy.interfaces.effect import Effect, Signal, SimulationCont
 #: Number of candidate instants of a change.
 INSTANTS = 27
 
-#: Margin at both ends of the estimation part, relative to its duration, without a search for changes: too few
-#: samples would show them.
+#: Margin at each end of the estimation part, relative to its duration. Changes are not searched for in it,
+#: since too few samples would show them.
 MARGIN = 0.06
 
 

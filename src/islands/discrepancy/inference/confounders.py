@@ -37,7 +37,8 @@ class Confounder:
     factor : float
         Factor from the values of the effect to those of the confounder.
     score_gain : float
-        Evidence of the residual for the confounder, in minus twice the log-likelihood; negative against it.
+        Twice the log-likelihood ratio in favour of the confounder; negative if the residual is evidence
+        against it.
     excess_mean_square : float
         Mean square of the part of its response that the effect does not have.
     """

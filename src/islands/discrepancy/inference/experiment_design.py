@@ -12,7 +12,7 @@ from islands.discrepancy.simulators.extended import ExtendedSimulator
 #: Distance of two simulations in standard deviations of the noise that gives odds of twenty to one.
 REQUIRED_DISTANCE = 2.7
 
-#: Factors by which the excitation may be faster.
+#: Factors by which the excitation may be faster; the first sufficient one is suggested.
 SPEED_FACTORS = (2, 4, 8, 16)
 
 
@@ -25,7 +25,8 @@ def suggest_experiment(best: CalibrationResult, alternatives: Sequence[ScreenedE
     Returns
     -------
     str
-        One sentence for each alternative; empty if the record distinguishes all of them.
+        One suggestion for each alternative that the record does not distinguish, separated by semicolons;
+        empty if it distinguishes all of them.
     """
     suggestions = []
     for alternative in alternatives:
@@ -47,7 +48,8 @@ def suggest_experiment(best: CalibrationResult, alternatives: Sequence[ScreenedE
             if speed is not None
             else f"a record {length:.0f} times as long is enough"
             if length < 1000
-            else "no faster input of this form distinguishes them; measure between the two places instead"
+            else "no faster input of this form distinguishes them; measure a signal between the places where "
+            "they act instead"
         )
         suggestions.append(
             f"{names} or {alternative.effect.name}: this record separates them by {distance:.1f} standard "

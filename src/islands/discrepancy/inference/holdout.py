@@ -8,7 +8,8 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.levenberg_marquardt import CalibrationResult, Target, calibrate
 from islands.discrepancy.interfaces.effect import Signal
 
-#: Number of blocks of a record, the units of the bootstrap and the cross-validation.
+#: Number of blocks into which the estimation part and the hold-out part are each divided. Blocks are the
+#: units of the bootstrap and the cross-validation.
 BLOCKS = 36
 
 #: Number of folds of the cross-validation.
@@ -20,12 +21,12 @@ BOOTSTRAP_SAMPLES = 1000
 #: Quantile of the bootstrapped gain that serves as its lower bound.
 LOWER_QUANTILE = 0.05
 
-#: Gain that is accepted without a bootstrap, in minus twice the log-likelihood. An event such as a clipped
-#: peak falls into few blocks, and a bootstrap sample may contain none of them.
+#: Net gain above which the bootstrap may be skipped, in minus twice the log-likelihood. An event such as a
+#: clipped peak falls into few blocks, and a bootstrap sample may contain none of them.
 MIN_EVENT_GAIN = 20.0
 
-#: Largest total loss of the blocks that lose for which the bootstrap is skipped, relative to the total gain
-#: of the others.
+#: The bootstrap is skipped only if the blocks with a loss lose less in total than this fraction of what the
+#: other blocks gain.
 MAX_LOSS_FRACTION = 0.1
 
 

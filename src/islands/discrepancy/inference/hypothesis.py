@@ -40,7 +40,7 @@ class Hypothesis:
 
     @property
     def rank(self) -> int:
-        """The cost in units of `SCORE_TIE`; hypotheses of equal rank keep their order."""
+        """Cost in units of `SCORE_TIE`, rounded; hypotheses of equal rank keep their order."""
         return round(self.cost / SCORE_TIE)
 
 
@@ -53,7 +53,7 @@ class Alternatives:
     without : Hypothesis
         The hypothesis without the effect, refitted.
     screened : sequence of ScreenedEffect
-        Every other effect added to that hypothesis, the best first.
+        Each effect that is not in that hypothesis, the removed one included, added to it; the best first.
     """
 
     without: Hypothesis
@@ -88,7 +88,7 @@ def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hy
 def find_alternatives(
     hypothesis: Hypothesis, target: Target, effects: Sequence[Effect], parallel_map: ParallelMap = map
 ) -> tuple[Alternatives, ...]:
-    """Remove each effect in turn and screen all others as its replacement."""
+    """Remove each effect in turn and screen all effects outside the rest, the removed one included."""
     alternatives = []
     for effect in hypothesis.effects:
         without = without_effect(hypothesis, effect, target)

@@ -70,6 +70,6 @@ def _make_maps(u: Signal, y: Signal, dt: float) -> Mapping[str, NDArray[np.int64
 
 
 def _assign_cells(signal: Signal, count: int) -> NDArray[np.int64]:
-    """Return the cell index of every sample; all cells hold the same number of samples."""
+    """Return the cell index of every sample; the cells hold about equally many samples."""
     edges = np.quantile(signal, np.linspace(0.0, 1.0, count + 1)[1:-1])
     return np.searchsorted(edges, signal).astype(np.int64)

@@ -107,7 +107,10 @@ def screen_effects(
 
 
 def _calibrate_from_starts(target: Target, task: CalibrationTask) -> list[Signal]:
-    """Calibrate a few iterations from every start, then the best one to convergence; return the values."""
+    """Calibrate from several starts, and return the values of those that were calibrated to convergence.
+
+    These are all starts under model error, and otherwise the best one after a few iterations.
+    """
     simulation, starts = task
     if target.effective_samples is not None:
         # Model error causes many minima, and the first iterations do not show which is the best.
@@ -134,7 +137,7 @@ def transfer_parameters(values: Signal, old: ExtendedSimulator, new: ExtendedSim
 
 
 class _Projection:
-    """Projection of responses onto the complement of what the parameters of the base can reproduce.
+    """Projection of responses onto the orthogonal complement of those that the base's parameters reproduce.
 
     The parameters act through their linearised, whitened responses. The prior of each parameter is one more
     observation.
@@ -196,7 +199,7 @@ def _find_starts(
     target: Target,
     projection: _Projection,
 ) -> list[tuple[float, Signal]]:
-    """Return the starting points that explain most, each with its strength fitted to the residual.
+    """Return the starting points that explain most, each with its strength scaled if that explains more.
 
     Returns
     -------

@@ -27,7 +27,8 @@ MIN_GAIN = 6.0
 #: Number of hypotheses that are followed at the same time.
 BEAM_WIDTH = 3
 
-#: Maximum number of effects of a hypothesis.
+#: Maximum number of effects of a hypothesis, not counting the model-form error; one more if pairs are
+#: searched for.
 MAX_EFFECTS = 3
 
 #: Number of single effects from which pairs are built.
@@ -169,7 +170,7 @@ def _get_min_further_gain(target: Target, effects: Sequence[Effect]) -> float:
 def _eliminate_backward(hypothesis: Hypothesis, target: Target, min_gain: float) -> Hypothesis:
     """Remove effects that are redundant given the others, and sort the rest, the most important first.
 
-    The last effect may go as well: refitted values and the noise model estimated with it may make it
+    The last effect may be removed too: refitted values and the noise model estimated with it may make it
     unnecessary.
     """
     while hypothesis.effects:

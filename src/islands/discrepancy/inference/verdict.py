@@ -179,7 +179,7 @@ def describe_effects(
 ) -> tuple[tuple[Finding, ...], tuple[ScreenedEffect, ...]]:
     """Return the findings of a hypothesis, and the alternatives that the record cannot distinguish from them.
 
-    Each effect is removed in turn, and all others are screened as its replacement.
+    The alternatives of each effect are those that were screened without it.
 
     Parameters
     ----------

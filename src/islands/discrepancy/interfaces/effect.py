@@ -52,13 +52,14 @@ class Effect:
     linear_parameters : int
         Number of leading parameters to which the response of a weak effect is proportional.
     is_gain : bool
-        Whether the effect is a gain. Gains are searched for only if every parameter has a tolerance;
-        otherwise calibration absorbs them.
+        Whether the effect is a gain. Gains are searched for only if every parameter except initial states has
+        a tolerance; otherwise calibration absorbs them.
     extra_degrees_of_freedom : int
         Degrees of freedom added to the number of parameters in the information criterion, for example for an
         instant or a frequency that is selected among all samples.
     confounded_with : tuple or None
-        Another effect with the same mean response, and the factor between the values of both.
+        Another effect with the same mean response, and the factor from the values of this effect to those of
+        the other one.
     similar_to : str
         Names of effects with a similar response, for the reference.
     distinguished_by : str
@@ -94,7 +95,8 @@ class EffectTemplate:
     Attributes
     ----------
     name, summary : str
-        As in `Effect`. The name of an effect is this name, a colon and the name of a state or parameter.
+        As in `Effect`. The name of an effect is this name, usually with a colon and the name of a state or
+        parameter.
     similar_to, distinguished_by : str
         As in `Effect`.
     """

@@ -22,7 +22,7 @@ class ForceLaw:
     force : callable
         ``(x, rate, z, numbers) -> force``. The numbers are the values of the effect, then the constants.
     state_derivative : callable or None
-        ``(x, rate, z, numbers) -> z'``: derivative of the internal state.
+        ``(x, rate, z, numbers) -> z'``: derivative of the internal state. None if the law has no state.
     constants : callable
         ``context -> numbers``: constants, which are not calibrated.
     is_dissipative : bool

@@ -118,7 +118,7 @@ def resample_input(x: Signal, intersample: InterSample, oversampling: int) -> tu
     ndarray, shape (oversampling * samples,)
         Input at the start of each step; every ``oversampling``-th value is a sample.
     ndarray, shape (2, oversampling * samples)
-        Input in the middle and at the end of each step, before a discontinuity.
+        Input in the middle and at the end of each step; at a discontinuity the left limit.
     """
     match intersample:
         case InterSample.ZOH:

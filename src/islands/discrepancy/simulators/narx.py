@@ -25,9 +25,9 @@ _SCALE = 0.01
 class NarxSimulator:
     """Free run of a model, started from the first measured samples; its parameters are calibrated.
 
-    Parameters of terms that are linear in the output alone are fixed, so that a constraint on them, such as a
-    sum of one, remains satisfied. An effect on the output is added after the model; inside a model whose
-    coefficients of the output sum to one, it would be integrated.
+    Parameters of terms with a single factor that reads the output alone, such as y(k-1), are fixed, so that a
+    constraint on them, such as a sum of one, remains satisfied. An effect on the output is added after the
+    model; inside a model whose coefficients of the output sum to one, it would be integrated.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class NarxSimulator:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the terms that are not linear in the output alone, and mean of the initial outputs.
+        """Parameters of the terms that are not fixed, and mean of the initial outputs.
 
         The initial outputs are measured. A model that holds its output at a constant input would keep their
         noise as an offset.

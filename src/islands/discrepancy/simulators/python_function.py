@@ -59,7 +59,7 @@ class PythonFunctionSimulator:
                     f"{self.name}: the parameter {name} needs a number for its default, like {name}=1.0"
                 )
         if len(arguments) < 2:
-            raise SettingsError(f"{self.name} has to take (u, dt), and parameters with numbers for defaults")
+            raise SettingsError(f"{self.name} must take (u, dt), then parameters with numeric defaults")
         object.__setattr__(
             self, "given", {name: float(value) for name, value in {**defaults, **self.given}.items()}
         )

@@ -39,9 +39,9 @@ _RELATIVE_VS = 0.01
 class RigidAxisSimulator:
     """``m x'' + c x' + F tanh(x' / vs) = u + forces`` by multiple shooting; the coordinate is the output.
 
-    An axis has no restoring force, so that a free run drifts. The simulation restarts every half second, from
-    a position and a rate that are fitted to the measured output (multiple shooting after Bock, with the
-    states eliminated).
+    An axis has no restoring force, so that a free run drifts. The simulation restarts every half second, or
+    every 20 samples if these last longer, from a position and a rate that are fitted to the measured output
+    (multiple shooting after Bock, with the states eliminated). The hold-out part is fitted in the same way.
 
     Attributes
     ----------

@@ -112,7 +112,7 @@ def _nominal(record: Dataset) -> tuple:
 
 
 UNUSABLE = {
-    "too short": (lambda record: record[: MIN_SAMPLES - 1], f"a diagnosis takes {MIN_SAMPLES} at least"),
+    "too short": (lambda record: record[: MIN_SAMPLES - 1], f"a diagnosis needs at least {MIN_SAMPLES}"),
     "constant input": (lambda record: with_input(record, 0, 1.0), "column u_V is constant"),
     "constant channel": (lambda record: with_input(record, 2, 1.0), "column w_V is constant"),
     "channel equal to the input": (

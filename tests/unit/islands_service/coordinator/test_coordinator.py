@@ -103,7 +103,7 @@ def test_coordinator_runs_jobs_of_every_kind(
     assert failed.state == JobState.FAILED
     assert failed.problem is not None
     assert failed.problem["type"] == "invalid-record"
-    assert "99 samples, and a diagnosis takes " in failed.problem["detail"]
+    assert "99 samples, and a diagnosis needs " in failed.problem["detail"]
 
 
 @pytest.mark.parametrize(

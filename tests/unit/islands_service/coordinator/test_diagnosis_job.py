@@ -129,7 +129,7 @@ def test_recorded_column_is_diagnosed_as_a_simulation(store: Store, blobs: Blobs
 @pytest.mark.parametrize(
     ("changes", "kind", "words"),
     [
-        ({"rows": "0:99"}, RecordError, "99 samples, and a diagnosis takes "),
+        ({"rows": "0:99"}, RecordError, "99 samples, and a diagnosis needs "),
         ({"simulation": PIEZO, "tolerance": {"mass": 0.1}}, SettingsError, "has no parameter 'mass'"),
         (
             {"simulation": {**PIEZO, "parameters": {"mass": 1.0}}},
