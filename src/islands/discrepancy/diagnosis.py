@@ -76,7 +76,8 @@ class Diagnosis:
     ----------
     verdict : Verdict
     effects : tuple of Finding
-        The named causes, the most important first; empty for "nothing" and "unknown".
+        The named causes, the most important first, then the properties of the noise; empty for "nothing" and
+        "unknown".
     candidates : tuple of Candidate
         All screened effects, the best first.
     gain : HoldoutGain or None

@@ -85,14 +85,24 @@ class CalibrationResult:
 
     @property
     def score(self) -> float:
-        """Minus twice the log-likelihood of the noise model plus `penalty`; effects have no BIC penalty here."""
+        """Minus twice the log-likelihood of the noise model plus `penalty`; no BIC penalty of effects."""
         return self.noise.minus_twice_log_likelihood + self.penalty
 
 
 def calibrate(
     simulation: ExtendedSimulator, target: Target, start: Signal, max_iterations: int = MAX_ITERATIONS
 ) -> CalibrationResult:
-    """Fit the parameters of a simulation, beginning at ``start``."""
+    """Fit the parameters of a simulation to a record.
+
+    Parameters
+    ----------
+    simulation : ExtendedSimulator
+    target : Target
+    start : ndarray, shape (parameters,)
+        Starting point. It is clipped to the bounds; if the simulation diverges there, it is not improved.
+    max_iterations : int
+        Maximum number of accepted steps.
+    """
     lower, upper = simulation.bounds
     inverse_std, nominal = prior_precision(simulation, target.prior_std)
     scales = simulation.scales

@@ -54,7 +54,8 @@ def fit_ar_noise(residual: Signal, max_order: int = MAX_ORDER) -> NoiseModel:
     Parameters
     ----------
     residual : ndarray, shape (samples,)
-        Residual of a single recording without gaps.
+        Residual of a single recording without gaps. NaN of a diverged simulation gives white noise of
+        infinite variance.
     max_order : int
         Maximum order of the autoregression.
     """

@@ -1,8 +1,8 @@
 """Confounders: effects with the same mean response as another one, and the evidence that separates both.
 
-The mean response of stick-slip motion is a play of half the breakaway. The instant of each slip depends on
-all earlier ones, so that no simulation predicts it. The serial correlation of the slips is known, though:
-while the input moves slowly, all samples of one slip have nearly the same error.
+The mean response of stick-slip motion is a play whose half width is half the breakaway. The instant of each
+slip depends on all earlier ones, so that no simulation predicts it. The serial correlation of the slips is
+known, though: while the input moves slowly, all samples of one slip have nearly the same error.
 """
 
 from dataclasses import dataclass

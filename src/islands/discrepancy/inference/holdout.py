@@ -25,8 +25,7 @@ LOWER_QUANTILE = 0.05
 #: clipped peak falls into few blocks, and a bootstrap sample may contain none of them.
 MIN_EVENT_GAIN = 20.0
 
-#: The bootstrap is skipped only if the blocks with a loss lose less in total than this fraction of what the
-#: other blocks gain.
+#: Ratio of the total loss to the total gain of the blocks, below which the bootstrap may be skipped.
 MAX_LOSS_FRACTION = 0.1
 
 

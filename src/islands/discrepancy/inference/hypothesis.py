@@ -88,7 +88,7 @@ def without_effect(hypothesis: Hypothesis, effect: Effect, target: Target) -> Hy
 def find_alternatives(
     hypothesis: Hypothesis, target: Target, effects: Sequence[Effect], parallel_map: ParallelMap = map
 ) -> tuple[Alternatives, ...]:
-    """Remove each effect in turn and screen all effects outside the rest, the removed one included."""
+    """Remove each effect in turn, and screen the effects that could take its place, itself included."""
     alternatives = []
     for effect in hypothesis.effects:
         without = without_effect(hypothesis, effect, target)

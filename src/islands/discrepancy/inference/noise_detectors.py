@@ -159,7 +159,7 @@ OUTLIERS = NoiseDetector(
 )
 
 
-#: Candidate strengths, relative to the largest absolute output.
+#: Candidate strengths k, times the largest absolute output.
 _HETEROSCEDASTIC_STRENGTHS = np.concatenate([[0.0], np.geomspace(0.1, 30.0, 60)])
 
 

@@ -1,4 +1,4 @@
-"""Residual analysis: dependence of a residual on the input, the output and their rates."""
+"""Residual analysis: dependence of a residual on the input, its rate and acceleration, and the output."""
 
 from collections.abc import Mapping
 
@@ -20,9 +20,9 @@ def find_residual_structure(
 ) -> Mapping[str, float]:
     """Return the maps on which a residual depends, each with its distance in standard deviations.
 
-    The whitened residual is averaged over cells of input, rate, direction and output. The null distribution
-    comes from circular shifts of the residual, which keep its autocorrelation and remove its dependence on
-    the maps.
+    The whitened residual is averaged over cells of the input, its rate, direction and acceleration, and the
+    output. The null distribution comes from circular shifts of the residual, which keep its autocorrelation
+    and remove its dependence on the maps.
 
     Parameters
     ----------

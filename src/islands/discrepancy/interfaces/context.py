@@ -25,7 +25,7 @@ class ForceCoordinate:
     force_unit : str
         Unit of a force.
     force : float
-        Peak of the forces that drive the coordinate.
+        Peak of the signal that forces are added to: the output, or the input if forces move the coordinate.
     sign : float
         Sign of friction that is added to an output: -1 if the output follows the coordinate, 1 if the output
         is the force.

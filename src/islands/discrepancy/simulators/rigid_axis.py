@@ -41,7 +41,7 @@ class RigidAxisSimulator:
 
     An axis has no restoring force, so that a free run drifts. The simulation restarts every half second, or
     every 20 samples if these last longer, from a position and a rate that are fitted to the measured output
-    (multiple shooting after Bock, with the states eliminated). The hold-out part is fitted in the same way.
+    (multiple shooting after Bock, with the states eliminated). This includes the hold-out part.
 
     Attributes
     ----------

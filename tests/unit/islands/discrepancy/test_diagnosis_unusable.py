@@ -102,7 +102,7 @@ FUNCTIONS = {
     "a parameter with a string": ("def f(u, dt, k='a'):\n    return u", "k needs a number"),
     "an infinite parameter": ("def f(u, dt, k=float('inf')):\n    return u", "k needs a number"),
     "any parameters": ("def f(u, dt, **more):\n    return u", "more needs a number"),
-    "one argument": ("def f(u):\n    return u", r"has to take \(u, dt\)"),
+    "one argument": ("def f(u):\n    return u", r"must take \(u, dt\)"),
     "unknown signature": ("f = max", "the arguments of .* are unknown"),
     "no function": ("g = 1", "has no function 'f'"),
     "no callable": ("f = 1", "has no function 'f'"),
