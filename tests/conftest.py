@@ -19,13 +19,13 @@ settings.register_profile("thorough", _LENIENT, max_examples=400)
 settings.load_profile("fast")
 
 
-#: Every law of the store holds on both; a server of its own makes the second one a part of the level ci.
+#: Databases of the store tests. PostgreSQL needs a server, so its tests belong to the level ci.
 DATABASES = ("sqlite", pytest.param("postgresql", marks=pytest.mark.ci))
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Mark a test that starts a PostgreSQL as a part of the level ci."""
+    """Mark the tests that start PostgreSQL as ci."""
     for item in items:
         if "postgres" in item.fixturenames and not item.get_closest_marker("nightly"):
             item.add_marker("ci")
@@ -41,7 +41,7 @@ def pytest_configure(config):
 
 @pytest.fixture(scope="session")
 def postgres():
-    """What makes databases on a PostgreSQL: one server for all tests of a process."""
+    """Return a function that creates databases on the PostgreSQL server of this process."""
     from support.databases import databases
 
     with databases() as maker:
@@ -50,7 +50,7 @@ def postgres():
 
 @pytest.fixture(scope="session")
 def prepared_postgres(postgres):
-    """The URL of a database with our tables. To make one takes a quarter of a second: it is used again."""
+    """Return the URL of a database with the tables of the store. Creating one takes 0.25 s, so tests share it."""
     from islands_service.store import Store
     from support.databases import database
 
@@ -71,7 +71,7 @@ def prepared_sqlite(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def serve(prepared_sqlite, tmp_path_factory):
-    """What serves a prepared database: in a new folder unless one is given, with settings of its own."""
+    """Return a function that starts a service on a prepared database, by default in a new folder."""
     from support.service import served
 
     def serve(folder=None, /, **changes):
@@ -123,7 +123,7 @@ def sqlite_database(request):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """What mounts a disk of so many bytes; where nothing can be mounted the test skips."""
+    """Return a function that mounts a disk of a given size. The test skips if it cannot mount one."""
     from support.disks import mounted
 
     with ExitStack() as stack:

@@ -137,7 +137,7 @@ REFUSED = {
     "column is output": (
         {"simulation": {"kind": "column", "column": "y_um"}},
         "invalid-record",
-        "column y_um is given as the simulation and as what it is held against",
+        "column y_um is given as the simulation and as a measured signal",
     ),
     "no kind": ({"simulation": {"kind": "pendulum"}}, "invalid-request", "/simulation: Input tag 'pendulum'"),
     "code": (

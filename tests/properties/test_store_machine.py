@@ -1,6 +1,7 @@
-"""The store is a dictionary of jobs: whatever owners, coordinators, zombies and restarts do, in any order.
+"""State machine of the store: it behaves like a dictionary of jobs, whatever the order of the operations.
 
-Two processes have it open. Leases expire at once or never, so that nobody has to wait.
+Owners, coordinators, expired coordinators and restarts act through two open stores. Leases expire at once or
+never, so that no test waits.
 """
 
 import shutil
@@ -151,9 +152,9 @@ class Machine(RuleBasedStateMachine):
 
     @rule(lease=leases, seconds=lasting)
     def beat(self, lease, seconds):
-        told, known = self.held(lease, lambda: self.store.leases.renew(lease, seconds))
+        answer, known = self.held(lease, lambda: self.store.leases.renew(lease, seconds))
         if known is not None:
-            assert told == known.cancel
+            assert answer == known.cancel
             known.expired = seconds == EXPIRED
 
     @rule(lease=leases, generation=st.integers(0, 9), kept=st.booleans())
@@ -161,13 +162,13 @@ class Machine(RuleBasedStateMachine):
         report = brought_on(generation)
         if not kept:
             report = replace(report, checkpoint=None)
-        told, known = self.held(lease, lambda: self.store.leases.report(lease, report))
+        answer, known = self.held(lease, lambda: self.store.leases.report(lease, report))
         if known is not None:
             known.generations = [each for each in known.generations if each < generation] + [generation]
             known.becomes(JobState.RUNNING, "progress")
             if kept:
                 known.checkpoint, known.stalled = report.checkpoint, 0
-            assert told.version == len(known.events)
+            assert answer.version == len(known.events)
 
     @rule(lease=leases, attempted=st.booleans())
     def release(self, lease, attempted):

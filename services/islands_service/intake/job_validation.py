@@ -96,7 +96,7 @@ def _check_discrepancy(spec: Discrepancy) -> list[Part]:
     for name in spec.recorded_columns:
         if name in (spec.input, spec.output, *spec.channels):
             raise RecordError(
-                f"column {name} is given as the simulation and as what it is held against: choose another "
+                f"column {name} is given as the simulation and as a measured signal: choose another "
                 "one for either"
             )
     return [Part(dataset=spec.dataset, rows=spec.rows)]

@@ -30,7 +30,7 @@ def regressor_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> ND
     """
     program = link(terms)
     _check_readable(program, record, warm_up)
-    rows = evaluate_terms(record, warm_up)
+    rows = select_rows(record, warm_up)
     out = np.empty((len(terms), rows.count))
     column_kernel.columns(program, rows, out)
     return out
@@ -47,7 +47,7 @@ def gram_matrix(terms: Sequence[Term], record: Dataset, warm_up: int) -> NDArray
     program = link(terms)
     _check_readable(program, record, warm_up)
     out = np.empty((len(terms), len(terms)))
-    gram_kernel.gram(program, evaluate_terms(record, warm_up), out)
+    gram_kernel.gram(program, select_rows(record, warm_up), out)
     return out
 
 
@@ -61,7 +61,7 @@ def _check_readable(program: Program, record: Dataset, warm_up: int) -> None:
         raise SettingsError(f"the terms read {lag} samples back, the warm-up has {warm_up}")
 
 
-def evaluate_terms(record: Dataset, warm_up: int) -> Rows:
+def select_rows(record: Dataset, warm_up: int) -> Rows:
     """Return the rows that are used for the estimation: those of every segment after its warm-up.
 
     Raises

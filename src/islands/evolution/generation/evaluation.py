@@ -22,7 +22,7 @@ from islands.kernels import population as kernel
 from islands.kernels.pair_table import PLACE_BYTES, clear, pair_table
 from islands.model.expression import Expression, Lagged
 from islands.model.regressor import Regressor
-from islands.program.regressor_matrix import evaluate_terms
+from islands.program.regressor_matrix import select_rows
 from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound
@@ -123,7 +123,7 @@ class Evaluator:
         self._layout = layout(record, self.warm_up, FITNESSES[settings.fitness](settings.shooting))
         self._predicted = int(self._layout.length.sum())
         self._bound = divergence_bound(record)
-        self._rows = evaluate_terms(record, self.warm_up)
+        self._rows = select_rows(record, self.warm_up)
         self._constraint = CONSTRAINTS[settings.constraints]
         self._outcomes = _OUTCOMES | {
             kernel.INFEASIBLE: EvaluationOutcome(Status.INFEASIBLE, self._constraint.lacking),

@@ -25,7 +25,7 @@ from islands.kernels.simulate import COMPLETE, Layout, simulate
 from islands.model.expression import Lagged
 from islands.performance.benchmark.clock import milliseconds
 from islands.performance.benchmark.workload import INTERVAL, WARM_UP, WorkloadModel
-from islands.program.regressor_matrix import evaluate_terms
+from islands.program.regressor_matrix import select_rows
 from islands.program.term_pool import link
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound
@@ -60,7 +60,7 @@ def prepare_record(record: Dataset) -> Prepared:
         record,
         layout(record, WARM_UP, INTERVAL),
         layout(record[: WARM_UP + 1], WARM_UP, INTERVAL),
-        evaluate_terms(record, WARM_UP),
+        select_rows(record, WARM_UP),
         divergence_bound(record),
     )
 

@@ -26,7 +26,7 @@ from islands.kernels.constrained_lstsq import (
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import arrange_rows, evaluate_terms, gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import arrange_rows, gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import link
 from islands.simulation.outcome import OK
 
@@ -271,7 +271,7 @@ def slow(frequency, segments):
 def test_columns_keep_six_digits_for_lags_of_a_slow_input(texts, group, segments):
     record, count = slow(0.003, segments), len(texts)
     terms = [*(regressor(parse(text))[1] for text in texts), Lagged(0, 0)]
-    gram, program, rows = gram_matrix(terms, record, 3), link(terms), evaluate_terms(record, 3)
+    gram, program, rows = gram_matrix(terms, record, 3), link(terms), select_rows(record, 3)
     reduction = reduced(gram, group)
     psi = regressor_matrix(terms, record, 3)
     expected = constrained_least_squares(psi[:-1], psi[-1], *sums(group or [-1] * count, np.ones(count)))
@@ -286,7 +286,7 @@ def test_columns_keep_six_digits_for_lags_of_a_slow_input(texts, group, segments
 def test_lags_of_a_nearly_constant_input_are_refused(route):
     record = slow(0.001, (4000,))
     terms = [*(regressor(parse(text))[1] for text in LAGS), Lagged(0, 0)]
-    gram, program, rows = gram_matrix(terms, record, 3), link(terms), evaluate_terms(record, 3)
+    gram, program, rows = gram_matrix(terms, record, 3), link(terms), select_rows(record, 3)
     assert solved(route, gram, program, rows, reduced(gram)) is None
     # With fixed sums, the remaining directions have digits again.
     assert solved(route, gram, program, rows, reduced(gram, [0, 0, 0, 1, 1, 1])) is not None

@@ -30,7 +30,7 @@ from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import evaluate_terms, gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.program.term_pool import TermPool
 from islands.simulation.layout import layout
 from islands.simulation.predictors import divergence_bound, multiple_shooting
@@ -102,7 +102,7 @@ def evaluated(
         store.nodes,
         make_groups(terms, constrained),
         table() if pairs is None else pairs,
-        evaluate_terms(data, WARM_UP),
+        select_rows(data, WARM_UP),
         layout(data, WARM_UP, INTERVAL),
         divergence_bound(data),
     )

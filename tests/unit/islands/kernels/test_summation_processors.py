@@ -30,7 +30,7 @@ from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import gram_matrix, regressor_matrix, evaluate_terms
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from islands.kernels.pair_table import pair_table
 from islands.program.term_pool import TermPool
 from islands.simulation.layout import layout
@@ -68,7 +68,7 @@ for name, groups in (("clusters", clusters), ("free", free)):
         for array in results:
             array.fill(0)
         context = PopulationContext(0, 1e-4, store.nodes, groups, pair_table(1 << 16),
-                                    evaluate_terms(record, 4), cut, divergence_bound(record))
+                                    select_rows(record, 4), cut, divergence_bound(record))
         pruned = np.array([True, False, False, False])
         evaluate(structures, sizes, pruned, np.full(count + 1, np.inf), context, results)
         found |= {f"{name}, {interval}, {part}": array for part, array in results._asdict().items()}

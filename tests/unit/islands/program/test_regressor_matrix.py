@@ -14,7 +14,7 @@ from islands.model.expression import Constant, Lagged
 from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.model.regressor import regressor
-from islands.program.regressor_matrix import evaluate_terms, gram_matrix, regressor_matrix
+from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value
 
@@ -150,7 +150,7 @@ def test_gram_matrix_equals_the_inner_products_for_any_segments(record, terms):
 
 
 def test_estimation_rows_follow_the_warm_up_of_every_segment():
-    found = evaluate_terms(ramp((3, 5, 2, 4)), 3)
+    found = select_rows(ramp((3, 5, 2, 4)), 3)
     assert found.count == 3
     # A stretch has at most one row: two rows in two lanes, and one; a chunk per segment.
     assert found.apart.tolist() == [1, 1]
