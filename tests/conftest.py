@@ -50,7 +50,7 @@ def postgres():
 
 @pytest.fixture(scope="session")
 def prepared_postgres(postgres):
-    """Return the URL of a database with the tables of the store. Creating one takes 0.25 s, so tests share it."""
+    """Return the URL of a database with the tables of the store. Tests share it, since it takes 0.25 s."""
     from islands_service.store import Store
     from support.databases import database
 
