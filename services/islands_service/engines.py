@@ -24,12 +24,12 @@ def ray_engine(address: str | None = None, progress: ProgressCallback = print) -
         ``HOST:PORT`` of the head of a Ray cluster. If None, Ray is started on the cores of this machine and
         ends with the block.
     progress : ProgressCallback
-        Takes a message when machines or actors join or fail.
+        Receives a message if an actor is lost or must wait for a CPU.
 
     Raises
     ------
     ClusterError
-        The address does not answer, or Ray does not start.
+        The address does not answer, Ray does not start, or this process is already connected to Ray.
     """
     # Importing Ray takes a quarter of a second, and only this engine needs it.
     from islands_service.runtime.cluster import cluster  # noqa: PLC0415

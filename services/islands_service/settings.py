@@ -34,9 +34,9 @@ class ServiceSettings(BaseSettings):
         Number of jobs that run at the same time.
     lease
         Duration of a lease without a heartbeat, after which another coordinator may claim the job; at least
-        one.
+        one second.
     checkpoint_every
-        Time between two checkpoints: the most work that a crash can lose.
+        Least time between two checkpoints: about the work that a crash can lose.
     max_upload, max_unpacked
         Largest upload, and largest size that it may unpack to.
     inspection_memory, inspection_seconds
@@ -52,7 +52,7 @@ class ServiceSettings(BaseSettings):
     retention
         Time after which a finished job is deleted; 0 keeps it for ever.
     rate, burst
-        Requests per second of one key, and the size of a burst above that; a rate of 0 disables the limit.
+        Requests per second of one key, and requests that it may send at once; a rate of 0 disables the limit.
     tls_certificate, tls_key
         PEM files for HTTPS.
     log_format

@@ -33,8 +33,8 @@ _MAX_BACKOFF = 2.5
 #: Seconds of run time after which an exit is followed by an immediate restart.
 _STABLE_AFTER = 10.0
 
-#: Seconds for which the other roles wait for the API. On two cores a concurrent start of Ray doubles its
-#: start-up.
+#: Longest time in seconds for which the other roles wait for the first heartbeat of the API. On two cores a
+#: concurrent start of Ray doubles the start-up time of the API.
 _API_HEAD_START = 2.0
 
 #: Seconds until the first heartbeat of a child: Ray may be read from a slow disk, a database may be locked.
@@ -48,8 +48,6 @@ _SHUTDOWN_GRACE = 15.0
 MISCONFIGURED = 2
 
 #: Option of Linux's prctl: the signal that a process receives when its parent ends.
-
-#: Linux: a process is sent this signal when its parent ends.
 _PR_SET_PDEATHSIG = 1
 
 
@@ -133,7 +131,7 @@ def supervise(roles: Sequence[Role], environment: Mapping[str, str], log: IO[str
     Parameters
     ----------
     roles : sequence of Role
-        The first role starts first, the others after its first heartbeat.
+        The first role starts first, the others after its first heartbeat, at the latest after two seconds.
     environment : mapping
         Environment of the children.
 
@@ -180,8 +178,8 @@ def _check_role(
         return 0
     code, has_run = role.process.returncode, role.has_run
     _handle_exit(role, now)
-    # If it has run with these settings, the cause can be repaired while jobs run: an expired key, a port in
-    # use.
+    # If it has run with these settings, the cause (an expired key, a port in use) can be repaired while the
+    # jobs run.
     if code == MISCONFIGURED and not has_run:
         return MISCONFIGURED
     _print(log, f"{role.name} ended ({code}): it is started again")
@@ -221,7 +219,8 @@ def _read_heartbeats(role: Role, now: float) -> None:
 
 def _handle_exit(role: Role, now: float) -> None:
     assert role.process is not None
-    # Kill the remaining processes of the group: Ray's check only once a minute whether their parent lives.
+    # Kill the remaining processes of the group: those of Ray check only once a minute whether
+    # their parent lives.
     with suppress(ProcessLookupError):
         os.killpg(role.process.pid, signal.SIGKILL)
     os.close(role.pipe)

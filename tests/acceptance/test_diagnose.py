@@ -141,7 +141,7 @@ def test_self_test_reports_detection_limits_and_false_alarms(
     assert alarms["value"] < 0.2
     assert document["p_value"] == pytest.approx(1 / (clean + 1))
     assert sum(each["times"] for each in document["confusion"] if each["hidden"] == "nothing") == clean
-    assert f"Of {clean} records like this one with nothing wrong in them" in printed
+    assert f"Of {clean} surrogate records without an effect" in printed
     text = (offset_record / out / "report.html").read_text()
     assert "smallest detected strength" in text
     assert re.search(r'<td class="name">offset</td><td>[\d.]+ um</td><td>[\d.]+ times the noise</td>', text)

@@ -137,7 +137,7 @@ REFUSED = {
     "column is output": (
         {"simulation": {"kind": "column", "column": "y_um"}},
         "invalid-record",
-        "column y_um is given as the simulation and as a measured signal",
+        "column y_um is given as the simulation and also as an input, a channel or the output",
     ),
     "no kind": ({"simulation": {"kind": "pendulum"}}, "invalid-request", "/simulation: Input tag 'pendulum'"),
     "code": (

@@ -55,7 +55,7 @@ class RunOptions:
     Attributes
     ----------
     engine : str, optional
-        Name of an engine.
+        Name of an engine; by default Ray for several islands or with an address, else serial.
     address : str, optional
         Address of a Ray cluster.
     wall_time : float, optional

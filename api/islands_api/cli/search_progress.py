@@ -40,7 +40,7 @@ def _has_error(island: int, error: float) -> Callable[[HistoryPoint], bool]:
 
 
 def _island_lines(history: Sequence[HistoryPoint]) -> list[str]:
-    """Return a line for each of the best islands: its best error, and since when it has not improved."""
+    """Return a line for each of the best islands: its best error, and the generations without improvement."""
     least = history[-1].islands
     if len(least) == 1:
         return []

@@ -66,8 +66,9 @@ class Endpoint(Generic[P, T]):
 
 
 class BaseClient(Generic[H]):
-    """What both clients share: add a call to `islands_api.client.calls` and one line here.
+    """Constructor and calls of both clients.
 
+    To add a call, add a function to `islands_api.client.calls` and one line here.
     The parameters are described in `islands_api.client.synchronous.Client`.
     """
 

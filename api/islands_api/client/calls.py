@@ -209,7 +209,7 @@ def extended(which: JobRef) -> RequestSpec[bytes]:
 
 
 def history(which: JobRef, after: int = -1) -> RequestSpec[HistoryPage]:
-    """Return a page of the search history after a generation; an empty page is the end."""
+    """Return a page of the search history after a generation. After the last page an empty one follows."""
     return RequestSpec(
         "GET", f"/v1/jobs/{_quote_id(which)}/history", read_as(HistoryPage), params={"after": after}
     )

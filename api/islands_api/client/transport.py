@@ -26,7 +26,7 @@ CONNECT_TIMEOUT = 10.0
 #: Longest time, in seconds, for which the service holds back the answer about an unchanged job.
 LONG_POLL_SECONDS = 30.0
 
-#: Seconds by which an answer may arrive after its deadline.
+#: Seconds after its deadline for which an answer is still awaited.
 GRACE_SECONDS = 5.0
 
 #: Seconds between the first attempts. A restarted service is back in one or two seconds.

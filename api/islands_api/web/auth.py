@@ -72,7 +72,7 @@ class KeyCache:
         return key
 
     async def is_still_valid(self, caller: Principal) -> bool:
-        """Return whether the caller's key is still valid. True if the database cannot say."""
+        """Return whether the key of the caller is still valid. True if the database is unavailable."""
         if caller.secret is None:
             return True
         try:
@@ -90,6 +90,7 @@ async def authenticate(request: Request) -> Principal:
     AuthenticationError
         The key is missing, unknown, revoked or expired.
     RateLimitError
+        The key, or the address that sent no valid key, has sent too many requests.
     """
     if not hasattr(request.state, "caller"):
         # Only once per request: each check takes a token of the rate limit.

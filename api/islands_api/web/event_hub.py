@@ -79,7 +79,7 @@ class JobEventHub:
 
     @contextmanager
     def subscribe(self, job: str, version: int) -> Iterator[JobFeed]:
-        """Return a context manager that keeps the feed of a job up to date, from a known version on."""
+        """Keep the feed of a job up to date while the block runs, from a known version on."""
         feed = self._feeds.setdefault(job, JobFeed(version))
         feed.subscribers += 1
         self._has_subscribers.set()
@@ -131,7 +131,7 @@ class JobEventHub:
             return []
         if feed.recent and feed.recent[0].number <= last + 1:
             return [event for event in feed.recent if event.number > last]
-        # These events may be newer than the feed, but are not added to it: the next poll delivers them.
+        # These events may be newer than the feed, but are not added to it: the next poll adds them.
         try:
             return list(await self._executor.run(self._store.jobs.events, job, last))
         except StoreError as error:

@@ -21,7 +21,7 @@ GZIP_SUFFIX = ".gz"
 
 
 def parse_file_name(given: str | None) -> tuple[str, bool]:
-    """Return the name of a file without folders and the suffix .gz, and whether the file is compressed.
+    """Return the name of a file, without folders and without .gz, and whether the file is compressed.
 
     Raises
     ------

@@ -99,7 +99,8 @@ class Coordinator:
         Raises
         ------
         ClusterError
-            The connection to the cluster is lost. Only a new process can connect to another one.
+            Ray has not started, or the connection to the cluster is lost. Only a new process can connect to
+            another one.
         """
         log.info("coordinator started", name=self._name)
         with self._store, self._ray, closing(self._traces):
@@ -198,15 +199,14 @@ class Coordinator:
     def _check(self, heartbeat: Heartbeat) -> None:
         """Raise the reason why a job must end; see `Heartbeat.check`."""
         heartbeat.check()
-        # A job that runs for days writes a checkpoint every few seconds, so replaced ones are deleted
-        # meanwhile.
+        # A job that runs for days writes a checkpoint every few seconds: delete replaced ones meanwhile.
         try:
             self._sweep_if_due()
         except (StoreError, OSError) as error:
             log.warning("sweep failed", reason=str(error))
 
     def _finish(self, lease: Lease, outcome: JobOutcome, heartbeat: Heartbeat) -> None:
-        """Store the outcome of a job; retry while the store is unavailable or full."""
+        """Store the outcome of a job. Retry while the store is unavailable or full: the work is done."""
         while True:
             try:
                 return self._store.leases.finish(lease, outcome)

@@ -33,7 +33,8 @@ def discrepancy(
     _every: float,
     map_cases: ParallelMap | None = None,
 ) -> JobOutcome:
-    """Run a discrepancy job. It takes seconds to minutes and has no checkpoints.
+    """Run a discrepancy job. It takes seconds to minutes and has no checkpoints: after an interruption it starts
+    again.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def discrepancy(
         try:
             store.leases.report(lease, ProgressReport({"phase": message}))
         except StoreError as error:
-            # Continue the analysis. The next line reports the progress.
+            # Continue the analysis. The next message reports the progress.
             log.warning("report failed", job=lease.job.id, reason=str(error))
 
     spec = discrepancy_of(lease.job.spec)

@@ -39,7 +39,7 @@ class JobCancelled(IslandsError):  # noqa: N818 - control flow, not an error
 
 
 class CoordinatorStopping(IslandsError):  # noqa: N818 - control flow, not an error
-    """The coordinator is stopping. The job continues on another one."""
+    """The coordinator is stopping. It releases the job, which another coordinator continues."""
 
 
 class Heartbeat:

@@ -128,7 +128,7 @@ class _ProgressReporter:
         self._check, self._every = check, every
         self._started_at = monotonic() - spent
         self._first = (monotonic(), 0 if start is None else start.evaluations)
-        # Number of final points that are stored. The last point of a history is replaced until the best
+        # Number of stored points that will not change. The last point of a history is replaced until the best
         # improves.
         self._stored_points = 0 if start is None else len(start.history) - 1
         self._report_at = self._checkpoint_at = monotonic()  # store the first populations immediately

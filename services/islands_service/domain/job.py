@@ -11,8 +11,9 @@
               '------------------ resume ---------------------'
 
 * claim: a coordinator takes a lease of the job. It may take over a running job whose lease has expired.
-* release: a stopping coordinator returns the job, which continues elsewhere from its last checkpoint.
-* cancel: a queued job is cancelled at once, a running one as soon as its coordinator has stopped it.
+* release: a coordinator that stops or cannot continue returns the job to the queue. The next attempt
+  continues from the last checkpoint.
+* cancel: a queued job is cancelled at once, a running one as soon as its coordinator has released it.
 * resume: a failed or cancelled job is queued again and continues from its last checkpoint, if it has one.
 """
 

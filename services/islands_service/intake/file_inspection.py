@@ -1,6 +1,6 @@
 """Inspection of an untrusted file in a subprocess with limited memory and time.
 
-A file that exhausts memory, or makes its reader loop, ends only this process.
+A file that exhausts memory, or makes its reader loop, ends only this subprocess.
 """
 
 import asyncio

@@ -96,8 +96,8 @@ def _check_discrepancy(spec: Discrepancy) -> list[Part]:
     for name in spec.recorded_columns:
         if name in (spec.input, spec.output, *spec.channels):
             raise RecordError(
-                f"column {name} is given as the simulation and as a measured signal: choose another "
-                "one for either"
+                f"column {name} is given as the simulation and also as an input, a channel or the "
+                "output: choose another column for one of them"
             )
     return [Part(dataset=spec.dataset, rows=spec.rows)]
 
@@ -118,8 +118,8 @@ def _check_simulation(spec: Discrepancy) -> None:
     if not isinstance(core, ModelSpec):
         return
     terms = core.model.get("terms")
-    # Check before parsing: nested powers would exhaust memory. A value that is no list is rejected by the
-    # parser.
+    # Check before parsing: nested powers would exhaust memory. The parser rejects a value that is not a
+    # list.
     if isinstance(terms, list):
         if len(terms) > LIMITS["max_terms"]:
             raise SettingsError(

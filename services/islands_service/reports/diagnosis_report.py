@@ -99,8 +99,8 @@ def summarise_self_test(tested: SelfTest) -> str:
     least = "at most " if tested.p_value * (alarms.trials + 1) < 1.5 else ""
     named = alarms.value * alarms.trials
     return (
-        f"Of {alarms.trials} records like this one with nothing wrong in them {named:.0f} got "
-        f"a name: {100 * alarms.value:.1f} % false alarms ({low:.1f} to {high:.1f}). A correct simulation "
+        f"Of {alarms.trials} surrogate records without an effect, a cause was named in {named:.0f}: "
+        f"{100 * alarms.value:.1f} % false alarms ({low:.1f} to {high:.1f}). A correct simulation "
         "yields a candidate as good as the best one of this record with a probability of "
         f"{least}{tested.p_value:.2g}.\n"
         f"Of {len(limits)} effects, {shown} can be detected on this record, up to a misfit of "

@@ -53,8 +53,8 @@ class IslandActorPool:
     progress : ProgressCallback
         Receives a message if an actor is lost or must wait for a CPU.
     title : str
-        Prefix of the names of the actors; empty for unnamed ones. `kill_stale_actors` finds the actors of a
-        hanging coordinator by this name, since they would keep their CPUs.
+        Prefix of the names of the actors; empty for unnamed ones. The coordinator that takes over a
+        job finds by it the actors of a hanging one (`kill_stale_actors`), which would keep their CPUs.
     """
 
     def __init__(self, problem: Problem, islands: int, progress: ProgressCallback, title: str = "") -> None:
@@ -78,7 +78,7 @@ class IslandActorPool:
         Raises
         ------
         ClusterError
-            Actors die repeatedly or cannot be started.
+            Actors die repeatedly or cannot be started, or a machine has another version of islands.
         """
         now = monotonic()
         if at_once or now - self._updated_at > _POLL_SECONDS:

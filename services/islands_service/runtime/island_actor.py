@@ -32,7 +32,10 @@ class IslandActor:
         self._name = str(ray.get_runtime_context().get_actor_id())
 
     def prepare(self) -> str:
-        """Compile kernels, build the evaluator, and return the version of islands."""
+        """Compile kernels, build the evaluator, and return the version of islands.
+
+        An error in the problem is raised here.
+        """
         warm_up(lambda _line: None)
         self._evaluator = Evaluator(self._problem.record, self._problem.settings)
         return version("islands")

@@ -55,7 +55,7 @@ def unpack_island(report: PackedEpoch) -> Island:
 
 
 class PackedIslands(Sequence[Island]):
-    """Sequence of the islands of packed epochs, each unpickled at its first access."""
+    """Sequence of the islands of packed epochs, each unpickled at its first access; equal to their tuple."""
 
     def __init__(self, reports: Sequence[PackedEpoch]) -> None:
         self._reports = tuple(reports)

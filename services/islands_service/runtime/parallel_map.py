@@ -37,9 +37,9 @@ def ray_pool(workers: int | None = None, address: str | None = None) -> Iterator
 
 
 def ray_map(workers: int | None = None) -> ParallelMap:
-    """Return a parallel map on the Ray cluster to which this process is connected when it is called.
+    """Return a parallel map on the Ray cluster to which this process is connected when the map is called.
 
-    The map raises a `ClusterError` if the process is not connected.
+    The map raises a `ClusterError` if the process is not connected to Ray, or if Ray fails.
     """
     task: Any = ray.remote(num_cpus=1, max_retries=3)(_call)
 

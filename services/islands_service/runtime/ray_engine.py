@@ -31,7 +31,7 @@ class RayEngine:
     progress : ProgressCallback
         Receives a message for the user if an actor is lost or must wait for a CPU.
     title : str
-        Prefix of the names of the actors: ``<job>.<lease epoch>``.
+        Prefix of the names of the actors, ``<job>.<lease epoch>``; empty for unnamed ones.
     """
 
     def __init__(self, progress: ProgressCallback = ignore_progress, title: str = "") -> None:

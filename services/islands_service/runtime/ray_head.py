@@ -59,7 +59,7 @@ def _find_failure() -> str:
 
 @contextmanager
 def _publish_address(path: Path) -> Iterator[None]:
-    """Write the address of Ray to a file, and remove it after the block."""
+    """Write the address of Ray to a file, and remove the file after the block."""
     address = ray.get_runtime_context().gcs_address
     part = path.with_suffix(".part")
     part.write_text(address)

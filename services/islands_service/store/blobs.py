@@ -17,7 +17,7 @@ _PART = ".part"
 
 
 class BlobNotFoundError(IslandsError):
-    """A referenced blob is missing: the data folder has lost a file."""
+    """A stored file is missing from the data folder: the operator must restore it from a backup."""
 
 
 class Blobs:

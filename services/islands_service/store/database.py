@@ -46,7 +46,7 @@ _COLLISION_STATES = ("40001", "40P01")
 
 
 class StoreError(IslandsError):
-    """The store cannot perform an operation."""
+    """The store cannot perform the operation."""
 
 
 class StoreUnavailableError(StoreError):
@@ -58,11 +58,11 @@ class StoreCollisionError(StoreUnavailableError):
 
 
 class CommitUnknownError(StoreUnavailableError):
-    """The connection was lost during a commit: it is unknown whether the transaction was written."""
+    """The connection to the database was lost during a commit: it is unknown whether it was written."""
 
 
 class StorageFullError(StoreError):
-    """The disk is full. Nothing was written, and accepted data are safe; free some space."""
+    """The disk is full. Nothing was written, and accepted data are safe; free some space and try again."""
 
 
 class Database:
@@ -232,7 +232,9 @@ def _translate(error: DBAPIError) -> StoreError | None:
     if state in _FULL_STATES or (isinstance(cause, sqlite3.Error) and _is_full(cause)):
         return StorageFullError(f"the disk of the database is full ({text}): nothing was written; make room")
     if state in _COLLISION_STATES:
-        return StoreCollisionError(f"the database is used by others ({text}): nothing was written; try again")
+        return StoreCollisionError(
+            f"a concurrent transaction conflicts ({text}): nothing was written; try again"
+        )
     if error.connection_invalidated or state.startswith(_UNAVAILABLE_STATES):
         return StoreUnavailableError(f"the database does not answer ({text}): nothing was written; try again")
     # SQLite also reports an invalid statement as an operational error: only that statement fails.

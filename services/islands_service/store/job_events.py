@@ -1,4 +1,4 @@
-"""Updates of jobs and their events. Each update raises the job's version, which numbers its event."""
+"""Updates of jobs and their events. Each update raises the version of the job, the number of its event."""
 
 import json
 from typing import Any

@@ -1,4 +1,7 @@
-"""Operations of owners on their jobs: submit, get, list, cancel, resume, delete."""
+"""Operations of owners on their jobs: submit, get, list, cancel, resume, delete.
+
+An owner has access only to its own jobs.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -153,7 +156,7 @@ class Jobs:
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
     def cancel(self, owner: str, job: str) -> Job:
-        """Cancel a queued job, or request cancellation of a running one.
+        """Cancel a queued job, or request cancellation of a running one, which a repeated call does not change.
 
         Raises
         ------

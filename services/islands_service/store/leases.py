@@ -16,7 +16,7 @@ from islands_service.store.dialect import now
 from islands_service.store.job_events import append_event, job_from_row, update_job
 from islands_service.store.tables import artefacts, events, jobs, models, points, results
 
-#: Consecutive attempts without a checkpoint after which a job fails.
+#: Attempts since the last checkpoint after which a job is given up.
 ATTEMPTS = 5
 
 #: Progress events that are kept per job. A client that was away longer reads the job itself.
@@ -75,7 +75,7 @@ class Leases:
         return self._database.write(operation)
 
     def report(self, lease: Lease, report: ProgressReport) -> Job:
-        """Store progress, history points and checkpoint of a job in one transaction.
+        """Store progress, history points and checkpoint of a job: all together or none of them.
 
         Raises
         ------
@@ -84,7 +84,7 @@ class Leases:
         return self._database.write(lambda connection: _report(connection, lease, report))
 
     def release(self, lease: Lease, attempted: bool = False) -> None:
-        """Return a job to the queue, or cancel it if that was requested.
+        """Return a job to the queue, to continue from its checkpoint, or cancel it if that was requested.
 
         Parameters
         ----------
@@ -230,7 +230,7 @@ def _held(lease: Lease) -> tuple[Any, ...]:
 
 
 def _update_fenced(connection: Connection, lease: Lease, **values: Any) -> Row[Any]:
-    """Update a job if the lease is still valid."""
+    """Update a job and return its row, or raise `LeaseLostError` if the lease is no longer valid."""
     row = connection.execute(
         update(jobs)
         .where(*_held(lease))

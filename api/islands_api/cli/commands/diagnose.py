@@ -126,7 +126,7 @@ def _run_self_test(
 
 
 def _parallel_map(workers: int | None, tested: bool) -> AbstractContextManager[ParallelMap]:
-    """Return the built-in map for one worker, else a pool of Ray actors."""
+    """Return the built-in map for one worker, else a parallel map on a local Ray."""
     if workers == 1 or (workers is None and not tested):
         return nullcontext(map)
     # Imported here: an analysis of a few seconds must not wait for Ray.
