@@ -170,7 +170,8 @@ class JobView(ResponseModel):
                         "verdict": "named",
                         "effects": ["thermal-drift"],
                         "reduction_percent": 64.3,
-                        "words": "The simulation lacks known effects, which explain the discrepancy.\n  thermal-drift: ...",
+                        "words": "The simulation lacks known effects, which explain the discrepancy.\n"
+                        "  thermal-drift: ...",
                         "wall_s": 2.1,
                     },
                     "problem": None,

@@ -1,6 +1,7 @@
 """Errors of the web service, and the table that maps each error to an HTTP problem (RFC 9457).
 
-To add an error, add an entry to `PROBLEMS` and a row to docs/how-to/use-the-rest-api.md. Its type never changes.
+To add an error, add an entry to `PROBLEMS`, and a row to docs/how-to/use-the-rest-api.md. Its type never
+changes.
 """
 
 from collections.abc import Mapping

@@ -33,8 +33,9 @@ def discrepancy(
     _every: float,
     map_cases: ParallelMap | None = None,
 ) -> JobOutcome:
-    """Run a discrepancy job. It takes seconds to minutes and has no checkpoints: after an interruption it starts
-    again.
+    """Run a discrepancy job.
+
+    It takes seconds to minutes and has no checkpoints: after an interruption it starts again.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ class Jobs:
         return JobRows(tuple(found), (found[-1].created, found[-1].id) if more else None)
 
     def cancel(self, owner: str, job: str) -> Job:
-        """Cancel a queued job, or request cancellation of a running one, which a repeated call does not change.
+        """Cancel a queued job, or request cancellation of a running one; a repeated request has no effect.
 
         Raises
         ------

@@ -230,7 +230,7 @@ def _make_name(name: str, record: Path) -> str:
 
 
 def _parse_validation(text: str | None) -> Path | str | float | None:
-    """Read ``--validation``, before anything is uploaded: a file, rows of the record, or a fraction of its end.
+    """Read ``--validation`` before any upload: a file, rows of the record, or a fraction of its end.
 
     Raises
     ------
