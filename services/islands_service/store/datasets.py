@@ -132,7 +132,10 @@ class Datasets:
     def page(
         self, owner: str, after: tuple[float, str] | None = None, limit: int = 50
     ) -> tuple[tuple[StoredDataset, ...], tuple[float, str] | None]:
-        """Return a page of the data sets of an owner, newest first, and the position of the next."""
+        """Return a page of the data sets of an owner, newest first, and the position of the next page.
+
+        The position is None on the last page.
+        """
         query = select(datasets).where(datasets.c.owner == owner)
         if after is not None:
             query = query.where(tuple_(datasets.c.created, datasets.c.id) < tuple_(*after))

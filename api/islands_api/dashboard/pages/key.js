@@ -23,7 +23,7 @@ export function mountKeyForm(host, problem, onAccepted) {
     event.preventDefault();
     const secret = field.value.trim();
     if (!KEY_CHARACTERS.test(secret)) {
-      setText(complaint, "A key has letters, digits and underscores, and no spaces.");
+      setText(complaint, "A key has letters, digits, hyphens and underscores, and no spaces.");
       return;
     }
     submit.disabled = true;
