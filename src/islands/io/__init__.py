@@ -1,1 +1,4 @@
-"""Files in, files out: the only room of the core that opens one."""
+"""Reading and writing files: records, models, checkpoints, results and exports.
+
+Start with `records` (measured data) and `models` (model files).
+"""

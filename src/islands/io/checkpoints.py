@@ -1,6 +1,7 @@
-"""Checkpoints: an archipelago as a versioned file, written so that a crash leaves the old one or the new one.
+"""Checkpoints: an archipelago as a versioned file.
 
-Expressions are text that is read back as written; floats are exact.
+The file is replaced atomically: a crash leaves either the old checkpoint or the new one. Expressions are
+stored as text, and floats are exact.
 """
 
 import json
@@ -29,7 +30,7 @@ HALL_SCHEMA = "islands.hall/1"
 
 
 def write_checkpoint(archipelago: Archipelago, path: Path, about: Mapping[str, Any]) -> None:
-    """Write an archipelago, and what it belongs to, in place of the file that is there."""
+    """Write an archipelago and its metadata ``about``; replace an existing file atomically."""
     _write(checkpoint_text(archipelago, about), path)
 
 
@@ -40,29 +41,29 @@ def checkpoint_text(archipelago: Archipelago, about: Mapping[str, Any]) -> str:
 
 
 def write_hall(hall: HallOfFame, path: Path) -> None:
-    """Write a hall of fame: the same bytes wherever and however it was found."""
+    """Write a hall of fame. The bytes do not depend on the engine or the machine that ran the search."""
     hall_of_fame = [_individual(each) for each in hall.entries]
     _write(json.dumps({"schema": HALL_SCHEMA, "hall": hall_of_fame}), path)
 
 
 def _write(text: str, path: Path) -> None:
-    beside = path.with_suffix(".part")
-    with beside.open("w", encoding="utf-8") as stream:
+    partial = path.with_suffix(".part")
+    with partial.open("w", encoding="utf-8") as stream:
         stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
-    beside.replace(path)
+    partial.replace(path)
 
 
 def read_checkpoint(
     path: Path, primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> tuple[Archipelago, dict[str, Any]]:
-    """Read an archipelago and what it belongs to.
+    """Read an archipelago and its metadata.
 
     Raises
     ------
     ModelError
-        There is no checkpoint, or it is damaged or of another version.
+        The checkpoint does not exist, is damaged or has another version.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -74,23 +75,32 @@ def read_checkpoint(
 def archipelago_from_document(
     text: str, name: str, primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> tuple[Archipelago, dict[str, Any]]:
-    """Make an archipelago of a checkpoint's text, which messages call by a name.
+    """Parse the text of a checkpoint.
+
+    Parameters
+    ----------
+    text : str
+        Content of a checkpoint file.
+    name : str
+        Name of the checkpoint in error messages.
+    primitives : mapping
+        Primitives that expressions may contain.
 
     Raises
     ------
     ModelError
-        It is damaged or of another version.
+        The checkpoint is damaged or has another version.
     """
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ModelError(f"cannot read the checkpoint {name}: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA:
-        raise ModelError(f"{name} is no checkpoint of schema {SCHEMA}")
+        raise ModelError(f"{name} is not a checkpoint of schema {SCHEMA}")
     try:
         islands = tuple(_read_island(island, primitives) for island in document["islands"])
         if len({island.generation for island in islands}) != 1:
-            raise ModelError("its islands are not at one generation")
+            raise ModelError("its islands are at different generations")
         return Archipelago(islands), dict(document["about"])
     except (KeyError, TypeError, ValueError, AttributeError, ModelError) as error:
         raise ModelError(f"the checkpoint {name} is damaged: {error!r}") from error
@@ -146,7 +156,7 @@ def _read_individual(document: Mapping[str, Any], primitives: Mapping[str, Primi
 
 
 def state_document(state: SearchState) -> dict[str, Any]:
-    """Describe what was counted, and the history; numbers that JSON does not know become null."""
+    """Return the counters and the history of a search as JSON values; infinite fitnesses become null."""
     return {
         "evaluations": state.evaluations,
         "duplicates": state.duplicates,
@@ -156,38 +166,38 @@ def state_document(state: SearchState) -> dict[str, Any]:
 
 
 def history_document(history: Sequence[HistoryPoint]) -> list[list[Any]]:
-    """Describe a history: generation, evaluations, best fitness by size, best fitness by island."""
+    """Return a history as lists: generation, evaluations, best fitness by size, best fitness by island."""
     return [
         [
             point.generation,
             point.evaluations,
             dict(point.best),
-            [least if least < inf else None for least in point.islands],
+            [fitness if fitness < inf else None for fitness in point.islands],
         ]
         for point in history
     ]
 
 
 def history_from_document(document: Sequence[Sequence[Any]]) -> tuple[HistoryPoint, ...]:
-    """Make a history of its document."""
+    """Make a history from the lists that `history_document` returns."""
     return tuple(
         HistoryPoint(
             generation,
             evaluations,
             {int(size): error for size, error in best.items()},
-            tuple(inf if error is None else error for error in least),
+            tuple(inf if fitness is None else fitness for fitness in by_island),
         )
-        for generation, evaluations, best, least in document
+        for generation, evaluations, best, by_island in document
     )
 
 
 def state_from_document(archipelago: Archipelago, document: Mapping[str, Any]) -> SearchState:
-    """Make a state of its document.
+    """Make a search state from the document that `state_document` returns.
 
     Raises
     ------
     KeyError, TypeError, ValueError, AttributeError
-        It is none.
+        The document does not describe a search state.
     """
     return SearchState(
         archipelago,

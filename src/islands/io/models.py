@@ -1,4 +1,4 @@
-"""Model files: JSON with a schema version, every float kept exactly."""
+"""Model files: JSON with a schema version and exact floats."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -20,7 +20,7 @@ SCHEMA: Literal["islands.model/1"] = "islands.model/1"
 
 
 class TermDocument(BaseModel):
-    """One term of a model, as it stands in a file."""
+    """One term of a model in a file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -30,7 +30,7 @@ class TermDocument(BaseModel):
 
 
 class ModelDocument(BaseModel):
-    """A model, as it stands in a file; ``equation`` and ``latex`` are for the reader and never read back."""
+    """A model in a file. ``equation`` and ``latex`` are for human readers and are never read back."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
@@ -44,7 +44,7 @@ class ModelDocument(BaseModel):
 
 
 def terms_document(model: Model) -> list[dict[str, Any]]:
-    """Return a model's terms as they stand in model files and in ``result.json``."""
+    """Return the terms of a model in the form used by model files and ``result.json``."""
     parameters = model.theta or (None,) * model.size
     errors = model.standard_errors or (None,) * model.size
     return [
@@ -54,12 +54,12 @@ def terms_document(model: Model) -> list[dict[str, Any]]:
 
 
 def model_json(model: Model) -> str:
-    """Write a model as JSON; the same model gives the same text.
+    """Return a model as JSON text. Equal models give equal texts.
 
     Raises
     ------
     ModelError
-        A number of the model is not finite: JSON has no word for it.
+        A number of the model is not finite; JSON cannot represent it.
     """
     fields = {
         "inputs": model.input_names,
@@ -72,7 +72,7 @@ def model_json(model: Model) -> str:
     try:
         document = ModelDocument.model_validate(fields)
     except ValidationError as error:
-        raise ModelError(f"the model cannot be written: {_problem(error)}") from error
+        raise ModelError(f"the model cannot be written: {_first_problem(error)}") from error
     return document.model_dump_json(by_alias=True, indent=2) + "\n"
 
 
@@ -97,12 +97,12 @@ def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVE
     Parameters
     ----------
     primitives : mapping
-        Functions that may stand in it; give your own with ``PRIMITIVES | {mine.name: mine}``.
+        Primitives that expressions may contain; add your own with ``PRIMITIVES | {mine.name: mine}``.
 
     Raises
     ------
     ModelError
-        There is no such file, or it is no model file: the message names the field.
+        The file does not exist or is not a model file. The message names the invalid field.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -114,7 +114,7 @@ def read_model(path: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVE
 def model_from_json(
     text: str, name: str = "model", primitives: Mapping[str, Primitive] = PRIMITIVES
 ) -> Model:
-    """Make a model of the text of a model file.
+    """Parse the text of a model file. ``name`` is the name of the file in error messages.
 
     Raises
     ------
@@ -124,35 +124,36 @@ def model_from_json(
     try:
         document = ModelDocument.model_validate_json(text)
     except ValidationError as error:
-        raise ModelError(f"{name} is no model file of schema {SCHEMA}: {_problem(error)}") from error
+        raise ModelError(f"{name} is not a model file of schema {SCHEMA}: {_first_problem(error)}") from error
     terms: dict[Regressor, tuple[float | None, float | None]] = {}
     for position, term in enumerate(document.terms):
         where = f"{name}: terms.{position}"
-        factor, item = _canonical(term.regressor, primitives, f"{where}.regressor")
+        factor, item = _parse_regressor(term.regressor, primitives, f"{where}.regressor")
         if item in terms:
-            raise ModelError(f"{where}.regressor: {term.regressor!r} stands there twice")
-        # A term may be written in any way: what canonical form takes out belongs to the parameter.
+            raise ModelError(f"{where}.regressor: {term.regressor!r} is given twice")
+        # A file may contain terms that are not in canonical form: the constant factor that canonicalisation
+        # extracts is multiplied into the parameter.
         terms[item] = (
-            _times(factor, term.parameter, f"{where}.parameter"),
-            _times(abs(factor), term.standard_error, f"{where}.standard_error"),
+            _scale(factor, term.parameter, f"{where}.parameter"),
+            _scale(abs(factor), term.standard_error, f"{where}.standard_error"),
         )
     ordered = canonical_order(terms)
-    theta = _complete([terms[item][0] for item in ordered], f"{name}: parameter")
-    errors = _complete([terms[item][1] for item in ordered], f"{name}: standard_error")
+    theta = _all_or_none([terms[item][0] for item in ordered], f"{name}: parameter")
+    errors = _all_or_none([terms[item][1] for item in ordered], f"{name}: standard_error")
     try:
         return Model(tuple(ordered), theta, document.inputs, document.output, document.dt, errors)
     except ModelError as error:
         raise ModelError(f"{name}: inputs: {error}") from error
 
 
-def _problem(error: ValidationError) -> str:
-    """Name the first field that is wrong, and say what it should be."""
+def _first_problem(error: ValidationError) -> str:
+    """Return the first invalid field and its validation message."""
     problem = error.errors(include_url=False)[0]
     where = ".".join(str(part) for part in problem["loc"]) or "the file"
     return f"{where}: {problem['msg']}"
 
 
-def _canonical(text: str, primitives: Mapping[str, Primitive], where: str) -> tuple[float, Regressor]:
+def _parse_regressor(text: str, primitives: Mapping[str, Primitive], where: str) -> tuple[float, Regressor]:
     try:
         factor, item = regressor(parse(text, primitives))
     except ModelError as error:
@@ -162,7 +163,7 @@ def _canonical(text: str, primitives: Mapping[str, Primitive], where: str) -> tu
     return factor, item
 
 
-def _times(factor: float, number: float | None, where: str) -> float | None:
+def _scale(factor: float, number: float | None, where: str) -> float | None:
     if number is None:
         return None
     if not isfinite(factor * number):
@@ -170,9 +171,9 @@ def _times(factor: float, number: float | None, where: str) -> float | None:
     return factor * number
 
 
-def _complete(values: list[float | None], what: str) -> tuple[float, ...] | None:
-    """Return numbers that are all there, or None where none is."""
-    there = tuple(value for value in values if value is not None)
-    if there and len(there) < len(values):
-        raise ModelError(f"{what} is given for some terms only: give it for all or for none")
-    return there or None
+def _all_or_none(values: list[float | None], field: str) -> tuple[float, ...] | None:
+    """Return the numbers if all are given, None if none is given."""
+    given = tuple(value for value in values if value is not None)
+    if given and len(given) < len(values):
+        raise ModelError(f"{field} is given for some terms only: give it for all or for none")
+    return given or None

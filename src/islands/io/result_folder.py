@@ -1,4 +1,4 @@
-"""A result folder: ``result.json``, one file a model, and a summary to read."""
+"""Result folder: ``result.json``, one file per model, and a text summary."""
 
 import hashlib
 import json
@@ -22,12 +22,12 @@ SCHEMA = "islands.result/1"
 
 
 def result_json(found: SearchResult) -> str:
-    """Write ``result.json``."""
+    """Return the text of ``result.json``."""
     return json.dumps(result_document(found), indent=2, allow_nan=False) + "\n"
 
 
 def result_document(found: SearchResult) -> dict[str, Any]:
-    """Describe a result; numbers that JSON does not know (NaN, infinity) become null."""
+    """Return a result as JSON values; NaN and infinity become null."""
     search = found.search
     document = {
         "schema": SCHEMA,
@@ -55,7 +55,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
 
 
 def record_document(record: Dataset) -> dict[str, Any]:
-    """Describe a record."""
+    """Return the description of a record as JSON values."""
     return {
         "sha256": record.sha256 or content_sha256(record),
         "samples": record.samples,
@@ -68,7 +68,7 @@ def record_document(record: Dataset) -> dict[str, Any]:
 
 
 def content_sha256(record: Dataset) -> str:
-    """Return the hash of a record that came from no file: of its numbers, sampling time and segments."""
+    """Return the SHA-256 of the samples, sampling time and segments, for records not read from a file."""
     digest = hashlib.sha256(np.ascontiguousarray(record.u).tobytes())
     digest.update(record.y.tobytes())
     digest.update(repr((record.dt, record.segments)).encode())
@@ -96,7 +96,7 @@ def _model_document(rank: int, entry: RankedModel) -> dict[str, Any]:
 
 
 def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
-    """Describe a physics check."""
+    """Return the results of the physics checks as JSON values."""
     return {
         "property_1": physics.property_1,
         "clusters": [asdict(entry) for entry in physics.clusters],
@@ -107,7 +107,7 @@ def physics_document(physics: PhysicsChecks) -> dict[str, Any]:
 
 
 def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
-    """Describe residual tests."""
+    """Return the results of the residual tests as JSON values."""
     return {
         "passed": tests.passed,
         "whiteness_p": tests.whiteness_p,
@@ -132,7 +132,7 @@ def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
 def write_result(found: SearchResult, folder: Path) -> None:
     """Write ``models/NN.json``, ``summary.txt`` and, last, ``result.json``.
 
-    Models of a result that was in the folder are removed.
+    Remove the model files of an earlier result in the same folder.
     """
     models = folder / "models"
     models.mkdir(parents=True, exist_ok=True)
@@ -145,7 +145,7 @@ def write_result(found: SearchResult, folder: Path) -> None:
 
 
 def summary(found: SearchResult) -> str:
-    """Write the result as plain text."""
+    """Return the result as plain text."""
     record, search = found.record, found.search
     outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
     full = search.full_set
@@ -162,7 +162,7 @@ def summary(found: SearchResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-#: Columns of the table of models: heading, format, and where the number is found.
+#: Headings of the table of models.
 COLUMNS = (
     "rank",
     "terms",
@@ -176,7 +176,7 @@ COLUMNS = (
 
 
 def table(models: Sequence[RankedModel]) -> list[str]:
-    """Return a table of models as lines of equal width, errors those of the free run."""
+    """Return a table of models as lines of equal width. Errors are those of the free run."""
     rows = [COLUMNS, *(row(rank, entry) for rank, entry in enumerate(models, start=1))]
     widths = [max(len(line[column]) for line in rows) for column in range(len(COLUMNS))]
     return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in rows]
@@ -187,21 +187,21 @@ def row(rank: int, entry: RankedModel) -> tuple[str, ...]:
     metrics, physics = entry.assessment.metrics, entry.assessment.physics
     estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
     estimated, validated = (bool(entry.assessment.outcomes[part]["free_run"]) for part in PARTS)
-    rests = all(hold.bounded for hold in physics.holds)
+    holds_bounded = all(hold.bounded for hold in physics.holds)
     return (
         str(rank),
         str(entry.model.size),
         number(estimation.mape, "{:.4f}", estimated),
         number(validation.mape, "{:.4f}", validated),
         number(validation.r2, "{:.5f}", validated),
-        number(physics.hold_drift_percent, "{:.3f}", rests),
+        number(physics.hold_drift_percent, "{:.3f}", holds_bounded),
         "yes" if physics.property_1 else "no",
         "pass" if entry.assessment.residual_tests.passed else "fail",
     )
 
 
 def number(value: float, form: str, bounded: bool) -> str:
-    """Format a number, or say that the simulation behind it diverged; "-" where the output has no range."""
+    """Format a number. Return "diverged" if its simulation diverged and "-" if the number is not finite."""
     if not bounded:
         return "diverged"
     return form.format(value) if isfinite(value) else "-"

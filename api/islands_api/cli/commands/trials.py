@@ -14,7 +14,7 @@ from rich.table import Table
 from islands.errors import SettingsError, lookup
 from islands.figures.confusion import draw_confusion
 from islands.figures.style import save
-from islands.performance.trials.cases import CORES, SimulatedCase
+from islands.performance.trials.cases import CASES, SimulatedCase
 from islands.performance.trials.scoring import (
     Proportion,
     ReliabilityBin,
@@ -40,7 +40,7 @@ POLE = 0.9
 def trials(
     cores: Annotated[
         list[str] | None,
-        typer.Option("--core", help=f"Simulation; repeatable: {', '.join(CORES)}; the first by default."),
+        typer.Option("--core", help=f"Simulation; repeatable: {', '.join(CASES)}; the first by default."),
     ] = None,
     effects: Annotated[
         list[str] | None,
@@ -78,7 +78,7 @@ def trials(
     out: Annotated[Path | None, typer.Option("--json", help="JSON file for the outcomes.")] = None,
 ) -> None:
     """Inject effects into simulated records, diagnose them, and count how often they are found and named."""
-    cases = {name: lookup(CORES, name, "core") for name in cores or [next(iter(CORES))]}
+    cases = {name: lookup(CASES, name, "core") for name in cores or [next(iter(CASES))]}
     if noise not in ("white", "ar"):
         raise SettingsError(f"--noise {noise}: take white or ar")
     pole = POLE if noise == "ar" else 0.0

@@ -1,4 +1,7 @@
-"""Models as text of other kinds: one entry in the table, and a model can be exported that way."""
+"""Export of models to text formats and programming languages.
+
+Each format is an entry of `EXPORTS`. Read `parts` and `infix` first: all programs share them.
+"""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -25,11 +28,11 @@ EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
 
 
 def export(model: Model, kind: str) -> str:
-    """Return a model as text of a kind in ``EXPORTS``.
+    """Return a model as text in one of the formats of ``EXPORTS``.
 
     Raises
     ------
     SettingsError
-        There is no such kind.
+        The format is unknown.
     """
     return lookup(EXPORTS, kind, "format")(model)

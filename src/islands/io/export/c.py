@@ -1,4 +1,4 @@
-"""A model as one file of C99, as it goes into a controller."""
+"""Export of a model as one C99 file, for example for an embedded controller."""
 
 import textwrap
 
@@ -10,9 +10,8 @@ _FILE = """\
 /*
 {heading}
  *
- * C99. Compiled with -ffp-contract=off and without -ffast-math it computes the numbers of the search bit for
- * bit; the last bits of exp, log, sin, cos and tanh are those of the machine's own library.
- */
+ * C99. If it is compiled with -ffp-contract=off and without -ffast-math, its results equal those of the
+ search * bit for bit. The last bits of exp, log, sin, cos and tanh depend on the C library. */
 
 #include <math.h>
 #include <stddef.h>
@@ -20,8 +19,8 @@ _FILE = """\
 enum {{ MAXIMUM_LAG = {lag} }};
 
 {functions}/*
- * Return y(k) from the samples before it. The pointers stand at sample k: y[-1] .. y[-MAXIMUM_LAG] and the
- * inputs likewise are read, and nothing from k on.
+ * Return y(k) from the preceding samples. The pointers point to sample k: the function reads y[-1] ..
+ * y[-MAXIMUM_LAG] and the same lags of the inputs, never sample k or later ones.
  */
 double predict({signals})
 {{
@@ -30,7 +29,7 @@ double predict({signals})
     return total;
 }}
 
-/* Run free over the inputs: y holds its first MAXIMUM_LAG samples, and the others are written. */
+/* Free run: the first MAXIMUM_LAG samples of y are given, the others are computed and written. */
 void simulate({inputs}, double *y, size_t samples)
 {{
     for (size_t k = MAXIMUM_LAG; k < samples; ++k) {{
@@ -41,18 +40,19 @@ void simulate({inputs}, double *y, size_t samples)
 
 
 def c_source(model: Model) -> str:
-    """Write a model as C99, of ASCII: ``predict`` one sample, ``simulate`` a free run.
+    """Return a model as C99 source in ASCII.
 
-    Sums and products stand in the order of this package's kernels.
+    The source defines the functions ``predict`` (one sample) and ``simulate`` (free run). Sums and products
+    are evaluated in the same order as in this package's kernels.
 
     Raises
     ------
     ModelError
-        The model has no finite parameters, or a primitive of the user's has no body in C.
+        The model has no finite parameters, or a user-defined primitive has no C body.
     """
     names = signals(model)
     definitions = [definition(primitive, _name(primitive)) for primitive in functions(model)]
-    # A compiler warns of an argument that is never read.
+    # Compilers warn about unused parameters.
     read = {channel for item in model.regressors for channel, _ in item.lags}
     lines = [f"(void){name};" for channel, name in enumerate(names) if channel not in read]
     lines += [f"total += {term};" for term in terms(model, lambda name, lag: f"{name}[-{lag}]", _name)]
@@ -69,17 +69,17 @@ def c_source(model: Model) -> str:
 
 
 def definition(primitive: Primitive, name: str) -> str:
-    """Write a primitive as a function of C.
+    """Return the definition of a primitive as a C function.
 
     Raises
     ------
     ModelError
-        It has no body in C.
+        The primitive has no C body.
     """
     arguments = ", ".join(f"double {argument}" for argument in "ab"[: primitive.arity])
     return f"static double {name}({arguments})\n{{\n{textwrap.indent(body(primitive, 'c'), '    ')}\n}}\n"
 
 
 def _name(primitive: Primitive) -> str:
-    # tanh is the library's, and what begins with _ the compiler's.
+    # The prefix avoids names of the C library (tanh) and reserved names (leading underscore).
     return f"f_{primitive.name}"

@@ -1,27 +1,27 @@
-"""Expressions as infix text: Python, C and MATLAB read the same, but for samples and names of functions."""
+"""Expressions as infix text. Python, C and MATLAB differ only in the syntax of samples and function names."""
 
 from collections.abc import Callable
 
 from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Expression, Lagged, Primitive
 
-#: Primitives that every language has as operators.
+#: Primitives that are operators in every language.
 OPERATORS = {"mul": "*", "add": " + ", "sub": " - "}
 
 
 def infix(
     expression: Expression, signal: Callable[[int, int], str], function: Callable[[Primitive], str]
 ) -> str:
-    """Write an expression.
+    """Return an expression as infix text.
 
     Parameters
     ----------
     expression : Expression
-        In canonical form, with its back-shifts at the leaves.
+        In canonical form, with back-shifts at the leaves.
     signal : callable
-        ``signal(channel, lag)`` writes a sample.
+        ``signal(channel, lag)`` returns the text of a sample.
     function : callable
-        Returns the name by which a primitive is called; whoever does not know it raises.
+        ``function(primitive)`` returns the name of a primitive's function.
 
     Raises
     ------
@@ -37,13 +37,13 @@ def infix(
         case Apply(primitive, arguments):
             parts = [infix(argument, signal, function) for argument in arguments]
             if primitive.name in OPERATORS:
-                # Operators of one kind are carried out from the left everywhere, as in `value`; the brackets
-                # keep that order under a parameter, which the kernels multiply last.
+                # All languages evaluate equal operators from left to right, as `value` does. The brackets
+                # keep that order when the parameter is multiplied; the kernels multiply by it last.
                 return f"({OPERATORS[primitive.name].join(parts)})"
-            return f"{function(primitive)}({', '.join(map(_unbracketed, arguments, parts))})"
+            return f"{function(primitive)}({', '.join(map(_strip_brackets, arguments, parts))})"
     raise ModelError(f"{expression!r} is not in canonical form: bring it there with `regressor`")
 
 
-def _unbracketed(argument: Expression, text: str) -> str:
-    """Write an argument of a function without brackets of its own."""
+def _strip_brackets(argument: Expression, text: str) -> str:
+    """Return the text of a function argument without its outer brackets."""
     return text[1:-1] if not isinstance(argument, Lagged) and text.startswith("(") else text

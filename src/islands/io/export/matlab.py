@@ -1,4 +1,4 @@
-"""A model as a function file that MATLAB and Octave run."""
+"""Export of a model as a function file for MATLAB and Octave."""
 
 import textwrap
 
@@ -8,12 +8,12 @@ from islands.model.model import Model
 
 _FILE = """\
 function y = narx_model({inputs}, y0)
-% NARX_MODEL  Free run of a NARX model over its inputs, from the first outputs y0.
+% NARX_MODEL  Free run of a NARX model from its inputs and the first outputs y0.
 %
 {heading}
 %
-% Inputs are vectors of one length, y is a vector like the first of them, and y0 holds the first {lag} samples
-% of y. Keep this file as narx_model.m; it runs in MATLAB and Octave.
+% Inputs are vectors of equal length, y has the size of the first input, and y0 holds the first {lag} samples
+% of y. Save this file as narx_model.m; it runs in MATLAB and Octave.
 
   maximum_lag = {lag};
   {conversions}
@@ -31,26 +31,26 @@ end
 
 
 def matlab_source(model: Model) -> str:
-    """Write a model as a function of MATLAB, of ASCII: a free run, from vectors to a vector.
+    """Return a model as an ASCII MATLAB function that computes the free run from input vectors.
 
-    Sums and products stand in the order of this package's kernels.
+    Sums and products are evaluated in the same order as in this package's kernels.
 
     Raises
     ------
     ModelError
-        The model has no finite parameters, or a primitive of the user's has no body in MATLAB.
+        The model has no finite parameters, or a user-defined primitive has no MATLAB body.
     """
     inputs = signals(model)[1:]
     definitions = [_definition(primitive) for primitive in functions(model)]
-    written = terms(model, lambda name, lag: f"{name}(k-{lag})", _name)
+    term_texts = terms(model, lambda name, lag: f"{name}(k-{lag})", _name)
     return _FILE.format(
         heading=heading(model, "%"),
         inputs=", ".join(inputs),
         first_input=inputs[0],
         lag=model.maximum_lag,
-        # Integers would round every product.
+        # With integer inputs MATLAB would round every product.
         conversions="\n  ".join(f"{name} = double({name});" for name in [*inputs, "y0"]),
-        terms="\n    ".join(f"total = total + {term};" for term in written),
+        terms="\n    ".join(f"total = total + {term};" for term in term_texts),
         functions="".join(f"\n{text}" for text in definitions),
     )
 

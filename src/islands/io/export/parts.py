@@ -1,4 +1,4 @@
-"""What the programs of a model have in common: their terms, the functions they call, what they say of it."""
+"""Parts shared by all exported programs: signal names, terms, primitive functions, headings."""
 
 import json
 import math
@@ -12,47 +12,49 @@ from islands.model.equations import equation
 from islands.model.expression import Apply, Constant, Primitive, walk
 from islands.model.model import Model
 
-#: C and MATLAB tell 63 characters of a name apart, and know no Greek letters.
+#: C and MATLAB distinguish the first 63 characters of a name and allow ASCII letters only.
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,59}")
 
-#: What a body of a function looks like, by the field of `Primitive`.
+#: Example of a function body for error messages, by the field of `Primitive`.
 _EXAMPLES = {"c": "return a / (1.0 + fabs(a));", "matlab": "r = a / (1 + abs(a));"}
 
 
 def signals(model: Model) -> list[str]:
-    """Return the names of the output and of the inputs: y, and u or u1, u2 .. where there are several."""
+    """Return the names of the output and the inputs: y and u, or y, u1, u2 .. for several inputs."""
     return ["y", "u"] if model.inputs == 1 else ["y", *(f"u{index + 1}" for index in range(model.inputs))]
 
 
 def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[Primitive], str]) -> list[str]:
-    """Write the terms in the order in which the kernels add them.
+    """Return the texts of the terms in the order in which the kernels add them.
 
     Parameters
     ----------
     sample : callable
-        ``sample("u", 2)`` writes a signal two samples back.
+        ``sample("u", 2)`` returns the text of the sample u(k-2).
     function : callable
         As in `infix`.
 
     Raises
     ------
     ModelError
-        The model has no parameters, or one that is not finite.
+        The model has no parameters, or a parameter is not finite.
     """
     names = signals(model)
-    written = []
+    texts = []
     for parameter, item in zip(model.parameters, model.regressors, strict=True):
         if not math.isfinite(parameter):
-            raise ModelError(f"the parameter of {item.text} is {parameter}: a program needs finite ones")
+            raise ModelError(
+                f"the parameter of {item.text} is {parameter}: an export needs finite parameters"
+            )
         text = repr(float(parameter))
         if item.expression != Constant(1.0):
             text += "*" + infix(item.expression, lambda channel, lag: sample(names[channel], lag), function)
-        written.append(text)
-    return written
+        texts.append(text)
+    return texts
 
 
 def functions(model: Model) -> list[Primitive]:
-    """Return the primitives that are called, each once, in the order of their names."""
+    """Return the primitives that the model calls as functions, sorted by name."""
     called = {
         node.primitive.name: node.primitive
         for item in model.regressors
@@ -73,12 +75,12 @@ def body(primitive: Primitive, language: str) -> str:
     Raises
     ------
     ModelError
-        It has none, or its name is no name in the language.
+        The primitive has no body, or its name is not a valid identifier of the language.
     """
     name, text = primitive.name, getattr(primitive, language)
     if not text:
         raise ModelError(
-            f"primitive {name!r} has no text in this language: give the body of its function when you make "
+            f"primitive {name!r} has no body in this language: pass the body of its function when you create "
             f"it, primitive({name!r}, ..., {language}={_EXAMPLES[language]!r})"
         )
     if not _NAME.fullmatch(name):
@@ -89,23 +91,23 @@ def body(primitive: Primitive, language: str) -> str:
     return str(text)
 
 
-def description(model: Model, quoted: Callable[[str], str]) -> str:
-    """Tell what the signals are; ``quoted`` writes a column's name so that it may stand in a comment."""
+def description(model: Model, quote: Callable[[str], str]) -> str:
+    """Describe the signals and the sampling time; ``quote`` escapes a column name for use in a comment."""
     names = zip(signals(model)[1:], model.input_names, strict=True)
-    inputs = ", ".join(f"{signal} = {quoted(name)}" for signal, name in names)
+    inputs = ", ".join(f"{signal} = {quote(name)}" for signal, name in names)
     dt = "any" if model.dt is None else f"{float(model.dt)!r} s"
-    return f"Inputs {inputs}; output y = {quoted(model.output_name)}; sampling time {dt}."
+    return f"Inputs {inputs}; output y = {quote(model.output_name)}; sampling time {dt}."
 
 
 def heading(model: Model, mark: str) -> str:
-    """Tell equation and signals in ASCII, in a comment whose lines begin with a mark."""
+    """Return the equation and the signals as an ASCII comment; every line begins with ``mark``."""
     lines = textwrap.wrap(
         f"NARX model: {equation(model)}", width=100, subsequent_indent="    ", break_long_words=False
     )
-    # The names stay on one line: broken behind a backslash, they would join it to the next one in C.
-    return "\n".join(f"{mark} {line}".rstrip() for line in [*lines, "", description(model, _quoted)])
+    # The names stay on one line: in C, a line that ends with a backslash continues on the next one.
+    return "\n".join(f"{mark} {line}".rstrip() for line in [*lines, "", description(model, _quote)])
 
 
-def _quoted(name: str) -> str:
-    """Return a name in JSON's quotes: ASCII, without line ends, and without an asterisk to end a comment."""
+def _quote(name: str) -> str:
+    """Return a name as a JSON string: ASCII, no line breaks, and no asterisk that could end a C comment."""
     return json.dumps(name).replace("*", r"\u002a")

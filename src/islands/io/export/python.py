@@ -1,4 +1,4 @@
-"""A model as a Python module of its own, that needs no library."""
+"""Export of a model as a self-contained Python module."""
 
 import inspect
 import math
@@ -24,14 +24,14 @@ MAXIMUM_LAG = {lag}
 {constants}
 
 {functions}def predict(k, y, {inputs}):
-    """Return y(k) from the samples before it."""
+    """Return y(k) from the preceding samples."""
     total = 0.0
     {terms}
     return total
 
 
 def simulate({inputs}, y0):
-    """Run free over the inputs, from the first MAXIMUM_LAG outputs y0."""
+    """Return the free run from the inputs and the first MAXIMUM_LAG outputs y0."""
     y = [float(value) for value in y0[:MAXIMUM_LAG]]
     for k in range(MAXIMUM_LAG, len({first_input})):
         y.append(predict(k, y, {inputs}))
@@ -40,30 +40,31 @@ def simulate({inputs}, y0):
 
 
 def python_source(model: Model) -> str:
-    """Write a model as a Python module of its own: ``predict`` one sample, ``simulate`` a free run.
+    """Return a model as the source of a Python module.
 
-    It needs no library, and computes the same numbers as this package's kernels, bit for bit: sums and
-    products stand in the same order.
+    The module defines the functions ``predict`` (one sample) and ``simulate`` (free run). It needs only the
+    standard library. Its results equal those of this package's kernels bit for bit, because sums and products
+    are evaluated in the same order.
 
     Raises
     ------
     ModelError
-        The model has no finite parameters, or a primitive of the user's can't stand alone: its source is
-        not at hand, or it needs more than ``math`` and numbers.
+        The model has no finite parameters, or a user-defined primitive cannot be exported: its source is not
+        available, or it uses globals other than ``math`` and numbers.
     """
     used = functions(model)
     inputs = signals(model)[1:]
-    written = terms(model, lambda name, lag: f"{name}[k-{lag}]", _name)
-    sources = [_function(primitive) for primitive in used]
+    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]", _name)
+    sources = [_function_source(primitive) for primitive in used]
     return _MODULE.format(
         equation=equation(model),
-        description=description(model, _quoted),
+        description=description(model, _quote),
         lag=model.maximum_lag,
-        constants="".join(f"{name} = {value}\n" for name, value in _constants(used).items()),
+        constants="".join(f"{name} = {value}\n" for name, value in _required_globals(used).items()),
         functions="\n\n".join(sources) + ("\n\n" if sources else ""),
         inputs=", ".join(inputs),
         first_input=inputs[0],
-        terms="\n    ".join(f"total += {term}" for term in written),
+        terms="\n    ".join(f"total += {term}" for term in term_texts),
     )
 
 
@@ -71,19 +72,19 @@ def _name(primitive: Primitive) -> str:
     return f"_{primitive.name}"
 
 
-def _quoted(name: str) -> str:
-    """Return a column's name as it may stand in a docstring, on one line."""
+def _quote(name: str) -> str:
+    """Return a column name escaped for a docstring, on one line."""
     escaped = name.replace("\\", r"\\").replace('"', r"\"")
     return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in escaped)
 
 
-def _function(primitive: Primitive) -> str:
-    """Return the source of a primitive's scalar function, under a name of its own."""
+def _function_source(primitive: Primitive) -> str:
+    """Return the source of a primitive's scalar function, renamed to ``_name(primitive)``."""
     try:
         source = textwrap.dedent(inspect.getsource(primitive.scalar))
     except (OSError, TypeError) as error:
         raise ModelError(
-            f"the source of primitive {primitive.name!r} is not at hand: define it with def in a file"
+            f"the source of primitive {primitive.name!r} is not available: define it with def in a file"
         ) from error
     if not source.startswith("def "):
         raise ModelError(
@@ -93,31 +94,31 @@ def _function(primitive: Primitive) -> str:
     return re.sub(r"def \w+", f"def _{primitive.name}", source, count=1)
 
 
-def _constants(primitives: Sequence[Primitive]) -> dict[str, str]:
-    """Return what the functions take from their modules: numbers, and ``math`` by other names."""
-    taken = {"math": "math", "MAXIMUM_LAG": "", "predict": "", "simulate": ""}
-    taken |= {f"_{primitive.name}": "" for primitive in primitives}
+def _required_globals(primitives: Sequence[Primitive]) -> dict[str, str]:
+    """Return the module-level names that the functions use, with their Python source."""
+    reserved = {"math": "math", "MAXIMUM_LAG": "", "predict": "", "simulate": ""}
+    reserved |= {f"_{primitive.name}": "" for primitive in primitives}
     found: dict[str, str] = {}
     for primitive in primitives:
-        held = inspect.getclosurevars(primitive.scalar)
-        for name, value in {**held.globals, **held.nonlocals}.items():
-            written = _written(value)
-            if written is None:
+        closure = inspect.getclosurevars(primitive.scalar)
+        for name, value in {**closure.globals, **closure.nonlocals}.items():
+            source = _value_source(value)
+            if source is None:
                 raise ModelError(
-                    f"primitive {primitive.name!r} uses {name}: an export knows math and numbers alone"
+                    f"primitive {primitive.name!r} uses {name}: an export may only use math and numbers"
                 )
-            if (taken | found).get(name, written) != written:
+            if (reserved | found).get(name, source) != source:
                 raise ModelError(
-                    f"primitive {primitive.name!r} uses {name}, a name that stands for something else in the "
+                    f"primitive {primitive.name!r} uses {name}, a name that means something else in the "
                     "export: rename it"
                 )
-            if name not in taken:
-                found[name] = written
+            if name not in reserved:
+                found[name] = source
     return found
 
 
-def _written(value: object) -> str | None:
-    """Return Python source of a number, of ``math`` or of one of its functions; None of anything else."""
+def _value_source(value: object) -> str | None:
+    """Return the Python source of a number, of ``math`` or of a function of it; None for other values."""
     if value is math:
         return "math"
     if isinstance(value, Integral):

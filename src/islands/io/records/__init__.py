@@ -1,4 +1,4 @@
-"""Records to and from files: each format is a reader, listed in `READERS`."""
+"""Records from and to files. Each format has one reader, listed in `READERS`. Read `reader` first."""
 
 from islands.io.records.preview import ColumnPreview, Preview, preview
 from islands.io.records.reader import READERS, fingerprint, read_columns, read_record

@@ -1,4 +1,4 @@
-"""What a column's name says: its unit, and whether the column is time."""
+"""Column names: units, structures and the time column."""
 
 import re
 from collections import Counter
@@ -6,13 +6,13 @@ from collections.abc import Collection, Iterable
 
 from islands.errors import RecordError
 
-#: Seconds of the units in which a time column may be given; a name without a unit is in seconds.
+#: Units of time columns in seconds. A column without a unit is in seconds.
 TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 
-#: With one of these a capital T is a temperature.
+#: Units with which a capital T means a temperature.
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
-#: Behind an input's name: the column one sample early, for a system that answers within the sample.
+#: Suffix of an input's name: read the column one sample early, for a system that responds within the sample.
 AT_ONCE = "+1"
 
 _TIME = re.compile(r"t(_.*|\s*[\[(].*)?|time.*", re.IGNORECASE)
@@ -20,9 +20,10 @@ _BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]*?)\s*[\])]")
 
 
 def parse_unit(name: str) -> str:
-    """Return the unit in a column's name: ``V`` of ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
+    """Return the unit in a column's name: ``V`` for ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
 
-    It is what follows the last underscore, unless that is a bare number (``u_1``); ``""`` without one.
+    The unit is the text in brackets or the text after the last underscore, unless that is a number (``u_1``).
+    Empty if the name has no unit.
     """
     if bracketed := _BRACKETED.fullmatch(name):
         return bracketed[1]
@@ -31,49 +32,49 @@ def parse_unit(name: str) -> str:
 
 
 def split_structures(names: Iterable[str]) -> dict[str, str]:
-    """Return the structure in which each column is a field: ``run_1.`` of ``run_1.u_V``, ``""`` at the top.
+    """Return the structure that contains each column: ``run_1.`` for ``run_1.u_V``, ``""`` at the top level.
 
-    It takes two fields to make a structure: a point alone may belong to a unit (``k_N.m``).
+    A structure has at least two fields; a single point may be part of a unit (``k_N.m``).
     """
-    before = {name: name[: name.rfind(".") + 1] for name in names}
-    fields = Counter(before.values())
-    return {name: structure if fields[structure] > 1 else "" for name, structure in before.items()}
+    prefixes = {name: name[: name.rfind(".") + 1] for name in names}
+    fields = Counter(prefixes.values())
+    return {name: prefix if fields[prefix] > 1 else "" for name, prefix in prefixes.items()}
 
 
 def find_column(name: str, columns: Iterable[str]) -> str:
-    """Return the column that an input names: ``u_V`` of ``u_V+1``, unless a column has the very name."""
+    """Return the column of an input name: ``u_V`` for ``u_V+1``, unless a column has exactly that name."""
     return name if name in tuple(columns) else name.removesuffix(AT_ONCE)
 
 
 def looks_like_time(name: str) -> bool:
-    """Tell whether a column is called ``t``, ``t_*`` or ``time*``; ``T_K`` is a temperature."""
+    """Return whether a column's name is ``t``, ``t_*`` or ``time*``; ``T_K`` is a temperature."""
     return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
 
 
 def seconds_per_unit(name: str) -> float | None:
-    """Return the seconds of a time column's unit, None where the unit is unknown."""
+    """Return the unit of a time column in seconds, None if the unit is unknown."""
     return TIME_UNITS.get(parse_unit(name).lower())
 
 
 def time_column(
     names: Collection[str], file: str, taken: Collection[str] = (), structure: str = ""
 ) -> str | None:
-    """Choose the time column; None where there is none.
+    """Return the name of the time column, None if the file has no time column.
 
-    ``t``, ``time`` and names with a unit of time go before other words that begin with ``time``, so that a
-    ``timestamp`` beside ``t_s`` does no harm.
+    ``t``, ``time`` and names with a unit of time take precedence over other words that begin with ``time``,
+    so that a file may contain both ``timestamp`` and ``t_s``.
 
     Parameters
     ----------
     names : collection of str
         All columns of the file.
     file : str
-        Its name, for the message.
+        Name of the file, for the message.
     taken : collection of str
-        Inputs and output, which are not the time.
+        Inputs and output; they are never the time.
     structure : str
-        The structure of the output (see `split_structures`). A time among its fields precedes one at the top;
-        fields of other structures are ignored.
+        The structure of the output (see `split_structures`). A time column among its fields takes precedence
+        over one at the top level; fields of other structures are ignored.
 
     Raises
     ------
@@ -81,20 +82,24 @@ def time_column(
         Several columns may be the time.
     """
     structures = split_structures(names)
-    for home in dict.fromkeys((structure, "")):
-        own = {
-            name: name.removeprefix(home) for name in names if structures[name] == home and name not in taken
+    for scope in dict.fromkeys((structure, "")):
+        fields = {
+            name: name.removeprefix(scope)
+            for name in names
+            if structures[name] == scope and name not in taken
         }
         candidates = [
-            name for name, word in own.items() if looks_like_time(word) and seconds_per_unit(word) is not None
+            name
+            for name, field in fields.items()
+            if looks_like_time(field) and seconds_per_unit(field) is not None
         ]
-        plain = [
-            name for name in candidates if own[name].lower() in {"t", "time"} or parse_unit(own[name])
+        preferred = [
+            name for name in candidates if fields[name].lower() in {"t", "time"} or parse_unit(fields[name])
         ] or candidates
-        if len(plain) > 1:
+        if len(preferred) > 1:
             raise RecordError(
-                f"{file}: columns {' and '.join(plain)} may all be the time: rename all but one"
+                f"{file}: columns {' and '.join(preferred)} may all be the time: rename all but one"
             )
-        if plain:
-            return plain[0]
+        if preferred:
+            return preferred[0]
     return None

@@ -1,4 +1,4 @@
-"""Files that hold one array per column, which NumPy archives, MAT-files and Parquet have in common."""
+"""Files with one array per column: the common part of NumPy archives, MAT-files and Parquet."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from islands.io.records.column_names import split_structures
 from islands.io.records.table import Columns, RowRange, select
 from islands.io.records.validation import check_equal_length
 
-#: Names, in lower case, under which a file states its sampling, and the sampling time in seconds.
+#: Names, in lower case, of arrays that state the sampling, with the conversion to seconds.
 SAMPLING: dict[str, Callable[[float], float]] = {
     "dt": lambda seconds: seconds,
     "ts": lambda seconds: seconds,
@@ -22,7 +22,7 @@ SAMPLING: dict[str, Callable[[float], float]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnarFile:
-    """A file of arrays; an array is loaded when it is asked for.
+    """A file of arrays. Arrays are loaded on demand.
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class ColumnarFile:
     names : tuple of str
         Names of the arrays.
     load : callable
-        The array of a name as it stands in the file; raises `RecordError`.
+        Returns the array with a given name as stored in the file; raises `RecordError`.
     scalars : sequence of str
-        Arrays that may be single numbers: those called as in `SAMPLING` state the sampling.
+        Arrays that may be single numbers. Those with a name in `SAMPLING` state the sampling.
     """
 
     file: str
@@ -42,22 +42,23 @@ class ColumnarFile:
     scalars: Sequence[str] = ()
 
     def stated(self, structure: str) -> Mapping[str, float]:
-        """Return the sampling times that the file states; see `islands.io.records.table.Table`."""
+        """Return the sampling times stated in the file; see `islands.io.records.table.Table`."""
         structures = split_structures(self.names)
         stated: dict[str, float] = {}
-        for home in dict.fromkeys((structure, "")):
+        for scope in dict.fromkeys((structure, "")):
             for name in self.scalars:
-                convert = SAMPLING.get(name.removeprefix(home).lower()) if structures[name] == home else None
+                field = name.removeprefix(scope).lower()
+                convert = SAMPLING.get(field) if structures[name] == scope else None
                 array = np.empty(0) if convert is None else self.load(name)
                 if convert is not None and array.size == 1:
-                    stated[name] = convert(_positive(array, name, self.file))
+                    stated[name] = convert(_check_positive(array, name, self.file))
             if stated:
                 break
         return stated
 
     def read(self, names: Sequence[str], rows: slice | None) -> Columns:
         """Convert the named arrays over the selected rows; see `islands.io.records.table.Table`."""
-        channels = {name: _channel(self.load(name), name, self.file) for name in names}
+        channels = {name: _to_channel(self.load(name), name, self.file) for name in names}
         check_equal_length({name: len(channel) for name, channel in channels.items()}, self.file)
         chosen = select(rows, len(channels[names[0]]), self.file)
         return Columns(
@@ -67,21 +68,21 @@ class ColumnarFile:
         )
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002
-        """Return nothing: arrays leave nothing to infer."""
+        """Return no remarks: nothing is inferred from arrays."""
         return ()
 
 
-def _positive(array: NDArray[Any], name: str, file: str) -> float:
+def _check_positive(array: NDArray[Any], name: str, file: str) -> float:
     value = float(array.item()) if array.dtype.kind in "fiu" else float("nan")
     if not (np.isfinite(value) and value > 0):
         raise RecordError(
-            f"{file}: array {name} states the sampling as {array.item()!r}: it is a positive number, "
+            f"{file}: array {name} states the sampling as {array.item()!r}: it must be a positive number, "
             "dt and Ts in seconds, fs in hertz"
         )
     return value
 
 
-def _channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
+def _to_channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
     if array.dtype.kind not in "fiub":
         raise RecordError(f"{file}: column {name} holds {array.dtype} where real numbers are expected")
     if not (array.ndim == 1 or (array.ndim == 2 and 1 in array.shape)):
@@ -89,5 +90,5 @@ def _channel(array: NDArray[Any], name: str, file: str) -> NDArray[np.float64]:
             f"{file}: column {name} has the shape {array.shape}, a channel has (samples,): save one "
             "array per channel and recording"
         )
-    with np.errstate(invalid="ignore"):  # of a NaN that signals, which becomes a quiet one
+    with np.errstate(invalid="ignore"):  # the conversion turns signalling NaNs into quiet ones
         return array.ravel().astype(np.float64)

@@ -1,4 +1,4 @@
-"""NumPy archives (.npz): one array per column, and the sampling time as an array of one number."""
+"""NumPy archives (.npz): one array per column; the sampling time may be an array of one number."""
 
 import math
 import struct
@@ -16,10 +16,12 @@ from islands.errors import RecordError
 from islands.io.records.columnar import ColumnarFile
 from islands.io.records.size_limits import check_samples, check_stored
 
-#: What NumPy and the standard library raise on damaged archives, and on Python objects in sound ones.
+#: Exceptions that NumPy and the standard library raise for damaged archives and for Python objects in valid
+#: ones.
 UNREADABLE = (ValueError, OSError, EOFError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error)
 
-#: An array's header by its version; the third is for names in Unicode, which no array of numbers has.
+#: Readers of an array's header by format version. Version 3 is for Unicode field names, which arrays of
+#: numbers do not have.
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
@@ -29,52 +31,52 @@ def read_archive(path: Path) -> ColumnarFile:
     Raises
     ------
     RecordError
-        The file is no archive.
+        The file is not a NumPy archive, is empty or is damaged.
     """
     if path.stat().st_size == 0:
-        raise RecordError(f"{path.name} is empty: write it anew with numpy.savez")
+        raise RecordError(f"{path.name} is empty: write it again with numpy.savez")
     if not zipfile.is_zipfile(path):
         raise RecordError(f"{path.name} is not a NumPy archive: write it with numpy.savez(path, u=u, y=y)")
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.namelist()
     except UNREADABLE as error:
-        raise RecordError(f"{path.name} is damaged ({error}): write it anew with numpy.savez") from error
+        raise RecordError(f"{path.name} is damaged ({error}): write it again with numpy.savez") from error
     names = tuple(member.removesuffix(".npy") for member in members)
-    return ColumnarFile(path.name, names, partial(_array, path), names)
+    return ColumnarFile(path.name, names, partial(_load_array, path), names)
 
 
-def _array(path: Path, name: str) -> NDArray[Any]:
+def _load_array(path: Path, name: str) -> NDArray[Any]:
     try:
         with zipfile.ZipFile(path) as archive:
-            member = _member(archive, name)
+            member = _find_member(archive, name)
             with archive.open(member) as stream:
-                _check_claims(stream, member, name, path)
+                _check_declared_size(stream, member, name, path)
                 stream.seek(0)
                 return np.asarray(npy.read_array(stream, allow_pickle=False))
     except UNREADABLE as error:
         raise RecordError(
             f"{path.name}: column {name} cannot be read ({error}): if it holds Python objects, which may run "
-            "code, save it as numpy.asarray(values, float); otherwise the file is damaged, write it anew"
+            "code, save it as numpy.asarray(values, float); otherwise the file is damaged, write it again"
         ) from error
 
 
-def _member(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo:
+def _find_member(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo:
     try:
         return archive.getinfo(f"{name}.npy")
     except KeyError:
         return archive.getinfo(name)
 
 
-def _check_claims(stream: IO[bytes], member: zipfile.ZipInfo, name: str, path: Path) -> None:
-    """Hold the header's shape against the member's size, and that against the bytes that pack it."""
+def _check_declared_size(stream: IO[bytes], member: zipfile.ZipInfo, name: str, path: Path) -> None:
+    """Check the shape in the header against the member's size, and that size against the compressed bytes."""
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise ValueError("it is packed in another way than numpy.savez and numpy.savez_compressed do")
+        raise ValueError("its compression method is not used by numpy.savez or numpy.savez_compressed")
     version = npy.read_magic(stream)
     if version not in _HEADERS:
-        raise ValueError(f"its format has the version {version}, which no array of numbers has")
+        raise ValueError(f"its format version {version} is not used for arrays of numbers")
     shape, _, dtype = _HEADERS[version](stream)
-    if dtype.hasobject:  # refused by read_array; its bytes are pickled and tell no size
+    if dtype.hasobject:  # read_array refuses it; the size of pickled objects does not follow from the shape
         return
     check_samples(math.prod(shape), name, path.name)
     values = member.file_size - stream.tell()

@@ -1,4 +1,4 @@
-"""Parquet files (.parquet), by pyarrow, which the extra `parquet` brings."""
+"""Parquet files (.parquet), read by pyarrow (extra `parquet`)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,76 +14,80 @@ from islands.io.records.column_names import seconds_per_unit
 from islands.io.records.columnar import ColumnarFile
 from islands.io.records.size_limits import check_samples
 
-#: Rows that are decoded at a time. Memory then follows what the pages hold, never what the file claims.
+#: Rows decoded at a time. Memory use then depends on the stored pages, not on the row count that the file
+#: declares.
 _BATCH = 2**16
 
-#: Seconds of a tick of Arrow's times.
+#: Arrow's time units in seconds.
 _TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 def read_parquet(path: Path) -> ColumnarFile:
-    """Open a Parquet file; a column is read when it is asked for.
+    """Open a Parquet file. Columns are read on demand.
 
-    Numbers of all kinds and booleans become float64, nulls NaN. Dates and times become numbers in the unit of
-    the column's name, points in time counted from the earliest: nanoseconds since 1970 are no float64.
+    Numbers and booleans become float64, nulls become NaN. Dates and times become numbers in the unit of the
+    column's name. Points in time are counted from the earliest one, because nanoseconds since 1970 exceed the
+    precision of float64.
 
     Raises
     ------
     RecordError
-        The file is no Parquet file or damaged, or pyarrow is not installed.
+        The file is not a Parquet file or is damaged, or pyarrow is not installed.
     """
     file = path.name
     if path.stat().st_size == 0:
-        raise RecordError(f"{file} is empty: write it anew")
-    with _opened(path) as parquet:
+        raise RecordError(f"{file} is empty: write it again")
+    with _open(path) as parquet:
         names, rows = tuple(parquet.schema_arrow.names), parquet.metadata.num_rows
-    return ColumnarFile(file, names, partial(_column, path, rows))
+    return ColumnarFile(file, names, partial(_read_column, path, rows))
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _open(path: Path) -> Iterator[Any]:
     try:
         import pyarrow  # noqa: PLC0415
         from pyarrow.parquet import ParquetFile  # noqa: PLC0415
     except ImportError as error:
         raise RecordError(
-            f"{path.name}: Parquet is read by pyarrow, which is not installed: "
+            f"{path.name}: reading Parquet needs pyarrow, which is not installed: "
             "pip install 'islands[parquet]', or export the record to .csv"
         ) from error
     try:
-        # Not mapped into memory: a file that is cut while it is mapped ends the process without a word.
+        # Not memory-mapped: truncating a mapped file would kill the process with SIGBUS.
         with ParquetFile(path, memory_map=False, pre_buffer=False) as parquet:
             yield parquet
     except (pyarrow.ArrowException, OSError) as error:
-        raise RecordError(f"{path.name} is damaged or no Parquet file ({error}): write it anew") from error
+        raise RecordError(
+            f"{path.name} is damaged or not a Parquet file ({error}): write it again"
+        ) from error
 
 
-def _column(path: Path, rows: int, name: str) -> NDArray[np.float64]:
+def _read_column(path: Path, rows: int, name: str) -> NDArray[np.float64]:
     import pyarrow  # noqa: PLC0415
 
     check_samples(rows, name, path.name)
-    with _opened(path) as parquet:
+    with _open(path) as parquet:
         batches = parquet.iter_batches(_BATCH, columns=[name], use_threads=False)
         chunks = [batch.column(batch.schema.names.index(name)) for batch in batches]
         stored = sum(map(len, chunks))
         if stored != rows:
             raise RecordError(
-                f"{path.name} claims {rows} rows and stores {stored}: it is damaged, write it anew"
+                f"{path.name} declares {rows} rows and stores {stored}: it is damaged, write it again"
             )
         schema = parquet.schema_arrow
         kind = schema.field(schema.names.index(name)).type
         if pyarrow.types.is_dictionary(kind):
             chunks, kind = [chunk.dictionary_decode() for chunk in chunks], kind.value_type
-        return _numbers(pyarrow.chunked_array(chunks, kind), name, path.name)
+        return _to_numbers(pyarrow.chunked_array(chunks, kind), name, path.name)
 
 
-def _numbers(column: Any, name: str, file: str) -> NDArray[np.float64]:
-    """Convert an Arrow column to float64, NaN where it is null."""
+def _to_numbers(column: Any, name: str, file: str) -> NDArray[np.float64]:
+    """Convert an Arrow column to float64; nulls become NaN."""
     from pyarrow import compute, float64, types  # noqa: PLC0415
 
     kind = column.type
     if types.is_temporal(kind):
-        return _elapsed(column, name)
+        return _to_elapsed(column, name)
     numeric = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
     if not any(test(kind) for test in numeric):
         raise RecordError(f"{file}: column {name} holds {kind} where real numbers are expected")
@@ -91,8 +95,8 @@ def _numbers(column: Any, name: str, file: str) -> NDArray[np.float64]:
     return numbers
 
 
-def _elapsed(column: Any, name: str) -> NDArray[np.float64]:
-    """Return times as numbers in the unit of the column's name, points in time from the earliest."""
+def _to_elapsed(column: Any, name: str) -> NDArray[np.float64]:
+    """Convert times to numbers in the unit of the column's name, points in time relative to the earliest."""
     from pyarrow import chunked_array, compute, int32, int64, types  # noqa: PLC0415
 
     kind = column.type

@@ -1,4 +1,4 @@
-"""Describes a file before anybody chooses columns of it: what is there, and what would be refused."""
+"""Preview of a file before columns are chosen: its columns, their statistics and their problems."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,19 +24,20 @@ from islands.io.records.validation import (
 
 @dataclass(frozen=True, slots=True)
 class ColumnPreview:
-    """A column at a glance.
+    """Preview of a column.
 
     Attributes
     ----------
     name, unit : str
-        The name, and the unit in it.
+        The column's name, and the unit in the name.
     samples : int or None
-        Number of samples; None where the column cannot be read.
+        Number of samples; None if the column cannot be read.
     minimum, maximum, mean, deviation : float or None
-        Of all samples, the deviation being the standard deviation; None where any is missing or infinite.
+        Statistics over all samples; ``deviation`` is the standard deviation. None if a sample is missing or
+        infinite.
     problem : str
-        Why `read_record` refuses this column, in its words; empty where it does not. That the time is not
-        uniform is a warning of the file.
+        The message with which `read_record` refuses this column; empty if it accepts the column. A
+        non-uniform time column is reported as a warning of the file.
     """
 
     name: str
@@ -51,20 +52,20 @@ class ColumnPreview:
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """A file at a glance.
+    """Preview of a file.
 
     Attributes
     ----------
     columns : tuple of ColumnPreview
-        In the file's order, without columns that have no name.
+        Columns in the file's order, without unnamed columns.
     time : str or None
-        The column that is taken for the time.
+        Name of the time column.
     dt : float or None
-        The sampling time in seconds; None where it has to be given, and a warning says why.
+        Sampling time in seconds; None if the user must give it. A warning then states the reason.
     samples : int
-        Samples of the channels that make up most of the file.
+        Number of samples of the largest group of columns of equal length.
     warnings : tuple of str
-        What `read_record` refuses whatever columns are chosen, and what it infers.
+        Problems that make `read_record` fail for any choice of columns, and remarks on inferred properties.
     """
 
     columns: tuple[ColumnPreview, ...]
@@ -75,32 +76,32 @@ class Preview:
 
 
 def preview(path: str | Path) -> Preview:
-    """Describe all columns of a file, each by itself, and say what stands against using it.
+    """Describe every column of a file separately, and list the problems of the file.
 
     Raises
     ------
     RecordError
-        The file is not there or cannot be read at all; never because of a column.
+        The file does not exist or cannot be read. Problems of single columns do not raise.
     """
     table, file = open_record(path), Path(path).name
-    columns, unread = _read(table)
-    groups = _of_equal_length(columns)
+    columns, unread = _read_columns(table)
+    groups = _group_by_length(columns)
     main = groups[0][0] if groups else None
-    lonely, unequal = _lengths(groups, columns, file)
-    problems = unread | lonely
-    time, dt, doubt = _sampling(table, columns, problems, main, file)
+    unmatched, unequal = _check_lengths(groups, columns, file)
+    problems = unread | unmatched
+    time, dt, sampling_problem = _preview_sampling(table, columns, problems, main, file)
     for name, column in columns.items():
-        problems.setdefault(name, _problem(column, name, is_time=name == time))
+        problems.setdefault(name, _find_problem(column, name, is_time=name == time))
     warnings = (
-        _complaint(check_unique, table.names, file),
+        _error_message(check_unique, table.names, file),
         *unequal,
-        _complaint(check_length, columns[main]) if main else "",
-        doubt,
+        _error_message(check_length, columns[main]) if main else "",
+        sampling_problem,
         *table.remarks(tuple(columns)),
     )
     return Preview(
         columns=tuple(
-            _described(name, parse_unit(name.removeprefix(structure)), columns.get(name), problems[name])
+            _preview_column(name, parse_unit(name.removeprefix(structure)), columns.get(name), problems[name])
             for name, structure in split_structures(table.names).items()
             if name
         ),
@@ -111,8 +112,8 @@ def preview(path: str | Path) -> Preview:
     )
 
 
-def _complaint(check: Callable[..., object], *arguments: Any) -> str:
-    """Return what a check refuses, in its words; empty where it does not."""
+def _error_message(check: Callable[..., object], *arguments: Any) -> str:
+    """Return the message of the error that a check raises; empty if the check passes."""
     try:
         check(*arguments)
     except RecordError as error:
@@ -120,8 +121,8 @@ def _complaint(check: Callable[..., object], *arguments: Any) -> str:
     return ""
 
 
-def _read(table: Table) -> tuple[dict[str, Columns], dict[str, str]]:
-    """Read every column that has a name, by itself; return those that can be read, and why others cannot."""
+def _read_columns(table: Table) -> tuple[dict[str, Columns], dict[str, str]]:
+    """Read every named column separately; return the readable ones and the errors of the others."""
     columns, unread = {}, {}
     for name in filter(None, dict.fromkeys(table.names)):
         try:
@@ -131,69 +132,73 @@ def _read(table: Table) -> tuple[dict[str, Columns], dict[str, str]]:
     return columns, unread
 
 
-def _of_equal_length(columns: Mapping[str, Columns]) -> list[list[str]]:
-    """Group the columns by their lengths, the group with most numbers first: it is what the file is about."""
+def _group_by_length(columns: Mapping[str, Columns]) -> list[list[str]]:
+    """Group the columns by length. The group with the most numbers comes first: it is the main recording."""
     groups: dict[int, list[str]] = {}
     for name, column in columns.items():
         groups.setdefault(len(column.rows), []).append(name)
     return [groups[length] for length in sorted(groups, key=lambda length: -length * len(groups[length]))]
 
 
-def _lengths(
+def _check_lengths(
     groups: Sequence[Sequence[str]], columns: Mapping[str, Columns], file: str
 ) -> tuple[dict[str, str], list[str]]:
-    """Return the problems of columns without a companion of their length, and warnings of other recordings.
+    """Return the problems of columns with a unique length, and warnings for further recordings.
 
-    Columns of another length than the most are no problem by themselves: two of them make a record.
+    A group of two or more columns with a length different from the main group is not a problem: it can form a
+    record.
     """
     problems: dict[str, str] = {}
     warnings = []
     for group in groups[1:]:
         length = len(columns[group[0]].rows)
         first = {groups[0][0]: len(columns[groups[0][0]].rows)}
-        complaints = {name: _complaint(check_equal_length, first | {name: length}, file) for name in group}
+        messages = {name: _error_message(check_equal_length, first | {name: length}, file) for name in group}
         if len(group) > 1 and length >= MIN_SAMPLES:
-            warnings.append(complaints[group[0]])
+            warnings.append(messages[group[0]])
         else:
-            problems |= complaints
+            problems |= messages
     return problems, warnings
 
 
-def _sampling(
+def _preview_sampling(
     table: Table,
     columns: Mapping[str, Columns],
     problems: Mapping[str, str],
     main: str | None,
     file: str,
 ) -> tuple[str | None, float | None, str]:
-    """Return the time column, the sampling time in seconds, and why there is none."""
+    """Return the time column, the sampling time in seconds, and the reason if the latter is unknown."""
     time = None
     structure = split_structures(table.names)[main] if main else ""
     try:
         time = time_column(table.names, file, structure=structure)
-        asked = time or main
-        if asked is not None and asked in problems:
-            return time, None, problems[asked]
-        known = columns[asked] if asked else Columns(RowRange(file, "sample", ()), {}, 0)
+        source = time or main
+        if source is not None and source in problems:
+            return time, None, problems[source]
+        known = columns[source] if source else Columns(RowRange(file, "sample", ()), {}, 0)
         if time is not None:
             check_values(known, time)
-            if len(known.rows) < 2:  # no step: `check_length` has more to say
+            if len(known.rows) < 2:  # no step; the message of `check_length` is more helpful
                 return time, None, ""
         return time, find_sampling(table, known, time, None, structure)[0], ""
     except RecordError as error:
         return time, None, str(error)
 
 
-def _problem(column: Columns, name: str, is_time: bool) -> str:
-    """Return what `read_record` says of a column's values; the time is held against a grid by `_sampling`."""
+def _find_problem(column: Columns, name: str, is_time: bool) -> str:
+    """Return the message of `read_record` about a column's values.
+
+    `_preview_sampling` checks whether the time column is uniform.
+    """
     if not len(column.rows):
-        return _complaint(check_length, column)
-    return _complaint(check_values, column, name) or (
-        "" if is_time else _complaint(check_varies, column, name)
+        return _error_message(check_length, column)
+    return _error_message(check_values, column, name) or (
+        "" if is_time else _error_message(check_varies, column, name)
     )
 
 
-def _described(name: str, unit: str, column: Columns | None, problem: str) -> ColumnPreview:
+def _preview_column(name: str, unit: str, column: Columns | None, problem: str) -> ColumnPreview:
     values = np.empty(0) if column is None else column.numbers[name]
     samples = None if column is None else len(values)
     if not len(values):

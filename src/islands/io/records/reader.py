@@ -1,4 +1,4 @@
-"""Reads a record from a file and refuses, with advice, what would spoil an identification later."""
+"""Reading of records from files, with checks for everything that would make an identification fail later."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from islands.io.records.table import Table
 from islands.io.records.text_table import read_delimited
 from islands.io.records.validation import check_choice, check_length, check_values, check_varies
 
-#: How a file is read, by its suffix. A new format is a reader and an entry here.
+#: Readers by file suffix. To add a format, write a reader and add an entry.
 READERS: dict[str, Callable[[Path], Table]] = {
     ".csv": read_delimited,
     ".txt": read_delimited,
@@ -40,42 +40,44 @@ def read_record(
 ) -> Dataset:
     """Read inputs and an output from a file (CSV, NPZ, MAT or Parquet) and check them.
 
-    A column called ``t``, ``t_*`` or ``time*`` that is neither input nor output is time, in the unit at the
-    end of its name (s, ms, us, ns, min, h; without one: s). What follows the last underscore of a name is the
-    unit: ``u_V``. The separator and a decimal comma of a text file are inferred. Of a MAT-file a field of a
-    structure is ``run.u``, its time ``run.t``, and a matrix ``x`` of a few channels is ``x_1, x_2 ...``.
+    A column named ``t``, ``t_*`` or ``time*`` that is neither input nor output is the time, in the unit at
+    the end of its name (s, ms, us, ns, min, h; s by default). The text after the last underscore of a name is
+    the unit: ``u_V``. The separator and a decimal comma of a text file are inferred. In a MAT-file, a field
+    of a structure is the column ``run.u``, its time ``run.t``; a matrix ``x`` of a few channels gives the
+    columns ``x_1, x_2 ...``.
 
-    A model reads inputs of the past alone. Where the output answers within the sample (a band-limited input
-    sampled at the same instants), name the input ``u_V+1``: it is read one sample early, so that its u(k-1)
-    is the input at k. The name stays with the model, which so reads other records in the same way.
+    A model reads past inputs only. If the output responds within the sample (a band-limited input sampled at
+    the same instants), name the input ``u_V+1``: it is read one sample early, so that its u(k-1) is the input
+    at k. The name is stored with the model, which therefore reads other records in the same way.
 
     Parameters
     ----------
     path : str or Path
-        The file; its suffix chooses the reader from `READERS`.
+        The file. Its suffix selects the reader from `READERS`.
     inputs : sequence of str
-        Columns that are inputs, in the order in which the model will number them; ``u_V+1`` for the column
-        u_V one sample early.
+        Names of the input columns, in the order of the model's inputs; ``u_V+1`` reads the column u_V one
+        sample early.
     output : str
-        Column that is the output.
+        Name of the output column.
     dt : float, optional
-        Sampling time in seconds, for files that do not tell it; where the file does, both agree within 1 %.
-        An NPZ or MAT file may hold it as a single number ``dt`` or ``Ts`` (seconds) or ``fs`` (hertz).
+        Sampling time in seconds, for files that do not contain it. If the file contains it, both must agree
+        within 1 %. An NPZ or MAT file may contain it as a single number ``dt`` or ``Ts`` (seconds) or ``fs``
+        (hertz).
     rows : slice, optional
-        Samples to read, from 0, not counting a header; what lies outside is not checked.
+        Samples to read, counted from 0 without the header. Samples outside are not checked.
     missing_output : bool
-        Accept an output with missing values, which a free run reads in its warm-up alone, and constant
-        channels: a hold is worth simulating, though nothing can be estimated from it.
+        Accept an output with missing values, which a free run needs in its warm-up only, and constant
+        channels: a constant input can be simulated, although nothing can be estimated from it.
 
     Returns
     -------
     Dataset
-        One segment of float64, with the columns' names and units; ``start`` is the first sample's time.
+        One segment of float64 with the columns' names and units; ``start`` is the time of the first sample.
 
     Raises
     ------
     RecordError
-        The record cannot be used as it is. The message names row and column and says what to do.
+        The record cannot be used as it is. The message names the row and the column and says what to do.
     """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
     table = open_record(path)
@@ -94,7 +96,7 @@ def read_record(
     return Dataset(
         u=np.column_stack(
             [
-                columns.numbers[source] if source == name else _early(columns.numbers[source])
+                columns.numbers[source] if source == name else _advance(columns.numbers[source])
                 for name, source in zip(inputs, sources, strict=True)
             ]
         ),
@@ -109,53 +111,53 @@ def read_record(
     )
 
 
-def _early(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Read a channel one sample early; no prediction reads what then stands at the last sample."""
+def _advance(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shift a channel one sample early. The last value is repeated; no prediction uses it."""
     return np.append(values[1:], values[-1])
 
 
 def read_columns(path: str | Path) -> tuple[str, ...]:
-    """Return the names of a file's columns (of an NPZ or MAT file: of its arrays), in the file's order.
+    """Return the names of the columns (NPZ and MAT: arrays) of a file, in the file's order.
 
     Raises
     ------
     RecordError
-        The file is not there or cannot be read.
+        The file does not exist or cannot be read.
     """
     return open_record(path).names
 
 
 def fingerprint(path: str | Path) -> str:
-    """Return the SHA-256 of the file's bytes in hexadecimal: two equal fingerprints are the same data.
+    """Return the SHA-256 of the file's bytes in hexadecimal. Equal fingerprints mean equal data.
 
     Raises
     ------
     RecordError
-        The file is not there or cannot be read.
+        The file does not exist or cannot be read.
     """
-    with _existing(path).open("rb") as stream:
+    with _check_readable(path).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def open_record(path: str | Path) -> Table:
-    """Open a file by the reader of its suffix.
+    """Open a file with the reader for its suffix.
 
     Raises
     ------
     RecordError
-        The file is not there, cannot be read, or its suffix is not one of `READERS`.
+        The file does not exist, cannot be read, or its suffix is not in `READERS`.
     """
-    file = _existing(path)
+    file = _check_readable(path)
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         raise RecordError(
-            f"{file.name}: files ending in '{file.suffix}' are not known, only {', '.join(READERS)}: export "
-            "the record to one of these"
+            f"{file.name}: files ending in '{file.suffix}' are not supported, only {', '.join(READERS)}: "
+            "export the record to one of these"
         )
     return reader(file)
 
 
-def _existing(path: str | Path) -> Path:
+def _check_readable(path: str | Path) -> Path:
     file = Path(path)
     try:
         file.open("rb").close()

@@ -1,15 +1,15 @@
-"""Rows of a record as text: ``START:STOP``."""
+"""Selections of rows as text: ``START:STOP``."""
 
 from islands.errors import SettingsError
 
 
 def parse_rows(text: str | None) -> slice | None:
-    """Read ``START:STOP``.
+    """Parse ``START:STOP``; None selects all rows.
 
     Raises
     ------
     SettingsError
-        It is none.
+        The text does not have this form.
     """
     if text is None:
         return None
@@ -21,7 +21,7 @@ def parse_rows(text: str | None) -> slice | None:
 
 
 def overlap(one: slice | None, other: slice | None) -> bool:
-    """Tell whether two selections share samples; an open end reaches as far as there are any."""
+    """Return whether two selections share samples. An open end extends to the end of the record."""
     if one is None or other is None:
         return True
     ends = [part.stop for part in (one, other) if part.stop is not None]

@@ -1,48 +1,49 @@
-"""What a file claims to hold is held against what it stores, before any memory is taken for it."""
+"""Limits on declared sizes: a file's declared sizes are checked before memory is allocated for them."""
 
 from islands.errors import RecordError
 
-#: Samples of a column, 1 GiB in double precision. Nobody identifies from more, and a few bytes can claim it.
+#: Largest number of samples of a column, 1 GiB in double precision. Longer records are not used for
+#: identification, and a few bytes in a file can declare any size.
 MOST_SAMPLES = 2**27
 
-#: Bytes that one byte of deflate can stand for at most: https://zlib.net/zlib_tech.html.
+#: Largest compression ratio of deflate: https://zlib.net/zlib_tech.html.
 DENSEST = 1032
 
 
 def check_samples(samples: int, column: str, file: str) -> None:
-    """Refuse a column that claims more samples than any record has.
+    """Refuse a column that declares more samples than a record may have.
 
     Raises
     ------
     RecordError
-        There are more than `MOST_SAMPLES`.
+        There are more than `MOST_SAMPLES` samples.
     """
     if samples > MOST_SAMPLES:
         raise RecordError(
-            f"{file}: column {column} claims {samples} samples, and a record has {MOST_SAMPLES} at most: "
-            "if it really is as long, write a part of it to a file of its own; otherwise the file is damaged"
+            f"{file}: column {column} declares {samples} samples, but a record has at most {MOST_SAMPLES}: "
+            "if it really is that long, write a part of it to a separate file; otherwise the file is damaged"
         )
 
 
-def check_stored(claimed: int, stored: int, deflated: bool, column: str, file: str) -> None:
-    """Refuse a column that claims more bytes than those that are stored for it can hold.
+def check_stored(declared: int, stored: int, deflated: bool, column: str, file: str) -> None:
+    """Refuse a column that declares more bytes than its stored bytes can contain.
 
     Parameters
     ----------
-    claimed, stored : int
-        Bytes of the values, and bytes in the file.
+    declared, stored : int
+        Declared bytes of the values, and bytes stored in the file.
     deflated : bool
-        Whether the stored bytes are packed by deflate.
+        Whether the stored bytes are compressed by deflate.
     column, file : str
-        For the message.
+        Names for the message.
 
     Raises
     ------
     RecordError
-        The claim cannot be true.
+        The declared size is impossible.
     """
-    if claimed > stored * (DENSEST if deflated else 1):
+    if declared > stored * (DENSEST if deflated else 1):
         raise RecordError(
-            f"{file}: column {column} claims {claimed} bytes, and the file stores {stored} for it"
-            f"{', packed' if deflated else ''}: it is damaged or cut short, write it anew"
+            f"{file}: column {column} declares {declared} bytes, but the file stores {stored} for it"
+            f"{', compressed' if deflated else ''}: it is damaged or truncated, write it again"
         )

@@ -1,4 +1,4 @@
-"""What a reader hands on: a file's named columns, and the numbers of those that are asked for."""
+"""Interface of a record reader: the columns of an opened file and their numbers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ from islands.errors import RecordError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowRange:
-    """Where the samples stand in their file, as a person counts them there.
+    """Position of samples in their file, for error messages.
 
     Attributes
     ----------
     file : str
         The file's name.
     counted : str
-        What is counted: ``"line"`` (the header is line 1) or ``"sample"`` (the first one is 0).
+        Unit of the numbers: ``"line"`` (the header is line 1) or ``"sample"`` (the first one is 0).
     numbers : sequence of int
-        The line or sample number of every sample.
+        Line or sample number of every sample.
     """
 
     file: str
@@ -29,11 +29,11 @@ class RowRange:
     numbers: Sequence[int]
 
     def place(self, sample: int, column: str) -> str:
-        """Name the cell of a sample: ``record.csv, line 14, column u_V``."""
+        """Return the position of a cell as text: ``record.csv, line 14, column u_V``."""
         return f"{self.file}, {self.row(sample)}, column {column}"
 
     def row(self, sample: int) -> str:
-        """Name the row of a sample: ``line 14``."""
+        """Return the row of a sample as text: ``line 14``."""
         return f"{self.counted} {self.numbers[sample]}"
 
     def __len__(self) -> int:
@@ -42,16 +42,16 @@ class RowRange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Numbers of the columns asked for, over the selected rows.
+    """Numbers of the requested columns over the selected rows.
 
     Attributes
     ----------
     rows : RowRange
-        Where the samples stand in the file.
+        Position of the samples in the file.
     numbers : mapping of str to ndarray, shape (samples,)
-        float64, all of one length; NaN where the cell is missing.
+        float64 arrays of equal length; missing cells are NaN.
     first : int
-        Number of the first selected sample in the file, from 0.
+        Index of the first selected sample in the file, from 0.
     """
 
     rows: RowRange
@@ -60,7 +60,10 @@ class Columns:
 
 
 class Table(Protocol):
-    """An opened file. Law: a column that is not asked for is never converted and so can do no harm."""
+    """An opened file.
+
+    Implementations convert only the requested columns, so that errors in other columns do no harm.
+    """
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -68,15 +71,15 @@ class Table(Protocol):
         ...
 
     def stated(self, structure: str) -> Mapping[str, float]:
-        """Return the sampling times in seconds that the file states besides a time column, by their arrays.
+        """Return the sampling times that the file states as single numbers, in seconds, by array name.
 
-        Those among the fields of the structure (`islands.io.records.column_names.split_structures`) go before
-        those at the top, and those of other structures do not count.
+        Fields of the structure (`islands.io.records.column_names.split_structures`) take precedence over
+        arrays at the top level; fields of other structures are ignored.
 
         Raises
         ------
         RecordError
-            What is stated is not a positive number.
+            A stated sampling time is not a positive number.
         """
         ...
 
@@ -91,17 +94,17 @@ class Table(Protocol):
         ...
 
     def remarks(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Say what was inferred to read the named columns, whole, or what forbids to read them together."""
+        """Return what was inferred when reading the named columns, or why they cannot be read together."""
         ...
 
 
 def select(rows: slice | None, samples: int, file: str) -> range:
-    """Return the samples of a selection; unlike a Python slice it is never cut to what is there.
+    """Return the samples of a selection. Unlike a Python slice, it is never clipped to the available samples.
 
     Raises
     ------
     RecordError
-        The selection is empty, reaches past the samples, or takes steps.
+        The selection is empty, extends past the samples, or has a step.
     """
     if rows is None:
         return range(samples)
@@ -111,12 +114,12 @@ def select(rows: slice | None, samples: int, file: str) -> range:
     )
     if rows.step not in (None, 1) or not 0 <= first < last <= samples:
         raise RecordError(
-            f"{file} has samples 0 to {samples - 1}: rows {_shown(rows)} are not a part of it. "
+            f"{file} has samples 0 to {samples - 1}: rows {_format_slice(rows)} are not a part of it. "
             "Give first:stop, counted from 0 without the header, stop not included"
         )
     return range(first, last)
 
 
-def _shown(rows: slice) -> str:
+def _format_slice(rows: slice) -> str:
     bounds = (rows.start, rows.stop) if rows.step is None else (rows.start, rows.stop, rows.step)
     return ":".join("" if bound is None else str(bound) for bound in bounds)

@@ -1,4 +1,4 @@
-"""What makes a record unusable, each with the words that help to mend it."""
+"""Checks of records. Every error message says how to correct the record."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -9,43 +9,47 @@ import numpy as np
 from islands.errors import RecordError
 from islands.io.records.table import Columns
 
-#: Fewer samples tell nothing: the 95 % band of a residual correlation, 1.96 / sqrt(30), is already 0.36, and
-#: the quarter kept for validation has seven samples, hardly more than a small model needs to warm up.
+#: Smallest number of samples. With 30 samples the 95 % band of a residual correlation, 1.96 / sqrt(30), is
+#: already 0.36, and the quarter kept for validation has seven samples, hardly more than the warm-up of a
+#: small model.
 MIN_SAMPLES = 30
 
 
 def check_unique(names: Sequence[str], file: str) -> None:
-    """Refuse a file two columns of which share a name.
+    """Refuse a file in which two columns have the same name.
 
     Raises
     ------
     RecordError
-        A name stands twice.
+        A name occurs twice.
     """
-    twice = [name for name, count in Counter(names).items() if count > 1 and name]
-    if twice:
-        raise RecordError(f"{file} has several columns called {twice[0]}: rename them in the header")
+    repeated = [name for name, count in Counter(names).items() if count > 1 and name]
+    if repeated:
+        raise RecordError(f"{file} has several columns named {repeated[0]}: rename them in the header")
 
 
 def check_choice(names: Sequence[str], inputs: Sequence[str], output: str, file: str) -> None:
-    """Refuse a choice of columns that the file cannot serve.
+    """Refuse an invalid choice of columns.
 
     Raises
     ------
     RecordError
-        Two columns share a name, no input is given, a column is chosen twice, or a column is not there.
+        Two columns have the same name, no input is given, a column is chosen twice, or a column does not
+        exist.
     """
     check_unique(names, file)
     if not inputs:
-        raise RecordError(f"no input is given: name one or more of the columns {_listed(names)}")
+        raise RecordError(f"no input is given: name one or more of the columns {_list_names(names)}")
     if output in inputs:
-        raise RecordError(f"column {output} is given as input and as output: choose another one for either")
+        raise RecordError(f"column {output} is given as input and as output: choose different columns")
     repeated = [name for name, count in Counter(inputs).items() if count > 1]
     if repeated:
         raise RecordError(f"column {repeated[0]} is given as an input twice: name it once")
     for name in (*inputs, output):
         if name not in names:
-            raise RecordError(f"{file} has no column {name}; it has {_listed(names)}{_guess(name, names)}")
+            raise RecordError(
+                f"{file} has no column {name}; it has {_list_names(names)}{_suggest(name, names)}"
+            )
 
 
 def check_equal_length(lengths: Mapping[str, int], file: str) -> None:
@@ -54,24 +58,24 @@ def check_equal_length(lengths: Mapping[str, int], file: str) -> None:
     Parameters
     ----------
     lengths : mapping of str to int
-        Samples of every channel; the first is the one that the others are held against.
+        Number of samples of every channel. The others are compared with the first one.
 
     Raises
     ------
     RecordError
-        A channel is shorter or longer than the first.
+        A channel is shorter or longer than the first one.
     """
     (first, samples), *others = lengths.items()
     for name, length in others:
         if length != samples:
             raise RecordError(
-                f"{file}: column {first} has {samples} samples, column {name} {length}: channels of one "
-                "record are of equal length"
+                f"{file}: column {first} has {samples} samples, column {name} {length}: the channels of a "
+                "record must have equal length"
             )
 
 
 def check_length(columns: Columns) -> None:
-    """Refuse a record that is too short to identify anything.
+    """Refuse a record that is too short for identification.
 
     Raises
     ------
@@ -80,16 +84,16 @@ def check_length(columns: Columns) -> None:
     """
     rows = columns.rows
     if not len(rows):
-        raise RecordError(f"{rows.file} has not a single sample: take another record")
+        raise RecordError(f"{rows.file} has no samples: use another record")
     if len(rows) < MIN_SAMPLES:
         raise RecordError(
             f"{rows.file}: {len(rows)} samples, from {rows.row(0)} to {rows.row(-1)}, are too few: at least "
-            f"{MIN_SAMPLES} are needed; take a longer record or more of its rows"
+            f"{MIN_SAMPLES} are needed; use a longer record or more of its rows"
         )
 
 
 def check_values(columns: Columns, name: str, missing: bool = False) -> None:
-    """Refuse values of a column that are missing or infinite.
+    """Refuse missing or infinite values in a column.
 
     Parameters
     ----------
@@ -117,7 +121,7 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
     if absent[sample:].all():
         raise RecordError(
             f"{rows.place(sample, name)} and all below, to {rows.row(-1)}, are empty or NaN: the channels "
-            "are of unequal lengths; complete the column or select the rows that are complete"
+            "have unequal lengths; complete the column or select the rows that are complete"
         )
     raise RecordError(
         f"{rows.place(sample, name)} is empty or NaN: repair it, for example by interpolation, or select "
@@ -126,7 +130,7 @@ def check_values(columns: Columns, name: str, missing: bool = False) -> None:
 
 
 def check_varies(columns: Columns, name: str) -> None:
-    """Refuse a constant column: nothing can be learned from it.
+    """Refuse a constant column: it contains no information for identification.
 
     Raises
     ------
@@ -137,15 +141,15 @@ def check_varies(columns: Columns, name: str) -> None:
     if values.min() == values.max():
         raise RecordError(
             f"{rows.file}: column {name} is constant, {values[0]:.6g} from {rows.row(0)} to {rows.row(-1)}: "
-            "choose a column, or rows, in which something happens"
+            "choose a column, or rows, that vary"
         )
 
 
-def _guess(name: str, names: Sequence[str]) -> str:
+def _suggest(name: str, names: Sequence[str]) -> str:
     spelled = {known.lower(): known for known in names}
     close = get_close_matches(name.lower(), spelled, n=1)
     return f". Did you mean {spelled[close[0]]}?" if close else ""
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     return ", ".join(name for name in names if name) or "(none with a name)"

@@ -1,4 +1,4 @@
-"""Records and simulations as CSV, every number so that it is read back exactly."""
+"""Writing of records and simulations as CSV with exact numbers."""
 
 import csv
 import math
@@ -18,13 +18,13 @@ def write_record(record: Dataset, path: str | Path) -> None:
     Raises
     ------
     RecordError
-        The record has several segments, which a table with one time column cannot show; or the file cannot be
-        written.
+        The record has several segments, which a table with one time column cannot represent, or the file
+        cannot be written.
     """
     if len(record.segments) > 1:
-        raise RecordError("a CSV holds one recording: write each segment to a file of its own")
+        raise RecordError("a CSV file holds one recording: write each segment to a separate file")
     names = ("t_s", *record.input_names, record.output_name)
-    _write(path, names, zip(_times(record), *record.u.T.tolist(), record.y.tolist(), strict=True))
+    _write(path, names, zip(_round_times(record), *record.u.T.tolist(), record.y.tolist(), strict=True))
 
 
 def write_simulation(record: Dataset, simulated: NDArray[np.float64], path: str | Path) -> None:
@@ -33,13 +33,13 @@ def write_simulation(record: Dataset, simulated: NDArray[np.float64], path: str 
     Parameters
     ----------
     simulated : ndarray, shape (samples,)
-        NaN is written as ``nan``: the warm-up has no prediction.
+        Simulated output. NaN, as in the warm-up, is written as ``nan``.
     """
-    _write(path, ("time", "y_sim"), zip(_times(record), simulated.tolist(), strict=True))
+    _write(path, ("time", "y_sim"), zip(_round_times(record), simulated.tolist(), strict=True))
 
 
-def _times(record: Dataset) -> list[float]:
-    # Twelve digits, or more where a millionth of a sample takes them: what lies behind is the rounding of
+def _round_times(record: Dataset) -> list[float]:
+    # Twelve digits, or more if a millionth of a sample needs them. Further digits are rounding errors of
     # start + k dt.
     time = record.time
     steps = float(np.abs(time).max()) / record.dt

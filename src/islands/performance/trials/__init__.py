@@ -1,1 +1,4 @@
-"""Blind trials: an effect is hidden in a record by code of its own, and the analysis has to find it."""
+"""Blind fault-injection trials of the discrepancy analysis. Read `trial` first.
+
+Code that is independent of the analysis injects faults into simulated records; the analysis has to name them.
+"""

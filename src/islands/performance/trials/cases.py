@@ -1,4 +1,4 @@
-"""The simulations that trials hold against records: of what system, how each is made, what it has to do."""
+"""Trial cases: the simulations under trial, their systems and their targets."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from islands.model.expression import Apply, Expression, Lagged
 from islands.model.model import Model
 from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import Regressor, regressor
-from islands.performance.trials.injection.measurement import SEEN, FaultyRecord
+from islands.performance.trials.injection.measurement import VISIBLE_FRACTION, FaultyRecord
 from islands.performance.trials.injection.oscillator import OSCILLATOR
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.injection.rig import Rig
@@ -25,30 +25,30 @@ from islands.performance.trials.injection.tanks import TANKS
 from islands.performance.trials.targets import EXACT, IDENTIFIED, Targets
 from islands.simulation.outcome import EvaluationOutcome
 
-#: The constraint under which it holds still where its input does.
+#: Parameter constraint of the identified actuator: the output stays constant under a constant input.
 _CONSTRAINT = "hysteresis"
 
 
 def identify_actuator(record: Dataset) -> Model:
-    """Identify increments of the output by those of the input, their size and sign, and levels.
+    """Identify a NARX model of a Bouc-Wen actuator with a fixed structure.
 
-    The structure is fixed: what an increment of a Bouc-Wen actuator is made of, the levels up to the second
-    degree. A second increment takes the first one on to the present, which a model may not read. Parameters
-    are estimated one step ahead and refined in free run.
+    The regressors are increments of the input, their size and sign, and products with input and output up to
+    the second degree. The second input increment extrapolates the first one to the current sample, which the
+    model cannot read. Parameters are estimated one step ahead and refined in free run.
 
     Raises
     ------
     RecordError
-        No such model can be estimated on this record.
+        The model cannot be estimated from this record.
     """
-    found = estimate(_structure(), record, _CONSTRAINT)
+    found = estimate(_make_regressors(), record, _CONSTRAINT)
     if isinstance(found, EvaluationOutcome):
         raise RecordError(f"no NARX model of this structure can be estimated: {found}")
     refined = refine(found.model, record, None, _CONSTRAINT)
     return found.model if isinstance(refined, EvaluationOutcome) else refined.model
 
 
-def _structure() -> list[Regressor]:
+def _make_regressors() -> list[Regressor]:
     y, u = Lagged(0, 1), Lagged(1, 1)
     increments = [Apply(PRIMITIVES["phi1"], (Lagged(1, lag), Lagged(1, lag + 1))) for lag in (1, 2)]
     direction = Apply(PRIMITIVES["phi2"], (Lagged(1, 1), Lagged(1, 2)))
@@ -64,82 +64,90 @@ def _structure() -> list[Regressor]:
 
 @dataclass(frozen=True, slots=True)
 class SimulatedCase:
-    """A simulation in trials.
+    """A simulation under trial.
 
     Attributes
     ----------
     system : Rig
-        What records are of.
-    made : callable
-        Makes the simulation that is held against a record.
+        System that the records come from.
+    make : callable
+        Makes the simulator that is compared with a record.
     goals : Targets
     tolerance : mapping
-        What is stated of the simulation's parameters.
-    apart : bool
-        The truth's parameters are not quite the simulation's. They are where it cannot be calibrated.
+        Tolerances of the simulator's parameters.
+    perturbed : bool
+        Whether the parameters of the plant differ from those of the simulator. False if the simulator cannot
+        be calibrated.
     free : bool
-        Its parameters are estimated, and nothing is stated of them.
+        Whether the parameters are estimated without tolerances.
     without : frozenset of str
-        What can be hidden in the system and has no name in this simulation: it has no place for it, or no
-        tolerances. Hidden all the same, they are unknown causes.
+        Faults of the system that this simulation has no name for, because it lacks the input or the equation
+        they act on, or tolerances. Injected faults of this kind count as unknown causes.
     """
 
     system: Rig
-    made: Callable[[FaultyRecord], Simulator]
+    make: Callable[[FaultyRecord], Simulator]
     goals: Targets
     tolerance: Mapping[str, float]
-    apart: bool = True
+    perturbed: bool = True
     free: bool = False
     without: frozenset[str] = frozenset()
 
     @property
     def nameable(self) -> tuple[str, ...]:
-        """What can be hidden and found."""
+        """Faults that the analysis can name."""
         return tuple(name for name in self.system.known if name not in self.without)
 
     @property
     def nameless(self) -> tuple[str, ...]:
-        """What can be hidden, and has no name."""
+        """Faults that the analysis has no name for."""
         return (*self.system.unknown, *sorted(self.without))
 
 
-def _narx(hiding: FaultyRecord) -> Simulator:
-    record = hiding.record
-    alone = replace(record, u=record.u[:, :1], input_names=record.input_names[:1], input_units=("V",))
-    model = identify_actuator(alone[: int(SEEN * record.samples)])
+def _make_narx(faulty: FaultyRecord) -> Simulator:
+    record = faulty.record
+    single_input = replace(record, u=record.u[:, :1], input_names=record.input_names[:1], input_units=("V",))
+    model = identify_actuator(single_input[: int(VISIBLE_FRACTION * record.samples)])
     return NarxSimulator(model, "narx", record.y[: model.maximum_lag])
 
 
-def _estimated(name: str) -> Callable[[FaultyRecord], Simulator]:
-    """Return what makes a physical system whose parameters are estimated from the record."""
-    return lambda hiding: make_simulator(name, hiding.record)
+def _with_estimated_parameters(name: str) -> Callable[[FaultyRecord], Simulator]:
+    """Return a factory of a physical simulator whose parameters are estimated from the record."""
+    return lambda faulty: make_simulator(name, faulty.record)
 
 
-_EQUATION = frozenset(("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing"))
-_INPUT = frozenset(
+#: Faults in the equation of the plant, which needs a physical simulator.
+_EQUATION_FAULTS = frozenset(("relaxation", "rate-dependent-loop", "loop-asymmetry", "gain-step", "ageing"))
+
+#: Faults at the input, which need a simulator with an input.
+_INPUT_FAULTS = frozenset(
     ("delay", "clock-skew", "input-gain", "dead-zone", "input-saturation", "backlash", "stiction")
 )
 
-#: Cases by name. A new one is an entry here; a new system is a file in `trials.injection`.
-CORES: Mapping[str, SimulatedCase] = MappingProxyType(
+#: Cases by name. To add a case, add an entry; to add a system, add a file to `trials.injection`.
+CASES: Mapping[str, SimulatedCase] = MappingProxyType(
     {
         "bouc-wen-piezo": SimulatedCase(PIEZO, lambda _: BoucWenPiezoSimulator(), EXACT, PIEZO.tolerance),
         "narx": SimulatedCase(
             PIEZO,
-            _narx,
+            _make_narx,
             IDENTIFIED,
             {},
-            without=_EQUATION | {"sensor-gain", "input-gain", "wrong-parameter"},
+            without=_EQUATION_FAULTS | {"sensor-gain", "input-gain", "wrong-parameter"},
         ),
         "column": SimulatedCase(
             PIEZO,
-            lambda hiding: RecordedOutput("column", hiding.nominal),
+            lambda faulty: RecordedOutput("column", faulty.nominal),
             replace(IDENTIFIED, first=85.0),
             {},
-            apart=False,
-            without=_EQUATION | _INPUT | {"wrong-parameter"},
+            perturbed=False,
+            without=_EQUATION_FAULTS | _INPUT_FAULTS | {"wrong-parameter"},
         ),
-        "second-order": SimulatedCase(OSCILLATOR, _estimated("second-order"), EXACT, {}, free=True),
-        "cascaded-tanks": SimulatedCase(TANKS, _estimated("cascaded-tanks"), EXACT, {}, free=True),
+        "second-order": SimulatedCase(
+            OSCILLATOR, _with_estimated_parameters("second-order"), EXACT, {}, free=True
+        ),
+        "cascaded-tanks": SimulatedCase(
+            TANKS, _with_estimated_parameters("cascaded-tanks"), EXACT, {}, free=True
+        ),
     }
 )

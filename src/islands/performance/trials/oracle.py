@@ -1,4 +1,4 @@
-"""The oracle: who is told the names of what is hidden, and only has to fit."""
+"""Oracle: a fit that knows the names of the injected faults. It bounds the achievable improvement."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,77 +10,84 @@ from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.effects import catalogue_order, model_form
 from islands.discrepancy.interfaces.effect import Effect
 
-#: Starts of each effect that are fitted, of those that promise most.
+#: Number of starting points of each effect that are fitted, the most promising ones.
 _STARTS = 3
 
-#: Part of the error by which the oracle's has to be smaller, or there is no gain to have a share of.
-_LEAST = 0.01
+#: Smallest relative improvement of the oracle for which the ratio is defined.
+_MIN_IMPROVEMENT = 0.01
 
 
 def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str, float]) -> float | None:
-    """Return what a diagnosis gained on the locked samples, relative to the oracle.
+    """Return the improvement of a diagnosis on the held-out samples relative to that of the oracle.
 
     Parameters
     ----------
     found : Diagnosis
     names : sequence of str
-        What is hidden.
+        Names of the injected faults.
     tolerance : mapping
-        What the diagnosis was given.
+        Tolerances of the parameters, as given to the diagnosis.
 
     Returns
     -------
     float or None
-        None where the oracle gains next to nothing, or has no names for it either.
+        None if the oracle improves the fit by less than 1 %, or if a fault has no effect in the catalogue.
     """
     target = Target(
         found.record.y, np.arange(found.record.samples) < found.estimation_samples, None, tolerance
     )
     simulation = found.base.simulation
     effects = select_effects(simulation.simulator, simulation.context, tolerance)
-    told = found.base
-    # That its own form is wrong is no gain of a cause: both are held against the model with that mended.
+    oracle = found.base
+    # Correcting the form of the simulator itself is not an improvement by a cause: diagnosis and oracle are
+    # both compared with the simulator of corrected form.
     for form in (effect for effect in effects if effect.name == model_form.CORE_SHAPE):
-        told = _fitted(told, form, target)
-    before = _error(found, told)
+        oracle = _fit_with_effect(oracle, form, target)
+    before = _rmse(found, oracle)
     for name in names:
-        alike = [effect for effect in effects if effect.name.partition(":")[0] == name]
-        if not alike:
+        variants = [effect for effect in effects if effect.name.partition(":")[0] == name]
+        if not variants:
             return None
-        told = min((_fitted(told, effect, target) for effect in alike), key=lambda fit: fit.mean_square)
-    if told.noise.order:
-        told = calibrate(
-            told.simulation, Target(target.y, target.estimation_part, told.noise, tolerance), told.values
+        oracle = min(
+            (_fit_with_effect(oracle, effect, target) for effect in variants), key=lambda fit: fit.mean_square
         )
-    after, best = _error(found, found.best), _error(found, told)
-    return (before - after) / (before - best) if best < (1.0 - _LEAST) * before else None
+    if oracle.noise.order:
+        oracle = calibrate(
+            oracle.simulation,
+            Target(target.y, target.estimation_part, oracle.noise, tolerance),
+            oracle.values,
+        )
+    after, best = _rmse(found, found.best), _rmse(found, oracle)
+    return (before - after) / (before - best) if best < (1.0 - _MIN_IMPROVEMENT) * before else None
 
 
-def _error(found: Diagnosis, fit: CalibrationResult) -> float:
-    """Return the RMSE over the locked samples."""
+def _rmse(found: Diagnosis, fit: CalibrationResult) -> float:
+    """Return the RMSE over the held-out samples."""
     return float(np.sqrt(np.mean((found.record.y - fit.output)[found.estimation_samples :] ** 2)))
 
 
-def _fitted(fit: CalibrationResult, effect: Effect, target: Target) -> CalibrationResult:
-    """Return a simulation with one more effect in it, fitted from the starts that promise most."""
+def _fit_with_effect(fit: CalibrationResult, effect: Effect, target: Target) -> CalibrationResult:
+    """Add an effect to a simulation and fit it from the most promising starting points."""
     old, context = fit.simulation, fit.simulation.context
     extended = old.with_effects(catalogue_order((*old.effects, effect)))
-    part, own = extended.get_slice(effect), len(old.simulator.parameters)
+    part, simulator_size = extended.get_slice(effect), len(old.simulator.parameters)
     residual = target.residual(fit.output)
     starts = []
     for point in effect.starting_points(context, target.y - fit.output):
         start = extended.nominal
-        start[:own] = fit.values[:own]
+        start[:simulator_size] = fit.values[:simulator_size]
         for each in old.effects:
             start[extended.get_slice(each)] = fit.values[old.get_slice(each)]
         start[part] = point
         response = target.select(extended.simulate(start) - fit.output)
-        size = float(response @ response)
-        if not 0.0 < size < np.inf:
+        energy = float(response @ response)
+        if not 0.0 < energy < np.inf:
             continue
-        along = float(response @ residual)
-        start[part][: effect.linear_parameters] *= along / size
-        starts.append((along**2 / size if effect.linear_parameters else 2 * along - size, start))
+        projection = float(response @ residual)
+        start[part][: effect.linear_parameters] *= projection / energy
+        starts.append(
+            (projection**2 / energy if effect.linear_parameters else 2 * projection - energy, start)
+        )
     best = sorted(starts, key=lambda each: -each[0])[:_STARTS]
     fits = [calibrate(extended, target, start) for _, start in best]
     return min((each for each in fits if np.isfinite(each.mean_square)), key=lambda each: each.mean_square)

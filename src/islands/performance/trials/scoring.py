@@ -1,4 +1,4 @@
-"""The tally of blind trials: how often the analysis was right, with bounds, beside what it should be."""
+"""Scores of blind trials: rates with confidence intervals, compared with targets."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -10,28 +10,35 @@ from scipy.special import betaincinv
 from islands.performance.trials.targets import EXACT, Targets
 from islands.performance.trials.trial import TrialOutcome
 
-#: Bounds of the bands of misfits, in standard deviations of the noise; names are counted from the second on.
-FAINT, FROM, STRONG = 0.05, 0.2, 1.0
+#: Lower bound of the weak misfits, in standard deviations of the noise.
+FAINT = 0.05
 
-#: Equally wide bins of the confidence.
+#: Lower bound of the middle misfits; smaller ones do not count in the scores of names.
+FROM = 0.2
+
+#: Lower bound of the strong misfits.
+STRONG = 1.0
+
+#: Number of bins of the confidence, of equal width.
 BINS = 10
 
-#: What the bounds leave out, half of it on either side.
+#: Probability outside the confidence interval, half of it on either side.
 _OUTSIDE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Proportion:
-    """How many of some trials came out in a way.
+    """Fraction of trials with a given result.
 
     Attributes
     ----------
     name : str
     count, of : int
+        Number of trials with the result, and of all trials considered.
     goal : float or None
-        In percent.
+        Target in percent.
     most : bool
-        The goal is the most that is allowed; else it is the least.
+        Whether the target is an upper limit; otherwise it is a lower limit.
     """
 
     name: str
@@ -42,12 +49,12 @@ class Proportion:
 
     @property
     def percent(self) -> float:
-        """The point estimate."""
+        """Point estimate in percent."""
         return 100 * self.count / self.of if self.of else float("nan")
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Clopper and Pearson's 95 % interval, in percent."""
+        """Clopper-Pearson 95 % confidence interval in percent."""
         low = betaincinv(self.count, self.of - self.count + 1, _OUTSIDE / 2) if self.count else 0.0
         high = (
             betaincinv(self.count + 1, self.of - self.count, 1 - _OUTSIDE / 2)
@@ -58,22 +65,24 @@ class Proportion:
 
     @property
     def kept(self) -> bool | None:
-        """Whether the point estimate keeps the goal; None without trials or a goal."""
-        return _kept(self.percent, self)
+        """Whether the point estimate meets the target; None without trials or a target."""
+        return _meets_goal(self.percent, self)
 
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """A number of some trials.
+    """Statistic of a set of trials.
 
     Attributes
     ----------
     name : str
     value : float
     of : int
+        Number of values.
     goal : float or None
+        Target, in the unit of the value.
     most : bool
-        The goal is the most that is allowed; else it is the least.
+        Whether the target is an upper limit; otherwise it is a lower limit.
     """
 
     name: str
@@ -84,19 +93,31 @@ class Statistic:
 
     @property
     def kept(self) -> bool | None:
-        """Whether it keeps the goal; None without trials or a goal."""
-        return _kept(self.value, self)
+        """Whether the value meets the target; None without trials or a target."""
+        return _meets_goal(self.value, self)
 
 
-def _kept(value: float, asked: Proportion | Statistic) -> bool | None:
-    if asked.goal is None or not asked.of:
+def _meets_goal(value: float, row: Proportion | Statistic) -> bool | None:
+    if row.goal is None or not row.of:
         return None
-    return value <= asked.goal if asked.most else value >= asked.goal
+    return value <= row.goal if row.most else value >= row.goal
 
 
 @dataclass(frozen=True, slots=True)
 class ReliabilityBin:
-    """Names that were said with about the same confidence: how sure the analysis was, and how often right."""
+    """First names with a similar confidence.
+
+    Attributes
+    ----------
+    low, high : float
+        Bounds of the confidence.
+    count : int
+        Number of names.
+    said : float
+        Mean confidence.
+    right : float
+        Fraction of correct names.
+    """
 
     low: float
     high: float
@@ -108,17 +129,16 @@ class ReliabilityBin:
 def score(
     outcomes: Sequence[TrialOutcome], unknown: Sequence[str], goals: Targets = EXACT
 ) -> list[Proportion | Statistic]:
-    """Count outcomes by what was hidden.
+    """Score the outcomes of trials by the injected faults.
 
-    That the form of an identified model is wrong is true of the model, on clean records as well: outcomes do
-    not count it among their names, so here it is no false name, makes no set of names inexact, and detects
-    nothing that was hidden.
+    A model-form error of an identified model is real, even on clean records. Outcomes do not list it among
+    their names, so that it is neither a false name nor a detection and does not make a set of names inexact.
 
     Parameters
     ----------
     outcomes : sequence of TrialOutcome
     unknown : sequence of str
-        Names of causes that the simulation has no name for.
+        Injected causes that the analysis has no name for.
     goals : Targets
     """
     known = [each for each in outcomes if not set(each.trial.effects) & set(unknown)]
@@ -133,36 +153,38 @@ def score(
     gains = [each.gain_share for each in detected if each.gain_share is not None]
     bins = reliability(known)
 
-    def share(
+    def proportion(
         name: str,
         among: Sequence[TrialOutcome],
-        right: Callable[[TrialOutcome], bool],
+        condition: Callable[[TrialOutcome], bool],
         goal: float | None,
         most: bool = False,
     ) -> Proportion:
-        return Proportion(name, sum(map(right, among)), len(among), goal, most)
+        return Proportion(name, sum(map(condition, among)), len(among), goal, most)
 
-    def seen(name: str, low: float, high: float, goal: float | None) -> Proportion:
+    def detection_rate(name: str, low: float, high: float, goal: float | None) -> Proportion:
         among = [each for each in every if low < each.misfit <= high]
-        return share(f"detected, misfit {name} sigma", among, lambda each: each.noticed, goal)
+        return proportion(f"detected, misfit {name} sigma", among, lambda each: each.noticed, goal)
 
     return [
-        seen(f"{FAINT:g} to {FROM:g}", FAINT, FROM, goals.weak),
-        seen(f"{FROM:g} to {STRONG:g}", FROM, STRONG, goals.middle),
-        seen(f"> {STRONG:g}", STRONG, float("inf"), goals.strong),
-        share("named first, where detected", detected, lambda each: each.first_right, goals.first),
-        share(
+        detection_rate(f"{FAINT:g} to {FROM:g}", FAINT, FROM, goals.weak),
+        detection_rate(f"{FROM:g} to {STRONG:g}", FROM, STRONG, goals.middle),
+        detection_rate(f"> {STRONG:g}", STRONG, float("inf"), goals.strong),
+        proportion("named first, where detected", detected, lambda each: each.first_right, goals.first),
+        proportion(
             "among the first three, where detected",
             detected,
             lambda each: bool({*each.named[:1], *each.candidates} & set(each.trial.effects)),
             goals.three,
         ),
-        share("family, where detected", detected, lambda each: each.family_right, goals.family),
-        share("truth within the reported set", detected, lambda each: each.within_set, goals.within),
+        proportion("family, where detected", detected, lambda each: each.family_right, goals.family),
+        proportion("truth within the reported set", detected, lambda each: each.within_set, goals.within),
         Statistic("names in the reported set, mean", _mean([each.set_size for each in named]), len(named)),
-        share("false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True),
-        share("pairs exact", pairs, lambda each: each.exact, goals.pairs),
-        share("triples exact", triples, lambda each: each.exact, goals.triples),
+        proportion(
+            "false names on clean records", clean, lambda each: bool(each.named), goals.false_names, True
+        ),
+        proportion("pairs exact", pairs, lambda each: each.exact, goals.pairs),
+        proportion("triples exact", triples, lambda each: each.exact, goals.triples),
         Statistic("share of the oracle's gain, median", _quantile(gains, 0.5), len(gains), goals.gain),
         Statistic(
             "share of the oracle's gain, 10th percentile", _quantile(gains, 0.1), len(gains), goals.gain_tenth
@@ -174,7 +196,7 @@ def score(
             goals.calibration,
             True,
         ),
-        share(
+        proportion(
             "unknown causes silently misnamed",
             open_set,
             lambda each: each.verdict == "named" and bool(each.named),
@@ -185,9 +207,9 @@ def score(
 
 
 def reliability(outcomes: Sequence[TrialOutcome]) -> list[ReliabilityBin]:
-    """Hold confidences against frequencies: first names in equally wide bins, those that hold any.
+    """Compare confidences with the frequency of correct first names, in non-empty bins of equal width.
 
-    A name on a clean record is a wrong one.
+    A name on a clean record is wrong.
     """
     said = np.array([each.confidence for each in outcomes if each.named])
     right = np.array([each.first_right for each in outcomes if each.named])
@@ -206,15 +228,15 @@ def reliability(outcomes: Sequence[TrialOutcome]) -> list[ReliabilityBin]:
 
 
 def calibration_error(bins: Sequence[ReliabilityBin]) -> float:
-    """Return how far confidences are from frequencies, on average over the names (Naeini et al., 2015)."""
+    """Return the expected calibration error of the confidence (Naeini et al., 2015)."""
     count = sum(each.count for each in bins)
     return sum(each.count * abs(each.said - each.right) for each in bins) / count if count else float("nan")
 
 
 def confusion(outcomes: Sequence[TrialOutcome]) -> Mapping[tuple[str, str], int]:
-    """Count what single hidden effects were called: (hidden, named first) to how often; "" is no name.
+    """Return the confusion counts of single faults: (injected, named first) to the number of trials.
 
-    What was noticed and got no name is called "unknown".
+    "" means no fault or no name. A discrepancy that was detected but not named is "unknown".
     """
     return Counter(
         (

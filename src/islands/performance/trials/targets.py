@@ -1,28 +1,29 @@
-"""What blind trials are held against, in percent where nothing else is said."""
+"""Targets of the blind trials, in percent unless stated otherwise."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """Goals of an analysis that is given a kind of simulation.
+    """Targets of an analysis for one kind of simulation.
 
     Attributes
     ----------
     weak, middle, strong : float or None
-        Detected, of misfits of 0.05 to 0.2, of 0.2 to 1, of more than one standard deviation of the noise.
+        Detection rates for misfits of 0.05 to 0.2, 0.2 to 1, and more than 1 standard deviation of the noise.
     first, three, family, within : float
-        Named first, among the first three, of the right family, and within the reported set.
+        Rates at which the truth is named first, is among the first three candidates, has the family of the
+        first name, and is in the reported set.
     false_names : float
-        On clean records, at the most.
+        Largest rate of false names on clean records.
     pairs, triples : float
-        Found exactly.
+        Rates at which two and three faults are named exactly.
     gain, gain_tenth : float
-        Share of the oracle's gain: the median, and what nine tenths of the trials exceed.
+        Improvement relative to that of the oracle, as a fraction: median and 10th percentile.
     calibration : float
-        Error of the confidence, at the most.
+        Largest calibration error of the confidence, as a fraction.
     misnamed : float
-        Unknown causes, silently, at the most.
+        Largest rate at which an unknown cause gets a name without a warning.
     """
 
     weak: float | None
@@ -41,7 +42,7 @@ class Targets:
     misnamed: float
 
 
-#: The truth itself, but for what is hidden.
+#: The simulation equals the plant, except for the injected faults.
 EXACT = Targets(
     weak=95.0,
     middle=95.0,
@@ -59,7 +60,7 @@ EXACT = Targets(
     misnamed=4.0,
 )
 
-#: A model that was identified with what is hidden already in the record.
+#: The simulation is a model that was identified from the record with the injected faults.
 IDENTIFIED = Targets(
     weak=None,
     middle=None,

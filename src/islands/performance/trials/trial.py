@@ -1,4 +1,4 @@
-"""A blind trial: hide, diagnose, compare."""
+"""One blind trial: inject faults, diagnose the record, compare the names."""
 
 from dataclasses import dataclass
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from islands.discrepancy.diagnosis import diagnose
 from islands.discrepancy.effects import CATALOGUE, model_form
-from islands.performance.trials.cases import CORES
+from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.oracle import share_of_gain
 
-#: Tolerances that are stated of the piezo's parameters.
+#: Stated tolerances of the piezo's parameters.
 TOLERANCE = PIEZO.tolerance
 
-#: Families of causes that belong to a simulation, and have no entry of their own in the catalogue.
+#: Families of causes that belong to a simulator and are not in the catalogue.
 _FAMILIES = {
     "wrong-parameter": "scale",
     "input-offset": "baseline",
@@ -25,25 +25,25 @@ _FAMILIES = {
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What is hidden, and in what.
+    """Settings of a trial.
 
     Attributes
     ----------
     effects : tuple of str
-        Names; empty for a clean record.
+        Names of the injected faults; empty for a clean record.
     seed : int
     pole : float
-        Of the noise's memory; 0 is white.
+        Pole of the first-order noise model; 0 is white noise.
     band : tuple of float or None
-        Of the misfit of each effect, in standard deviations of the noise.
+        Bounds of the misfit of each fault, in standard deviations of the noise.
     variant : bool
-        In forms unlike those that the analysis extends by.
+        Whether to inject forms that differ from the effects of the analysis.
     seconds : float or None
-        Length of the record; None is what its system usually has.
+        Length of the record; None is the system's default.
     core : str
-        The simulation that is held against it, an entry of `CORES`.
+        Simulation under trial, an entry of `CASES`.
     oracle : bool
-        Who knows the names is asked as well: this takes time.
+        Whether to fit the oracle too, which takes time.
     """
 
     effects: tuple[str, ...]
@@ -58,30 +58,31 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class TrialOutcome:
-    """What came of a trial.
+    """Result of a trial.
 
     Attributes
     ----------
     trial : Trial
     misfit : float
-        Of what was hidden, in standard deviations of the noise; of gains and parameters what tolerances do
-        not allow.
+        Misfit caused by the injected faults, in standard deviations of the noise. For gains and parameters,
+        only the part outside the tolerances.
     verdict : str
     named : tuple of str
-        Causes, the most important first; without those of the noise, and without the form of a model.
+        Named causes, the most important first, without noise findings and without model-form error.
     noise : tuple of str
-        What was said of sampling and noise.
+        Findings on sampling and noise.
     equivalents : tuple of tuple of str
-        Of each name.
+        Equivalent causes of each name.
     candidates : tuple of str
-        The first three causes of the ladder.
+        The first three screened causes.
     confidence : float
-        Of the first name.
+        Confidence of the first name.
     gain_share : float or None
-        Error on the locked samples: by how much it is smaller, relative to an oracle's; None where there is
-        nothing to gain, or no oracle was asked.
+        Improvement of the error on the held-out samples relative to that of the oracle; None if no
+        improvement is possible or the oracle was not fitted.
     form : bool
-        The simulation's own form was said to be wrong: of an identified model that is true, and no cause.
+        Whether a model-form error was reported. For an identified model this is correct, and it is not a
+        cause.
     """
 
     trial: Trial
@@ -97,39 +98,41 @@ class TrialOutcome:
 
     @property
     def noticed(self) -> bool:
-        """Whether something beside the noise was found, with a name or without."""
+        """Whether a discrepancy other than noise was found, named or not."""
         return bool(self.named) or self.verdict == "unknown"
 
     @property
     def first_right(self) -> bool:
-        """Whether the first name is one of those hidden."""
+        """Whether the first name is an injected fault."""
         return bool(self.named) and self.named[0] in self.trial.effects
 
     @property
     def exact(self) -> bool:
-        """Whether all that is hidden is named, and nothing else."""
+        """Whether the names are exactly the injected faults."""
         return sorted(self.named) == sorted(self.trial.effects)
 
     @property
     def within_set(self) -> bool:
-        """Whether the first name, or one that cannot be told from it, is one of those hidden."""
+        """Whether the first name or an equivalent cause is an injected fault."""
         return bool(self.named) and bool({self.named[0], *self.equivalents[0]} & set(self.trial.effects))
 
     @property
     def set_size(self) -> int:
-        """How many names are in the first name's set, itself included."""
+        """Number of causes in the set of the first name, including itself."""
         return 1 + len(self.equivalents[0])
 
     @property
     def family_right(self) -> bool:
-        """Whether the first name is of the family of one of those hidden."""
-        return bool(self.named) and _family(self.named[0]) in {_family(name) for name in self.trial.effects}
+        """Whether the first name has the family of an injected fault."""
+        return bool(self.named) and _get_family(self.named[0]) in {
+            _get_family(name) for name in self.trial.effects
+        }
 
 
 def run_trial(trial: Trial) -> TrialOutcome:
-    """Hide, diagnose, compare."""
-    simulated = CORES[trial.core]
-    hiding = inject(
+    """Inject faults, diagnose the record and compare the names."""
+    simulated = CASES[trial.core]
+    faulty = inject(
         trial.effects,
         np.random.default_rng([trial.seed, *map(ord, "".join(trial.effects))]),
         trial.seconds,
@@ -137,29 +140,29 @@ def run_trial(trial: Trial) -> TrialOutcome:
         trial.band,
         trial.variant,
         simulated.system,
-        simulated.apart,
+        simulated.perturbed,
         simulated.free,
     )
-    found = diagnose(hiding.record, simulated.made(hiding), simulated.tolerance, trial.seed)
+    found = diagnose(faulty.record, simulated.make(faulty), simulated.tolerance, trial.seed)
     causes = [
         each
         for each in found.effects
         if each.explained_fraction is not None and each.name != model_form.CORE_SHAPE
     ]
-    asked = trial.oracle and trial.effects
+    use_oracle = trial.oracle and trial.effects
     return TrialOutcome(
         trial,
-        hiding.misfit,
+        faulty.misfit,
         str(found.verdict),
         tuple(finding.name for finding in causes),
         tuple(finding.name for finding in found.effects if finding.explained_fraction is None),
         tuple(finding.equivalents for finding in causes),
         tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,
-        share_of_gain(found, trial.effects, simulated.tolerance) if asked else None,
+        share_of_gain(found, trial.effects, simulated.tolerance) if use_oracle else None,
         any(finding.name == model_form.CORE_SHAPE for finding in found.effects),
     )
 
 
-def _family(name: str) -> str:
+def _get_family(name: str) -> str:
     return CATALOGUE[name].family if name in CATALOGUE else _FAMILIES.get(name, name)

@@ -89,7 +89,7 @@ def make_injections(surrogates: Surrogates, effect: Effect, seed: int = 0) -> tu
 
 
 def test_surrogate_is_the_simulation_plus_noise_of_the_record() -> None:
-    faulty = inject([], np.random.default_rng(5), 6.0, 0.8, apart=False)
+    faulty = inject([], np.random.default_rng(5), 6.0, 0.8, perturbed=False)
     simulator = RecordedOutput("theirs", faulty.nominal)
     found = diagnose(faulty.record, simulator)
     surrogates = make_surrogates(found, simulator, {})

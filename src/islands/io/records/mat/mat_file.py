@@ -1,4 +1,4 @@
-"""MAT-files (.mat): of version 4, of version 5 to 7, and of version 7.3, which is HDF5."""
+"""MAT-files (.mat) of version 4, of versions 5 to 7, and of version 7.3, which is HDF5."""
 
 from pathlib import Path
 
@@ -7,39 +7,39 @@ from islands.io.records.columnar import ColumnarFile
 from islands.io.records.mat import v4, v5, v73
 from islands.io.records.mat.workspace import make_columns
 
-#: How HDF5 begins, and where: MATLAB puts 512 bytes of its own before it.
+#: Signature of HDF5 and its possible offsets. MATLAB writes a header of 512 bytes before it.
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_STARTS = (0, 512, 1024, 2048)
 
-#: How files begin that are called .mat and are none, and what they are.
-_OTHERS = {
-    b"# Created by Octave": "is text in Octave's own format: save it by save -v7 {file}",
-    b"": "is not a MAT-file: save it by save -v7 {file}, or, if it is a table of text, call it .csv",
+#: Messages for other formats in .mat files, by their first bytes.
+_OTHER_FORMATS = {
+    b"# Created by Octave": "is text in Octave's format: save it with save -v7 {file}",
+    b"": "is not a MAT-file: save it with save -v7 {file}, or, if it is a text table, rename it to .csv",
 }
 
 
 def read_matlab(path: Path) -> ColumnarFile:
     """Open a MAT-file.
 
-    Columns are vectors by their names, fields of structures as ``run.u``, and matrices of a few channels as
-    ``x_1, x_2 ...``. What is no channel (text, cells, objects, complex or sparse numbers) is refused when
-    somebody asks for it.
+    Vectors become columns with their names, fields of structures become ``run.u``, and matrices of a few
+    channels become ``x_1, x_2 ...``. Other variables (text, cells, objects, complex or sparse numbers) raise
+    an error only when they are read.
 
     Raises
     ------
     RecordError
-        The file is no MAT-file, is damaged, or holds thousands of variables.
+        The file is not a MAT-file, is damaged, or has more variables than `workspace.MOST_VARIABLES`.
     """
     file = path.name
     with path.open("rb") as stream:
         head = stream.read(_HDF5_STARTS[-1] + len(_HDF5))
     if not head:
-        raise RecordError(f"{file} is empty: save it anew in MATLAB or Octave by save -v7 {file}")
+        raise RecordError(f"{file} is empty: save it again in MATLAB or Octave with save -v7 {file}")
     if any(head.startswith(_HDF5, start) for start in _HDF5_STARTS):
         return make_columns(v73.read_variables(path), file)
     content = path.read_bytes()
     variables = v5.read_variables(content) or v4.read_variables(content)
     if variables is None:
-        words = next(words for begin, words in _OTHERS.items() if head.startswith(begin))
-        raise RecordError(f"{file} {words.format(file=file)}")
+        message = next(text for signature, text in _OTHER_FORMATS.items() if head.startswith(signature))
+        raise RecordError(f"{file} {message.format(file=file)}")
     return make_columns(variables, file)

@@ -1,9 +1,11 @@
-"""MAT-files of version 5 to 7: their variables, every size in which is held against the bytes that are there.
+"""MAT-files of versions 5 to 7. Every declared size is checked against the available bytes.
 
-Not by SciPy's reader: it is "not hardened for untrusted input" (github.com/scipy/scipy/pull/25166), takes
-memory for every size that it reads, ends the process at a type that it does not know, and lists no file that
-holds an object. Numbers and structures are read here, which is the smaller part of the format. Its source:
-MathWorks, "MAT-File Format", chapter 1.
+SciPy's reader is not used: it is "not hardened for untrusted input" (github.com/scipy/scipy/pull/25166),
+allocates memory for every size that it reads, terminates the process at an unknown type, and cannot list
+files that contain an object. This module reads numbers and structures only, which are the smaller part of the
+format.
+
+Source: MathWorks, "MAT-File Format", chapter 1.
 """
 
 import math
@@ -21,22 +23,24 @@ from islands.io.records.mat.workspace import DAMAGED, Variable
 from islands.io.records.size_limits import DENSEST, MOST_SAMPLES
 
 _HEADER = 128  # bytes before the first element
-_HEAD = 1024  # bytes of an element in which class, dimensions and name of a variable stand
-_DEEPEST = 32  # structures in one another
+_HEAD = 1024  # first bytes of an element, which contain class, dimensions and name of a variable
+_MAX_DEPTH = 32  # nested structures
 
-#: Types of elements; of those with numbers also NumPy's names.
-_MATRIX, _COMPRESSED = 14, 15
+_MATRIX = 14  # element type of a variable
+_COMPRESSED = 15  # element type of a compressed variable
+
+#: Element types of numbers, and NumPy's names for them.
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 
-#: Classes of variables; those of numbers are 6 to 15.
+#: Classes of variables. Classes 6 to 15 are numbers.
 _CLASSES = {1: "cell", 2: "struct", 3: "object", 4: "char", 5: "sparse", 16: "function_handle"}
-_OPAQUE = 17
-_COMPLEX = 0x800  # a flag beside the class
+_OPAQUE = 17  # class of MATLAB's own objects
+_COMPLEX = 0x800  # flag in the same word as the class
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Span:
-    """A part of the file, or of what was packed in it."""
+    """A range of bytes of the file or of a decompressed element."""
 
     content: bytes
     order: str
@@ -54,7 +58,7 @@ class _Span:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Matrix:
-    """What a variable announces, and the elements behind that."""
+    """Header of a variable, and the elements that follow it."""
 
     name: str
     kind: str
@@ -63,84 +67,86 @@ class _Matrix:
 
 
 def read_variables(content: bytes) -> Iterator[Variable] | None:
-    """Yield the variables of a MAT-file of version 5 to 7 and the fields of structures; None if it is none.
+    """Yield the variables and structure fields of a MAT-file of versions 5 to 7.
 
-    The iterator raises one of `islands.io.records.mat.workspace.DAMAGED` if the bytes are damaged.
+    Return None if the file has another format. The iterator raises one of
+    `islands.io.records.mat.workspace.DAMAGED` if the bytes are damaged.
     """
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
-    return None if order is None else _variables(_Span(content, order, _HEADER, len(content)))
+    return None if order is None else _iterate_variables(_Span(content, order, _HEADER, len(content)))
 
 
-def _variables(file: _Span) -> Iterator[Variable]:
-    for kind, span in _elements(file):
+def _iterate_variables(file: _Span) -> Iterator[Variable]:
+    for kind, span in _iterate_elements(file):
         if kind == _COMPRESSED:
-            packed = file.content[span.start : span.stop]
-            head = zlib.decompressobj().decompress(packed, _HEAD)
+            compressed = file.content[span.start : span.stop]
+            head = zlib.decompressobj().decompress(compressed, _HEAD)
             matrix, load = (
-                _matrix(_Span(head, file.order, 8, len(head))),
-                partial(_inflated, packed, file.order),
+                _read_header(_Span(head, file.order, 8, len(head))),
+                partial(_decompress, compressed, file.order),
             )
         else:
-            matrix, load = _matrix(span), partial(_itself, span)
-        if not matrix.name or matrix.name.startswith("__"):  # MATLAB's own: the contents of objects
+            matrix, load = _read_header(span), partial(_identity, span)
+        if not matrix.name or matrix.name.startswith("__"):  # internal to MATLAB: the contents of objects
             continue
         try:
-            yield from list(_offered(matrix.name, matrix, load, 0))
-        except DAMAGED as error:  # of a structure; it does no harm to who asks for others
-            yield Variable(matrix.name, "", matrix.shape, partial(_refuse, error))
+            yield from list(_flatten(matrix.name, matrix, load, 0))
+        except DAMAGED as error:  # a damaged structure does not prevent reading other variables
+            yield Variable(matrix.name, "", matrix.shape, partial(_raise, error))
 
 
-def _offered(name: str, matrix: _Matrix, load: Callable[[], _Span], depth: int) -> Iterator[Variable]:
-    """Yield a variable, or what the fields of a structure hold."""
+def _flatten(name: str, matrix: _Matrix, load: Callable[[], _Span], depth: int) -> Iterator[Variable]:
+    """Yield a variable, or the fields of a structure."""
     if matrix.kind != "struct" or matrix.shape != (1, 1):
-        yield Variable(name, matrix.kind, matrix.shape, partial(_numbers, load))
+        yield Variable(name, matrix.kind, matrix.shape, partial(_read_numbers, load))
         return
-    if depth > _DEEPEST:
-        raise ValueError(f"structures stand in one another more than {_DEEPEST} deep")
-    parts = _matrix(load()).parts
+    if depth > _MAX_DEPTH:
+        raise ValueError(f"structures are nested more than {_MAX_DEPTH} deep")
+    parts = _read_header(load()).parts
     width = int(_next(parts).numbers("i4")[0])
     table = _next(parts).text()
     fields = [table[start : start + width].partition("\0")[0] for start in range(0, len(table), width)]
     for field, (_, span) in zip(fields, parts, strict=True):
-        yield from _offered(f"{name}.{field}", _matrix(span), partial(_itself, span), depth + 1)
+        yield from _flatten(f"{name}.{field}", _read_header(span), partial(_identity, span), depth + 1)
 
 
-def _numbers(load: Callable[[], _Span]) -> NDArray[Any]:
-    matrix = _matrix(load())
+def _read_numbers(load: Callable[[], _Span]) -> NDArray[Any]:
+    matrix = _read_header(load())
     if not math.prod(matrix.shape):
         return np.empty(matrix.shape)
     kind, span = next(matrix.parts, (0, None))
     if span is None or kind not in _TYPES:
-        raise ValueError(f"its numbers are of the unknown type {kind}")
+        raise ValueError(f"its numbers have the unknown type {kind}")
     numbers = span.numbers(_TYPES[kind])
     if numbers.size != math.prod(matrix.shape):
-        raise ValueError(f"it claims the shape {matrix.shape} and holds {numbers.size} numbers")
+        raise ValueError(f"it declares the shape {matrix.shape} but has {numbers.size} numbers")
     return numbers.reshape(matrix.shape, order="F")
 
 
-def _inflated(packed: bytes, order: str) -> _Span:
+def _decompress(compressed: bytes, order: str) -> _Span:
     stream = zlib.decompressobj()
-    _, size = struct.unpack(f"{order}2I", stream.decompress(packed, 8))
-    if size > min(DENSEST * len(packed), 8 * MOST_SAMPLES):
-        raise ValueError(f"it claims {size} bytes, packed in {len(packed)}")
+    _, size = struct.unpack(f"{order}2I", stream.decompress(compressed, 8))
+    if size > min(DENSEST * len(compressed), 8 * MOST_SAMPLES):
+        raise ValueError(f"it declares {size} bytes, compressed to {len(compressed)}")
     content = stream.decompress(stream.unconsumed_tail, size) if size else b""
-    if len(content) < size or stream.decompress(stream.unconsumed_tail, 1):  # its end tells the checksum
-        raise ValueError(f"it claims {size} bytes, and as many are not packed")
+    # Reading up to the end also verifies the checksum.
+    if len(content) < size or stream.decompress(stream.unconsumed_tail, 1):
+        raise ValueError(f"it declares {size} bytes but contains a different number")
     return _Span(content, order, 0, size)
 
 
-def _itself(span: _Span) -> _Span:
+def _identity(span: _Span) -> _Span:
     return span
 
 
-def _refuse(error: Exception) -> NoReturn:
+def _raise(error: Exception) -> NoReturn:
     raise error
 
 
-def _matrix(span: _Span) -> _Matrix:
-    """Read what a variable announces; nothing behind that need be there yet."""
-    parts = _elements(span)
-    if span.start == span.stop:  # an empty field may have no bytes at all
+def _read_header(span: _Span) -> _Matrix:
+    """Read the header of a variable. The bytes after the header need not be available yet."""
+    parts = _iterate_elements(span)
+    if span.start == span.stop:  # an empty field may have no bytes
         return _Matrix("", "", (0, 0), parts)
     flags = int(_next(parts).numbers("u4")[0])
     code = flags & 0xFF
@@ -161,8 +167,8 @@ def _next(parts: Iterator[tuple[int, _Span]]) -> _Span:
     return span
 
 
-def _elements(outer: _Span) -> Iterator[tuple[int, _Span]]:
-    """Yield type and place of every element, one after the other."""
+def _iterate_elements(outer: _Span) -> Iterator[tuple[int, _Span]]:
+    """Yield the type and the byte range of every element."""
     start = outer.start
     while start < outer.stop:
         kind, size = struct.unpack_from(f"{outer.order}2I", outer.content, start)
@@ -171,6 +177,6 @@ def _elements(outer: _Span) -> Iterator[tuple[int, _Span]]:
             kind, size, body = kind & 0xFFFF, kind >> 16, start + 4
             padding = 4 - size
         if body + size > outer.stop or padding < 0:
-            raise ValueError(f"an element claims {size} bytes where {outer.stop - body} are left")
+            raise ValueError(f"an element declares {size} bytes but {outer.stop - body} are left")
         yield kind, _Span(outer.content, outer.order, body, body + size)
         start = body + size + padding

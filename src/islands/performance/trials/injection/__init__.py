@@ -1,1 +1,4 @@
-"""How effects are hidden: the truth of the trials. Nothing here comes from what looks for them."""
+"""Fault injection: plants, their faults and their records. Read `plant` first, then `faults`.
+
+Independent of the analysis under trial: nothing here imports `islands.discrepancy`.
+"""

@@ -1,4 +1,4 @@
-"""What can be hidden, and the ways in: before a system, in its equation, behind it."""
+"""Faults and the ways to inject them: at the input, in the equation, at the output."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,79 +9,80 @@ import numpy as np
 from islands.performance.trials.injection.excitation import random_sign
 from islands.performance.trials.injection.plant import Force, Map, Plant
 
-#: Takes chance, the strength, and a truth; gives that truth with something hidden in it.
+#: Takes a random generator, a strength and a plant; returns the plant with a fault.
 Inject = Callable[[np.random.Generator, float, Plant], Plant]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """An effect, as it may be hidden.
+    """A fault that can be injected.
 
     Attributes
     ----------
     name : str
-        What the analysis should call it; "" for what it has no name for.
+        Name that the analysis should report; empty if the catalogue has no name for it.
     minimum, maximum : float
-        Strengths, drawn evenly in their logarithm; what they mean is the form's.
+        Bounds of the strength, which is drawn from a log-uniform distribution. Its meaning depends on the
+        form.
     forms : tuple of callable
-        The first ones are usual, the others are unlike what the analysis would extend a simulation by.
-    usual : int
-        How many are usual.
+        The standard forms, followed by variants that differ from the effects of the analysis.
+    standard_forms : int
+        Number of standard forms.
     """
 
     name: str
     minimum: float
     maximum: float
     forms: tuple[Inject, ...]
-    usual: int = 1
+    standard_forms: int = 1
 
 
-def alter_parameter(truth: Plant, **parts: Any) -> Plant:
-    """Return a truth with other parts, of its own kind as well."""
-    return replace(truth, **parts)
+def alter_parameter(plant: Plant, **parameters: Any) -> Plant:
+    """Return a plant with other values of some attributes, including those of its subclass."""
+    return replace(plant, **parameters)
 
 
 def before_plant(make: Callable[[np.random.Generator, float], Map]) -> Inject:
-    """Hide a map on the input."""
-    return lambda rng, strength, truth: replace(truth, before=(*truth.before, make(rng, strength)))
+    """Inject a map of the input."""
+    return lambda rng, strength, plant: replace(plant, input_maps=(*plant.input_maps, make(rng, strength)))
 
 
 def after_plant(make: Callable[[np.random.Generator, float], Map]) -> Inject:
-    """Hide a map on the output."""
-    return lambda rng, strength, truth: replace(truth, behind=(*truth.behind, make(rng, strength)))
+    """Inject a map of the output."""
+    return lambda rng, strength, plant: replace(plant, output_maps=(*plant.output_maps, make(rng, strength)))
 
 
 def add_force(make: Callable[[np.random.Generator, float], Force]) -> Inject:
-    """Hide a force."""
-    return lambda rng, strength, truth: replace(truth, beside=(*truth.beside, make(rng, strength)))
+    """Inject a force."""
+    return lambda rng, strength, plant: replace(plant, forces=(*plant.forces, make(rng, strength)))
 
 
-def wrong(which: str) -> Inject:
-    """Hide another value of a parameter."""
+def scale_parameter(name: str) -> Inject:
+    """Multiply or divide a parameter by ``exp(strength)``."""
 
-    def hide(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
+    def inject(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
         factor = float(np.exp(random_sign(rng) * strength))
-        return alter_parameter(truth, **{which: getattr(truth, which) * factor})
+        return alter_parameter(plant, **{name: getattr(plant, name) * factor})
 
-    return hide
-
-
-def set_attribute(which: str, signed: bool = True, per: float = 1.0) -> Inject:
-    """Hide something that a truth's own equation knows, ``strength / per`` of it."""
-
-    def hide(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-        return alter_parameter(truth, **{which: (random_sign(rng) if signed else 1.0) * strength / per})
-
-    return hide
+    return inject
 
 
-def gain_step(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-    """Let the gain change at an instant."""
+def set_attribute(name: str, signed: bool = True, per: float = 1.0) -> Inject:
+    """Set an attribute of the plant to ``strength / per``, with a random sign if ``signed``."""
+
+    def inject(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+        return alter_parameter(plant, **{name: (random_sign(rng) if signed else 1.0) * strength / per})
+
+    return inject
+
+
+def gain_step(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+    """Change the gain at a random time."""
     k, at = random_sign(rng) * strength, float(rng.uniform(0.15, 0.6))
-    return replace(truth, gain=lambda time: 1.0 + k * (time > at * time[-1]))
+    return replace(plant, gain_profile=lambda time: 1.0 + k * (time > at * time[-1]))
 
 
-def ageing(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-    """Let the gain drift."""
+def ageing(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+    """Change the gain linearly over the record."""
     k = random_sign(rng) * strength
-    return replace(truth, gain=lambda time: 1.0 + k * time / time[-1])
+    return replace(plant, gain_profile=lambda time: 1.0 + k * time / time[-1])

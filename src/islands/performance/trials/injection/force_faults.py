@@ -1,7 +1,7 @@
-"""Forces, as they may be hidden in an equation: of coordinate and rate, each in its usual size.
+"""Force laws to inject into the equation of a plant.
 
-Each takes chance and a strength, and gives a force in the usual size and how its own state changes with the
-coordinate.
+Each factory takes a random generator and a strength and returns a `Force`: a function of the normalised
+coordinate q, rate w and state z that returns the normalised force and the derivative of z by q.
 """
 
 from math import copysign, tanh
@@ -13,49 +13,49 @@ from islands.performance.trials.injection.plant import Force
 
 
 def viscous(_rng: np.random.Generator, strength: float) -> Force:
-    """Act against the rate."""
+    """Viscous damping, proportional to the rate."""
     return lambda _q, w, _z: (-strength * w, 0.0)
 
 
 def coulomb(_rng: np.random.Generator, strength: float) -> Force:
-    """Rub dry."""
+    """Coulomb friction."""
     return lambda _q, w, _z: (-copysign(strength, w) if w else 0.0, 0.0)
 
 
 def stribeck(_rng: np.random.Generator, strength: float) -> Force:
-    """Rub dry, turning within a thirtieth of the usual rate."""
+    """Coulomb friction with a smooth change of sign within a thirtieth of the typical rate."""
     return lambda _q, w, _z: (-strength * tanh(30.0 * w), 0.0)
 
 
 def one_sided(rng: np.random.Generator, strength: float) -> Force:
-    """Rub more in one direction."""
+    """Direction-dependent viscous damping, proportional to the absolute rate."""
     c = random_sign(rng) * strength
     return lambda _q, w, _z: (-c * abs(w), 0.0)
 
 
 def drag(_rng: np.random.Generator, strength: float) -> Force:
-    """Act against the rate's square."""
+    """Quadratic drag."""
     return lambda _q, w, _z: (-strength * w * abs(w), 0.0)
 
 
 def square(rng: np.random.Generator, strength: float) -> Force:
-    """Act evenly."""
+    """Quadratic (even) stiffness."""
     c = random_sign(rng) * strength
     return lambda q, _w, _z: (c * q * q, 0.0)
 
 
 def cube(rng: np.random.Generator, strength: float) -> Force:
-    """Act oddly."""
+    """Cubic (odd) stiffness."""
     c = random_sign(rng) * strength
     return lambda q, _w, _z: (c * q * q * q, 0.0)
 
 
 def parallel(rng: np.random.Generator, strength: float) -> Force:
-    """Act as a Bouc-Wen element of its own."""
+    """Second Bouc-Wen element of either sign."""
     c = random_sign(rng) * strength
     return lambda _q, w, z: (c * z, 1.0 - 2.4 * copysign(1.0, w) * z - 0.4 * abs(z))
 
 
 def hysteresis(_rng: np.random.Generator, strength: float) -> Force:
-    """Restore as a Bouc-Wen element: what it holds back is always against the motion."""
+    """Restoring Bouc-Wen element: its force always opposes the motion."""
     return lambda _q, w, z: (-strength * z, 1.0 - 2.4 * copysign(1.0, w) * z - 0.4 * abs(z))

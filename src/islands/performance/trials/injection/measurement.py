@@ -1,4 +1,4 @@
-"""Records of a truth, as they would have been measured: decimated, and with noise."""
+"""Simulated measurements of a plant with injected faults: decimated and with noise."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,38 +13,50 @@ from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.injection.plant import Plant, simulate_plant
 from islands.performance.trials.injection.rig import Rig
 
-#: Part of a record in which what is hidden has to be seen: the rest may be locked away.
-SEEN = 0.75
+#: Fraction of a record, from its start, in which faults must be visible; the rest may be held out.
+VISIBLE_FRACTION = 0.75
 
-#: What calibration takes up: of these only what is left behind it can be seen.
-SCALE = ("sensor-gain", "input-gain", "wrong-parameter")
+#: Faults that calibration can absorb. Only the part that remains after calibration is visible.
+GAIN_FAULTS = ("sensor-gain", "input-gain", "wrong-parameter")
 
-#: Part of all clean records whose parameters are further from their nominal values than what counts as
-#: allowed: who calls less a wrong parameter has more false names than that.
-_BEYOND = 0.01
+#: Fraction of clean records whose parameters exceed the allowed deviation from their nominal values. An
+#: analysis that reports smaller deviations as wrong parameters has more false names than this.
+_EXCESS_PROBABILITY = 0.01
 
-#: How far below its least strength an effect may be to come into a band, and a gain above its most, in
-#: logarithms; halvings of the interval of strengths until its misfit is there; draws of all else of an
-#: effect, and then of the record.
-_BELOW, _ABOVE, _TRIES, _DRAWS, _RECORDS = 3.0, 1.5, 14, 5, 10
+#: Extension of the strengths below the minimum of a fault to reach a band, as a difference of natural
+#: logarithms.
+_EXTENSION_BELOW = 3.0
+
+#: Extension of the strengths above the maximum of a gain fault, as a difference of natural logarithms.
+_EXTENSION_ABOVE = 1.5
+
+#: Largest number of bisection steps of the strength until the misfit is in the band.
+_MAX_BISECTIONS = 14
+
+#: Largest number of draws of a fault's form and its random values.
+_MAX_DRAWS = 5
+
+#: Largest number of records that are drawn.
+_MAX_RECORDS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaultyRecord:
-    """A record with something hidden in it.
+    """A record with injected faults.
 
     Attributes
     ----------
     record : Dataset
-        Input, temperature and neighbour; output.
+        Inputs (input, temperature, neighbour) and output.
     misfit : float
-        Root mean square of what was hidden, over the part that is not locked away, in the noise's. Of gains
-        and parameters: of what is left of them when the parameters are moved as far as tolerances allow; and
-        so of all, where nothing is stated of parameters and they may be moved as far as they like.
+        RMS of the change of the output caused by the faults over the visible part, in standard deviations of
+        the noise. For gains and parameters, only the part that remains when the parameters are adjusted
+        within their tolerances. Without tolerances, the part of any fault that remains after an unrestricted
+        adjustment.
     sigma : float
-        The noise's standard deviation in the output's unit.
+        Standard deviation of the noise in the unit of the output.
     nominal : ndarray, shape (samples,)
-        What a system of nominal parameters would have done, with nothing hidden in it.
+        Output of the plant with nominal parameters and without faults.
     """
 
     record: Dataset
@@ -61,179 +73,190 @@ def inject(
     band: tuple[float, float] | None = None,
     variant: bool = False,
     system: Rig = PIEZO,
-    apart: bool = True,
+    perturbed: bool = True,
     free: bool = False,
 ) -> FaultyRecord:
-    """Hide effects, or nothing, in a record.
+    """Simulate a record with injected faults.
 
     Parameters
     ----------
     names : sequence of str
-        Of what can be hidden in the system, known and unknown.
+        Names of faults of the system, known and unknown; empty for a clean record.
     rng : Generator
     seconds : float, optional
-        The system's usual length where nothing is said.
+        Length of the record; the default of the system if not given.
     pole : float
-        Of the noise's memory of the last sample of the record; 0 is white.
+        Pole of the first-order noise model at the sampling rate of the record; 0 is white noise.
     band : tuple of float, optional
-        Between which the misfit of each effect alone has to be, in standard deviations of the noise.
+        Bounds of the misfit of each fault alone, in standard deviations of the noise.
     variant : bool
-        In forms unlike the usual ones, where there are others.
+        Whether to use the non-standard forms of faults that have them.
     system : Rig
-    apart : bool
-        The truth's parameters are not the nominal ones, within what tolerances say. Else they are, for a
-        simulation that cannot be calibrated: then gains and parameters can be seen in full.
+    perturbed : bool
+        Whether the parameters of the plant deviate from the nominal ones within the tolerances. If not, as
+        for a simulator that cannot be calibrated, gains and parameters are fully visible.
     free : bool
-        Nothing is stated of the simulation's parameters: what they can take up is no misfit.
+        Whether the parameters of the simulator have no tolerances. Then the part of a fault that any
+        parameters can absorb does not count as misfit.
 
     Raises
     ------
     ValueError
-        No strength of an effect has a misfit within the band, in any of several records.
+        No strength of a fault has a misfit within the band, in any of several records.
     """
-    entries = {**system.known, **system.unknown}
-    for _ in range(_RECORDS):
-        driven = system.excitation(rng, seconds or system.seconds)
-        truth = system.plant
-        for name, spread in system.relative_error.items() if apart else ():
+    faults = {**system.known, **system.unknown}
+    for _ in range(_MAX_RECORDS):
+        drive = system.excitation(rng, seconds or system.seconds)
+        plant = system.plant
+        for name, spread in system.relative_error.items() if perturbed else ():
             factor = float(np.exp(spread * rng.standard_normal()))
-            truth = alter_parameter(truth, **{name: getattr(truth, name) * factor})
-        seen = _Seen(system, driven, truth, free)
-        affected: Plant | None = truth
+            plant = alter_parameter(plant, **{name: getattr(plant, name) * factor})
+        observer = _Observer(system, drive, plant, free)
+        faulty: Plant | None = plant
         for name in names:
-            scale = free or (apart and name in SCALE)
-            affected = affected and _hidden(entries[name], scale, rng, truth, affected, seen, band, variant)
-        if affected is not None:
+            absorbable = free or (perturbed and name in GAIN_FAULTS)
+            faulty = faulty and _inject_fault(
+                faults[name], absorbable, rng, plant, faulty, observer, band, variant
+            )
+        if faulty is not None:
             break
     else:
         raise ValueError(f"{' and '.join(names)} cannot be hidden with a misfit within {band} sigma")
-    y = seen.clean if affected is truth else seen.of(affected)
-    noise = seen.sigma * _noise(rng, y.size, pole)
+    y = observer.clean if faulty is plant else observer.simulate(faulty)
+    noise = observer.sigma * _draw_noise(rng, y.size, pole)
     record = Dataset(
-        u=np.column_stack([driven.u, driven.temperature, driven.neighbour])[:: system.decimation],
+        u=np.column_stack([drive.u, drive.temperature, drive.neighbour])[:: system.decimation],
         y=y + noise,
-        dt=system.decimation / driven.rate,
+        dt=system.decimation / drive.rate,
         input_names=(system.input[0], "T_K", system.neighbour[0]),
         input_units=(system.input[1], "K", system.neighbour[1]),
         output_name=system.output[0],
         output_unit=system.output[1],
     )
-    misfit = seen.left if names and (free or (apart and set(names) & set(SCALE))) else seen.misfit
-    return FaultyRecord(record, misfit(y), seen.sigma, seen.nominal)
+    absorbable = names and (free or (perturbed and set(names) & set(GAIN_FAULTS)))
+    misfit = observer.misfit_after_calibration if absorbable else observer.misfit
+    return FaultyRecord(record, misfit(y), observer.sigma, observer.nominal)
 
 
-class _Seen:
-    """What a record shows of a truth, and how far that is from the truth with nothing hidden in it."""
+class _Observer:
+    """Noise-free recorded output of plants, and its misfit to the plant without faults."""
 
-    def __init__(self, system: Rig, driven: Excitation, truth: Plant, free: bool) -> None:
-        self._system, self._driven, self._free = system, driven, free
-        self.clean = self.of(truth)
-        self.nominal = self.of(system.plant)
-        self.sigma = system.noise * driven.output
-        self._moved: Signal | None = None
+    def __init__(self, system: Rig, drive: Excitation, plant: Plant, free: bool) -> None:
+        self._system, self._drive, self._free = system, drive, free
+        self.clean = self.simulate(plant)
+        self.nominal = self.simulate(system.plant)
+        self.sigma = system.noise * drive.peak_output
+        self._sensitivities: Signal | None = None
 
-    def of(self, truth: Plant) -> Signal:
-        """Return the samples of a truth that are recorded, without noise."""
-        return simulate_plant(truth, self._driven)[:: self._system.decimation]
+    def simulate(self, plant: Plant) -> Signal:
+        """Return the recorded samples of a plant without noise."""
+        return simulate_plant(plant, self._drive)[:: self._system.decimation]
 
     def misfit(self, y: Signal) -> float:
-        """Return the root mean square of what was hidden, in the noise's."""
-        part = slice(int(SEEN * y.size))
+        """Return the RMS deviation from the clean output, in standard deviations of the noise."""
+        part = slice(int(VISIBLE_FRACTION * y.size))
         with np.errstate(over="ignore", invalid="ignore"):
             return float(np.sqrt(np.mean((y - self.clean)[part] ** 2))) / self.sigma
 
-    def left(self, y: Signal) -> float:
-        """Return the same, of what is left when the nominal parameters are moved as far as they may be.
+    def misfit_after_calibration(self, y: Signal) -> float:
+        """Return the RMS deviation that remains after calibration, in standard deviations of the noise.
 
-        To the first order, and all parameters together: they are as many tolerances off, in the root of the
-        sum of squares, as in all but a few clean records.
+        Calibration adjusts the nominal parameters within their tolerances. The adjustment is linearised. The
+        norm of the adjustments of all parameters, in tolerances, is limited to its quantile in clean records.
         """
-        part = slice(int(SEEN * y.size))
+        part = slice(int(VISIBLE_FRACTION * y.size))
         tolerance = self._system.tolerance
-        if self._moved is None:
-            self._moved = np.column_stack([self._by(name, stated) for name, stated in tolerance.items()])
-        moved, missed = self._moved[part], (y - self.nominal)[part]
-        reach = np.inf if self._free else float(np.sqrt(scipy.stats.chi2.ppf(1.0 - _BEYOND, len(tolerance))))
-        left = missed - moved @ _within(moved, missed, reach)
-        return float(np.sqrt(np.mean(left**2))) / self.sigma
+        if self._sensitivities is None:
+            self._sensitivities = np.column_stack(
+                [self._change_by(name, relative) for name, relative in tolerance.items()]
+            )
+        sensitivities, deviation = self._sensitivities[part], (y - self.nominal)[part]
+        radius = (
+            np.inf
+            if self._free
+            else float(np.sqrt(scipy.stats.chi2.ppf(1.0 - _EXCESS_PROBABILITY, len(tolerance))))
+        )
+        remaining = deviation - sensitivities @ _solve_within_radius(sensitivities, deviation, radius)
+        return float(np.sqrt(np.mean(remaining**2))) / self.sigma
 
-    def _by(self, name: str, far: float) -> Signal:
+    def _change_by(self, name: str, relative: float) -> Signal:
+        """Return the change of the nominal output by a relative change of a parameter."""
         nominal = self._system.plant
-        change = {name: getattr(nominal, name) * (1.0 + far)}
-        return self.of(alter_parameter(nominal, **change)) - self.nominal
+        change = {name: getattr(nominal, name) * (1.0 + relative)}
+        return self.simulate(alter_parameter(nominal, **change)) - self.nominal
 
 
-def _within(columns: Signal, target: Signal, reach: float) -> Signal:
-    """Return least squares no longer than a reach: the pull to zero is as strong as that takes."""
+def _solve_within_radius(columns: Signal, target: Signal, radius: float) -> Signal:
+    """Solve a least-squares problem under an upper bound of the norm, by ridge regression."""
     values, vectors = np.linalg.eigh(columns.T @ columns)
     values = np.maximum(values, 1e-12 * values[-1])
     slope = vectors.T @ (columns.T @ target)
 
-    def far(pull: float) -> float:
-        return float(np.linalg.norm(slope / (values + pull))) - reach
+    def excess_norm(ridge: float) -> float:
+        return float(np.linalg.norm(slope / (values + ridge))) - radius
 
-    pull = 0.0
-    if far(0.0) > 0.0:  # never, of a reach without end
-        pull = scipy.optimize.brentq(far, 0.0, float(np.linalg.norm(slope)) / reach)
-    return vectors @ (slope / (values + pull))
+    ridge = 0.0
+    if excess_norm(0.0) > 0.0:  # never true for an infinite radius
+        ridge = scipy.optimize.brentq(excess_norm, 0.0, float(np.linalg.norm(slope)) / radius)
+    return vectors @ (slope / (values + ridge))
 
 
-def _hidden(
-    entry: Fault,
-    scale: bool,
+def _inject_fault(
+    fault: Fault,
+    absorbable: bool,
     rng: np.random.Generator,
-    truth: Plant,
-    affected: Plant,
-    seen: _Seen,
+    plant: Plant,
+    faulty: Plant,
+    observer: _Observer,
     band: tuple[float, float] | None,
     variant: bool,
 ) -> Plant | None:
-    """Return a truth with an effect hidden in it too; None where that cannot be seen in this record.
+    """Add a fault to an already faulty plant; return None if the fault is not visible in this record.
 
-    Such as a limit that only the locked part comes near.
+    An example is a saturation that only the held-out part reaches.
     """
-    forms = (variant and entry.forms[entry.usual :]) or entry.forms[: entry.usual]
-    for _ in range(_DRAWS):
+    forms = (variant and fault.forms[fault.standard_forms :]) or fault.forms[: fault.standard_forms]
+    for _ in range(_MAX_DRAWS):
         form = forms[int(rng.integers(len(forms)))]
-        hidden = _sought(entry, form, scale, rng, truth, seen, band)
-        if hidden is not None:
-            return hidden(affected)
+        inject_form = _find_strength(fault, form, absorbable, rng, plant, observer, band)
+        if inject_form is not None:
+            return inject_form(faulty)
     return None
 
 
-def _sought(
-    entry: Fault,
+def _find_strength(
+    fault: Fault,
     form: Inject,
-    scale: bool,
+    absorbable: bool,
     rng: np.random.Generator,
-    truth: Plant,
-    seen: _Seen,
+    plant: Plant,
+    observer: _Observer,
     band: tuple[float, float] | None,
 ) -> Callable[[Plant], Plant] | None:
-    """Return what hides a form with a strength whose misfit is in a band, if there is one."""
-    low, high = np.log(entry.minimum), np.log(entry.maximum)
+    """Return a function that injects a form with a misfit in the band; None if no strength is found."""
+    low, high = np.log(fault.minimum), np.log(fault.maximum)
     logarithm = float(rng.uniform(low, high))
     state = rng.bit_generator.state
 
-    def hidden(in_truth: Plant) -> Plant:
-        # The same draws each time: signs, instants and frequencies stay as the strength is sought.
+    def inject_form(target: Plant) -> Plant:
+        # Restore the generator, so that signs, times and frequencies do not change during the bisection.
         rng.bit_generator.state = state
-        return form(rng, float(np.exp(logarithm)), in_truth)
+        return form(rng, float(np.exp(logarithm)), target)
 
     if band is None:
-        return hidden
-    measure = seen.left if scale else seen.misfit
-    low, high = low - _BELOW, high + (_ABOVE if scale else 0.0)
-    for _ in range(_TRIES):
-        misfit = measure(seen.of(hidden(truth)))
+        return inject_form
+    measure = observer.misfit_after_calibration if absorbable else observer.misfit
+    low, high = low - _EXTENSION_BELOW, high + (_EXTENSION_ABOVE if absorbable else 0.0)
+    for _ in range(_MAX_BISECTIONS):
+        misfit = measure(observer.simulate(inject_form(plant)))
         if band[0] <= misfit <= band[1]:
-            return hidden
+            return inject_form
         low, high = (logarithm, high) if misfit < band[0] else (low, logarithm)
         logarithm = (low + high) / 2
     return None
 
 
-def _noise(rng: np.random.Generator, count: int, pole: float) -> Signal:
+def _draw_noise(rng: np.random.Generator, count: int, pole: float) -> Signal:
     white = rng.standard_normal(count + 1000)
     coloured: Signal = scipy.signal.lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)
     return coloured[1000:]

@@ -1,4 +1,4 @@
-"""A truth: a physical system whose every part may be another one than the simulation takes it for."""
+"""Plant: the physical system of a trial, in which faults can be injected."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -6,42 +6,42 @@ from dataclasses import dataclass, field
 
 from islands.performance.trials.injection.excitation import Excitation, Signal
 
-#: Takes what drives the truth and a signal, and gives the signal as it really is.
+#: Takes the excitation and a signal; returns the changed signal.
 Map = Callable[[Excitation, Signal], Signal]
 
-#: Takes coordinate and rate, each in its usual size, and a state of its own; gives a force in the usual size,
-#: and how the state changes with the coordinate.
+#: Takes coordinate and rate, both normalised by their typical size, and the state of the force; returns the
+#: normalised force and the derivative of the state by the coordinate.
 Force = Callable[[float, float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Plant(ABC):
-    """A system with whatever was hidden in it; one with parameters and an equation derives from it.
+    """Base class of plants with injected faults. Subclasses add parameters and the equation.
 
     Attributes
     ----------
-    gain : callable or None
-        Of time: what the system's own gain is multiplied by.
-    before, beside, behind : tuple
-        What acts on the input, as a force in the equation, and on the output, in this order.
+    gain_profile : callable or None
+        Function of time by which the gain of the plant is multiplied.
+    input_maps, forces, output_maps : tuple
+        Faults that act on the input, as forces in the equation, and on the output, in this order.
     """
 
-    gain: Callable[[Signal], Signal] | None = None
-    before: tuple[Map, ...] = field(default=())
-    beside: tuple[Force, ...] = field(default=())
-    behind: tuple[Map, ...] = field(default=())
+    gain_profile: Callable[[Signal], Signal] | None = None
+    input_maps: tuple[Map, ...] = field(default=())
+    forces: tuple[Force, ...] = field(default=())
+    output_maps: tuple[Map, ...] = field(default=())
 
     @abstractmethod
     def equation(self, drive: Excitation, x: Signal) -> Signal:
-        """Return what the system makes of an input behind its map, shape (samples,)."""
+        """Return the output for an input x after the input maps, shape (samples,)."""
 
 
-def simulate_plant(truth: Plant, drive: Excitation) -> Signal:
-    """Return what the truth does, at its own rate, shape (samples,)."""
+def simulate_plant(plant: Plant, drive: Excitation) -> Signal:
+    """Return the output of a plant at the sampling rate of the excitation, shape (samples,)."""
     x = drive.u
-    for change in truth.before:
+    for change in plant.input_maps:
         x = change(drive, x)
-    y = truth.equation(drive, x)
-    for change in truth.behind:
+    y = plant.equation(drive, x)
+    for change in plant.output_maps:
         y = change(drive, y)
     return y

@@ -1,4 +1,4 @@
-"""A system that something can be hidden in: its truth, its drive and its recorder, and what can be hidden."""
+"""Rig: a plant with its excitation, its measurement and its faults."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,36 +9,36 @@ from islands.performance.trials.injection.excitation import Excitation
 from islands.performance.trials.injection.faults import Fault
 from islands.performance.trials.injection.plant import Plant
 
-#: Stated tolerances are so many times the spread of the truth.
-_STATED = 2.0
+#: Stated tolerances in standard deviations of the plant's parameters.
+_TOLERANCE_SIGMAS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """A system.
+    """A system under trial.
 
     Attributes
     ----------
     plant : Plant
-        With its nominal parameters.
+        Plant with its nominal parameters.
     relative_error : mapping
-        How far a truth's parameters are from their nominal values, as relative standard deviations.
+        Relative standard deviations of the parameters around their nominal values.
     excitation : callable
-        Draws what drives it, over some seconds.
+        Draws an excitation of a given length in seconds.
     seconds : float
-        The usual length of a record.
+        Default length of a record.
     decimation : int
-        How many samples of the truth make one of the record.
+        Number of plant samples per recorded sample.
     noise : float
-        Standard deviation relative to the usual largest output.
+        Standard deviation of the measurement noise relative to the typical largest output.
     input, output : tuple of str
-        Name and unit of the columns.
+        Names and units of the columns.
     neighbour : tuple of str
-        Name and unit of the channel that may couple in.
+        Name and unit of the neighbouring channel.
     known : mapping
-        What can be hidden, by its name in the catalogue.
+        Faults that the catalogue of effects has a name for, by this name.
     unknown : mapping
-        Causes that the catalogue has no name for, by what they are.
+        Faults that the catalogue has no name for.
     """
 
     plant: Plant
@@ -55,10 +55,10 @@ class Rig:
 
     @property
     def tolerance(self) -> Mapping[str, float]:
-        """Tolerances of its parameters that whoever made the simulation would state."""
-        return {name: _STATED * spread for name, spread in self.relative_error.items()}
+        """Tolerances of the parameters as the author of the simulator would state them."""
+        return {name: _TOLERANCE_SIGMAS * spread for name, spread in self.relative_error.items()}
 
 
-def fault_table(*hidden: Fault) -> Mapping[str, Fault]:
-    """Return what can be hidden by its name."""
-    return {each.name: each for each in hidden}
+def fault_table(*faults: Fault) -> Mapping[str, Fault]:
+    """Return the faults by their names."""
+    return {fault.name: fault for fault in faults}

@@ -1,7 +1,7 @@
-"""Maps of a signal, as they may be hidden: what acts before a system on its input, or behind it.
+"""Signal maps to inject at the input or at the output of a plant.
 
-Each takes chance and a strength, and gives what is done to a signal. What is made with a range first draws
-from that as well.
+Each factory takes a random generator and a strength and returns a `Map`. Functions with a range return a
+factory that also draws a value from this range.
 """
 
 from collections.abc import Callable
@@ -15,202 +15,203 @@ from islands.performance.trials.injection.plant import Map
 Make = Callable[[np.random.Generator, float], Map]
 
 
-def later(_rng: np.random.Generator, tau: float) -> Map:
-    """Delay."""
+def delay(_rng: np.random.Generator, tau: float) -> Map:
+    """Delay by tau seconds."""
     return lambda drive, u: np.interp(drive.time - tau, drive.time, u)
 
 
 def two_lags(_rng: np.random.Generator, tau: float) -> Map:
-    """Let two quick lags follow each other: nearly a delay of their sum."""
+    """Two first-order lags in series, which approximate a delay of tau seconds."""
     return lambda drive, u: lag(lag(u, tau / 2, drive.rate), tau / 2, drive.rate)
 
 
-def sensor(_rng: np.random.Generator, tau: float) -> Map:
-    """Let a sensor follow with a time constant."""
+def sensor_lag(_rng: np.random.Generator, tau: float) -> Map:
+    """First-order lag with a time constant of tau seconds."""
     return lambda drive, y: lag(y, tau, drive.rate)
 
 
-def averaging(_rng: np.random.Generator, tau: float) -> Map:
-    """Average over twice the lag."""
+def moving_average(_rng: np.random.Generator, tau: float) -> Map:
+    """Average over a moving window of 2 tau seconds."""
 
     def average(drive: Excitation, y: Signal) -> Signal:
-        # Of a spline's integral, so that no width has to be a whole number of samples; it began at rest.
+        # From the integral of a spline, so that the window need not be a whole number of samples. Before the
+        # first sample the signal is constant.
         integral = scipy.interpolate.CubicSpline(drive.time, y).antiderivative()
-        ago = drive.time - 2 * tau
-        before = integral(np.maximum(ago, 0.0)) + np.minimum(ago, 0.0) * y[0]
-        return (integral(drive.time) - before) / (2 * tau)
+        window_start = drive.time - 2 * tau
+        integral_start = integral(np.maximum(window_start, 0.0)) + np.minimum(window_start, 0.0) * y[0]
+        return (integral(drive.time) - integral_start) / (2 * tau)
 
     return average
 
 
-def mode(rng: np.random.Generator, strength: float) -> Map:
-    """Let the output ring: ``strength`` is the period in seconds."""
+def resonance(rng: np.random.Generator, strength: float) -> Map:
+    """Second-order resonance of the output; ``strength`` is the period in seconds."""
     damping = float(np.exp(rng.uniform(np.log(0.02), np.log(0.3))))
     w = 2 * np.pi / strength
 
-    def ring(drive: Excitation, y: Signal) -> Signal:
+    def resonate(drive: Excitation, y: Signal) -> Signal:
         mode = ([w * w], [1.0, 2 * damping * w, w * w])
         system = scipy.signal.cont2discrete(mode, 1 / drive.rate, method="foh")
-        rung: Signal = scipy.signal.lfilter(np.ravel(system[0]), np.ravel(system[1]), y - y[0])
-        return y[0] + rung
+        response: Signal = scipy.signal.lfilter(np.ravel(system[0]), np.ravel(system[1]), y - y[0])
+        return y[0] + response
 
-    return ring
+    return resonate
 
 
-def clock(rng: np.random.Generator, strength: float) -> Map:
-    """Let the clocks run apart."""
+def clock_skew(rng: np.random.Generator, strength: float) -> Map:
+    """Clocks of the input and the output that run at different rates."""
     e = random_sign(rng) * strength
     return lambda drive, u: np.interp(drive.time * (1.0 + e), drive.time, u)
 
 
 def lag(signal: Signal, tau: float, rate: float) -> Signal:
-    """Follow a signal with a time constant, from rest with it."""
+    """Return a signal after a first-order lag that starts in equilibrium."""
     a = np.exp(-1.0 / (rate * tau))
     lagged: Signal = scipy.signal.lfilter([1.0 - a], [1.0, -a], signal - signal[0])
     return signal[0] + lagged
 
 
-def sensor_gain(rng: np.random.Generator, strength: float) -> Map:
-    """Scale."""
+def gain_error(rng: np.random.Generator, strength: float) -> Map:
+    """Relative gain error of either sign."""
     factor = 1.0 + random_sign(rng) * strength
     return lambda _drive, y: factor * y
 
 
-def zero(rng: np.random.Generator, strength: float) -> Map:
-    """Shift."""
+def offset(rng: np.random.Generator, strength: float) -> Map:
+    """Constant offset."""
     c = random_sign(rng) * strength
-    return lambda drive, y: y + c * drive.output
+    return lambda drive, y: y + c * drive.peak_output
 
 
-def drift(rng: np.random.Generator, strength: float) -> Map:
-    """Drift over the record."""
+def linear_drift(rng: np.random.Generator, strength: float) -> Map:
+    """Linear drift over the record."""
     c = random_sign(rng) * strength
-    return lambda drive, y: y + c * drive.output * drive.time / drive.time[-1]
+    return lambda drive, y: y + c * drive.peak_output * drive.time / drive.time[-1]
 
 
 def jump(rng: np.random.Generator, strength: float) -> Map:
-    """Jump at an instant."""
+    """Jump at a random time."""
     c, at = random_sign(rng) * strength, float(rng.uniform(0.15, 0.6))
-    return lambda drive, y: y + c * drive.output * (drive.time > at * drive.time[-1])
+    return lambda drive, y: y + c * drive.peak_output * (drive.time > at * drive.time[-1])
 
 
-def thermal(rng: np.random.Generator, strength: float) -> Map:
-    """Follow the temperature."""
+def thermal_drift(rng: np.random.Generator, strength: float) -> Map:
+    """Drift proportional to the temperature."""
     c = random_sign(rng) * strength
-    return lambda drive, y: y + c * drive.output * drive.temperature
+    return lambda drive, y: y + c * drive.peak_output * drive.temperature
 
 
-def slow_thermal(rng: np.random.Generator, strength: float) -> Map:
-    """Let the body follow the sensor's temperature within two seconds."""
+def lagged_thermal_drift(rng: np.random.Generator, strength: float) -> Map:
+    """Drift proportional to the temperature after a first-order lag of two seconds."""
     c = random_sign(rng) * strength
-    return lambda drive, y: y + c * drive.output * lag(drive.temperature, 2.0, drive.rate)
+    return lambda drive, y: y + c * drive.peak_output * lag(drive.temperature, 2.0, drive.rate)
 
 
-def creep(least: float, most: float) -> Make:
-    """Creep with a time constant in a range."""
+def exponential_creep(lower: float, upper: float) -> Make:
+    """Exponential creep with a time constant from a range, in seconds."""
 
     def make(rng: np.random.Generator, strength: float) -> Map:
-        tau = float(np.exp(rng.uniform(np.log(least), np.log(most))))
+        tau = float(np.exp(rng.uniform(np.log(lower), np.log(upper))))
         return lambda drive, y: y + strength * lag(y - y[0], tau, drive.rate)
 
     return make
 
 
-def log_creep(_rng: np.random.Generator, strength: float) -> Map:
-    """Creep with the logarithm of time."""
+def logarithmic_creep(_rng: np.random.Generator, strength: float) -> Map:
+    """Creep with the logarithm of time, as a sum of exponential creep."""
     taus = (0.3, 1.0, 3.0, 10.0, 30.0)
     return lambda drive, y: y + strength * sum(lag(y - y[0], tau, drive.rate) for tau in taus)
 
 
-def play(_rng: np.random.Generator, strength: float) -> Map:
-    """Follow with a play."""
+def backlash(_rng: np.random.Generator, strength: float) -> Map:
+    """Backlash (play operator) with a half-width of ``strength``."""
 
     def follow(_drive: Excitation, u: Signal) -> Signal:
-        places, place = [], float(u[0])
-        for wanted in u.tolist():
-            place = min(max(place, wanted - strength), wanted + strength)
-            places.append(place)
-        return np.array(places)
+        positions, position = [], float(u[0])
+        for target in u.tolist():
+            position = min(max(position, target - strength), target + strength)
+            positions.append(position)
+        return np.array(positions)
 
     return follow
 
 
-def stick(_rng: np.random.Generator, strength: float) -> Map:
-    """Follow in slips."""
+def stiction(_rng: np.random.Generator, strength: float) -> Map:
+    """Stick-slip: the output jumps to the input when their distance exceeds ``strength``."""
 
     def follow(_drive: Excitation, u: Signal) -> Signal:
-        places, place = [], float(u[0])
-        for wanted in u.tolist():
-            if abs(wanted - place) > strength:
-                place = wanted
-            places.append(place)
-        return np.array(places)
+        positions, position = [], float(u[0])
+        for target in u.tolist():
+            if abs(target - position) > strength:
+                position = target
+            positions.append(position)
+        return np.array(positions)
 
     return follow
 
 
-def cut_input(_rng: np.random.Generator, strength: float) -> Map:
-    """Cut the input off."""
-    return lambda drive, u: np.clip(u, -drive.peak * (1 - strength), drive.peak * (1 - strength))
+def input_saturation(_rng: np.random.Generator, strength: float) -> Map:
+    """Saturation of the input, at a fraction of its typical largest value."""
+    return lambda drive, u: np.clip(u, -drive.peak_input * (1 - strength), drive.peak_input * (1 - strength))
 
 
-def cut_output(_rng: np.random.Generator, strength: float) -> Map:
-    """Cut the output off."""
+def output_saturation(_rng: np.random.Generator, strength: float) -> Map:
+    """Saturation of the output, at a fraction of its largest absolute value."""
 
-    def cut(_drive: Excitation, y: Signal) -> Signal:
+    def saturate(_drive: Excitation, y: Signal) -> Signal:
         level = float(np.max(np.abs(y))) * (1 - strength)
         return np.clip(y, -level, level)
 
-    return cut
+    return saturate
 
 
-def dead(_rng: np.random.Generator, strength: float) -> Map:
-    """Do nothing around zero."""
+def dead_zone(_rng: np.random.Generator, strength: float) -> Map:
+    """Dead zone around zero with a half-width of ``strength``."""
     return lambda _drive, u: np.where(np.abs(u) > strength, u - strength * np.sign(u), 0.0)
 
 
-def kink(rng: np.random.Generator, strength: float) -> Map:
-    """Bend at zero."""
+def sign_dependent_gain(rng: np.random.Generator, strength: float) -> Map:
+    """Different gains for positive and negative values."""
     k = random_sign(rng) * strength
     return lambda _drive, y: np.where(y > 0.0, (1 + k) * y, (1 - k) * y)
 
 
-def hum(least: float, most: float) -> Make:
-    """Add a sine of a frequency in a range."""
+def periodic_disturbance(lower: float, upper: float) -> Make:
+    """Sinusoidal disturbance with a frequency from a range, in Hz."""
 
     def make(rng: np.random.Generator, strength: float) -> Map:
-        frequency, phase = float(rng.uniform(least, most)), float(rng.uniform(0.0, 2 * np.pi))
+        frequency, phase = float(rng.uniform(lower, upper)), float(rng.uniform(0.0, 2 * np.pi))
         return lambda drive, y: (
-            y + strength * drive.output * np.sin(2 * np.pi * frequency * drive.time + phase)
+            y + strength * drive.peak_output * np.sin(2 * np.pi * frequency * drive.time + phase)
         )
 
     return make
 
 
-def coupling(rng: np.random.Generator, strength: float) -> Map:
-    """Add the neighbour's signal."""
+def cross_coupling(rng: np.random.Generator, strength: float) -> Map:
+    """Cross-coupling of the neighbouring channel."""
     c = random_sign(rng) * strength
-    return lambda drive, y: y + c * drive.output * drive.neighbour
+    return lambda drive, y: y + c * drive.peak_output * drive.neighbour
 
 
-def slew(_rng: np.random.Generator, strength: float) -> Map:
-    """Follow at a limited rate, in the input's unit a second."""
+def slew_rate_limit(_rng: np.random.Generator, strength: float) -> Map:
+    """Rate limiter, in units of the input per second."""
 
     def follow(drive: Excitation, u: Signal) -> Signal:
-        most, places, place = strength / drive.rate, [], float(u[0])
-        for wanted in u.tolist():
-            place += min(max(wanted - place, -most), most)
-            places.append(place)
-        return np.array(places)
+        max_step, positions, position = strength / drive.rate, [], float(u[0])
+        for target in u.tolist():
+            position += min(max(target - position, -max_step), max_step)
+            positions.append(position)
+        return np.array(positions)
 
     return follow
 
 
-def ripple(least: float, most: float) -> Make:
-    """Add a wave over the output itself, of a period in a range."""
+def ripple(lower: float, upper: float) -> Make:
+    """Sinusoidal error as a function of the output, with a period from a range, in units of the output."""
 
     def make(rng: np.random.Generator, strength: float) -> Map:
-        period = float(rng.uniform(least, most))
-        return lambda drive, y: y + strength * drive.output * np.sin(2 * np.pi * y / period)
+        period = float(rng.uniform(lower, upper))
+        return lambda drive, y: y + strength * drive.peak_output * np.sin(2 * np.pi * y / period)
 
     return make

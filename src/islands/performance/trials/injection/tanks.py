@@ -1,4 +1,4 @@
-"""Two tanks, a pump fills the upper one and that the lower: a truth, and what can be hidden in it."""
+"""Cascaded tanks (a pump fills the upper tank, which drains into the lower one) and their faults."""
 
 from dataclasses import dataclass
 from math import inf, sqrt
@@ -26,17 +26,24 @@ from islands.performance.trials.injection.faults import (
 from islands.performance.trials.injection.plant import Plant
 from islands.performance.trials.injection.rig import Rig, fault_table
 
-#: Samples a second of the truth, and the frequency in Hz up to which the pump's voltage moves.
-RATE, BAND = 2.5, 0.004
+#: Sampling rate of the plant in Hz.
+RATE = 2.5
 
-#: Largest voltage of the pump, and the usual highest level as its sensor has it: what strengths refer to.
-PEAK, OUTPUT = 5.0, 8.0
+#: Highest frequency of the pump's voltage in Hz.
+BAND = 0.004
 
-#: The linear part of an outflow in 1/s that is as large as the other one at half the usual level.
-_LAW = 0.025
+#: Largest voltage of the pump in V; fault strengths refer to it.
+PEAK = 5.0
 
-#: Inflow in V/s of the pump at its largest voltage.
-_PUMPED = 0.2
+#: Typical highest level in V of the sensor; fault strengths refer to it.
+OUTPUT = 8.0
+
+#: Coefficient of a linear outflow in 1/s that equals the outflow of Torricelli's law at half the typical
+#: level.
+_LINEAR_OUTFLOW = 0.025
+
+#: Inflow of the pump in V/s at its largest voltage.
+_MAX_INFLOW = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,102 +54,111 @@ class Tanks(Plant):
     ----------
     k1, k3, k4 : float
     start : tuple of float
-        Levels at the first sample: there nobody measures the upper one.
-    below : tuple of float
-        How far below its highest level each tank overflows, relative to that; 0 is never.
-    spilled : float
-        Part of what the upper one loses over its edge that falls into the lower one.
+        Levels of the upper and the lower tank at the first sample. The upper level is not measured.
+    overflow_depths : tuple of float
+        Distance of each tank's edge from the highest level without overflow, relative to this level; 0 means
+        that the tank does not overflow.
+    spill_fraction : float
+        Fraction of the overflow of the upper tank that falls into the lower one.
     leaks : tuple of float
-        Linear parts of the outflows, 1/s.
+        Coefficients of linear outflows, 1/s.
     exponent : float
-        Of both outflows' law.
+        Exponent of the outflow law of both tanks.
     inflows : tuple of float
-        What flows into each tank besides, V/s.
+        Additional inflows into each tank, V/s.
     """
 
     k1: float = 0.05
     k3: float = 0.05
     k4: float = 0.04
     start: tuple[float, float] = (5.0, 5.0)
-    below: tuple[float, float] = (0.0, 0.0)
-    spilled: float = 0.0
+    overflow_depths: tuple[float, float] = (0.0, 0.0)
+    spill_fraction: float = 0.0
     leaks: tuple[float, float] = (0.0, 0.0)
     exponent: float = 0.5
     inflows: tuple[float, float] = (0.0, 0.0)
 
     def equation(self, drive: Excitation, x: Signal) -> Signal:
-        """See `Plant`."""
-        pumped = self.k4 * (x if self.gain is None else x * self.gain(drive.time))
-        between = ((pumped[1:] + pumped[:-1]) / 2).tolist()
-        upper, lower = self._levels(between, (inf, inf))
-        if any(self.below):
+        """Return the lower level in V for a pump voltage x."""
+        pumped = self.k4 * (x if self.gain_profile is None else x * self.gain_profile(drive.time))
+        midpoints = ((pumped[1:] + pumped[:-1]) / 2).tolist()
+        upper, lower = self._integrate_levels(midpoints, (inf, inf))
+        if any(self.overflow_depths):
             edges = [
-                max(levels) * (1.0 - low) for levels, low in zip((upper, lower), self.below, strict=True)
+                max(levels) * (1.0 - depth)
+                for levels, depth in zip((upper, lower), self.overflow_depths, strict=True)
             ]
-            upper, lower = self._levels(between, (edges[0], edges[1]))
+            upper, lower = self._integrate_levels(midpoints, (edges[0], edges[1]))
         return np.array(lower)
 
-    def _levels(self, pumped: list[float], edges: tuple[float, float]) -> tuple[list[float], list[float]]:
-        """Integrate both levels by Heun's method; what overflows leaves at the end of a step."""
+    def _integrate_levels(
+        self, pumped: list[float], edges: tuple[float, float]
+    ) -> tuple[list[float], list[float]]:
+        """Integrate both levels by Heun's method. The overflow is removed at the end of each step."""
         h = 1.0 / RATE
-        (edge, edge_below), (upper, lower) = edges, self.start
-        (leak, leak_below), (beside, beside_below) = self.leaks, self.inflows
+        (upper_edge, lower_edge), (upper, lower) = edges, self.start
+        (upper_leak, lower_leak), (upper_inflow, lower_inflow) = self.leaks, self.inflows
         power = self.exponent
 
         def slopes(upper: float, lower: float, inflow: float) -> tuple[float, float]:
             upper, lower = max(upper, 0.0), max(lower, 0.0)
-            # A square root is what the power of one half costs four times.
-            fallen = self.k1 * (sqrt(upper) if power == 0.5 else upper**power) + leak * upper
-            gone = self.k3 * (sqrt(lower) if power == 0.5 else lower**power) + leak_below * lower
-            return inflow + beside - fallen, fallen + beside_below - gone
+            # sqrt is four times as fast as a power of one half.
+            drained = self.k1 * (sqrt(upper) if power == 0.5 else upper**power) + upper_leak * upper
+            outflow = self.k3 * (sqrt(lower) if power == 0.5 else lower**power) + lower_leak * lower
+            return inflow + upper_inflow - drained, drained + lower_inflow - outflow
 
-        levels, levels_below = [upper], [lower]
+        upper_levels, lower_levels = [upper], [lower]
         for inflow in pumped:
-            one, other = slopes(upper, lower, inflow)
-            then, otherwise = slopes(upper + h * one, lower + h * other, inflow)
-            upper, lower = upper + h * (one + then) / 2, lower + h * (other + otherwise) / 2
-            if upper > edge:
-                upper, lower = edge, lower + self.spilled * (upper - edge)
-            lower = min(lower, edge_below)
-            levels.append(upper)
-            levels_below.append(lower)
-        return levels, levels_below
+            upper_slope, lower_slope = slopes(upper, lower, inflow)
+            upper_next, lower_next = slopes(upper + h * upper_slope, lower + h * lower_slope, inflow)
+            upper, lower = (
+                upper + h * (upper_slope + upper_next) / 2,
+                lower + h * (lower_slope + lower_next) / 2,
+            )
+            if upper > upper_edge:
+                upper, lower = upper_edge, lower + self.spill_fraction * (upper - upper_edge)
+            lower = min(lower, lower_edge)
+            upper_levels.append(upper)
+            lower_levels.append(lower)
+        return upper_levels, lower_levels
 
 
-def _upper_edge(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-    """Let the upper tank overflow, and a part of that fall into the lower one."""
-    return alter_parameter(truth, below=(strength, 0.0), spilled=float(rng.uniform(0.1, 0.9)))
-
-
-def _lower_edge(_rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-    """Let the lower tank overflow."""
-    return alter_parameter(truth, below=(0.0, strength))
-
-
-def _leak(upper: float, lower: float) -> Inject:
-    """Let outflows have a linear part."""
-    return lambda _rng, strength, truth: alter_parameter(
-        truth, leaks=(upper * strength * _LAW, lower * strength * _LAW)
+def _upper_overflow(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+    """Let the upper tank overflow; a random part of the overflow falls into the lower tank."""
+    return alter_parameter(
+        plant, overflow_depths=(strength, 0.0), spill_fraction=float(rng.uniform(0.1, 0.9))
     )
 
 
-def _inflow(upper: float, lower: float) -> Inject:
-    """Let something flow in beside the pump."""
-
-    def hide(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-        c = random_sign(rng) * strength * _PUMPED
-        return alter_parameter(truth, inflows=(upper * c, lower * c))
-
-    return hide
+def _lower_overflow(_rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+    """Let the lower tank overflow."""
+    return alter_parameter(plant, overflow_depths=(0.0, strength))
 
 
-def _steeper(rng: np.random.Generator, strength: float, truth: Plant) -> Plant:
-    """Let the outflows' law have another exponent."""
-    return alter_parameter(truth, exponent=0.5 * (1.0 + random_sign(rng) * strength))
+def _linear_outflow(upper: float, lower: float) -> Inject:
+    """Add linear outflows to the tanks, weighted by ``upper`` and ``lower``."""
+    return lambda _rng, strength, plant: alter_parameter(
+        plant, leaks=(upper * strength * _LINEAR_OUTFLOW, lower * strength * _LINEAR_OUTFLOW)
+    )
 
 
-def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
-    """Draw a random multisine, or noise through a low-pass, about a level."""
+def _additional_inflow(upper: float, lower: float) -> Inject:
+    """Add constant inflows to the tanks, weighted by ``upper`` and ``lower``."""
+
+    def inject(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+        c = random_sign(rng) * strength * _MAX_INFLOW
+        return alter_parameter(plant, inflows=(upper * c, lower * c))
+
+    return inject
+
+
+def _outflow_exponent(rng: np.random.Generator, strength: float, plant: Plant) -> Plant:
+    """Change the exponent of the outflow law."""
+    return alter_parameter(plant, exponent=0.5 * (1.0 + random_sign(rng) * strength))
+
+
+def _draw_excitation(rng: np.random.Generator, seconds: float) -> Excitation:
+    """Draw a random multisine or low-pass noise around a mean voltage."""
     count = int(seconds * RATE)
     spread = (
         random_noise(rng, count, RATE, BAND, BAND) if rng.integers(2) else multisine(rng, count, RATE, BAND)
@@ -154,7 +170,7 @@ def _drive(rng: np.random.Generator, seconds: float) -> Excitation:
 TANKS = Rig(
     plant=Tanks(),
     relative_error={"k1": 0.02, "k3": 0.02, "k4": 0.02},
-    excitation=_drive,
+    excitation=_draw_excitation,
     seconds=4096.0,
     decimation=10,
     noise=0.003,
@@ -162,26 +178,46 @@ TANKS = Rig(
     output=("y_V", "V"),
     neighbour=("w_V", "V"),
     known=fault_table(
-        Fault("state-clip", 0.02, 0.6, (_upper_edge, _lower_edge), usual=2),
-        Fault("outflow-law", 0.002, 0.5, (_leak(0.0, 1.0), _leak(1.0, 0.0), _steeper), usual=2),
-        Fault("input-offset", 0.001, 0.2, (_inflow(1.0, 0.0), _inflow(0.0, 1.0)), usual=2),
-        Fault("delay", 1.0, 40.0, (before_plant(signal_faults.later), before_plant(signal_faults.two_lags))),
+        Fault("state-clip", 0.02, 0.6, (_upper_overflow, _lower_overflow), standard_forms=2),
         Fault(
-            "sensor-lag", 1.0, 40.0, (after_plant(signal_faults.sensor), after_plant(signal_faults.averaging))
+            "outflow-law",
+            0.002,
+            0.5,
+            (_linear_outflow(0.0, 1.0), _linear_outflow(1.0, 0.0), _outflow_exponent),
+            standard_forms=2,
         ),
-        Fault("offset", 0.005, 0.1, (after_plant(signal_faults.zero),)),
-        Fault("linear-drift", 0.005, 0.2, (after_plant(signal_faults.drift),)),
+        Fault(
+            "input-offset",
+            0.001,
+            0.2,
+            (_additional_inflow(1.0, 0.0), _additional_inflow(0.0, 1.0)),
+            standard_forms=2,
+        ),
+        Fault("delay", 1.0, 40.0, (before_plant(signal_faults.delay), before_plant(signal_faults.two_lags))),
+        Fault(
+            "sensor-lag",
+            1.0,
+            40.0,
+            (after_plant(signal_faults.sensor_lag), after_plant(signal_faults.moving_average)),
+        ),
+        Fault("offset", 0.005, 0.1, (after_plant(signal_faults.offset),)),
+        Fault("linear-drift", 0.005, 0.2, (after_plant(signal_faults.linear_drift),)),
         Fault("jump", 0.005, 0.2, (after_plant(signal_faults.jump),)),
-        Fault("thermal-drift", 0.005, 0.2, (after_plant(signal_faults.thermal),)),
-        Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.cut_output),)),
-        Fault("input-saturation", 0.03, 0.5, (before_plant(signal_faults.cut_input),)),
+        Fault("thermal-drift", 0.005, 0.2, (after_plant(signal_faults.thermal_drift),)),
+        Fault("output-saturation", 0.03, 0.5, (after_plant(signal_faults.output_saturation),)),
+        Fault("input-saturation", 0.03, 0.5, (before_plant(signal_faults.input_saturation),)),
         Fault("gain-step", 0.01, 0.2, (gain_step,)),
         Fault("ageing", 0.01, 0.2, (ageing,)),
-        Fault("periodic-disturbance", 0.002, 0.05, (after_plant(signal_faults.hum(0.006, 0.1)),)),
-        Fault("cross-coupling", 0.005, 0.2, (after_plant(signal_faults.coupling),)),
+        Fault(
+            "periodic-disturbance",
+            0.002,
+            0.05,
+            (after_plant(signal_faults.periodic_disturbance(0.006, 0.1)),),
+        ),
+        Fault("cross-coupling", 0.005, 0.2, (after_plant(signal_faults.cross_coupling),)),
     ),
     unknown={
-        "slew-rate": Fault("", 0.002, 0.01, (before_plant(signal_faults.slew),)),
+        "slew-rate": Fault("", 0.002, 0.01, (before_plant(signal_faults.slew_rate_limit),)),
         "ripple": Fault("", 0.003, 0.03, (after_plant(signal_faults.ripple(1.0, 3.0)),)),
     },
 )

@@ -15,7 +15,7 @@ from islands.io.simulator_spec.document import extended_document
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.model.model import Model, make_model
 from islands.model.parsing import parse
-from islands.performance.trials.cases import CORES
+from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import FaultyRecord, inject
 
 
@@ -27,7 +27,7 @@ def faulty() -> FaultyRecord:
 @pytest.fixture(scope="module")
 def extended(faulty: FaultyRecord) -> ExtendedSimulator:
     """Return an identified model with its missing terms as an effect."""
-    simulator = CORES["narx"].made(faulty)
+    simulator = CASES["narx"].make(faulty)
     context = make_context(faulty.record, simulator, 1500)
     return ExtendedSimulator(simulator, simulator.state_effects, context)
 

@@ -7,19 +7,21 @@ import pytest
 
 from islands.discrepancy.calibration.preparation import count_fitted_samples, make_context, select_effects
 from islands.discrepancy.diagnosis import Diagnosis, diagnose
-from islands.performance.trials.cases import CORES, identify_actuator
+from islands.performance.trials.cases import CASES, identify_actuator
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO
 from islands.performance.trials.oracle import share_of_gain
 from islands.simulation.predictors import free_run
 
 
-@pytest.mark.parametrize("name", CORES)
+@pytest.mark.parametrize("name", CASES)
 def test_what_is_hidden_is_what_a_simulation_can_name(name: str) -> None:
-    simulated = CORES[name]
+    simulated = CASES[name]
     system = simulated.system
-    hiding = inject([], np.random.default_rng(4), system.seconds / 3, system=system, apart=simulated.apart)
-    core = simulated.made(hiding)
+    hiding = inject(
+        [], np.random.default_rng(4), system.seconds / 3, system=system, perturbed=simulated.perturbed
+    )
+    core = simulated.make(hiding)
     scene = make_context(hiding.record, core, count_fitted_samples(hiding.record))
     found = {effect.name.partition(":")[0] for effect in select_effects(core, scene, simulated.tolerance)}
     assert set(simulated.nameable) == found & set(system.known)
@@ -40,8 +42,8 @@ def test_an_identified_model_follows_a_clean_record() -> None:
 
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
-    hiding = inject(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), apart=False)
-    return diagnose(hiding.record, CORES["column"].made(hiding))
+    hiding = inject(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), perturbed=False)
+    return diagnose(hiding.record, CASES["column"].make(hiding))
 
 
 def test_who_finds_the_name_gains_what_the_oracle_gains(found: Diagnosis) -> None:
@@ -62,12 +64,12 @@ def test_an_oracle_without_a_name_or_without_a_gain_is_none(found: Diagnosis) ->
 @pytest.mark.ci
 def test_two_names_are_told_one_after_the_other() -> None:
     hiding = inject(
-        ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), apart=False
+        ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), perturbed=False
     )
-    found = diagnose(hiding.record, CORES["column"].made(hiding))
+    found = diagnose(hiding.record, CASES["column"].make(hiding))
     share = share_of_gain(found, ["offset", "even-nonlinearity"], {})
     assert share == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_piezos_core_is_given_what_is_stated() -> None:
-    assert CORES["bouc-wen-piezo"].tolerance == {name: 2 * far for name, far in PIEZO.relative_error.items()}
+    assert CASES["bouc-wen-piezo"].tolerance == {name: 2 * far for name, far in PIEZO.relative_error.items()}

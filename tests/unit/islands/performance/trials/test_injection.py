@@ -7,7 +7,7 @@ import pytest
 import scipy
 
 from islands.performance.trials.injection import force_faults, measurement
-from islands.performance.trials.injection.measurement import SCALE, FaultyRecord, inject
+from islands.performance.trials.injection.measurement import GAIN_FAULTS, FaultyRecord, inject
 from islands.performance.trials.injection.oscillator import OSCILLATOR, OUTPUT, SPEED, Oscillator
 from islands.performance.trials.injection.piezo import PIEZO, Piezo
 from islands.performance.trials.injection.plant import Force, simulate_plant
@@ -48,7 +48,7 @@ def test_the_same_seed_hides_the_same(system: str) -> None:
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_where_nothing_is_hidden_there_is_noise_alone(system: str) -> None:
-    found = hidden(system, apart=False)
+    found = hidden(system, perturbed=False)
     left = found.record.y - found.nominal
     assert found.misfit == 0.0
     assert np.std(left) == pytest.approx(found.sigma, rel=0.1)
@@ -62,7 +62,7 @@ def test_what_tolerances_allow_is_no_misfit() -> None:
         replace(PIEZO, known={"sensor-gain": replace(gain, minimum=k, maximum=k)}) for k in (0.015, 0.08)
     )
     allowed, off, in_full = (
-        inject(["sensor-gain"], np.random.default_rng(3), 12.0, system=system, apart=apart)
+        inject(["sensor-gain"], np.random.default_rng(3), 12.0, system=system, perturbed=apart)
         for system, apart in ((small, True), (large, True), (small, False))
     )
     assert allowed.misfit < 0.05
@@ -85,7 +85,7 @@ def test_what_is_hidden_beside_a_gain_keeps_its_misfit() -> None:
 def test_the_oscillator_is_solved(force: object) -> None:
     rng = np.random.default_rng(2)
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
-    truth = Oscillator(beside=made)
+    truth = Oscillator(forces=made)
     drive = OSCILLATOR.excitation(rng, 2.0)
     y = simulate_plant(truth, drive)
 
@@ -120,8 +120,10 @@ def test_the_tanks_are_solved() -> None:
 def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
     drive = TANKS.excitation(np.random.default_rng(2), 4096.0)
     free = simulate_plant(Tanks(), drive)
-    lower = simulate_plant(Tanks(below=(0.0, 0.2)), drive)
-    lost, caught = (simulate_plant(Tanks(below=(0.3, 0.0), spilled=part), drive) for part in (0.0, 1.0))
+    lower = simulate_plant(Tanks(overflow_depths=(0.0, 0.2)), drive)
+    lost, caught = (
+        simulate_plant(Tanks(overflow_depths=(0.3, 0.0), spill_fraction=part), drive) for part in (0.0, 1.0)
+    )
     assert lower.max() == pytest.approx(0.8 * free.max())
     assert lost.max() < free.max()
     assert caught.mean() > lost.mean()
@@ -132,7 +134,7 @@ def test_a_gain_that_changes_shows_behind_its_instant() -> None:
         drive = system.excitation(np.random.default_rng(2), 0.3 * system.seconds)
         half = float(drive.time[-1]) / 2
         changed = simulate_plant(
-            replace(truth, gain=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive
+            replace(truth, gain_profile=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive
         )
         moved = np.abs(changed - simulate_plant(truth, drive)) > 1e-9
         assert not moved[: moved.size // 2].any()
@@ -141,14 +143,14 @@ def test_a_gain_that_changes_shows_behind_its_instant() -> None:
 
 def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
     def scales(system: Rig) -> set[str]:
-        return set(system.known) & set(SCALE)
+        return set(system.known) & set(GAIN_FAULTS)
 
-    assert scales(PIEZO) == set(SCALE)
+    assert scales(PIEZO) == set(GAIN_FAULTS)
     assert not scales(OSCILLATOR) | scales(TANKS)
 
 
 def test_a_misfit_that_no_strength_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measurement, "_RECORDS", 2)
+    monkeypatch.setattr(measurement, "_MAX_RECORDS", 2)
     with pytest.raises(ValueError, match=r"delay cannot be hidden with a misfit within"):
         inject(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
 
@@ -161,6 +163,6 @@ def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: py
         return inject(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))
 
     assert 0.3 <= hidden_peak().misfit <= 2.0
-    monkeypatch.setattr(measurement, "_RECORDS", 1)
+    monkeypatch.setattr(measurement, "_MAX_RECORDS", 1)
     with pytest.raises(ValueError, match="cannot be hidden"):
         hidden_peak()
