@@ -95,22 +95,22 @@ def make_zip_bomb(samples, members):
 #: Unusable files: content, name, and parts of the message.
 UNUSABLE = {
     "empty": (b"", "a.csv", ("a.csv is empty", "export the record again")),
-    "header alone": (b"t_s,u_V,y_um\n", "a.csv", ("a header in line 1 and not a single sample",)),
+    "header alone": (b"t_s,u_V,y_um\n", "a.csv", ("a header in line 1 but no samples",)),
     "text as archive": (csv(), "a.npz", ("a.npz is not a NumPy archive", "numpy.savez")),
     "program": (csv(), "a.exe", ("a.exe: its name must end in one of .csv", "export the record")),
     "picture": (PNG, "a.csv", ("a.csv, line 1: byte 0x89", "is not UTF-8: save the file as UTF-8")),
     "2 GB header": (
         make_archive_with_false_size(2**28),
         "a.npz",
-        (f"column u claims {2**28} samples", "the file is damaged"),
+        (f"column u declares {2**28} samples", "the file is damaged"),
     ),
     "0.8 GB header": (
         make_archive_with_false_size(10**8),
         "a.npz",
-        ("claims 800000000 bytes, and the file stores 64", "write it"),
+        ("declares 800000000 bytes, but the file stores 64", "write it"),
     ),
-    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or cut short", "save it")),
-    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or cut short", "save it")),
+    "MAT 5 cut short": (matlab_5()[:2000], "a.mat", ("a.mat is damaged or truncated", "save it")),
+    "MAT 7.3 cut short": (matlab_73()[:3000], "a.mat", ("a.mat is damaged or truncated", "save it")),
     "long name": (
         csv().replace(b"y_um", b"y" * 100_000),
         "a.csv",
@@ -205,7 +205,7 @@ DEFECTIVE = {
     ),
     "text": (
         csv(y_um={7: "oops"}),
-        ("a.csv, line 7, column y_um: 'oops' is not a number", "mend the cell or leave its row out"),
+        ("a.csv, line 7, column y_um: 'oops' is not a number", "correct the cell or leave its row out"),
     ),
     "NaN": (
         csv(y_um={7: "NaN"}),
@@ -218,7 +218,7 @@ DEFECTIVE = {
     ),
     "two lengths": (
         npz(u_V=np.arange(100) % 7, y_um=np.arange(90) % 5, dt=0.1),
-        ("column u_V has 100 samples, column y_um 90", "channels of one record are of equal length"),
+        ("column u_V has 100 samples, column y_um 90", "the channels of a record must have equal length"),
     ),
     "uneven time": (
         csv(t_s={50: "0.4812"}),

@@ -132,7 +132,7 @@ def test_every_setting_is_described(settings: type) -> None:
     assert attributes(settings).keys() == {*settings.__annotations__} - {"model_config"}
 
 
-def test_every_effect_says_what_resembles_it_and_what_distinguishes_it() -> None:
+def test_every_effect_lists_similar_effects_and_a_distinction() -> None:
     for entry in [*CATALOGUE.values(), *OF_EACH.values(), *DETECTORS.values()]:
         assert entry.similar_to, entry.name
         assert entry.distinguished_by, entry.name

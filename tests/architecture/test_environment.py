@@ -52,7 +52,7 @@ def test_only_the_settings_module_reads_the_environment(path):
     assert reads((ROOT / path).read_text()) == []
 
 
-def test_the_one_reader_does():
+def test_the_settings_module_reads_the_environment():
     assert reads((ROOT / READER).read_text())
 
 
@@ -70,7 +70,7 @@ def test_the_one_reader_does():
         "import os\ngetattr(os, 'environ')",
     ],
 )
-def test_a_reader_is_found_out(text):
+def test_environment_reads_are_detected(text):
     assert reads(text)
 
 
@@ -82,5 +82,5 @@ def test_a_reader_is_found_out(text):
         "import os\nos.getpid()",
     ],
 )
-def test_a_writer_is_none(text):
+def test_environment_writes_are_not_reads(text):
     assert not reads(text)

@@ -30,23 +30,23 @@ def test_imports_keep_the_contracts() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_every_source_folder_is_a_package_with_a_purpose() -> None:
+def test_every_source_folder_is_a_package_with_a_docstring() -> None:
     folders = {path.parent for path in SOURCES}
     for folder in folders:
         assert (folder / "__init__.py").read_text().startswith('"""'), folder
 
 
-def test_every_module_says_why_it_exists() -> None:
+def test_every_module_has_a_docstring() -> None:
     for path in SOURCES:
         assert path.read_text().lstrip("r").startswith('"""'), path
 
 
-def test_files_stay_small_enough_to_read() -> None:
+def test_source_files_are_below_the_length_limit() -> None:
     long = {str(path): count for path in SOURCES if (count := len(path.read_text().splitlines())) > 300}
     assert not long
 
 
-def test_most_files_are_long_enough_to_hold_a_subject() -> None:
+def test_most_source_files_are_above_the_length_minimum() -> None:
     lengths = [len(path.read_text().splitlines()) for path in SOURCES if "migrations" not in path.parts]
     lengths = [length for length in lengths if length > 5]
     assert median(lengths) >= 105
@@ -82,7 +82,7 @@ def test_a_folder_has_at_most_fifteen_entries() -> None:
     assert not {str(folder): len(found) for folder, found in entries.items() if len(found) > 15}
 
 
-def test_no_room_is_an_attic() -> None:
+def test_no_module_has_a_catch_all_name() -> None:
     for path in SOURCES:
         assert not {"utils", "helpers", "common", "misc"} & {path.stem, *path.parts}, path
 

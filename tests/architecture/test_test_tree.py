@@ -80,7 +80,7 @@ def test_every_folder_of_unit_tests_mirrors_a_package_or_a_module() -> None:
     assert not lost
 
 
-def test_every_file_of_unit_tests_is_named_after_a_module() -> None:
+def test_every_unit_test_file_is_named_after_a_module() -> None:
     """A subject may stand behind the name of the module or package: ``test_matlab_damage``."""
     nameless = []
     for path in files_of_tests(UNIT):
@@ -90,7 +90,7 @@ def test_every_file_of_unit_tests_is_named_after_a_module() -> None:
     assert not nameless
 
 
-def test_no_file_of_tests_is_too_long_to_read() -> None:
+def test_test_files_are_below_the_length_limit() -> None:
     long = {
         str(path.relative_to(TESTS)): count
         for path in files_of_tests(TESTS)
@@ -100,7 +100,7 @@ def test_no_file_of_tests_is_too_long_to_read() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(HEAVY))
-def test_no_module_of_tests_imports_what_is_heavy_when_it_is_collected(name: str) -> None:
+def test_test_modules_do_not_import_heavy_packages_at_collection(name: str) -> None:
     assert not [
         str(path.relative_to(TESTS)) for path in sorted(TESTS.rglob("*.py")) if name in imported(path)
     ]

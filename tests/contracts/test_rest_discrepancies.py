@@ -154,10 +154,10 @@ REFUSED = {
     "no model": (
         {"simulation": {"kind": "model", "model": {"a": 1}, "name": "m.json"}},
         "invalid-model",
-        "m.json is no model file of schema islands.model/1",
+        "m.json is not a model file of schema islands.model/1",
     ),
     "no regressor": (make_model_simulation("z(k-1)"), "invalid-model", "terms.0.regressor"),
-    "no text": (make_model_simulation(equation="\ud800"), "invalid-model", "is no model file"),
+    "no text": (make_model_simulation(equation="\ud800"), "invalid-model", "is not a model file"),
     "far back": (
         make_model_simulation("y(k-9999)"),
         "invalid-settings",

@@ -113,7 +113,7 @@ def test_columns_of_two_recordings_cannot_be_combined(service):
     for inputs, output in ((["u"], "y"), (["v"], "z")):
         assert service.submit(dataset=dataset, inputs=inputs, output=output).status_code == 202
     answer = service.submit(dataset=dataset, inputs=["u"], output="z")
-    assert "channels of one record are of equal length" in problem_of(answer, 422, "invalid-record")
+    assert "the channels of a record must have equal length" in problem_of(answer, 422, "invalid-record")
 
 
 def test_a_replayed_job_is_not_inspected_again(service, dataset):

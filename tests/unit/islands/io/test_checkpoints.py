@@ -78,7 +78,7 @@ def document(path):
     return json.loads(path.read_text())
 
 
-def test_an_archipelago_comes_back_exactly(path):
+def test_an_archipelago_is_read_back_exactly(path):
     write_checkpoint(archipelago(), path, ABOUT)
     read, about = read_checkpoint(path)
     assert read == archipelago()
@@ -87,7 +87,7 @@ def test_an_archipelago_comes_back_exactly(path):
     assert repr(read) == repr(archipelago())
 
 
-def test_writing_what_was_read_gives_the_same_bytes(path, tmp_path):
+def test_rewriting_a_checkpoint_gives_the_same_bytes(path, tmp_path):
     write_checkpoint(archipelago(), path, ABOUT)
     again = tmp_path / "again.json"
     read, about = read_checkpoint(path)
@@ -95,13 +95,13 @@ def test_writing_what_was_read_gives_the_same_bytes(path, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_islands_that_nobody_lives_on_yet_are_a_checkpoint_too(path):
+def test_an_empty_archipelago_is_read_back_exactly(path):
     write_checkpoint(EMPTY, path, {})
     assert read_checkpoint(path) == (EMPTY, {})
     assert EMPTY.generation == -1
 
 
-def test_it_is_json_that_others_can_read(document, path):
+def test_a_checkpoint_is_strict_json(document, path):
     assert document["schema"] == SCHEMA == "islands.checkpoint/3"
     assert document["islands"][0]["population"][1]["fitness"] is None
     assert [island["bar"] for island in document["islands"]] == [0.1 + 0.2, None]
@@ -109,7 +109,7 @@ def test_it_is_json_that_others_can_read(document, path):
     assert "NaN" not in path.read_text()
 
 
-def test_primitives_of_the_user_s_own_are_read_back_from_their_table(path):
+def test_user_defined_primitives_are_read_back_from_their_table(path):
     def _twice(a: float) -> float:
         return 2.0 * a
 
@@ -124,7 +124,7 @@ def test_primitives_of_the_user_s_own_are_read_back_from_their_table(path):
 
 
 @pytest.mark.parametrize("name", ["index", "seed", "generation", "population", "elite", "hall", "bar"])
-def test_an_island_that_lacks_a_part_is_refused(document, path, name):
+def test_an_island_with_a_missing_part_is_refused(document, path, name):
     """An island without its bar is one of the first schema, whose tournaments knew every fitness."""
     del document["islands"][1][name]
     path.write_text(json.dumps(document))
@@ -135,7 +135,7 @@ def test_an_island_that_lacks_a_part_is_refused(document, path, name):
 # Written so that a crash leaves the old one or the new one.
 
 
-def test_a_crash_between_writing_and_replacing_leaves_the_old_one(path, monkeypatch):
+def test_a_crash_before_replacing_keeps_the_old_checkpoint(path, monkeypatch):
     write_checkpoint(EMPTY, path, {"epoch": "old"})
 
     def crash(self, target):
@@ -151,7 +151,7 @@ def test_a_crash_between_writing_and_replacing_leaves_the_old_one(path, monkeypa
     assert [entry.name for entry in path.parent.iterdir()] == ["checkpoint.json"]
 
 
-def test_a_crash_while_writing_leaves_the_old_one(path, monkeypatch):
+def test_a_crash_while_writing_keeps_the_old_checkpoint(path, monkeypatch):
     write_checkpoint(EMPTY, path, {"epoch": "old"})
 
     def full(_number):
@@ -163,7 +163,7 @@ def test_a_crash_while_writing_leaves_the_old_one(path, monkeypatch):
     assert read_checkpoint(path) == (EMPTY, {"epoch": "old"})
 
 
-def test_it_is_on_the_disk_before_it_takes_the_old_one_s_place(path, monkeypatch):
+def test_a_checkpoint_is_synced_before_it_replaces_the_old_one(path, monkeypatch):
     order = []
     synchronise, put = os.fsync, Path.replace
     monkeypatch.setattr(os, "fsync", lambda number: (order.append("synchronised"), synchronise(number))[1])
@@ -189,7 +189,7 @@ def halls():
     return one, merge(*parts)
 
 
-def test_equal_halls_are_the_same_bytes_however_they_were_found(tmp_path):
+def test_equal_halls_are_the_same_bytes_from_any_search(tmp_path):
     one, other = halls()
     assert [entry.size for entry in one.entries] == [1, 1, 2, 6]
     write_hall(one, tmp_path / "one.json")
@@ -202,7 +202,7 @@ def test_equal_halls_are_the_same_bytes_however_they_were_found(tmp_path):
     "change",
     [{"fitness": 0.3}, {"theta": (0.3,)}, {"regressors": individual("y(k-7)").regressors}],
 )
-def test_halls_that_differ_are_other_bytes(tmp_path, change):
+def test_different_halls_are_different_bytes(tmp_path, change):
     one, _ = halls()
     first, *others = one.entries
     write_hall(one, tmp_path / "one.json")
@@ -210,7 +210,7 @@ def test_halls_that_differ_are_other_bytes(tmp_path, change):
     assert (tmp_path / "one.json").read_bytes() != (tmp_path / "other.json").read_bytes()
 
 
-def test_a_hall_is_json_that_others_can_read(tmp_path):
+def test_a_hall_is_strict_json(tmp_path):
     write_hall(halls()[0], tmp_path / "hall.json")
     document = json.loads((tmp_path / "hall.json").read_text())
     assert list(document) == ["schema", "hall"]
@@ -226,7 +226,7 @@ def test_a_hall_is_json_that_others_can_read(tmp_path):
     assert (middle["regressors"], middle["fitness"]) == (["y(k-2)", "y(k-1)*u1(k-1)"], 0.25)
 
 
-def test_a_hall_too_is_replaced_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
+def test_a_hall_is_replaced_atomically(tmp_path, monkeypatch):
     path = tmp_path / "hall.json"
     write_hall(HallOfFame(), path)
     before = path.read_bytes()
@@ -250,7 +250,7 @@ def test_a_missing_file_is_named(tmp_path):
         read_checkpoint(tmp_path)
 
 
-def test_a_file_that_was_cut_is_refused_wherever_it_was_cut(document, path):
+def test_a_file_truncated_at_any_position_is_refused(document, path):
     whole = path.read_bytes()
     for end in (0, 1, len(whole) // 2, len(whole) - 1):
         path.write_bytes(whole[:end])
@@ -279,7 +279,7 @@ def test_a_foreign_file_is_refused(path, content):
 def test_another_schema_is_refused(path, foreign):
     path.write_text(json.dumps(foreign))
     with pytest.raises(
-        ModelError, match=r"checkpoint\.json is no checkpoint of schema islands\.checkpoint/3"
+        ModelError, match=r"checkpoint\.json is not a checkpoint of schema islands\.checkpoint/3"
     ):
         read_checkpoint(path)
 
@@ -294,7 +294,7 @@ def test_islands_at_different_generations_are_refused(document, path, changed):
         island["generation"] = generation
     document["islands"] = [island for island, _ in pairs]
     path.write_text(json.dumps(document))
-    with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*not at one generation"):
+    with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*at different generations"):
         read_checkpoint(path)
 
 

@@ -74,7 +74,7 @@ def test_a_structure_without_parameters_is_read_back_as_one():
     assert again.dt is None
 
 
-def test_a_users_own_primitive_is_read_where_it_is_given():
+def test_a_user_defined_primitive_is_read_if_it_is_given():
     known = islands.PRIMITIVES | {"halved": islands.primitive("halved", halved, parity=-1)}
     model = islands.make_model([(islands.parse("halved(y(k-1))", known), 0.5)])
     assert model_from_json(model_json(model), primitives=known) == model
@@ -89,7 +89,7 @@ def halved(a):
 # The file.
 
 
-def test_a_model_file_says_schema_columns_sampling_time_and_terms_and_shows_the_equation():
+def test_a_model_file_has_schema_columns_sampling_time_terms_and_equation():
     model = PUBLISHED["12"].model
     fields = json.loads(model_json(model))
     assert list(fields) == ["schema", "inputs", "output", "dt", "equation", "latex", "terms"]
@@ -102,7 +102,7 @@ def test_a_model_file_says_schema_columns_sampling_time_and_terms_and_shows_the_
     assert len(fields["terms"]) == 6
 
 
-def test_a_model_file_holds_nothing_of_the_machine_that_wrote_it(tmp_path, monkeypatch):
+def test_a_model_file_does_not_depend_on_the_machine(tmp_path, monkeypatch):
     model = PUBLISHED["13"].model
     texts = []
     for name in ("here", "there"):
@@ -115,12 +115,12 @@ def test_a_model_file_holds_nothing_of_the_machine_that_wrote_it(tmp_path, monke
     assert str(tmp_path).encode() not in texts[0]
 
 
-def test_what_is_shown_for_the_reader_is_never_read_back():
+def test_equation_and_latex_are_never_read_back():
     model = model_from_json(document(equation="y(k) = 7", latex="nonsense"))
     assert model == model_from_json(document())
 
 
-def test_terms_may_be_written_in_any_way():
+def test_terms_may_be_in_any_form():
     model = model_from_json(
         document(
             terms=[
@@ -142,7 +142,7 @@ def test_terms_may_be_written_in_any_way():
     }
 
 
-def test_terms_may_stand_in_any_order():
+def test_terms_may_be_in_any_order():
     straight, reversed_ = (json.loads(document())["terms"][::step] for step in (1, -1))
     assert straight != reversed_
     assert model_from_json(document(terms=reversed_)) == model_from_json(document(terms=straight))
@@ -203,7 +203,7 @@ BROKEN = {
     ),
     "twice": (
         document(terms=[term("u(k-1)*y(k-1)"), term("2*y(k-1)*u(k-1)")]),
-        "terms.1.regressor: '2*y(k-1)*u(k-1)' stands there twice",
+        "terms.1.regressor: '2*y(k-1)*u(k-1)' is given twice",
     ),
     "an input too many": (
         document(terms=[term("u2(k-1)")]),
@@ -225,7 +225,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize(("text", "message"), BROKEN.values(), ids=BROKEN)
-def test_a_broken_file_is_refused_by_name_and_field(text, message, tmp_path):
+def test_an_invalid_file_is_refused_with_its_name_and_field(text, message, tmp_path):
     file = tmp_path / "broken.json"
     file.write_text(text)
     with pytest.raises(ModelError) as caught:
@@ -236,7 +236,7 @@ def test_a_broken_file_is_refused_by_name_and_field(text, message, tmp_path):
     assert "pydantic" not in said
 
 
-def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path):
+def test_a_missing_or_binary_file_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"cannot read the model file .*nowhere\.json: .*No such file"):
         read_model(tmp_path / "nowhere.json")
     (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00")
@@ -246,7 +246,7 @@ def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path):
         read_model(tmp_path)
 
 
-def test_a_model_is_not_written_where_there_is_no_folder(tmp_path):
+def test_a_model_is_not_written_to_a_missing_folder(tmp_path):
     with pytest.raises(ModelError) as caught:
         write_model(PUBLISHED["12"].model, tmp_path / "nowhere" / "model.json")
     assert str(caught.value).startswith(
@@ -255,7 +255,7 @@ def test_a_model_is_not_written_where_there_is_no_folder(tmp_path):
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-def test_a_model_whose_numbers_are_not_finite_is_not_written(number, tmp_path):
+def test_a_model_with_infinite_numbers_is_not_written(number, tmp_path):
     model = islands.make_model([(islands.parse("y(k-1)"), 0.5), (islands.parse("u(k-1)"), number)])
     with pytest.raises(ModelError, match=r"cannot be written: terms\.1\.parameter: Input should be a finite"):
         write_model(model, tmp_path / "model.json")

@@ -74,13 +74,13 @@ def test_a_result_has_every_field_of_the_contract(findings):
         assert set(model["information"]) == {"aic", "bic", "fpe"}
 
 
-def test_a_result_says_what_ended_an_evolution_and_nothing_did_end_another_search(findings):
+def test_a_result_has_the_reason_that_ended_an_evolution(findings):
     assert loaded(findings)["search"]["ended_by"] is None
     evolved = replace(findings, search=replace(findings.search, ended_by="target error"))
     assert loaded(evolved)["search"]["ended_by"] == "target error"
 
 
-def test_the_physics_and_the_residual_tests_are_told_one_by_one(findings):
+def test_a_result_lists_physics_checks_and_residual_tests(findings):
     for model in loaded(findings)["models"]:
         physics, tests = model["physics"], model["residual_tests"]
         assert set(physics) == {"property_1", "clusters", "hold_drift_percent", "holds", "excursions"}
@@ -97,7 +97,7 @@ def test_the_physics_and_the_residual_tests_are_told_one_by_one(findings):
             assert 0.0 < test["largest"] < 1.0
 
 
-def test_a_result_says_what_was_given_and_what_was_done(findings):
+def test_a_result_has_the_settings_and_the_search_statistics(findings):
     result = loaded(findings)
     assert result["seed"] == 7
     assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
@@ -111,7 +111,7 @@ def test_a_result_says_what_was_given_and_what_was_done(findings):
     assert result["search"]["full_set"] == {"candidates": 462, "bytes": 8 * 462 * 222}
 
 
-def test_models_stand_in_their_order_with_the_numbers_that_were_found(findings):
+def test_models_are_in_rank_order_with_their_numbers(findings):
     result = loaded(findings)
     assert [model["rank"] for model in result["models"]] == [1, 2, 3, 4]
     for model, entry in zip(result["models"], findings.models, strict=True):
@@ -123,7 +123,7 @@ def test_models_stand_in_their_order_with_the_numbers_that_were_found(findings):
         assert model["outcomes"]["validation"]["free_run"] == "ok"
 
 
-def test_what_json_does_not_know_becomes_null(findings):
+def test_numbers_that_json_cannot_represent_become_null(findings):
     best = findings.models[0].assessment
     lost = replace(best.metrics["validation"]["free_run"], mape=nan, r2=-inf, rmse=inf)
     metrics = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": lost}}
@@ -147,7 +147,7 @@ def test_what_json_does_not_know_becomes_null(findings):
     assert model["physics"]["property_1"] is False
 
 
-def test_settings_that_are_numpys_numbers_are_written_as_numbers(findings):
+def test_numpy_numbers_in_settings_are_written_as_numbers(findings):
     settings = {"max_terms": np.int64(4), "validation": np.float64(0.25), "flag": np.bool_(True), "x": np.nan}
     result = loaded(replace(findings, settings=settings))
     assert result["settings"] == {"max_terms": 4, "validation": 0.25, "flag": True, "x": None}
@@ -156,13 +156,13 @@ def test_settings_that_are_numpys_numbers_are_written_as_numbers(findings):
 # The record's hash.
 
 
-def test_a_record_from_a_file_is_known_by_the_files_hash(findings):
+def test_a_record_from_a_file_has_the_hash_of_the_file(findings):
     named = replace(findings, record=replace(findings.record, sha256="ab" * 32))
     assert loaded(named)["record"]["sha256"] == "ab" * 32
     assert loaded(findings)["record"]["sha256"] == content_sha256(findings.record)
 
 
-def test_a_record_from_no_file_is_known_by_its_numbers():
+def test_a_record_without_a_file_has_the_hash_of_its_numbers():
     plain = content_sha256(record())
     assert plain == content_sha256(record(output_name="z", input_units=("V",)))
     assert len(plain) == len(hashlib.sha256().hexdigest())
@@ -175,7 +175,7 @@ def test_a_record_from_no_file_is_known_by_its_numbers():
 # The folder.
 
 
-def test_the_folder_holds_a_file_a_model_and_what_is_said_of_all(findings, tmp_path):
+def test_the_folder_has_a_file_per_model_a_summary_and_a_result(findings, tmp_path):
     write_result(findings, tmp_path / "out")
     files = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*.*"))
     assert files == [*(f"models/0{rank}.json" for rank in range(1, 5)), "result.json", "summary.txt"]
@@ -185,7 +185,7 @@ def test_the_folder_holds_a_file_a_model_and_what_is_said_of_all(findings, tmp_p
     assert (tmp_path / "out" / "summary.txt").read_text() == summary(findings)
 
 
-def test_models_of_an_earlier_result_are_removed_and_nothing_else(findings, tmp_path):
+def test_only_the_models_of_an_earlier_result_are_removed(findings, tmp_path):
     write_result(findings, tmp_path)
     (tmp_path / "models" / "mine.json").write_text("{}")
     write_result(replace(findings, models=findings.models[:2]), tmp_path)
@@ -222,7 +222,7 @@ def test_the_summary_shows_record_settings_table_and_equations(findings):
     assert lines[-4].startswith(" 1  y(k) = 1*y(k-1) ")
 
 
-def test_the_table_has_a_row_a_model_and_columns_of_one_width(findings):
+def test_the_table_has_a_row_per_model_and_aligned_columns(findings):
     head, *rows = table(findings.models)
     assert head.split("  ")[0] == "rank"
     assert len(rows) == 4
@@ -236,7 +236,7 @@ def test_the_table_has_a_row_a_model_and_columns_of_one_width(findings):
     assert rows[0].split()[-2] == "yes"
 
 
-def test_the_table_tells_a_divergence_from_an_output_without_a_range(findings):
+def test_the_table_distinguishes_divergence_from_an_undefined_number(findings):
     best = findings.models[0].assessment
     flat = replace(best.metrics["validation"]["free_run"], mape=nan, r2=nan)
     without = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": flat}}
@@ -250,7 +250,7 @@ def test_the_table_tells_a_divergence_from_an_output_without_a_range(findings):
     assert cells[5:7] == ["diverged", "no"]
 
 
-def test_a_number_is_shown_as_it_is_asked_for():
+def test_a_number_is_shown_in_the_given_format():
     assert number(0.12345, "{:.3f}", True) == "0.123"
     assert number(inf, "{:.3f}", True) == number(nan, "{:.3f}", True) == "-"
     assert number(0.12345, "{:.3f}", False) == "diverged"

@@ -133,8 +133,8 @@ def inject(
         output_name=system.output[0],
         output_unit=system.output[1],
     )
-    absorbable = names and (free or (perturbed and set(names) & set(GAIN_FAULTS)))
-    misfit = observer.misfit_after_calibration if absorbable else observer.misfit
+    after_calibration = bool(names) and (free or (perturbed and bool(set(names) & set(GAIN_FAULTS))))
+    misfit = observer.misfit_after_calibration if after_calibration else observer.misfit
     return FaultyRecord(record, misfit(y), observer.sigma, observer.nominal)
 
 

@@ -61,7 +61,7 @@ def of_the_library(exported):
 
 @needs_compiler
 @pytest.mark.parametrize("name", CASES)
-def test_the_compiled_program_simulates_as_the_kernel_does(name, folder):
+def test_the_compiled_program_simulates_like_the_kernel(name, folder):
     exported, data = CASES[name], record_of(name)
     ours, theirs, lag = free_run(exported, data), simulated(exported, data, folder), exported.maximum_lag
     assert ours.outcome
@@ -74,7 +74,7 @@ def test_the_compiled_program_simulates_as_the_kernel_does(name, folder):
 
 @needs_compiler
 @pytest.mark.parametrize("name", PRIMITIVES)
-def test_a_compiled_primitive_is_the_kernels_at_every_jump_and_limit(name, folder):
+def test_compiled_primitives_equal_the_kernels_at_jumps_and_limits(name, folder):
     exported, data = at_the_edges(name)
     ours, theirs = free_run(exported, data, bound=np.inf).y[1:], simulated(exported, data, folder)[1:]
     if name in OF_THE_LIBRARY:
@@ -86,7 +86,7 @@ def test_a_compiled_primitive_is_the_kernels_at_every_jump_and_limit(name, folde
 @needs_compiler
 @part_of_the_examples(3)  # each is compiled
 @given(models(), st.integers(0, 2**32 - 1))
-def test_the_compiled_program_is_the_model_bit_for_bit(folder, random_model, seed):
+def test_the_compiled_program_equals_the_model_bit_for_bit(folder, random_model, seed):
     assume(not of_the_library(random_model))
     data = record(2, seed)
     run = free_run(random_model, data)
@@ -97,13 +97,13 @@ def test_the_compiled_program_is_the_model_bit_for_bit(folder, random_model, see
 
 
 @needs_compiler
-def test_an_input_at_rest_leaves_no_minus_zero(folder):
+def test_a_zero_input_gives_no_negative_zero(folder):
     at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
     assert bits(simulated(model({"u(k-1)": -0.5, "y(k-1)": -0.25}), at_rest, folder)) == [0] * 9
 
 
 @needs_compiler
-def test_predict_is_one_step_ahead_and_reads_nothing_but_its_past(folder):
+def test_predict_reads_past_samples_only(folder):
     data, exported = record(), PUBLISHED["12"].model
     predict = compile_model(export(exported, "c"), FLAGS, folder).predict
     predict.restype = ctypes.c_double
@@ -118,7 +118,7 @@ def test_predict_is_one_step_ahead_and_reads_nothing_but_its_past(folder):
 
 @needs_compiler
 @pytest.mark.parametrize("samples", [0, 1, 2, 3, 5])
-def test_the_first_samples_and_what_lies_behind_the_last_are_left_as_they_are(samples, folder):
+def test_simulate_does_not_write_outside_its_range(samples, folder):
     exported = PUBLISHED["12"].model
     data, y = record(), np.arange(1.0, 9.0)
     simulate = compile_model(export(exported, "c"), FLAGS, folder).simulate
@@ -131,7 +131,7 @@ def test_the_first_samples_and_what_lies_behind_the_last_are_left_as_they_are(sa
 
 @needs_compiler
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
-def test_a_columns_name_cannot_break_the_file(name, folder):
+def test_a_column_name_cannot_break_the_file(name, folder):
     exported = islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name)
     data = Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
     assert simulated(exported, data, folder).tolist() == [0.5, 2.0]
@@ -139,7 +139,7 @@ def test_a_columns_name_cannot_break_the_file(name, folder):
 
 @pytest.mark.parametrize("kind", ["c", "matlab"])
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
-def test_a_columns_name_is_read_back_from_its_line_of_the_comment(name, kind):
+def test_a_column_name_is_read_back_from_its_comment_line(name, kind):
     text = export(islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name), kind)
     assert text.isascii()
     (line,) = (line for line in text.split("\n") if "Inputs u = " in line)
@@ -149,7 +149,7 @@ def test_a_columns_name_is_read_back_from_its_line_of_the_comment(name, kind):
     assert line.endswith("; sampling time any.")
 
 
-def test_the_file_says_what_the_model_is():
+def test_the_file_describes_the_model():
     text = export(PUBLISHED["12"].model, "c")
     comment = text[: text.index("*/")]
     assert "NARX model: y(k) = 1*y(k-1) - 0.000246*" in comment
@@ -162,7 +162,7 @@ def test_the_file_says_what_the_model_is():
 
 
 @pytest.mark.parametrize(("kind", "mark"), [("c", " *"), ("matlab", "%")])
-def test_a_long_equation_is_broken_between_its_parts_alone(kind, mark):
+def test_a_long_equation_is_wrapped_between_its_parts(kind, mark):
     exported = model(
         {"*".join(f"u(k-{lag})" for lag in range(1, 30)): 0.5, "y(k-1)*u(k-1)^2": -0.25, "1": 1.0}
     )
@@ -174,7 +174,7 @@ def test_a_long_equation_is_broken_between_its_parts_alone(kind, mark):
     assert text == f"NARX model: {export(exported, 'plain')}"
 
 
-def test_the_functions_stand_once_and_only_where_they_are_needed():
+def test_functions_are_defined_once_and_only_if_used():
     text = export(model({"y(k-1)*sign(u(k-1))": 1.0, "sign(u(k-2))": 2.0}), "c")
     assert text.count("static double") == 1
     assert "total += 2.0*f_sign(u[-2]);" in text
@@ -203,7 +203,7 @@ OWN = {
 
 @needs_compiler
 @pytest.mark.parametrize("name", OWN)
-def test_a_users_own_primitive_is_compiled_with_the_body_that_was_given(name, folder):
+def test_a_user_defined_primitive_is_compiled_with_its_body(name, folder):
     arguments = "u(k-1), y(k-1)" if OWN[name].arity == 2 else "u(k-1)"
     exported = model({f"{name}({arguments})*sign(u(k-2))": 0.3, "y(k-2)": 0.2}, primitives=PRIMITIVES | OWN)
     assert bits(simulated(exported, record(), folder)[2:]) == bits(free_run(exported, record()).y[2:])
@@ -213,19 +213,19 @@ def test_a_users_own_primitive_is_compiled_with_the_body_that_was_given(name, fo
     ("kind", "given"),
     [("c", "c='return a / (1.0 + fabs(a));'"), ("matlab", "matlab='r = a / (1 + abs(a));'")],
 )
-def test_a_users_own_primitive_without_a_body_is_refused_with_advice(kind, given):
+def test_a_user_defined_primitive_without_a_body_is_refused_with_advice(kind, given):
     known = PRIMITIVES | {"own": primitive("own", saturation)}
     with pytest.raises(ModelError) as caught:
         export(model({"own(u(k-1))": 1.0}, primitives=known), kind)
     assert str(caught.value) == (
-        "primitive 'own' has no text in this language: give the body of its function when you make it, "
+        "primitive 'own' has no body in this language: pass the body of its function when you create it, "
         f"primitive('own', ..., {given})"
     )
 
 
 @pytest.mark.parametrize("name", ["σ", "a" * 61])
 @pytest.mark.parametrize("kind", ["c", "matlab"])
-def test_a_primitive_whose_name_is_none_in_the_language_is_refused(name, kind):
+def test_a_primitive_with_an_invalid_identifier_is_refused(name, kind):
     known = PRIMITIVES | {name: primitive(name, saturation, c="return a;", matlab="r = a;")}
     with pytest.raises(ModelError, match="name it with at most 60 of the characters A-Z, a-z, 0-9 and _"):
         export(model({f"{name}(u(k-1))": 1.0}, primitives=known), kind)

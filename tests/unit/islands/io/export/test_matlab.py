@@ -70,7 +70,7 @@ def cases(tmp_path_factory):
 
 @needs_octave
 @pytest.mark.parametrize("name", CASES)
-def test_octave_simulates_as_the_kernel_does(name, cases):
+def test_octave_simulates_like_the_kernel(name, cases):
     exported, data = CASES[name], record_of(name)
     ours, lag = free_run(exported, data), exported.maximum_lag
     assert ours.outcome
@@ -79,7 +79,7 @@ def test_octave_simulates_as_the_kernel_does(name, cases):
 
 
 @needs_octave
-def test_octaves_primitives_are_the_kernels_at_every_jump_and_limit(tmp_path):
+def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
     programs = [at_the_edges(name) for name in PRIMITIVES]
     for (exported, data), theirs in zip(programs, simulated(programs, tmp_path), strict=True):
         ours = free_run(exported, data, bound=np.inf).y
@@ -91,7 +91,7 @@ def test_octaves_primitives_are_the_kernels_at_every_jump_and_limit(tmp_path):
 @pytest.mark.ci
 @settings(max_examples=4, phases=[Phase.reuse, Phase.generate])
 @given(st.lists(models(), min_size=12, max_size=12), st.integers(0, 2**32 - 1))
-def test_octave_runs_whatever_stands_in_a_model(tmp_path_factory, random_models, seed):
+def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
     data = record(2, seed)
     runs = [(each, free_run(each, data)) for each in random_models]
     # A diverging free run ends at the bound; Octave goes on to infinity.
@@ -103,7 +103,7 @@ def test_octave_runs_whatever_stands_in_a_model(tmp_path_factory, random_models,
 
 
 @needs_octave
-def test_a_columns_name_cannot_break_the_file(tmp_path):
+def test_a_column_name_cannot_break_the_file(tmp_path):
     data = islands.Dataset([[1.0], [2.0]], [0.5, 0.0], 0.1)
     named = [islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name) for name in HOSTILE_NAMES]
     found = simulated([(each, data) for each in named], tmp_path)
@@ -127,7 +127,7 @@ CALLS = {
 
 
 @needs_octave
-def test_octave_takes_vectors_of_every_shape_and_class(tmp_path):
+def test_octave_accepts_vectors_of_every_shape_and_class(tmp_path):
     (tmp_path / "narx_model.m").write_text(export(model({"y(k-1)": 0.5, "u(k-2)": 0.25}), "matlab"))
     show = "r = {}; if ischar(r), disp(r), else, disp(mat2str(r)), end"
     shown = octave("\n".join(show.format(call) for call in CALLS), tmp_path).splitlines()
@@ -135,7 +135,7 @@ def test_octave_takes_vectors_of_every_shape_and_class(tmp_path):
 
 
 @needs_octave
-def test_octave_takes_integers_for_every_input(tmp_path):
+def test_octave_accepts_integers_for_every_input(tmp_path):
     exported = model({"u1(k-1)": 0.25, "u2(k-1)": 0.25}, ("one", "other"))
     (tmp_path / "narx_model.m").write_text(export(exported, "matlab"))
     for call in ("narx_model(int8([1 1]), [2 2], 7)", "narx_model([1 1], int8([2 2]), int8(7))"):
@@ -143,24 +143,24 @@ def test_octave_takes_integers_for_every_input(tmp_path):
 
 
 @needs_octave
-def test_too_few_first_outputs_are_octaves_error(tmp_path):
+def test_too_few_first_outputs_are_an_error_in_octave(tmp_path):
     (tmp_path / "narx_model.m").write_text(export(PUBLISHED["12"].model, "matlab"))
     shown = octave("try, narx_model(1:9, 1), catch e, disp(e.message), end", tmp_path)
     assert "out of bound 1" in shown
     assert "y0" in shown
 
 
-def test_the_file_says_what_the_model_is():
+def test_the_file_describes_the_model():
     text = export(PUBLISHED["12"].model, "matlab")
     assert text.startswith("function y = narx_model(u, y0)\n% NARX_MODEL  Free run")
     assert "% NARX model: y(k) = 1*y(k-1) - 0.000246*" in text
     assert '% Inputs u = "u_V"; output y = "y_um"; sampling time 0.001 s.' in text
     assert "y0 holds the first 3 samples" in text
-    assert "Keep this file as narx_model.m" in text
+    assert "Save this file as narx_model.m" in text
     assert max(map(len, text.splitlines())) <= 110
 
 
-def test_the_functions_stand_once_behind_the_models_own():
+def test_functions_are_defined_once_after_the_model():
     text = export(model({"y(k-1)*sign(u(k-1))": 1.0, "sign(u(k-2))": 2.0}), "matlab")
     assert [line for line in text.splitlines() if line.startswith("function")] == [
         "function y = narx_model(u, y0)",
@@ -190,7 +190,7 @@ OWN = {
 
 
 @needs_octave
-def test_a_users_own_primitive_runs_with_the_body_that_was_given(tmp_path):
+def test_a_user_defined_primitive_runs_with_its_body(tmp_path):
     programs = []
     for name, entry in OWN.items():
         arguments = "u(k-1), y(k-1)" if entry.arity == 2 else "u(k-1)"

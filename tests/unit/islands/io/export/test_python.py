@@ -47,12 +47,12 @@ def assert_same_free_run(exported, data):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_python_module_simulates_as_the_kernel_does(name):
+def test_the_python_module_simulates_like_the_kernel(name):
     assert_same_free_run(CASES[name], record_of(name))
     assert module(CASES[name])["MAXIMUM_LAG"] == CASES[name].maximum_lag
 
 
-def test_an_input_at_rest_leaves_no_minus_zero():
+def test_a_zero_input_gives_no_negative_zero():
     # The kernel adds its terms to zero.
     at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
     exported = model({"u(k-1)": -0.5, "y(k-1)": -0.25})
@@ -61,7 +61,7 @@ def test_an_input_at_rest_leaves_no_minus_zero():
 
 
 @given(models(), st.integers(0, 2**32 - 1))
-def test_the_python_module_is_the_model_bit_for_bit(random_model, seed):
+def test_the_python_module_equals_the_model_bit_for_bit(random_model, seed):
     data = record(2, seed)
     run = free_run(random_model, data)
     # A diverging free run ends at the bound; Python goes on, to infinity or an error of its math.
@@ -81,7 +81,7 @@ def test_predict_is_one_step_ahead():
     assert bits(predicted) == bits(one_step_ahead(chosen, data).y[3:])
 
 
-def test_the_module_says_what_the_model_is():
+def test_the_module_describes_the_model():
     text = export(PUBLISHED["12"].model, "python")
     assert text.startswith('"""NARX model: y(k) = 1*y(k-1)')
     assert "Inputs u = u_V; output y = y_um; sampling time 0.001 s." in text
@@ -90,14 +90,14 @@ def test_the_module_says_what_the_model_is():
 
 
 @pytest.mark.parametrize(("kind", "quote"), [("python", ""), ("c", '"'), ("matlab", '"')])
-def test_every_program_says_which_column_an_input_is(kind, quote):
+def test_every_program_names_the_columns_of_its_inputs(kind, quote):
     text = export(CASES["several inputs"], kind)
     named = [f"u{number} = {quote}{name}{quote}" for number, name in ((1, "a_V"), (2, "b_A"), (3, "c_K"))]
     assert f"Inputs {', '.join(named)}; output" in text
 
 
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
-def test_a_columns_name_cannot_break_the_module(name):
+def test_a_column_name_cannot_break_the_module(name):
     made = module(islands.make_model([(islands.parse("u(k-1)"), 2.0)], (name,), name))
     assert f"Inputs u = {name}; output y = {name};" in made["__doc__"]
     assert made["simulate"]([1.0, 2.0], [0.5]) == [0.5, 2.0]
@@ -170,18 +170,18 @@ OWN = {
 
 
 @pytest.mark.parametrize("scalar", OWN.values(), ids=OWN)
-def test_a_users_own_primitive_is_exported_with_all_that_it_uses(scalar):
+def test_a_user_defined_primitive_is_exported_with_its_globals(scalar):
     known = PRIMITIVES | {"own": primitive("own", scalar)}
     arguments = "u(k-1), y(k-1)" if known["own"].arity == 2 else "u(k-1)"
     assert_same_free_run(model({f"own({arguments})": 0.3, "y(k-2)": 0.2}, primitives=known), record())
 
 
-def test_two_primitives_may_be_functions_of_one_name():
+def test_two_primitives_may_have_functions_of_the_same_name():
     known = PRIMITIVES | {"a": primitive("a", saturation), "b": primitive("b", renamed(0.1))}
     assert_same_free_run(model({"a(u(k-1))*b(y(k-1))": 0.3}, primitives=known), record())
 
 
-def test_the_constants_stand_once_and_by_their_names():
+def test_constants_are_defined_once_under_their_names():
     known = PRIMITIVES | {"a": primitive("a", saturation)}
     text = export(model({"a(u(k-1)) + log(u(k-2))": 1.0}, primitives=known), "python")
     lines = text.splitlines()
@@ -210,7 +210,7 @@ def test_a_lambda_is_refused_with_advice():
 
 
 def test_a_function_without_source_is_refused_with_advice():
-    assert refused(math.erf) == "the source of primitive 'own' is not at hand: define it with def in a file"
+    assert refused(math.erf) == "the source of primitive 'own' is not available: define it with def in a file"
     namespace = {}
     exec("def typed(a):\n    return 0.5 * a", namespace)
     assert "define it with def in a file" in refused(namespace["typed"])
@@ -225,13 +225,13 @@ def uses_another(a):
 
 
 @pytest.mark.parametrize(("scalar", "name"), [(uses_a_table, "NOTHING"), (uses_another, "saturation")])
-def test_what_is_neither_math_nor_a_number_is_refused_by_name(scalar, name):
-    assert refused(scalar) == f"primitive 'own' uses {name}: an export knows math and numbers alone"
+def test_other_globals_than_math_and_numbers_are_refused_by_name(scalar, name):
+    assert refused(scalar) == f"primitive 'own' uses {name}: an export may only use math and numbers"
 
 
 def test_numbers_that_would_overwrite_each_other_are_refused():
     assert refused(limited(0.5), other=limited(0.75)) == (
-        "primitive 'own' uses limit, a name that stands for something else in the export: rename it"
+        "primitive 'own' uses limit, a name that means something else in the export: rename it"
     )
 
 
@@ -243,13 +243,13 @@ def with_a_taken_name(a):
 
 
 def test_a_number_with_a_name_of_the_export_is_refused():
-    assert "'own' uses MAXIMUM_LAG, a name that stands for something else" in refused(with_a_taken_name)
+    assert "'own' uses MAXIMUM_LAG, a name that means something else" in refused(with_a_taken_name)
 
 
 # The other kinds.
 
 
-def test_the_other_kinds_are_equations_and_the_model_file():
+def test_other_formats_are_equations_and_the_model_file():
     assert list(EXPORTS) == ["plain", "latex", "mathml", "python", "c", "matlab", "json"]
     chosen = model({"y(k-1)": 0.5, "u(k-1)": 0.25})
     assert export(chosen, "plain") == "y(k) = 0.5*y(k-1) + 0.25*u(k-1)"
@@ -259,7 +259,7 @@ def test_the_other_kinds_are_equations_and_the_model_file():
     assert json.loads(export(chosen, "json"))["inputs"] == ["u"]
 
 
-def test_an_unknown_kind_is_refused():
+def test_an_unknown_format_is_refused():
     with pytest.raises(SettingsError) as caught:
         export(PUBLISHED["12"].model, "fortran")
     kinds = "plain, latex, mathml, python, c, matlab, json"
@@ -270,7 +270,7 @@ PROGRAMS = ["python", "c", "matlab"]
 
 
 @pytest.mark.parametrize("kind", PROGRAMS)
-def test_a_structure_without_parameters_is_no_program(kind):
+def test_a_structure_without_parameters_is_not_exported(kind):
     structure = islands.Model(PUBLISHED["12"].model.regressors)
     with pytest.raises(ModelError, match="no parameters yet"):
         export(structure, kind)
@@ -279,10 +279,10 @@ def test_a_structure_without_parameters_is_no_program(kind):
 
 @pytest.mark.parametrize("kind", PROGRAMS)
 @pytest.mark.parametrize("number", [math.inf, -math.inf, math.nan])
-def test_a_parameter_that_is_not_finite_is_refused_by_its_regressor(kind, number):
+def test_a_parameter_that_is_not_finite_is_refused_with_its_regressor(kind, number):
     with pytest.raises(ModelError) as caught:
         export(model({"y(k-1)": 0.5, "u(k-2)": number}), kind)
-    assert str(caught.value) == f"the parameter of u1(k-2) is {number}: a program needs finite ones"
+    assert str(caught.value) == f"the parameter of u1(k-2) is {number}: an export needs finite parameters"
 
 
 @pytest.mark.parametrize("kind", PROGRAMS)

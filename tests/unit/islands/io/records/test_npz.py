@@ -18,13 +18,13 @@ def test_a_missing_value_in_an_archive_is_refused_by_sample(tmp_path):
 
 
 @pytest.mark.parametrize("shape", [(), (30, 2), (2, 30), (60, 1, 1)])
-def test_an_array_that_is_no_channel_is_refused_with_its_shape(tmp_path, shape):
+def test_an_array_of_another_shape_is_refused_with_its_shape(tmp_path, shape):
     message = archived(tmp_path, u=np.ones(shape))
     assert f"column u has the shape {shape}" in message
     assert "one array per channel and recording" in message
 
 
-def test_an_array_of_objects_is_refused_unopened(tmp_path):
+def test_an_array_of_objects_is_refused_without_unpickling(tmp_path):
     message = archived(tmp_path, u=np.array([1.0, None] * 30, dtype=object))
     assert "bad.npz: column u cannot be read" in message
     assert (
@@ -52,11 +52,11 @@ def test_an_archive_that_states_an_impossible_sampling_time_is_refused(tmp_path,
 def test_a_time_array_with_a_gap_is_refused_by_sample(tmp_path):
     t = np.arange(60) * 0.01
     t[40:] += 0.05
-    assert "sample 40, column t stands behind a gap" in archived(tmp_path, t=t)
+    assert "sample 40, column t follows a gap" in archived(tmp_path, t=t)
 
 
 @pytest.mark.parametrize(("content", "words"), [(b"", "is empty"), (b"u,y\n1,2\n", "is not a NumPy archive")])
-def test_a_file_that_is_no_archive_is_refused(tmp_path, content, words):
+def test_a_file_of_another_format_is_refused(tmp_path, content, words):
     message = refusal(tmp_path, content, name="bad.npz")
     assert words in message
     assert "numpy.savez" in message
@@ -69,13 +69,13 @@ def test_a_damaged_archive_is_refused(tmp_path):
     content[1000:1040] = bytes(40)
     message = refusal(tmp_path, bytes(content), inputs=["u"], output="y", name="bad.npz")
     assert "column u cannot be read" in message
-    assert "the file is damaged, write it anew" in message
+    assert "the file is damaged, write it again" in message
 
 
-def test_an_archive_cut_short_is_refused(tmp_path):
+def test_a_truncated_archive_is_refused(tmp_path):
     np.savez(tmp_path / "whole.npz", u=np.arange(500.0), y=np.arange(500.0), dt=0.01)
     content = (tmp_path / "whole.npz").read_bytes()
     # The directory at the archive's end stays, so that it still counts as an archive.
     message = refusal(tmp_path, content[:200] + content[-230:], inputs=["u"], output="y", name="bad.npz")
     assert "bad.npz" in message
-    assert "write it anew" in message
+    assert "write it again" in message

@@ -41,7 +41,7 @@ def refusal(file, inputs=("u_V",), output="y_um", **options):
 @pytest.mark.parametrize(
     "options", [{}, {"row_group_size": 7}, {"compression": "zstd", "use_dictionary": False}]
 )
-def test_columns_come_back_with_names_units_and_times(write, options):
+def test_columns_are_read_with_names_units_and_times(write, options):
     record = read_record(write(options), ["u_V"], "y_um", rows=slice(8, None))
     assert read_columns(write()) == ("t_s", "u_V", "y_um")
     assert record.u[:, 0].tolist() == U[8:].tolist()
@@ -90,23 +90,23 @@ def test_a_column_of_nulls_alone_is_empty(write):
     [["on"] * SAMPLES, [[1.0]] * SAMPLES, [{"re": 1.0}] * SAMPLES, [b"\x01"] * SAMPLES],
     ids=["text", "list", "struct", "bytes"],
 )
-def test_a_column_of_other_things_does_no_harm_and_is_refused_by_its_type(write, column):
+def test_a_column_of_another_type_is_refused_only_when_it_is_read(write, column):
     file = write(note=column)
     assert read_record(file, ["u_V"], "y_um").samples == SAMPLES
     kind = parquet.read_schema(file).field("note").type
     assert refusal(file, ["note"]) == f"r.parquet: column note holds {kind} where real numbers are expected"
 
 
-def test_only_the_columns_that_are_asked_for_are_read(write):
+def test_only_the_requested_columns_are_read(write):
     file = write({"compression": "none", "use_dictionary": False}, other=U)
     content = file.read_bytes()
     place = parquet.read_metadata(file).row_group(0).column(3).data_page_offset
     file.write_bytes(content[:place] + b"\xff" * 24 + content[place + 24 :])
     assert read_record(file, ["u_V"], "y_um").samples == SAMPLES
-    assert "r.parquet is damaged or no Parquet file" in refusal(file, ["other"])
+    assert "r.parquet is damaged or not a Parquet file" in refusal(file, ["other"])
 
 
-def test_a_name_may_hold_points_and_be_the_beginning_of_another(write):
+def test_a_name_may_contain_points_and_be_a_prefix_of_another(write):
     record = read_record(write(**{"k_N.m": U, "k_N": Y}), ["k_N.m"], "k_N")
     assert record.u[:, 0].tolist() == U.tolist()
     assert record.y.tolist() == Y.tolist()
@@ -133,7 +133,7 @@ def timed(write, name, column):
 @pytest.mark.parametrize(
     "column", [stamps("ms"), stamps("us", zone="Europe/Berlin"), stamps("ns", zone="UTC")]
 )
-def test_points_in_time_are_seconds_from_the_first_whatever_unit_the_name_is_in(write, name, column):
+def test_points_in_time_are_relative_to_the_first_in_any_unit(write, name, column):
     record = read_record(timed(write, name, column), ["u_V"], "y_um", rows=slice(8, None))
     assert record.dt == pytest.approx(0.125)
     assert record.start == pytest.approx(1.0)
@@ -154,7 +154,7 @@ def test_nanoseconds_keep_their_precision(write):
     ],
     ids=str,
 )
-def test_durations_and_times_of_day_are_times_too(write, kind, step):
+def test_durations_and_times_of_day_are_times(write, kind, step):
     column = pa.array([int(k) * step + 10 * step for k in K], kind)
     record = read_record(timed(write, "t_ms", column), ["u_V"], "y_um")
     assert (record.dt, record.start) == (pytest.approx(0.125), pytest.approx(1.25))
@@ -174,7 +174,7 @@ def test_a_missing_point_in_time_is_refused_by_sample(write):
 
 def test_a_gap_in_time_is_refused_by_sample(write):
     column = [datetime(2024, 1, 1, tzinfo=UTC) + timedelta(seconds=int(k + 5 * (k > 30))) for k in K]
-    assert "sample 31, column time stands behind a gap" in refusal(timed(write, "time", pa.array(column)))
+    assert "sample 31, column time follows a gap" in refusal(timed(write, "time", pa.array(column)))
 
 
 # Damage, lies, and the extra
@@ -184,21 +184,21 @@ def test_a_gap_in_time_is_refused_by_sample(write):
     ("content", "words"),
     [
         (b"", "r.parquet is empty"),
-        (b"t,u\n" * 60, "r.parquet is damaged or no Parquet file"),
-        (b"PAR1" + bytes(90) + b"PAR1", "r.parquet is damaged or no Parquet file"),
+        (b"t,u\n" * 60, "r.parquet is damaged or not a Parquet file"),
+        (b"PAR1" + bytes(90) + b"PAR1", "r.parquet is damaged or not a Parquet file"),
     ],
 )
-def test_a_file_that_is_no_parquet_file_is_refused(tmp_path, content, words):
+def test_a_file_of_another_format_is_refused(tmp_path, content, words):
     (tmp_path / "r.parquet").write_bytes(content)
     assert words in refusal(tmp_path / "r.parquet")
 
 
-def test_a_file_that_is_cut_short_is_refused_wherever_it_is_cut(write):
+def test_a_file_truncated_at_any_position_is_refused(write):
     file = write()
     content = file.read_bytes()
     for length in range(1, len(content) - 1, 97):
         file.write_bytes(content[:length])
-        assert "r.parquet is damaged or no Parquet file" in refusal(file)
+        assert "r.parquet is damaged or not a Parquet file" in refusal(file)
 
 
 def varint(number):
@@ -227,27 +227,27 @@ def honest(tmp_path):
     return tmp_path / "r.parquet"
 
 
-def test_rows_that_do_not_add_up_are_refused(honest):
+def test_inconsistent_row_counts_are_refused(honest):
     claiming(honest, 2**26, everywhere=False)
-    assert "r.parquet claims 67108864 rows and stores 1234" in refusal(honest, ["u"], "y")
+    assert "r.parquet declares 67108864 rows and stores 1234" in refusal(honest, ["u"], "y")
 
 
 @pytest.mark.parametrize("rows", [1235, 2**26])
-def test_rows_that_are_not_there_are_refused_without_memory_for_them(honest, rows):
+def test_missing_rows_are_refused_without_allocating_memory(honest, rows):
     claiming(honest, rows)
     pool = pa.default_memory_pool()
     before = pool.max_memory()
-    assert f"r.parquet claims {rows} rows and stores" in refusal(honest, ["u"], "y")
+    assert f"r.parquet declares {rows} rows and stores" in refusal(honest, ["u"], "y")
     assert pool.max_memory() - before < 2**23
 
 
-def test_more_rows_than_any_record_has_are_refused(honest):
+def test_a_row_count_above_the_limit_is_refused(honest):
     claiming(honest, 2**40)
     message = refusal(honest, ["u"], "y")
-    assert f"column u claims {2**40} samples, and a record has {MOST_SAMPLES} at most" in message
+    assert f"column u declares {2**40} samples, but a record has at most {MOST_SAMPLES}" in message
 
 
-def test_without_the_extra_the_message_says_how_to_get_it(write, monkeypatch):
+def test_a_missing_extra_is_refused_with_installation_advice(write, monkeypatch):
     file = write()
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     message = refusal(file)

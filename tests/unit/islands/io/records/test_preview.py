@@ -52,7 +52,7 @@ def refusal(file, inputs, output, **options):
     return str(caught.value)
 
 
-def test_a_sound_file_is_described_without_a_complaint(tmp_path):
+def test_a_valid_file_is_described_without_problems(tmp_path):
     seen = preview(table(tmp_path))
     assert (seen.time, seen.dt, seen.samples, seen.warnings) == ("t_s", pytest.approx(0.01), SAMPLES, ())
     assert [column.name for column in seen.columns] == ["t_s", "u_V", "y_um"]
@@ -60,7 +60,7 @@ def test_a_sound_file_is_described_without_a_complaint(tmp_path):
     assert not any(column.problem for column in seen.columns)
 
 
-def test_the_numbers_are_those_of_the_samples(tmp_path):
+def test_the_statistics_are_those_of_the_samples(tmp_path):
     column = preview(table(tmp_path)).columns[2]
     assert (column.samples, column.minimum, column.maximum) == (SAMPLES, Y.min(), Y.max())
     assert column.mean == pytest.approx(Y.mean())
@@ -104,14 +104,14 @@ def test_a_preview_is_plain_data(tmp_path):
     ],
     ids=["text", "missing", "infinite", "short", "constant", "both marks"],
 )
-def test_a_problem_is_the_very_message_of_read_record(tmp_path, column):
+def test_a_problem_is_the_message_of_read_record(tmp_path, column):
     file = table(tmp_path, separator=";", x=column)
     message = refusal(file, ["x"], "y_um")
     assert problems(file) == {"x": message}
     assert preview(file).warnings == ()
 
 
-def test_a_column_with_a_bad_sample_has_no_statistics_and_a_constant_one_has(tmp_path):
+def test_a_column_with_an_invalid_sample_has_no_statistics(tmp_path):
     file = table(tmp_path, a=cells(U, c5="nan"), b=cells(U, c5="inf"), c=[2.5] * SAMPLES, d=["x"] * SAMPLES)
     *_, missing, infinite, constant, text = preview(file).columns
     for column in (missing, infinite, text):
@@ -120,7 +120,7 @@ def test_a_column_with_a_bad_sample_has_no_statistics_and_a_constant_one_has(tmp
     assert (constant.minimum, constant.maximum, constant.mean, constant.deviation) == (2.5, 2.5, 2.5, 0.0)
 
 
-def test_numbers_too_large_for_a_mean_have_none(tmp_path):
+def test_numbers_too_large_for_a_mean_have_no_statistics(tmp_path):
     column = preview(table(tmp_path, x=[1.7e308] * (SAMPLES - 1) + [1.6e308])).columns[3]
     assert (column.mean, column.problem) == (None, "")
 
@@ -133,25 +133,25 @@ def test_a_ragged_line_is_the_problem_of_every_column(tmp_path):
     assert preview(file).samples == 0
 
 
-def test_columns_of_no_name_are_left_out(tmp_path):
+def test_unnamed_columns_are_omitted(tmp_path):
     file = table(tmp_path)
     file.write_text(file.read_text().replace("\n", ",\n") + ",")
     assert [column.name for column in preview(file).columns] == ["t_s", "u_V", "y_um"]
 
 
-def test_an_array_that_no_other_is_as_long_as_has_a_problem(tmp_path):
+def test_an_array_of_unique_length_has_a_problem(tmp_path):
     file = archive(tmp_path, u=U, y=Y, short=U[:50], gain=2.0 * np.ones(1), dt=0.1)
     found = problems(file)
     assert set(found) == {"short", "gain", "dt"}
     assert found["short"] == refusal(file, ["u"], "short")
     assert (
         found["short"]
-        == "r.npz: column u has 60 samples, column short 50: channels of one record are of equal length"
+        == "r.npz: column u has 60 samples, column short 50: the channels of a record must have equal length"
     )
     assert preview(file).samples == SAMPLES
 
 
-def test_two_recordings_in_one_file_are_a_warning_and_no_problem(tmp_path):
+def test_two_recordings_in_one_file_are_a_warning_not_a_problem(tmp_path):
     file = archive(tmp_path, u_test=U[:50], y_test=Y[:50], u=U, y=Y, dt=0.1)
     seen = preview(file)
     assert "dt" in problems(file)
@@ -161,7 +161,7 @@ def test_two_recordings_in_one_file_are_a_warning_and_no_problem(tmp_path):
     assert read_record(file, ["u_test"], "y_test").samples == 50
 
 
-def test_numbers_by_themselves_are_no_recording(tmp_path):
+def test_single_numbers_are_not_a_recording(tmp_path):
     file = archive(tmp_path, u=U, y=Y, gain=np.ones(1), offset=np.ones(1), dt=0.1)
     assert {"gain", "offset"} <= set(problems(file))
     assert preview(file).warnings == ()
@@ -173,7 +173,7 @@ def test_an_array_of_another_shape_or_kind_is_a_problem(tmp_path):
     assert problems(file)["text"] == refusal(file, ["text"], "y")
 
 
-def test_a_file_without_a_channel_still_tells_its_sampling_time(tmp_path):
+def test_a_file_without_channels_still_has_a_sampling_time(tmp_path):
     seen = preview(archive(tmp_path, cube=np.ones((2, 3, 4)), fs=100.0))
     assert (seen.samples, seen.dt, seen.warnings) == (0, pytest.approx(0.01), ())
 
@@ -183,7 +183,7 @@ def test_an_empty_array_is_a_problem(tmp_path):
     assert (seen.columns[0].samples, seen.columns[0].mean) == (0, None)
     assert "column u has 60 samples, column x 0" in seen.columns[0].problem
     seen = preview(archive(tmp_path, x=np.empty(0), u=np.empty(0)))
-    assert seen.columns[0].problem == "r.npz has not a single sample: take another record"
+    assert seen.columns[0].problem == "r.npz has no samples: use another record"
 
 
 # Warnings
@@ -227,51 +227,51 @@ def test_commas_in_one_column_and_points_in_another_are_a_warning(tmp_path):
     ],
     ids=["uneven", "repeated", "missing", "text", "gap"],
 )
-def test_a_time_that_cannot_be_used_is_a_warning(tmp_path, time):
+def test_an_unusable_time_column_is_a_warning(tmp_path, time):
     file = table(tmp_path, t_s=time)
     seen = preview(file)
     assert (seen.time, seen.dt) == ("t_s", None)
     assert seen.warnings == (refusal(file, ["u_V"], "y_um"),)
 
 
-def test_a_time_that_stands_still_is_a_warning_and_no_constant_column(tmp_path):
+def test_a_constant_time_is_a_warning_not_a_constant_column(tmp_path):
     seen = preview(table(tmp_path, t_s=[1.0] * SAMPLES))
     assert "line 3, column t_s repeats the time stamp 1" in seen.warnings[0]
     assert seen.columns[0].problem == ""
 
 
-def test_a_time_too_large_for_single_precision_is_held_against_the_grid_like_any_other(tmp_path):
+def test_a_time_too_large_for_single_precision_is_checked_for_uniformity(tmp_path):
     file = table(tmp_path, t_s=[k * 1e39 + (k == 30) * 1e38 for k in range(SAMPLES)])
     assert preview(file).warnings == (refusal(file, ["u_V"], "y_um"),)
 
 
-def test_a_file_that_does_not_tell_its_sampling_time_is_a_warning(tmp_path):
+def test_a_file_without_a_sampling_time_is_a_warning(tmp_path):
     file = table(tmp_path, drop=["t_s"])
     seen = preview(file)
     assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
 
 
-def test_two_columns_that_may_be_the_time_are_a_warning(tmp_path):
+def test_two_possible_time_columns_are_a_warning(tmp_path):
     file = table(tmp_path, time_ms=T * 1000)
     seen = preview(file)
     assert (seen.time, seen.dt, seen.warnings) == (None, None, (refusal(file, ["u_V"], "y_um"),))
 
 
-def test_a_stated_sampling_time_is_told_and_held_against_the_time(tmp_path):
+def test_a_stated_sampling_time_is_shown_and_compared_with_the_time(tmp_path):
     assert preview(archive(tmp_path, u=U, y=Y, fs=250.0)).dt == pytest.approx(0.004)
     file = archive(tmp_path, u=U, y=Y, t=T, fs=250.0)
     assert preview(file).dt is None
     assert preview(file).warnings == (refusal(file, ["u"], "y"),)
 
 
-def test_a_stated_sampling_time_that_is_none_is_a_warning(tmp_path):
+def test_an_invalid_stated_sampling_time_is_a_warning(tmp_path):
     file = archive(tmp_path, u=U, y=Y, dt=0.0)
     assert read_columns(file) == ("u", "y", "dt")
     assert preview(file).dt is None
     assert preview(file).warnings == (refusal(file, ["u"], "y"),)
 
 
-def test_of_a_structure_its_own_time_is_told(save):
+def test_a_structure_is_shown_with_its_own_time(save):
     seen = preview(save("7", a={"t": T[:50], "u": U[:50]}, b_1={"t": T * 2, "u_V": U, "y": Y}))
     assert (seen.time, seen.dt, seen.samples) == ("b_1.t", pytest.approx(0.02), SAMPLES)
     units = {column.name: column.unit for column in seen.columns}
@@ -279,7 +279,7 @@ def test_of_a_structure_its_own_time_is_told(save):
 
 
 @pytest.mark.parametrize("content", [b"", b"t_s,u,y\n", b"t,u\n0,\xb5\n"])
-def test_a_file_that_cannot_be_read_at_all_is_refused(tmp_path, content):
+def test_an_unreadable_file_is_refused(tmp_path, content):
     (tmp_path / "r.csv").write_bytes(content)
     with pytest.raises(RecordError, match=r"r\.csv"):
         preview(tmp_path / "r.csv")
@@ -291,7 +291,7 @@ def test_one_sample_has_no_sampling_time(tmp_path):
     assert (seen.samples, seen.dt, seen.time) == (1, None, "t_s")
 
 
-def test_the_readers_of_rare_formats_import_their_libraries_when_they_read():
+def test_readers_of_rare_formats_import_their_libraries_on_demand():
     program = (
         "import sys, islands.io.records; print([m for m in ('h5py', 'pyarrow', 'scipy') if m in sys.modules])"
     )

@@ -51,7 +51,7 @@ def archive(path: Path, **arrays: object) -> Path:
         ("   ", True),
     ],
 )
-def test_every_dialect_returns_the_numbers_that_were_written(tmp_path, separator, comma, end):
+def test_every_dialect_returns_the_written_numbers(tmp_path, separator, comma, end):
     record = read_record(written(tmp_path, separator, comma, end), ["u_V"], "y_um")
     assert record.u[:, 0].tolist() == U.tolist()
     assert record.y.tolist() == Y.tolist()
@@ -85,7 +85,7 @@ def test_a_path_may_be_a_string(tmp_path):
     assert read_record(str(written(tmp_path)), ["u_V"], "y_um").samples == SAMPLES
 
 
-def test_a_byte_order_mark_and_blank_lines_at_the_end_are_tolerated(tmp_path):
+def test_a_byte_order_mark_and_trailing_blank_lines_are_accepted(tmp_path):
     file = written(tmp_path)
     file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes() + b"\n  \n,,\n\n")
     record = read_record(file, ["u_V"], "y_um")
@@ -93,26 +93,26 @@ def test_a_byte_order_mark_and_blank_lines_at_the_end_are_tolerated(tmp_path):
     assert record.dt == pytest.approx(0.01)
 
 
-def test_a_separator_at_every_lines_end_is_tolerated(tmp_path):
+def test_a_separator_at_the_end_of_every_line_is_accepted(tmp_path):
     file = written(tmp_path, ";", comma=True)
     file.write_text(file.read_text().replace("\n", ";\n"))
     assert read_record(file, ["u_V"], "y_um").y.tolist() == Y.tolist()
 
 
-def test_what_numpy_savetxt_writes_is_read(tmp_path):
+def test_a_file_of_numpy_savetxt_is_read(tmp_path):
     np.savetxt(tmp_path / "r.txt", np.column_stack([T, U, Y]), header="t_s u_V y_um")
     record = read_record(tmp_path / "r.txt", ["u_V"], "y_um")
     assert record.u[:, 0].tolist() == U.tolist()
 
 
-def test_a_name_may_hold_a_mark_that_separates_elsewhere(tmp_path):
+def test_a_name_may_contain_an_unused_separator(tmp_path):
     file = written(tmp_path)
     file.write_text(file.read_text().replace("u_V", "u (a;b)"))
     assert read_columns(file) == ("t_s", "u (a;b)", "y_um")
     assert read_record(file, ["u (a;b)"], "y_um").u[:, 0].tolist() == U.tolist()
 
 
-def test_quoted_names_may_hold_the_separator_and_blanks(tmp_path):
+def test_quoted_names_may_contain_the_separator_and_blanks(tmp_path):
     file = written(tmp_path)
     file.write_text(file.read_text().replace("u_V", '"drive, left (V)"'))
     record = read_record(file, ["drive, left (V)"], "y_um")
@@ -126,7 +126,7 @@ def test_quoted_numbers_may_have_decimal_commas_between_commas(tmp_path):
     assert read_record(tmp_path / "r.csv", ["u_V"], "y_um").y.tolist() == Y.tolist()
 
 
-def test_a_text_column_that_nobody_asked_for_does_no_harm(tmp_path):
+def test_an_unused_text_column_does_no_harm(tmp_path):
     lines = written(tmp_path).read_text().splitlines()
     text = [lines[0] + ",note", *(f"{line},n.a. 1_000" for line in lines[1:])]
     (tmp_path / "r.csv").write_text("\n".join(text))
@@ -162,11 +162,11 @@ def test_a_time_column_is_read_in_its_unit(tmp_path, name, seconds):
 
 
 @pytest.mark.parametrize("name", ["T_K", "T_degC", "T_in_C", "temperature", "tank", "test", "T (K)"])
-def test_a_column_that_is_no_time_is_not_taken_for_it(name):
+def test_a_column_with_another_name_is_not_the_time(name):
     assert not looks_like_time(name)
 
 
-def test_a_timestamp_beside_the_time_does_no_harm():
+def test_a_timestamp_column_next_to_the_time_does_no_harm():
     assert time_column(["timestamp", "t_s", "T_K"], "r.csv") == "t_s"
     assert time_column(["timestamp"], "r.csv") == "timestamp"
     assert time_column(["T_K", "t_days", "k"], "r.csv") is None
@@ -187,7 +187,7 @@ def test_a_timestamp_beside_the_time_does_no_harm():
         ("flow (m^3/s)", "m^3/s"),
     ],
 )
-def test_a_unit_is_what_follows_the_last_underscore_or_stands_in_brackets(name, unit):
+def test_a_unit_follows_the_last_underscore_or_is_in_brackets(name, unit):
     assert parse_unit(name) == unit
 
 
@@ -220,14 +220,14 @@ def test_seconds_since_1970_are_a_time_like_any_other(tmp_path):
     assert record.start == 1_700_000_000
 
 
-def test_without_a_time_column_the_given_sampling_time_holds(tmp_path):
+def test_the_given_sampling_time_is_used_without_a_time_column(tmp_path):
     file = written(tmp_path)
     file.write_text(file.read_text().replace("t_s", "k"))
     record = read_record(file, ["u_V"], "y_um", dt=0.25, rows=slice(4, 44))
     assert (record.dt, record.start, record.samples) == (0.25, 1.0, 40)
 
 
-def test_a_given_sampling_time_within_one_per_cent_leaves_the_columns_own(tmp_path):
+def test_the_time_column_takes_precedence_over_a_similar_sampling_time(tmp_path):
     assert read_record(written(tmp_path), ["u_V"], "y_um", dt=0.01005).dt == pytest.approx(0.01, rel=1e-12)
 
 
@@ -251,7 +251,7 @@ def test_rows_select_samples_counted_from_zero_without_the_header(tmp_path, rows
         assert record.start == pytest.approx(0.01 * first)
 
 
-def test_what_lies_outside_the_selected_rows_is_not_checked(tmp_path):
+def test_samples_outside_the_selected_rows_are_not_checked(tmp_path):
     lines = written(tmp_path).read_text().splitlines()
     lines[1:4] = ["5.0,nan,text", "too,short", ""]
     (tmp_path / "r.csv").write_text("\n".join(lines))
@@ -263,7 +263,7 @@ def test_what_lies_outside_the_selected_rows_is_not_checked(tmp_path):
 
 
 @pytest.mark.parametrize("cell", ["", "nan", "NaN", " NA "])
-def test_an_output_that_is_missing_after_the_warm_up_is_accepted_on_request(tmp_path, cell):
+def test_a_missing_output_after_the_warm_up_is_accepted_on_request(tmp_path, cell):
     lines = written(tmp_path).read_text().splitlines()
     lines[11:] = [line.rpartition(",")[0] + "," + cell for line in lines[11:]]
     (tmp_path / "r.csv").write_text("\n".join(lines))
@@ -272,7 +272,7 @@ def test_an_output_that_is_missing_after_the_warm_up_is_accepted_on_request(tmp_
     assert np.isnan(record.y[10:]).all()
 
 
-def test_missing_cells_and_decimal_commas_go_together(tmp_path):
+def test_missing_cells_and_decimal_commas_may_be_combined(tmp_path):
     lines = written(tmp_path, ";", comma=True).read_text().splitlines()
     lines[20] = lines[20].rpartition(";")[0] + ";"
     (tmp_path / "r.csv").write_text("\n".join(lines))
@@ -313,7 +313,7 @@ def test_arrays_of_other_numbers_become_double_precision(tmp_path, kind):
     assert record.u[:3, 0].tolist() == [0.0, 1.0, 0.0]
 
 
-def test_an_array_that_nobody_asked_for_does_no_harm(tmp_path):
+def test_an_unused_array_does_no_harm(tmp_path):
     file = archive(tmp_path, dt=1.0, extra=np.array([{"a": 1}], dtype=object), short=np.ones(3))
     assert read_record(file, ["u"], "y").samples == SAMPLES
 
@@ -343,7 +343,7 @@ def test_every_known_suffix_is_lower_case_with_its_dot():
     assert all(suffix == suffix.lower() and suffix.startswith(".") for suffix in READERS)
 
 
-def test_an_input_named_plus_one_is_read_one_sample_early(tmp_path):
+def test_an_input_with_the_suffix_plus_one_is_read_one_sample_early(tmp_path):
     file = tmp_path / "record.csv"
     file.write_text("t_s,u_V,y_um\n" + "\n".join(f"{k / 10:g},{k * k},{k}" for k in range(40)))
     early, plain = (read_record(file, [name], "y_um") for name in ("u_V+1", "u_V"))
@@ -353,7 +353,7 @@ def test_an_input_named_plus_one_is_read_one_sample_early(tmp_path):
     assert np.array_equal(early.y, plain.y)
 
 
-def test_a_column_that_is_called_plus_one_is_itself(tmp_path):
+def test_a_column_name_with_the_suffix_plus_one_is_not_shifted(tmp_path):
     file = tmp_path / "record.csv"
     file.write_text("t_s,u,u+1,y\n" + "\n".join(f"{k / 10:g},{k},{-k},{k % 7}" for k in range(40)))
     assert read_record(file, ["u+1"], "y").u[3, 0] == -3.0
@@ -380,5 +380,5 @@ def test_a_file_that_cannot_be_opened_is_refused_with_the_reason(tmp_path):
 
 def test_an_unknown_suffix_is_refused_with_the_known_ones(tmp_path):
     message = refusal(tmp_path, lines(), name="bad.xlsx")
-    assert "bad.xlsx: files ending in '.xlsx' are not known" in message
+    assert "bad.xlsx: files ending in '.xlsx' are not supported" in message
     assert all(suffix in message for suffix in READERS)

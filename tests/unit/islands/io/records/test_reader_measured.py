@@ -18,7 +18,7 @@ def test_the_piezo_record_is_sampled_at_a_fifth_of_a_millisecond():
 
 
 @pytest.mark.nightly
-def test_silverbox_is_read_with_the_sampling_frequency_that_it_states():
+def test_silverbox_is_read_with_its_stated_sampling_frequency():
     file = measured_record("silverbox.npz")
     record = read_record(file, ["u"], "y", rows=slice(40650, 105712))
     assert record.samples == 65_062
@@ -46,7 +46,7 @@ def test_the_measured_records_are_read(name, inputs, output, dt, samples, step):
 
 
 @pytest.mark.nightly
-def test_the_two_parts_of_the_buck_converter_follow_one_another_in_time():
+def test_buck_converter_parts_are_consecutive_in_time():
     file = measured_record("buck_converter.csv")
     whole = read_record(file, ["u_V"], "y_V")
     assert whole.samples == 2000
@@ -65,7 +65,7 @@ def test_the_hair_dryer_needs_its_sampling_time():
 
 
 @pytest.mark.nightly
-def test_the_tests_of_the_damper_are_told_apart_by_their_time():
+def test_damper_tests_are_separated_by_their_time():
     file = measured_record("mrdamper_labcontrol.csv")
     with pytest.raises(RecordError, match=r"line 3003, column t_s jumps back to 0 from 30: .*islands\.join"):
         read_record(file, ["volt_V", "dist_mm"], "force_N")
@@ -73,6 +73,6 @@ def test_the_tests_of_the_damper_are_told_apart_by_their_time():
 
 
 @pytest.mark.nightly
-def test_the_mirrors_arrays_of_many_realisations_are_refused_with_their_shape():
+def test_mirror_arrays_of_many_realisations_are_refused_with_their_shape():
     with pytest.raises(RecordError, match=r"u_100mV_train has the shape \(8192, 3, 6, 2\)"):
         read_record(measured_record("fsm_piezo.npz"), ["u_100mV_train"], "y_um_100mV_train")

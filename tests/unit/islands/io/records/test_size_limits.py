@@ -36,36 +36,36 @@ def archive(tmp_path):
     return archive
 
 
-def test_the_sound_archive_of_these_tests_is_read(archive):
+def test_the_valid_archive_of_these_tests_is_read(archive):
     assert read_record(archive(x=member(U)), ["x"], "y").u[:, 0].tolist() == U.tolist()
 
 
-def test_a_header_that_claims_more_than_its_member_holds_is_refused(archive, refusal):
+def test_a_header_with_a_size_above_that_of_its_member_is_refused(archive, refusal):
     for samples in (61, 2**26):
         message = refusal(archive(x=member(U, (samples,))))
-        assert f"bad.npz: column x claims {8 * samples} bytes, and the file stores 480 for it" in message
-        assert "write it anew" in message
+        assert f"bad.npz: column x declares {8 * samples} bytes, but the file stores 480 for it" in message
+        assert "write it again" in message
 
 
 @pytest.mark.parametrize("shape", [(2**28,), (2**40, 1), (2**62, 2**62)])
-def test_more_samples_than_any_record_has_are_refused(archive, shape, refusal):
+def test_a_sample_count_above_the_limit_is_refused(archive, shape, refusal):
     message = refusal(archive(x=member(U, shape)))
     assert (
-        f"claims {shape[0] * (shape[1:] or (1,))[0]} samples, and a record has {MOST_SAMPLES} at most"
+        f"declares {shape[0] * (shape[1:] or (1,))[0]} samples, but a record has at most {MOST_SAMPLES}"
         in message
     )
 
 
-def test_more_samples_of_nothing_are_refused_too(archive, refusal):
-    assert f"claims {2**40} samples" in refusal(archive(x=member(np.zeros(60, "V0"), (2**40,))))
+def test_a_sample_count_above_the_limit_is_refused_for_empty_items(archive, refusal):
+    assert f"declares {2**40} samples" in refusal(archive(x=member(np.zeros(60, "V0"), (2**40,))))
 
 
-def test_a_header_of_a_shape_that_cannot_be_is_refused(archive, refusal):
+def test_a_header_with_an_impossible_shape_is_refused(archive, refusal):
     assert "column x cannot be read" in refusal(archive(x=member(U, (-60,))))
 
 
 @pytest.mark.parametrize("packing", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
-def test_a_directory_that_claims_more_than_its_bytes_can_hold_is_refused(archive, packing, refusal):
+def test_a_directory_size_above_the_compression_limit_is_refused(archive, packing, refusal):
     """The directory at the archive's end says 512 MB, and so does the header of the array."""
     content = member(U, (2**26,))
     claimed = len(content) - U.nbytes + 8 * 2**26
@@ -76,37 +76,37 @@ def test_a_directory_that_claims_more_than_its_bytes_can_hold_is_refused(archive
     assert written[entry + 24 : entry + 28] == sizes
     file.write_bytes(written[: entry + 24] + struct.pack("<I", claimed) + written[entry + 28 :])
     message = refusal(file)
-    assert f"column x claims {claimed} bytes, and the file stores" in message
+    assert f"column x declares {claimed} bytes, but the file stores" in message
     assert message.count(", packed") == (packing == zipfile.ZIP_DEFLATED)
 
 
-def test_a_directory_that_claims_more_than_the_whole_file_is_refused(archive, refusal):
+def test_a_directory_size_above_that_of_the_file_is_refused(archive, refusal):
     file = archive(x=member(U, (2**26,)))
     written = file.read_bytes()
     entry = written.rindex(b"PK\x01\x02")
     claimed = struct.pack("<I", 8 * 2**26 + 128)
     file.write_bytes(written[: entry + 20] + 2 * claimed + written[entry + 28 :])
-    assert f"claims {8 * 2**26 + 128} bytes, and the file stores {len(written)} for it" in refusal(file)
+    assert f"declares {8 * 2**26 + 128} bytes, but the file stores {len(written)} for it" in refusal(file)
 
 
 @pytest.mark.parametrize("packing", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_an_archive_that_numpy_does_not_write_is_refused(archive, packing, refusal):
-    assert "cannot be read (it is packed in another way than numpy.savez" in refusal(archive(packing), ["u"])
+def test_an_archive_with_another_compression_is_refused(archive, packing, refusal):
+    assert "cannot be read (its compression method is not used by numpy.savez" in refusal(archive(packing), ["u"])
 
 
-def test_an_array_with_names_in_unicode_is_refused(archive, refusal):
+def test_an_array_with_unicode_field_names_is_refused(archive, refusal):
     stream = io.BytesIO()
     np.lib.format.write_array(stream, np.zeros(60, [("µ", "f8")]), version=(3, 0))
-    assert "its format has the version (3, 0), which no array of numbers has" in refusal(
+    assert "its format version (3, 0) is not used for arrays of numbers" in refusal(
         archive(x=stream.getvalue())
     )
 
 
-def test_a_lie_in_an_array_that_nobody_asks_for_does_no_harm(archive):
+def test_a_wrong_size_of_an_unused_array_does_no_harm(archive):
     assert read_record(archive(x=member(U, (2**40,))), ["u"], "y").samples == 60
 
 
-def test_a_signal_that_hardly_changes_may_be_packed_as_tightly_as_deflate_can(tmp_path):
+def test_a_nearly_constant_signal_may_use_the_full_compression_ratio(tmp_path):
     hold = np.repeat([0.0, 1.0], 500_000)
     np.savez_compressed(tmp_path / "r.npz", u=hold, y=hold, dt=0.1)
     assert read_record(tmp_path / "r.npz", ["u"], "y").samples == 1_000_000
@@ -114,4 +114,4 @@ def test_a_signal_that_hardly_changes_may_be_packed_as_tightly_as_deflate_can(tm
 
 def test_arrays_without_a_sample_are_refused(archive, refusal):
     nothing = member(np.empty(0))
-    assert "bad.npz has not a single sample" in refusal(archive(x=nothing, y=nothing))
+    assert "bad.npz has no samples" in refusal(archive(x=nothing, y=nothing))

@@ -5,8 +5,8 @@ import pytest
 from support.bad_records import changed, lines, refusal
 
 
-def test_a_header_without_a_single_name_is_refused(tmp_path):
-    assert refusal(tmp_path, b",,\n,,\n").startswith("bad.csv has a header in line 1 and not a single sample")
+def test_a_header_without_names_is_refused(tmp_path):
+    assert refusal(tmp_path, b",,\n,,\n").startswith("bad.csv has a header in line 1 but no samples")
     rows = [",,", *lines()[1:]]
     assert "bad.csv has no column u_V; it has (none with a name)" in refusal(tmp_path, rows)
 
@@ -14,26 +14,26 @@ def test_a_header_without_a_single_name_is_refused(tmp_path):
 @pytest.mark.parametrize("header", [[], [""]])
 def test_a_file_without_a_header_is_refused(tmp_path, header):
     message = refusal(tmp_path, [*header, *lines()[1:]])
-    assert f"bad.csv, line {len(header) + 1} holds the number 0 where names are expected" in message
+    assert f"bad.csv, line {len(header) + 1} contains the number 0 instead of a name" in message
     assert "add a header line" in message
 
 
-def test_a_european_file_without_a_header_is_refused_for_that(tmp_path):
+def test_a_file_with_decimal_commas_and_no_header_is_refused(tmp_path):
     rows = [f"0,{k:03d};1,5;2,5" for k in range(60)]
-    assert "line 1 holds the number 0,000" in refusal(tmp_path, rows)
+    assert "line 1 contains the number 0,000" in refusal(tmp_path, rows)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xef\xbb\xbf", b"\n \n\r\n"])
 def test_an_empty_file_is_refused(tmp_path, content):
     message = refusal(tmp_path, content)
     assert "bad.csv is empty" in message
-    assert "a header with names and a line per sample" in message
+    assert "a header with names and one line per sample" in message
 
 
 @pytest.mark.parametrize("content", [b"t_s,u_V,y_um", b"t_s,u_V,y_um\r\n\r\n,,\r\n"])
 def test_a_file_with_a_header_only_is_refused(tmp_path, content):
     message = refusal(tmp_path, content)
-    assert "bad.csv has a header in line 1 and not a single sample" in message
+    assert "bad.csv has a header in line 1 but no samples" in message
 
 
 def test_a_file_that_is_not_utf_8_is_refused_at_its_byte(tmp_path):
@@ -51,7 +51,7 @@ def test_decimal_commas_and_points_in_one_file_are_refused(tmp_path):
     assert "the same mark" in message
 
 
-def test_marks_for_thousands_are_refused(tmp_path):
+def test_thousands_separators_are_refused(tmp_path):
     rows = ["t_s;u_V;y_um", *(f"{k};{k % 7};1.{k:03d},5" for k in range(60))]
     assert "line 2, column y_um: '1.000,5' is not a number" in refusal(tmp_path, rows)
 

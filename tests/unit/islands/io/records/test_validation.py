@@ -8,7 +8,7 @@ from islands.io.records.validation import MIN_SAMPLES
 from support.bad_records import HEADER, changed, lines, refusal
 
 
-def test_the_sound_record_of_these_tests_is_read(tmp_path):
+def test_the_valid_record_of_these_tests_is_read(tmp_path):
     (tmp_path / "good.csv").write_text("\n".join(lines()))
     assert read_record(tmp_path / "good.csv", ["u_V"], "y_um").dt == pytest.approx(0.01)
 
@@ -25,7 +25,7 @@ def test_a_missing_value_is_refused(tmp_path, cell, column, name):
 
 
 @pytest.mark.parametrize("cell", ["inf", "-Infinity", "1e999"])
-def test_an_infinite_value_is_refused_even_in_an_output_that_may_be_missing(tmp_path, cell):
+def test_an_infinite_value_is_refused_even_in_an_optional_output(tmp_path, cell):
     message = refusal(tmp_path, changed(20, 2, cell), missing_output=True)
     assert "bad.csv, line 20, column y_um is infinite" in message
     assert "leave the row out" in message
@@ -37,7 +37,7 @@ def test_a_text_cell_is_refused_and_shown(tmp_path, cell):
     rows[7] = f"0.06;{cell};2.5"
     message = refusal(tmp_path, rows)
     assert message == (
-        f"bad.csv, line 8, column u_V: '{cell}' is not a number: mend the cell or leave its row out"
+        f"bad.csv, line 8, column u_V: '{cell}' is not a number: correct the cell or leave its row out"
     )
 
 
@@ -62,10 +62,10 @@ def test_a_constant_channel_is_refused(tmp_path, column, name):
         rows[line - 1] = ",".join(cells)
     message = refusal(tmp_path, rows)
     assert f"column {name} is constant, 2.5 from line 2 to line 61" in message
-    assert "choose a column, or rows, in which something happens" in message
+    assert "choose a column, or rows, that vary" in message
 
 
-def test_a_constant_input_is_refused_but_for_a_simulation(tmp_path):
+def test_a_constant_input_is_accepted_for_a_simulation_only(tmp_path):
     rows = [HEADER, *(f"{k / 100:g},1,{k}" for k in range(60))]
     assert "column u_V is constant" in refusal(tmp_path, rows)
     (tmp_path / "hold.csv").write_text("\n".join(rows))
@@ -93,7 +93,7 @@ def test_a_line_with_too_many_cells_is_refused(tmp_path):
     rows[8] += ";7"
     message = refusal(tmp_path, rows)
     assert "line 9, column y_um: the line has 4 cells for 3 columns" in message
-    assert "delete what follows the last column" in message
+    assert "delete the cells after the last column" in message
     assert "decimal comma" not in message
 
 
@@ -158,19 +158,19 @@ def test_a_selection_that_is_empty_or_out_of_range_is_refused(tmp_path, rows, sh
 # Sampling
 
 
-def test_a_gap_is_refused_at_the_line_behind_it(tmp_path):
+def test_a_gap_is_refused_at_the_line_after_it(tmp_path):
     rows = lines()
     del rows[30]
     message = refusal(tmp_path, rows)
-    assert "line 31, column t_s stands behind a gap: time goes from 0.28 to 0.3" in message
+    assert "line 31, column t_s follows a gap: the time changes from 0.28 to 0.3" in message
     assert "resampling to a uniform grid" in message
     assert "islands.join" in message
 
 
 @pytest.mark.parametrize("missing", [2, 30, 59])
-def test_a_gap_of_one_sample_is_found_wherever_it_is_in_whole_numbers_too(tmp_path, missing):
+def test_a_gap_of_one_sample_is_found_anywhere_even_in_integers(tmp_path, missing):
     rows = ["t_s,u_V,y_um", *(f"{k},{k % 7},{k % 11}" for k in range(61) if k != missing)]
-    assert f"line {missing + 2}, column t_s stands behind a gap" in refusal(tmp_path, rows)
+    assert f"line {missing + 2}, column t_s follows a gap" in refusal(tmp_path, rows)
 
 
 def test_a_repeated_time_stamp_is_refused(tmp_path):
@@ -196,21 +196,21 @@ def test_jittered_sampling_is_refused(tmp_path):
 
 def test_one_displaced_time_stamp_is_named(tmp_path):
     message = refusal(tmp_path, changed(33, 0, "0.3125"))
-    assert "line 33, column t_s is off the uniform grid: time goes from 0.3 to 0.3125" in message
+    assert "line 33, column t_s is off the uniform grid: the time changes from 0.3 to 0.3125" in message
 
 
-def test_a_displaced_first_time_stamp_is_shown_with_the_step_behind_it(tmp_path):
+def test_a_displaced_first_time_stamp_is_shown_with_the_next_step(tmp_path):
     message = refusal(tmp_path, changed(2, 0, "0.0025"))
-    assert "line 3, column t_s is off the uniform grid: time goes from 0.0025 to 0.01" in message
+    assert "line 3, column t_s is off the uniform grid: the time changes from 0.0025 to 0.01" in message
 
 
-def test_fine_early_stamps_are_held_to_their_own_digits_beside_coarse_late_ones(tmp_path):
+def test_early_stamps_are_checked_with_their_own_number_of_digits(tmp_path):
     rows = [HEADER, *(f"{2.13e-4 * k:.5g},{k % 7},{k % 11}" for k in range(10_000))]
     rows[100] = f"{2.13e-4 * 99 + 1e-5:.5g},1,1"
     assert "line 101, column t_s is off the uniform grid" in refusal(tmp_path, rows)
 
 
-def test_jitter_of_two_per_cent_of_a_step_is_refused_and_of_half_a_per_cent_is_not(tmp_path):
+def test_jitter_is_refused_at_two_but_not_at_half_a_per_cent(tmp_path):
     assert "line 33, column t_s" in refusal(tmp_path, changed(33, 0, "0.3102000001"))
     (tmp_path / "good.csv").write_text("\n".join(changed(33, 0, "0.3100500001")))
     assert read_record(tmp_path / "good.csv", ["u_V"], "y_um").dt == pytest.approx(0.01)
@@ -221,7 +221,7 @@ def test_jitter_of_whole_milliseconds_is_not_taken_for_rounding(tmp_path):
     assert "column t_ms is off the uniform grid" in refusal(tmp_path, rows)
 
 
-def test_a_change_of_the_sampling_rate_is_refused_where_it_happens(tmp_path):
+def test_a_change_of_the_sampling_rate_is_refused_at_its_line(tmp_path):
     t = [k * 0.01 if k < 30 else 0.3 + (k - 30) * 0.02 for k in range(60)]
     rows = [HEADER, *(f"{t[k]:.4f},{k % 7},{k % 11}" for k in range(60))]
     message = refusal(tmp_path, rows)
@@ -238,7 +238,7 @@ def test_a_sampling_time_that_is_not_a_positive_number_is_refused(tmp_path, dt):
     assert f"positive number of seconds, got {dt}" in refusal(tmp_path, lines(), dt=dt)
 
 
-def test_a_file_that_does_not_tell_its_sampling_time_is_refused(tmp_path):
+def test_a_file_without_a_sampling_time_is_refused(tmp_path):
     rows = lines()
     rows[0] = "k,u_V,y_um"
     message = refusal(tmp_path, rows)
@@ -253,7 +253,7 @@ def test_a_time_column_in_an_unknown_unit_is_named(tmp_path):
     assert "if t_days is the time, end its name in one of the units s, ms, us, ns, min, h" in message
 
 
-def test_two_columns_that_may_both_be_the_time_are_refused(tmp_path):
+def test_two_possible_time_columns_are_refused(tmp_path):
     rows = [f"{line},{k}" if k else f"{line},time_ms" for k, line in enumerate(lines())]
     assert "columns t_s and time_ms may all be the time: rename all but one" in refusal(tmp_path, rows)
 
@@ -261,7 +261,7 @@ def test_two_columns_that_may_both_be_the_time_are_refused(tmp_path):
 # Columns
 
 
-def test_a_missing_column_is_refused_with_those_there_are_and_the_closest(tmp_path):
+def test_a_missing_column_is_refused_with_all_columns_and_the_closest(tmp_path):
     message = refusal(tmp_path, lines(), inputs=["U_v"])
     assert message == "bad.csv has no column U_v; it has t_s, u_V, y_um. Did you mean u_V?"
 
@@ -275,7 +275,7 @@ def test_columns_of_one_name_are_refused(tmp_path):
     rows = lines()
     rows[0] = "t_s,u_V,u_V"
     message = refusal(tmp_path, rows, output="u_V")
-    assert "several columns called u_V: rename them" in message
+    assert "several columns named u_V: rename them" in message
 
 
 def test_one_column_as_input_and_output_is_refused(tmp_path):

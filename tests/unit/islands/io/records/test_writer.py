@@ -57,7 +57,7 @@ def test_every_number_is_read_back_exactly(tmp_path_factory, values):
         (0.1, 0.1 + 0.2),
     ],
 )
-def test_sampling_time_and_start_survive_whatever_their_ratio(dt, start, tmp_path):
+def test_sampling_time_and_start_survive_at_any_ratio(dt, start, tmp_path):
     write_record(record(2000, dt, start=start), tmp_path / "r.csv")
     found = read(tmp_path / "r.csv")
     assert found.samples == 2000
@@ -66,14 +66,14 @@ def test_sampling_time_and_start_survive_whatever_their_ratio(dt, start, tmp_pat
     assert found.start == pytest.approx(start, rel=1e-12, abs=1e-6 * dt)
 
 
-def test_times_are_written_without_the_rounding_of_their_sum(tmp_path):
+def test_times_are_written_without_rounding_errors(tmp_path):
     write_record(record(50, 0.1), tmp_path / "r.csv")
     times = [line.split(",")[0] for line in (tmp_path / "r.csv").read_text().splitlines()]
     assert times[:5] == ["t_s", "0.0", "0.1", "0.2", "0.3"]
     assert max(len(cell) for cell in times) == 3
 
 
-def test_a_file_has_a_header_and_a_line_a_sample_and_nothing_of_the_platform(tmp_path):
+def test_a_file_has_a_header_and_one_line_per_sample_on_any_platform(tmp_path):
     write_record(record(40), tmp_path / "r.csv")
     raw = (tmp_path / "r.csv").read_bytes()
     assert raw.startswith(b"t_s,u_V,T_K,y_um\n")
@@ -102,7 +102,7 @@ def test_a_missing_output_stays_missing(tmp_path):
 def test_several_recordings_do_not_fit_into_one_table(tmp_path):
     with pytest.raises(RecordError) as caught:
         write_record(record(segments=(20, 30)), tmp_path / "r.csv")
-    assert str(caught.value) == "a CSV holds one recording: write each segment to a file of its own"
+    assert str(caught.value) == "a CSV file holds one recording: write each segment to a separate file"
     assert not (tmp_path / "r.csv").exists()
 
 
@@ -118,7 +118,7 @@ def test_a_simulation_has_a_row_for_every_sample_of_the_record(tmp_path):
     assert np.array_equal(found, simulated, equal_nan=True)
 
 
-def test_a_simulation_of_several_recordings_has_their_samples_one_after_the_other(tmp_path):
+def test_a_simulation_of_several_recordings_concatenates_their_samples(tmp_path):
     write_simulation(record(segments=(20, 30)), np.arange(50.0), tmp_path / "s.csv")
     table = np.genfromtxt(tmp_path / "s.csv", delimiter=",", names=True)
     assert table["time"].tolist() == pytest.approx((0.01 * np.arange(50)).tolist())
@@ -126,7 +126,7 @@ def test_a_simulation_of_several_recordings_has_their_samples_one_after_the_othe
 
 
 @pytest.mark.parametrize("write", [write_record, lambda data, path: write_simulation(data, data.y, path)])
-def test_what_cannot_be_written_is_refused_by_its_path(write, tmp_path):
+def test_an_unwritable_file_is_refused_with_its_path(write, tmp_path):
     with pytest.raises(RecordError) as caught:
         write(record(), tmp_path / "nowhere" / "r.csv")
     assert str(caught.value) == f"cannot write {tmp_path / 'nowhere' / 'r.csv'}: No such file or directory"

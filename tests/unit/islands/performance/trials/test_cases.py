@@ -15,7 +15,7 @@ from islands.simulation.predictors import free_run
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_what_is_hidden_is_what_a_simulation_can_name(name: str) -> None:
+def test_nameable_faults_are_those_with_an_effect(name: str) -> None:
     simulated = CASES[name]
     system = simulated.system
     hiding = inject(
@@ -46,23 +46,23 @@ def found() -> Diagnosis:
     return diagnose(hiding.record, CASES["column"].make(hiding))
 
 
-def test_who_finds_the_name_gains_what_the_oracle_gains(found: Diagnosis) -> None:
+def test_a_correct_diagnosis_improves_as_much_as_the_oracle(found: Diagnosis) -> None:
     assert [effect.name for effect in found.effects] == ["even-nonlinearity"]
     assert share_of_gain(found, ["even-nonlinearity"], {}) == pytest.approx(1.0, abs=0.02)
 
 
-def test_who_finds_nothing_gains_nothing(found: Diagnosis) -> None:
+def test_an_empty_diagnosis_has_no_improvement(found: Diagnosis) -> None:
     silent = replace(found, best=found.base)
     assert share_of_gain(silent, ["even-nonlinearity"], {}) == 0.0
 
 
-def test_an_oracle_without_a_name_or_without_a_gain_is_none(found: Diagnosis) -> None:
+def test_the_oracle_ratio_is_none_without_a_name_or_an_improvement(found: Diagnosis) -> None:
     assert share_of_gain(found, ["delay"], {}) is None
     assert share_of_gain(found, ["periodic-disturbance"], {}) is None
 
 
 @pytest.mark.ci
-def test_two_names_are_told_one_after_the_other() -> None:
+def test_the_oracle_fits_two_faults_in_turn() -> None:
     hiding = inject(
         ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), perturbed=False
     )
@@ -71,5 +71,5 @@ def test_two_names_are_told_one_after_the_other() -> None:
     assert share == pytest.approx(1.0, abs=0.05)
 
 
-def test_the_piezos_core_is_given_what_is_stated() -> None:
+def test_the_piezo_case_uses_the_stated_tolerances() -> None:
     assert CASES["bouc-wen-piezo"].tolerance == {name: 2 * far for name, far in PIEZO.relative_error.items()}

@@ -26,7 +26,7 @@ def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> FaultyRe
 @pytest.mark.ci
 @pytest.mark.parametrize("variant", [False, True], ids=["usual", "variant"])
 @pytest.mark.parametrize("system", ["piezo", "tanks", "oscillator"])
-def test_every_effect_can_be_hidden_in_a_band(system: str, variant: bool) -> None:
+def test_every_fault_reaches_a_band_of_misfits(system: str, variant: bool) -> None:
     for name in SYSTEMS[system][0].known:
         found = hidden(system, name, band=(0.3, 2.0), variant=variant)
         assert 0.3 <= found.misfit <= 2.0, name
@@ -34,20 +34,20 @@ def test_every_effect_can_be_hidden_in_a_band(system: str, variant: bool) -> Non
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_causes_without_a_name_are_seen(system: str) -> None:
+def test_unknown_faults_are_visible(system: str) -> None:
     for name in SYSTEMS[system][0].unknown:
         assert hidden(system, name).misfit > 0.5, name
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_the_same_seed_hides_the_same(system: str) -> None:
+def test_equal_seeds_inject_equal_faults(system: str) -> None:
     first, again, other = (hidden(system, "jump", "delay", seed=seed) for seed in (5, 5, 6))
     assert np.array_equal(first.record.y, again.record.y)
     assert not np.array_equal(first.record.u, other.record.u)
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_where_nothing_is_hidden_there_is_noise_alone(system: str) -> None:
+def test_a_clean_record_has_noise_only(system: str) -> None:
     found = hidden(system, perturbed=False)
     left = found.record.y - found.nominal
     assert found.misfit == 0.0
@@ -55,7 +55,7 @@ def test_where_nothing_is_hidden_there_is_noise_alone(system: str) -> None:
     assert np.std(hidden(system).record.y - found.nominal) > 1.1 * found.sigma
 
 
-def test_what_tolerances_allow_is_no_misfit() -> None:
+def test_changes_within_tolerances_are_not_a_misfit() -> None:
     """Of a gain only what no admissible parameters can take up is left."""
     gain = PIEZO.known["sensor-gain"]
     small, large = (
@@ -70,7 +70,7 @@ def test_what_tolerances_allow_is_no_misfit() -> None:
     assert in_full.misfit > 1.0
 
 
-def test_what_is_hidden_beside_a_gain_keeps_its_misfit() -> None:
+def test_a_fault_next_to_a_gain_error_keeps_its_misfit() -> None:
     assert hidden("piezo", "sensor-gain", "periodic-disturbance", band=(2.0, 3.0)).misfit > 2.0
 
 
@@ -82,7 +82,7 @@ def test_what_is_hidden_beside_a_gain_keeps_its_misfit() -> None:
         None,
     ],
 )
-def test_the_oscillator_is_solved(force: object) -> None:
+def test_the_oscillator_matches_a_reference_solution(force: object) -> None:
     rng = np.random.default_rng(2)
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
     truth = Oscillator(forces=made)
@@ -102,7 +102,7 @@ def test_the_oscillator_is_solved(force: object) -> None:
     assert np.max(np.abs(y - ideal)) < 2e-3 * np.max(np.abs(y))
 
 
-def test_the_tanks_are_solved() -> None:
+def test_the_tanks_match_a_reference_solution() -> None:
     drive = TANKS.excitation(np.random.default_rng(2), 800.0)
     truth = Tanks(leaks=(0.002, 0.001), inflows=(0.01, -0.005))
 
@@ -117,7 +117,7 @@ def test_the_tanks_are_solved() -> None:
     assert np.max(np.abs(simulate_plant(truth, drive) - ideal)) < 1e-3
 
 
-def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
+def test_a_tank_overflows_at_its_edge_into_the_lower_tank() -> None:
     drive = TANKS.excitation(np.random.default_rng(2), 4096.0)
     free = simulate_plant(Tanks(), drive)
     lower = simulate_plant(Tanks(overflow_depths=(0.0, 0.2)), drive)
@@ -129,7 +129,7 @@ def test_a_tank_overflows_at_its_edge_and_spills_on() -> None:
     assert caught.mean() > lost.mean()
 
 
-def test_a_gain_that_changes_shows_behind_its_instant() -> None:
+def test_a_gain_step_changes_the_output_only_after_its_time() -> None:
     for system, truth in ((PIEZO, Piezo()), (OSCILLATOR, Oscillator()), (TANKS, Tanks())):
         drive = system.excitation(np.random.default_rng(2), 0.3 * system.seconds)
         half = float(drive.time[-1]) / 2
@@ -141,7 +141,7 @@ def test_a_gain_that_changes_shows_behind_its_instant() -> None:
         assert moved[moved.size // 2 + 10 :].mean() > 0.9
 
 
-def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
+def test_only_the_piezo_has_gain_faults() -> None:
     def scales(system: Rig) -> set[str]:
         return set(system.known) & set(GAIN_FAULTS)
 
@@ -149,14 +149,14 @@ def test_scale_is_what_systems_can_hide_with_tolerances() -> None:
     assert not scales(OSCILLATOR) | scales(TANKS)
 
 
-def test_a_misfit_that_no_strength_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreachable_misfit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measurement, "_MAX_RECORDS", 2)
     with pytest.raises(ValueError, match=r"delay cannot be hidden with a misfit within"):
         inject(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
 
 
 @pytest.mark.ci
-def test_a_record_that_shows_nothing_of_an_effect_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_record_in_which_a_fault_is_invisible_is_redrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
 
     def hidden_peak() -> FaultyRecord:

@@ -34,7 +34,7 @@ def measured(*outcomes: TrialOutcome) -> dict[str, Statistic]:
     return {row.name: row for row in score(outcomes, ["ripple"]) if isinstance(row, Statistic)}
 
 
-def test_everything_is_counted_where_it_belongs() -> None:
+def test_every_outcome_is_counted_in_its_scores() -> None:
     found = counted(
         outcome(("delay",), ("delay",)),
         outcome(("delay",), ("jump",), equivalents=(("delay",),)),
@@ -67,7 +67,7 @@ def test_everything_is_counted_where_it_belongs() -> None:
     }
 
 
-def test_that_the_form_of_a_model_is_wrong_is_neither_a_name_nor_a_detection() -> None:
+def test_a_model_form_error_is_neither_a_name_nor_a_detection() -> None:
     found = counted(
         outcome((), (), verdict="named", form=True),
         outcome(("jump",), (), verdict="named", form=True),
@@ -82,7 +82,7 @@ def test_that_the_form_of_a_model_is_wrong_is_neither_a_name_nor_a_detection() -
     assert found["unknown causes silently misnamed"] == (0, 1)
 
 
-def test_a_reported_set_has_a_size_where_there_is_a_name() -> None:
+def test_the_set_size_is_averaged_over_named_outcomes() -> None:
     found = measured(
         outcome(("delay",), ("delay",)),
         outcome(("delay",), ("jump",), equivalents=(("delay", "viscous"),)),
@@ -91,7 +91,7 @@ def test_a_reported_set_has_a_size_where_there_is_a_name() -> None:
     assert (found.value, found.of) == (2.0, 2)
 
 
-def test_shares_of_the_oracles_gain_are_those_of_what_was_detected() -> None:
+def test_oracle_ratios_are_taken_over_detected_faults() -> None:
     found = measured(
         *(outcome(("delay",), ("delay",), gain_share=share / 10) for share in range(11)),
         outcome(("delay",), ("delay",)),
@@ -106,7 +106,7 @@ def test_shares_of_the_oracles_gain_are_those_of_what_was_detected() -> None:
     assert median.kept is False
 
 
-def test_confidences_are_held_against_frequencies() -> None:
+def test_confidences_are_compared_with_frequencies() -> None:
     """Of four names said with 0.95 three are right, of two with 0.55 one; a name for nothing is wrong."""
     outcomes = [
         *[outcome(("delay",), ("delay",), confidence=0.95)] * 3,
@@ -125,12 +125,12 @@ def test_confidences_are_held_against_frequencies() -> None:
     assert row.kept is False
 
 
-def test_whoever_is_sure_is_in_the_last_bin() -> None:
+def test_full_confidence_is_in_the_last_bin() -> None:
     (only,) = reliability([outcome(("delay",), ("delay",), confidence=1.0)])
     assert (only.low, only.high, only.right) == (0.9, 1.0, 1.0)
 
 
-def test_goals_are_those_of_the_simulation() -> None:
+def test_targets_depend_on_the_kind_of_simulation() -> None:
     said = [outcome(("delay",), (name,)) for name in ["delay"] * 9 + ["jump"]]
     kept = [
         {row.name: row.kept for row in score(said, [], goals)}["named first, where detected"]
@@ -139,11 +139,11 @@ def test_goals_are_those_of_the_simulation() -> None:
     assert kept == [False, True]
 
 
-def test_without_trials_nothing_is_kept_or_missed() -> None:
+def test_targets_are_undecided_without_trials() -> None:
     assert {row.kept for row in score([], [])} == {None}
 
 
-def test_bounds_are_those_of_clopper_and_pearson() -> None:
+def test_bounds_are_the_clopper_pearson_interval() -> None:
     """0 of 300 allows 1.2 %, 97 of 100 stands for 91.5 to 99.4 %."""
     assert Proportion("", 0, 300).bounds == pytest.approx((0.0, 1.2221), abs=1e-3)
     assert Proportion("", 97, 100).bounds == pytest.approx((91.482, 99.377), abs=1e-2)
@@ -154,12 +154,12 @@ def test_bounds_are_those_of_clopper_and_pearson() -> None:
     ("count", "goal", "most", "kept"),
     [(97, 97.0, False, True), (96, 97.0, False, False), (1, 1.0, True, True), (2, 1.0, True, False)],
 )
-def test_a_goal_is_kept_or_missed(count: int, goal: float, most: bool, kept: bool) -> None:
+def test_a_target_is_met_or_missed(count: int, goal: float, most: bool, kept: bool) -> None:
     assert Proportion("", count, 100, goal, most).kept is kept
     assert Statistic("", count, 100, goal, most).kept is kept
 
 
-def test_a_confusion_says_what_was_taken_for_what() -> None:
+def test_the_confusion_counts_pairs_of_fault_and_name() -> None:
     found = confusion(
         [
             outcome(("delay",), ("jump",)),

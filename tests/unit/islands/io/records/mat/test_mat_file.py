@@ -31,7 +31,7 @@ def refusal(file, inputs=("u",), output="y", **options):
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("shape", [(SAMPLES, 1), (1, SAMPLES)])
-def test_a_vector_is_a_column_whichever_way_it_lies(save, version, shape):
+def test_row_and_column_vectors_are_columns(save, version, shape):
     file = save(version, u=U.reshape(shape), y=Y.reshape(shape), t=T.reshape(shape))
     record = read_record(file, ["u"], "y")
     assert sorted(read_columns(file)) == ["t", "u", "y"]
@@ -65,16 +65,16 @@ def test_a_file_may_state_its_sampling(save, version, name, value):
     assert record.start == pytest.approx(0.04)
 
 
-def test_a_sampling_time_that_is_no_positive_number_is_refused(save):
+def test_a_sampling_time_that_is_not_a_positive_number_is_refused(save):
     assert "array Ts states the sampling as 0.0" in refusal(save("7", u=U, y=Y, Ts=0.0))
 
 
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
-def test_a_vector_called_ts_states_no_sampling(save, version):
+def test_a_vector_named_ts_does_not_state_the_sampling(save, version):
     assert read_record(save(version, u=U, y=Y, ts=T, t=T), ["u"], "y").dt == pytest.approx(0.01)
 
 
-def test_a_nan_that_signals_is_a_missing_value(save):
+def test_a_signalling_nan_is_a_missing_value(save):
     u = U.astype("f4")
     u.view("u4")[17] = 0x7F800001
     assert "r.mat, sample 17, column u is empty or NaN" in refusal(save("7", u=u, y=Y, Ts=0.1))
@@ -85,7 +85,7 @@ def test_a_nan_that_signals_is_a_missing_value(save):
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_matrix_of_a_few_channels_offers_each_of_them(save, version, turned):
+def test_a_matrix_of_a_few_channels_is_split_into_columns(save, version, turned):
     data = np.column_stack([T, U, Y])
     file = save(version, data=data.T if turned else data, Ts=0.01)
     assert sorted(read_columns(file)) == ["Ts", "data_1", "data_2", "data_3"]
@@ -97,7 +97,7 @@ def test_a_matrix_of_a_few_channels_offers_each_of_them(save, version, turned):
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("shape", [(4, 5), (SAMPLES, MOST_CHANNELS + 1), (SAMPLES, SAMPLES)])
-def test_a_matrix_that_is_no_set_of_channels_is_refused_with_its_shape(save, version, shape):
+def test_a_matrix_of_another_shape_is_refused_with_its_shape(save, version, shape):
     message = refusal(save(version, u=np.ones(shape), y=Y, Ts=0.1))
     assert f"r.mat: column u has the shape {shape}" in message
     assert "one array per channel" in message
@@ -110,7 +110,7 @@ def test_a_cube_is_refused_with_its_shape(save):
         )
 
 
-def test_a_matrix_beside_its_columns_leaves_them_their_names(save):
+def test_a_matrix_is_not_split_if_a_column_name_is_taken(save):
     file = save("7", u=np.column_stack([U, Y]), u_1=Y, u_2=U, y=Y, Ts=0.1)
     assert read_columns(file) == ("u", "u_1", "u_2", "y", "Ts")
     assert read_record(file, ["u_1"], "u_2").u[:, 0].tolist() == Y.tolist()
@@ -131,13 +131,13 @@ def test_the_fields_of_a_structure_are_columns(save, version):
     assert (record.input_units[0], record.output_unit) == ("V", "um")
 
 
-def test_a_structures_name_lends_no_unit_to_its_fields(save):
+def test_a_structure_name_is_not_a_unit_of_its_fields(save):
     record = read_record(save("7", my_data={"u": U, "y": Y, "t": T}), ["my_data.u"], "my_data.y")
     assert (record.input_units, record.output_unit) == (("",), "")
 
 
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
-def test_each_structure_has_a_time_and_a_sampling_time_of_its_own(save, version):
+def test_each_structure_has_its_own_time_and_sampling_time(save, version):
     file = save(
         version,
         first={"u": U, "y": Y, "t": T + 1},
@@ -164,7 +164,7 @@ def test_a_field_that_may_be_a_time_in_an_unknown_unit_is_named(save):
     assert "if run.t_days is the time, end its name in one of the units s, ms" in message
 
 
-def test_a_structure_whose_name_looks_like_time_is_none(save):
+def test_a_structure_with_a_name_like_time_is_not_the_time(save):
     file = save("7", time1={"u": U, "y": Y}, u=U, y=Y, t=T)
     assert read_record(file, ["u"], "y").dt == pytest.approx(0.01)
 
@@ -183,7 +183,7 @@ NO_CHANNELS = {
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
 @pytest.mark.parametrize("kind", NO_CHANNELS)
 @pytest.mark.parametrize("place", ["odd", "run.odd"])
-def test_what_is_no_channel_does_no_harm_and_is_refused_with_advice_when_asked_for(
+def test_an_unsupported_class_is_refused_with_advice_only_when_read(
     save, version, kind, place
 ):
     odd = NO_CHANNELS[kind]
@@ -198,7 +198,7 @@ def test_what_is_no_channel_does_no_harm_and_is_refused_with_advice_when_asked_f
 
 
 @pytest.mark.parametrize("kind", ["char", "complex", "sparse"])
-def test_the_same_holds_in_version_4(save, kind):
+def test_unsupported_classes_of_version_4_are_refused_only_when_read(save, kind):
     file = save("4", u=U, y=Y, odd=NO_CHANNELS[kind], Ts=0.1)
     assert read_record(file, ["u"], "y").samples == SAMPLES
     assert f"column odd holds {kind}" in refusal(file, ["odd"])
@@ -218,7 +218,7 @@ def test_an_empty_matrix_is_refused_with_its_shape(save, version):
     assert "column u has the shape (0, 0)" in message
 
 
-def test_advice_is_text_with_one_gap():
+def test_advice_has_one_placeholder():
     for advice in ADVICE.values():
         assert "{" not in advice.format(x="run.u").replace("{1}", "")
 
@@ -238,7 +238,7 @@ def numbers_by_scipy(file):
     }
 
 
-def test_scipys_samples_of_matlab_4_to_7_4_hold_the_same_numbers_here():
+def test_samples_of_matlab_4_to_7_4_have_the_same_numbers_as_in_scipy():
     """Files of MATLAB itself, on Solaris, Linux and Windows, of either byte order."""
     folder = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
     compared = 0
@@ -254,7 +254,7 @@ def test_scipys_samples_of_matlab_4_to_7_4_hold_the_same_numbers_here():
 @pytest.mark.nightly
 @pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave: apt-get install octave")
 @pytest.mark.parametrize("option", ["-v4", "-v6", "-v7"])
-def test_what_octave_saves_is_read(tmp_path, option):
+def test_files_of_octave_are_read(tmp_path, option):
     program = "t = (0:59)' / 8; u = t .^ 2; y = int16(-u)'; data = [t u]; Ts = 0.125; s.q = u; s.w = 'text';"
     names = "t u data Ts" if option == "-v4" else "t u y data Ts s"
     subprocess.run(

@@ -63,7 +63,7 @@ def write(tmp_path):
     return write
 
 
-def test_the_sound_file_of_these_tests_is_read(write):
+def test_the_valid_file_of_these_tests_is_read(write):
     file = write(numbers("x", U), packed(numbers("z", Y)), packed(structure("s", a=numbers("", U))))
     assert read_columns(file) == ("u", "y", "Ts", "x", "z", "s.a")
     record = read_record(file, ["x", "z", "s.a"], "y")
@@ -72,7 +72,7 @@ def test_the_sound_file_of_these_tests_is_read(write):
 
 @pytest.mark.parametrize("kind", ["timeseries", "timetable", "iddata", "mine"])
 @pytest.mark.parametrize("wrapped", [bytes, packed])
-def test_an_object_does_no_harm_even_if_it_is_called_ts_and_is_refused_with_advice(
+def test_an_object_named_ts_is_refused_with_advice_only_when_read(
     write, kind, wrapped, refusal
 ):
     file = write(wrapped(opaque("ts", kind)))
@@ -82,7 +82,7 @@ def test_an_object_does_no_harm_even_if_it_is_called_ts_and_is_refused_with_advi
     assert ADVICE.get(kind, "one vector per channel").format(x="ts") in message
 
 
-def test_what_matlab_keeps_for_itself_is_no_column(write):
+def test_internal_variables_of_matlab_are_not_columns(write):
     file = write(numbers("", U), numbers("__function_workspace__", U))
     assert read_columns(file) == ("u", "y", "Ts")
 
@@ -97,24 +97,24 @@ def test_a_function_handle_is_refused_with_advice(write, refusal):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "is empty: save it anew"),
+        (b"", "is empty: save it again"),
         (b"t,u,y\n" + b"0,1,2\n" * 60, "is not a MAT-file"),
         (b"PK\x03\x04" + bytes(200), "is not a MAT-file"),
         (bytes(500), "is not a MAT-file"),
         (
             b"# Created by Octave 7.3.0\n# name: u\n",
-            "is text in Octave's own format: save it by save -v7 bad.mat",
+            "is text in Octave's format: save it with save -v7 bad.mat",
         ),
-        (b"\x89HDF\r\n\x1a\n" + bytes(500), "is damaged or cut short"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(500), "is damaged or truncated"),
     ],
 )
-def test_a_file_that_is_no_mat_file_is_refused_for_what_it_is(tmp_path, content, words, refusal):
+def test_a_file_of_another_format_is_refused_with_its_format(tmp_path, content, words, refusal):
     (tmp_path / "bad.mat").write_bytes(content)
     assert f"bad.mat {words}" in refusal(tmp_path / "bad.mat")
 
 
 @pytest.mark.parametrize("version", ["4", "6", "7", "7.3"])
-def test_a_file_that_is_cut_short_is_refused_wherever_it_is_cut(save, version):
+def test_a_file_truncated_at_any_position_is_refused(save, version):
     variables = {"u": U, "y": Y} | ({} if version == "4" else {"s": {"a": U, "b": Y}})
     file = save(version, **variables, Ts=0.1)
     content = file.read_bytes()
@@ -124,7 +124,7 @@ def test_a_file_that_is_cut_short_is_refused_wherever_it_is_cut(save, version):
             read_record(file, ["u"], "y", dt=0.1)
 
 
-def test_a_flipped_bit_in_packed_numbers_is_noticed_in_that_column_alone(write, refusal):
+def test_a_flipped_bit_in_compressed_numbers_affects_one_column_only(write, refusal):
     noise = np.random.default_rng(0).normal(size=500)
     variable = bytearray(packed(numbers("x", noise)))
     variable[-60] ^= 1
@@ -137,10 +137,10 @@ def test_a_flipped_bit_in_packed_numbers_is_noticed_in_that_column_alone(write, 
     ("change", "words"),
     [
         (lambda stream: stream[:-4] + bytes(4), "incorrect data check"),
-        (lambda stream: stream[:-9], "it claims 4056 bytes, and as many are not packed"),
+        (lambda stream: stream[:-9], "it claims 4056 bytes but contains a different number"),
     ],
 )
-def test_packed_numbers_of_another_checksum_or_without_an_end_are_refused(write, change, words, refusal):
+def test_compressed_numbers_with_a_wrong_checksum_or_no_end_are_refused(write, change, words, refusal):
     variable = numbers("x", np.random.default_rng(0).normal(size=500))
     file = write(element(COMPRESSED, change(zlib.compress(variable))))
     assert read_record(file, ["u"], "y").samples == len(U)
@@ -149,66 +149,66 @@ def test_packed_numbers_of_another_checksum_or_without_an_end_are_refused(write,
     assert words in message
 
 
-def test_more_packed_bytes_than_claimed_are_refused(write, refusal):
+def test_more_compressed_bytes_than_declared_are_refused(write, refusal):
     file = write(element(COMPRESSED, zlib.compress(numbers("x", U) + bytes(8))))
-    assert "column x cannot be read (it claims 536 bytes, and as many are not packed)" in refusal(file)
+    assert "column x cannot be read (it declares 536 bytes but contains a different number)" in refusal(file)
 
 
-def test_numbers_of_a_type_that_nobody_knows_are_refused(write, refusal):
+def test_numbers_of_an_unknown_type_are_refused(write, refusal):
     """SciPy 1.17 looks this type up behind the end of its table and ends the process."""
     file = write(numbers("x", U, kind=0xFFFF))
-    assert "column x cannot be read (its numbers are of the unknown type 65535)" in refusal(file)
+    assert "column x cannot be read (its numbers have the unknown type 65535)" in refusal(file)
 
 
-def test_a_structure_that_cannot_be_read_does_no_harm(write, refusal):
+def test_a_damaged_structure_does_no_harm(write, refusal):
     lie = matrix("", "double", (60, 1), element(DOUBLE, U.tobytes()), size=8000)
     file = write(packed(structure("s", a=numbers("", Y), b=lie)), structure("r", b=lie))
     assert read_record(file, ["u"], "y").samples == len(U)
     for name in "sr":
-        assert f"column {name} cannot be read (an element claims 8000 bytes" in refusal(file, [name])
+        assert f"column {name} cannot be read (an element declares 8000 bytes" in refusal(file, [name])
 
 
-def test_an_empty_field_may_take_no_bytes_at_all(write, refusal):
+def test_an_empty_field_may_have_no_bytes(write, refusal):
     file = write(structure("s", a=element(MATRIX, b""), b=numbers("", U)))
     assert read_record(file, ["s.b"], "y").samples == len(U)
     assert "column s.a has the shape (0, 0)" in refusal(file, ["s.a"])
 
 
-def test_a_field_that_cannot_be_read_does_no_harm(write, refusal):
+def test_a_damaged_field_does_no_harm(write, refusal):
     file = write(structure("s", a=numbers("", Y, shape=(61, 1)), b=numbers("", U)))
     assert read_record(file, ["s.b"], "y").samples == len(U)
     assert "column s.a cannot be read (it claims the shape (61, 1)" in refusal(file, ["s.a"])
 
 
-def test_structures_in_structures_end_somewhere(write, refusal):
+def test_the_nesting_of_structures_is_limited(write, refusal):
     nested = numbers("", U)
     for _ in range(100):
         nested = structure("", a=nested)
     message = refusal(write(structure("s", a=nested)), ["s"])
-    assert "column s cannot be read (structures stand in one another more than 32 deep" in message
+    assert "column s cannot be read (structures are nested more than 32 deep" in message
 
 
-def test_a_file_of_too_many_variables_is_refused(write, monkeypatch, refusal):
+def test_a_file_with_too_many_variables_is_refused(write, monkeypatch, refusal):
     monkeypatch.setattr("islands.io.records.mat.workspace.MOST_VARIABLES", 50)
     many = [numbers(f"v{index}", U) for index in range(48)]
     assert len(read_columns(write(*many[:47]))) == 50
-    assert "bad.mat holds more than 50 variables" in refusal(write(*many))
+    assert "bad.mat has more than 50 variables" in refusal(write(*many))
 
 
 # Lies
 
 
-def test_a_shape_that_its_numbers_do_not_fill_is_refused(write, refusal):
+def test_a_shape_with_too_few_numbers_is_refused(write, refusal):
     for variable in (numbers("x", U, shape=(2**27, 1)), packed(numbers("x", U, shape=(2**27, 1)))):
         message = refusal(write(variable))
         assert "it claims the shape (134217728, 1) and holds 60 numbers" in message
 
 
 @pytest.mark.parametrize("shape", [(2**28, 1), (2**31 - 1, 2**31 - 1)])
-def test_more_samples_than_any_record_has_are_refused(write, shape, refusal):
+def test_a_sample_count_above_the_limit_is_refused(write, shape, refusal):
     message = refusal(write(numbers("x", U, shape=shape)))
     assert (
-        f"column x claims {shape[0] * shape[1]} samples, and a record has {MOST_SAMPLES} at most" in message
+        f"column x declares {shape[0] * shape[1]} samples, but a record has at most {MOST_SAMPLES}" in message
     )
 
 
@@ -217,38 +217,38 @@ def test_impossible_dimensions_are_refused(write, shape, refusal):
     assert "an array has the dimensions" in refusal(write(numbers("x", U, shape=shape)))
 
 
-def test_an_element_larger_than_what_it_is_in_is_refused(write, refusal):
-    assert "an element claims 2147483648 bytes" in refusal(write(numbers("x", U, size=2**31)))
-    assert "an element claims 4000000000 bytes" in refusal(
+def test_an_element_larger_than_its_parent_is_refused(write, refusal):
+    assert "an element declares 2147483648 bytes" in refusal(write(numbers("x", U, size=2**31)))
+    assert "an element declares 4000000000 bytes" in refusal(
         write(matrix("x", "double", (60, 1), element(DOUBLE, U.tobytes()), size=4_000_000_000))
     )
 
 
-def test_a_short_element_holds_four_bytes_at_most(write, refusal):
+def test_a_short_element_has_at_most_four_bytes(write, refusal):
     dimensions = struct.pack("<2H", INT32, 8) + struct.pack("<2i", 60, 1)
     flags = element(UINT32, struct.pack("<2I", CLASSES["double"], 0))
     lie = element(MATRIX, flags + dimensions + element(INT8, b"x") + element(DOUBLE, U.tobytes()))
-    assert "bad.mat is damaged or cut short (an element claims 8 bytes" in refusal(write(lie))
+    assert "bad.mat is damaged or truncated (an element declares 8 bytes" in refusal(write(lie))
 
 
-def test_packed_bytes_that_claim_more_than_deflate_can_hold_are_refused(write, refusal):
+def test_a_size_above_the_compression_limit_is_refused(write, refusal):
     lie = matrix("x", "double", (2**20, 1), element(DOUBLE, U.tobytes(), 2**23), size=2**23 + 48)
     message = refusal(write(packed(lie)))
-    assert "column x cannot be read (it claims 8388656 bytes, packed in" in message
+    assert "column x cannot be read (it declares 8388656 bytes, compressed to" in message
 
 
-def test_a_variable_of_version_4_that_claims_too_much_is_refused(save, refusal):
+def test_a_variable_of_version_4_with_too_large_a_size_is_refused(save, refusal):
     file = save("4", u=U, y=Y)
     content = bytearray(file.read_bytes())
     content[4:8] = struct.pack("<i", 2**28)
     file.write_bytes(content)
-    assert f"r.mat is damaged or cut short (variable u claims {8 * 60 * 2**28} bytes where" in refusal(file)
+    assert f"r.mat is damaged or truncated (variable u declares {8 * 60 * 2**28} bytes where" in refusal(file)
 
 
 @pytest.mark.parametrize(
     ("place", "number"), [(0, 2000), (0, 60), (4, -60), (8, -1), (12, 2), (16, 1), (16, 2**20)]
 )
-def test_a_header_of_version_4_that_cannot_be_is_refused(save, place, number, refusal):
+def test_an_invalid_header_of_version_4_is_refused(save, place, number, refusal):
     """Byte orders of VAX, unknown types, negative dimensions, names of no length."""
     file = save("4", u=U, y=Y)
     content = bytearray(file.read_bytes())
@@ -257,4 +257,4 @@ def test_a_header_of_version_4_that_cannot_be_is_refused(save, place, number, re
     assert "r.mat is not a MAT-file" in refusal(file)
     second = content[: len(content) // 2]
     file.write_bytes(save("4", u=U, y=Y).read_bytes()[: len(second)] + content)
-    assert "r.mat is damaged or cut short (no variable begins at byte" in refusal(file)
+    assert "r.mat is damaged or truncated (no variable begins at byte" in refusal(file)

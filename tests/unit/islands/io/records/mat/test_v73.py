@@ -26,30 +26,30 @@ def hdf5(save):
     return hdf5
 
 
-def test_what_is_never_stored_is_not_made_up(hdf5, refusal):
+def test_unwritten_datasets_are_refused(hdf5, refusal):
     for chunks in (None, (1, 1000)):
         file = hdf5(lambda file, chunks=chunks: file.create_dataset("x", (1, 2**26), "f8", chunks=chunks))
         message = refusal(file)
-        assert "column x claims 536870912 bytes, and the file stores 0 for it" in message
+        assert "column x declares 536870912 bytes, but the file stores 0 for it" in message
 
 
-def test_a_shape_or_a_chunk_of_more_samples_than_any_record_has_is_refused(hdf5, refusal):
+def test_a_shape_or_a_chunk_above_the_sample_limit_is_refused(hdf5, refusal):
     def wide(file):
         file.create_dataset("x", (1, 2**40), "f8", chunks=(1, 2**16))
         file.create_dataset("z", (1, 60), "f8", chunks=(1, 2**28), maxshape=(1, None), compression="gzip")
 
     file = hdf5(wide)
-    assert "column x claims 1099511627776 samples" in refusal(file)
-    assert "column z claims 268435456 samples" in refusal(file, ["z"])
+    assert "column x declares 1099511627776 samples" in refusal(file)
+    assert "column z declares 268435456 samples" in refusal(file, ["z"])
 
 
 def test_a_filter_that_matlab_does_not_use_is_refused(hdf5, refusal):
     file = hdf5(lambda file: file.create_dataset("x", data=U[None, :], compression="lzf"))
-    assert "column x cannot be read (it is packed by a filter that MATLAB does not use" in refusal(file)
+    assert "column x cannot be read (it is compressed by a filter that MATLAB does not use" in refusal(file)
 
 
 @pytest.mark.parametrize("shuffle", [False, True])
-def test_a_signal_that_hardly_changes_may_be_packed_as_tightly_as_it_likes(hdf5, shuffle):
+def test_a_nearly_constant_signal_may_use_the_full_compression_ratio(hdf5, shuffle):
     steps = np.repeat([0.0, 1.0], 500_000)[None, :]
     file = hdf5(
         lambda file: file.create_dataset("x", data=steps, chunks=(1, 10**5), compression=9, shuffle=shuffle)
@@ -57,7 +57,7 @@ def test_a_signal_that_hardly_changes_may_be_packed_as_tightly_as_it_likes(hdf5,
     assert read_matlab(file).load("x").sum() == 500_000
 
 
-def test_nothing_outside_of_the_file_is_ever_read(hdf5, tmp_path, refusal):
+def test_other_files_are_never_read(hdf5, tmp_path, refusal):
     """Each of these shows the secret to whoever opens it with h5py alone."""
     secret = np.arange(60.0) + 1000
     (tmp_path / "secret.bin").write_bytes(secret.tobytes())
@@ -87,19 +87,19 @@ def test_nothing_outside_of_the_file_is_ever_read(hdf5, tmp_path, refusal):
         )
 
 
-def test_shapes_are_those_that_matlab_shows(hdf5):
+def test_shapes_are_those_of_matlab(hdf5):
     file = hdf5(lambda file: file.create_dataset("x", data=np.ones((2, 3, 4))))
     assert next(variable.shape for variable in read_variables(file) if variable.name == "x") == (4, 3, 2)
 
 
-def test_rings_of_groups_end_somewhere(hdf5, refusal):
+def test_cycles_of_groups_are_refused(hdf5, refusal):
     def ring(file):
         file["run/a"] = file["run"]
 
-    assert "a structure stands in two places, run and run.a" in refusal(hdf5(ring))
+    assert "a structure occurs in two places, run and run.a" in refusal(hdf5(ring))
 
 
-def test_groups_that_multiply_are_refused(hdf5, refusal):
+def test_groups_with_several_names_are_refused(hdf5, refusal):
     def tree(file):
         group = file["run"]
         for level in range(30):
@@ -108,12 +108,12 @@ def test_groups_that_multiply_are_refused(hdf5, refusal):
                 group[twin] = inner
             group = inner
 
-    assert "a structure stands in two places" in refusal(hdf5(tree))
+    assert "a structure occurs in two places" in refusal(hdf5(tree))
 
 
-def test_groups_in_groups_end_somewhere(hdf5, refusal):
+def test_the_nesting_of_groups_is_limited(hdf5, refusal):
     file = hdf5(lambda file: file.create_group("/".join("a" * 40)))
-    assert "structures stand in one another more than 32 deep" in refusal(file)
+    assert "structures are nested more than 32 deep" in refusal(file)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_objects_of_version_7_3_are_refused_with_advice(hdf5, kind, attributes, 
     assert ADVICE[kind].format(x="x") in message
 
 
-def test_an_array_of_structures_of_version_7_3_is_one_column_that_is_refused(hdf5, refusal):
+def test_an_array_of_structures_of_version_7_3_is_refused(hdf5, refusal):
     def store(file):
         runs = file.create_group("runs")
         runs.attrs["MATLAB_class"] = np.bytes_("struct")
