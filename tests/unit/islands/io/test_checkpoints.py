@@ -1,4 +1,4 @@
-"""Checkpoints: an archipelago comes back as it was, or not at all and with a message."""
+"""Checkpoints: exact round trips, atomic writes, and errors for damaged files."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from islands.model.parsing import parse
 from islands.model.primitives import PRIMITIVES, primitive
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
-#: Floats that lose something in any but an exact round trip.
+#: Floats that only an exact round trip preserves.
 FLOATS = (0.1 + 0.2, 5e-324, -1.7976931348623157e308, 1 / 3, -0.0, 1e22)
 
 GENES = (
@@ -53,11 +53,11 @@ def archipelago():
     hall = with_entries(HallOfFame(), population)
     assert len(hall.entries) == 2
     here = Island(0, 2**40, 7, population, population[:1], hall, 0.1 + 0.2)
-    beside = replace(here, index=1, population=population[::-1], elite=(), abandon_threshold=inf)
-    return Archipelago((here, beside))
+    second = replace(here, index=1, population=population[::-1], elite=(), abandon_threshold=inf)
+    return Archipelago((here, second))
 
 
-#: Nobody lives there yet.
+#: Islands without individuals.
 EMPTY = empty_archipelago(2, 5)
 
 
@@ -83,7 +83,7 @@ def test_an_archipelago_is_read_back_exactly(path):
     read, about = read_checkpoint(path)
     assert read == archipelago()
     assert about == ABOUT
-    # Equality of floats overlooks the sign of zero, equality of regressors all but their text.
+    # Float equality ignores the sign of zero, and regressor equality compares texts only.
     assert repr(read) == repr(archipelago())
 
 
@@ -125,14 +125,14 @@ def test_user_defined_primitives_are_read_back_from_their_table(path):
 
 @pytest.mark.parametrize("name", ["index", "seed", "generation", "population", "elite", "hall", "bar"])
 def test_an_island_with_a_missing_part_is_refused(document, path, name):
-    """An island without its bar is one of the first schema, whose tournaments knew every fitness."""
+    """An island without ``bar`` has the first schema, in which no evaluations were abandoned."""
     del document["islands"][1][name]
     path.write_text(json.dumps(document))
     with pytest.raises(ModelError, match=f"checkpoint.json is damaged: KeyError\\('{name}'\\)"):
         read_checkpoint(path)
 
 
-# Written so that a crash leaves the old one or the new one.
+# Atomic replacement.
 
 
 def test_a_crash_before_replacing_keeps_the_old_checkpoint(path, monkeypatch):
@@ -172,11 +172,11 @@ def test_a_checkpoint_is_synced_before_it_replaces_the_old_one(path, monkeypatch
     assert order == ["synchronised", "replaced"]
 
 
-# A hall of fame by itself.
+# Hall of fame files.
 
 
 def halls():
-    """One hall found in two ways: in another order, on islands, written otherwise."""
+    """One hall of fame, built in two orders and from differently written expressions."""
     found = [
         individual(*GENES, fitness=1 / 3),
         individual("y(k-2)", "u1(k-1)*y(k-1)", fitness=0.25),
@@ -240,7 +240,7 @@ def test_a_hall_is_replaced_atomically(tmp_path, monkeypatch):
     assert path.read_bytes() == before
 
 
-# What is no checkpoint is refused with a message that names the file.
+# Invalid checkpoints are refused with a message that names the file.
 
 
 def test_a_missing_file_is_named(tmp_path):
@@ -288,7 +288,7 @@ def test_another_schema_is_refused(path, foreign):
     "changed", [{"islands": []}, {"islands": [0, 8]}, {"islands": [7, 6]}, {"islands": [-1, 7]}]
 )
 def test_islands_at_different_generations_are_refused(document, path, changed):
-    """And no islands at all: they are at no generation."""
+    """A checkpoint without islands has no generation and is refused too."""
     pairs = list(zip(document["islands"], changed["islands"], strict=False))
     for island, generation in pairs:
         island["generation"] = generation

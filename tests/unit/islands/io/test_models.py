@@ -1,4 +1,4 @@
-"""Model files: what is written is read back exactly, and what is wrong in one is named."""
+"""Model files: exact round trips, and errors that name the invalid field."""
 
 import json
 import math
@@ -20,7 +20,7 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def document(**changes):
-    """The text of a model file: y(k) = 0.5 y(k-1) + 0.25 u(k-1), with changes to its fields."""
+    """Return the text of a model file for y(k) = 0.5 y(k-1) + 0.25 u(k-1), with changed fields."""
     fields = {
         "schema": SCHEMA,
         "inputs": ["u_V"],
@@ -154,15 +154,15 @@ def test_dt_and_standard_errors_may_be_missing():
     assert model.standard_errors is None
 
 
-# What is wrong in a file.
+# Invalid files.
 
 BROKEN = {
     "no field": ("{}", "inputs: Field required"),
     "no json": ("y(k) = 1", "the file: Invalid JSON"),
     "a list": ("[]", "the file: Input should be an object"),
     "another schema": (document(schema="islands.model/2"), "schema: Input should be 'islands.model/1'"),
-    "a stranger": (document(author="me"), "author: Extra inputs are not permitted"),
-    "a stranger in a term": (
+    "unknown field": (document(author="me"), "author: Extra inputs are not permitted"),
+    "unknown field of a term": (
         document(terms=[term("u(k-1)", unit="V")]),
         "terms.0.unit: Extra inputs are not permitted",
     ),

@@ -1,4 +1,4 @@
-"""A result folder: every field of the contract, no number that JSON does not know, nothing left over."""
+"""Result folder: all fields of the contract, only JSON numbers, no files of earlier results."""
 
 import hashlib
 import json
@@ -42,7 +42,7 @@ def loaded(findings):
 
 
 def with_best(findings, **changes):
-    """Change what is known of the best model."""
+    """Return the result with changed fields of the best model."""
     best, *others = findings.models
     changed = RankedModel(best.model, replace(best.assessment, **changes))
     return replace(findings, models=(changed, *others))
@@ -208,7 +208,7 @@ def test_model_files_do_not_depend_on_the_folder_or_the_clock(findings, tmp_path
     assert str(tmp_path) not in "".join((tmp_path / "here" / name).read_text() for name in names)
 
 
-# What is read by people.
+# Text summary.
 
 
 def test_the_summary_shows_record_settings_table_and_equations(findings):

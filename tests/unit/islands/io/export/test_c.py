@@ -1,4 +1,4 @@
-"""The exported C: compiled as the strictest of its readers compile it, it simulates what the kernel does."""
+"""C export: it compiles with strict warnings and simulates like the kernel."""
 
 import ctypes
 import json
@@ -45,7 +45,7 @@ def pointer(signal, sample=0):
 
 
 def simulated(exported, data, folder, y=None):
-    """Run the compiled ``simulate``; behind the first samples, y holds NaN before."""
+    """Run the compiled ``simulate``. Before the run, y is NaN after the first samples."""
     y = data.y.copy() if y is None else y
     y[exported.maximum_lag :] = np.nan
     inputs = [np.ascontiguousarray(column) for column in data.u.T]
@@ -90,7 +90,7 @@ def test_the_compiled_program_equals_the_model_bit_for_bit(folder, random_model,
     assume(not of_the_library(random_model))
     data = record(2, seed)
     run = free_run(random_model, data)
-    # A diverging free run ends at the bound; C goes on to infinity.
+    # The kernel stops a diverging free run at the bound; C continues to infinity.
     assume(run.outcome)
     lag = random_model.maximum_lag
     assert bits(simulated(random_model, data, folder)[lag:]) == bits(run.y[lag:])
@@ -181,7 +181,7 @@ def test_functions_are_defined_once_and_only_if_used():
     assert "static double" not in export(model({"y(k-1)": 1.0}), "c")
 
 
-# A user's own primitives.
+# User-defined primitives.
 
 
 def saturation(a):
@@ -194,7 +194,7 @@ def blend(a, b):
 
 OWN = {
     "saturation": primitive("saturation", saturation, c="return a / (1.0 + fabs(a));"),
-    # Names of the language and of the program itself.
+    # Names of the language and of the exported program.
     "double": primitive("double", saturation, c="double size = fabs(a);\nreturn a / (1.0 + size);"),
     "predict": primitive("predict", blend, c="return a > 0.5 ? 0.25 * a - b : b;"),
     "f_sign": primitive("f_sign", blend, c="if (a > 0.5)\n    return 0.25 * a - b;\nreturn b;"),

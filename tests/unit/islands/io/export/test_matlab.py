@@ -1,4 +1,4 @@
-"""The exported MATLAB: Octave runs it, and it simulates what the kernel does."""
+"""MATLAB export: Octave runs it, and it simulates like the kernel."""
 
 import shutil
 import subprocess
@@ -20,7 +20,7 @@ OCTAVE = shutil.which("octave-cli")
 
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="no octave-cli: install Octave to run the MATLAB")
 
-#: Reads numbers of a file, and writes them: files keep every bit.
+#: Exchanges numbers through binary files, which keep every bit.
 _SCRIPT = """
 function r = read_numbers(name)
   file = fopen(name); r = fread(file, Inf, 'double'); fclose(file);
@@ -33,7 +33,7 @@ end
 
 
 def octave(script, folder):
-    """Run a script in a folder of functions; no warning passes."""
+    """Run a script in a folder of functions. Warnings fail the test."""
     done = subprocess.run(
         [OCTAVE, "--quiet", "--no-init-file", "--no-history", "--eval", script],
         cwd=folder,
@@ -46,7 +46,7 @@ def octave(script, folder):
 
 
 def simulated(programs, folder):
-    """Run several exported models on a record each, in one process; every one has a folder of its own."""
+    """Run several exported models on one record each, in one process with a folder for each."""
     runs = []
     for index, (exported, data) in enumerate(programs):
         own = folder / str(index)
@@ -87,14 +87,14 @@ def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
 
 
 @needs_octave
-# An example is a process of Octave: to shrink one would take minutes.
+# Each example starts Octave, so that shrinking would take minutes.
 @pytest.mark.ci
 @settings(max_examples=4, phases=[Phase.reuse, Phase.generate])
 @given(st.lists(models(), min_size=12, max_size=12), st.integers(0, 2**32 - 1))
 def test_octave_runs_any_model(tmp_path_factory, random_models, seed):
     data = record(2, seed)
     runs = [(each, free_run(each, data)) for each in random_models]
-    # A diverging free run ends at the bound; Octave goes on to infinity.
+    # The kernel stops a diverging free run at the bound; Octave continues to infinity.
     calm = [(each, run) for each, run in runs if run.outcome]
     found = simulated([(each, data) for each, _ in calm], tmp_path_factory.mktemp("octave"))
     for (each, run), theirs in zip(calm, found, strict=True):
@@ -110,9 +110,9 @@ def test_a_column_name_cannot_break_the_file(tmp_path):
     assert [y.tolist() for y in found] == [[0.5, 2.0]] * len(HOSTILE_NAMES)
 
 
-#: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and what Octave shows of what they return.
+#: Calls of y(k) = 0.5 y(k-1) + 0.25 u(k-2), and Octave's output for them.
 CALLS = {
-    # A row or a column as the input is, and y0 of either.
+    # The output is a row or a column like the input; y0 may be either.
     "narx_model([4 8 12], [1 2])": "[1 2 2]",
     "narx_model([4 8 12], [1; 2])": "[1 2 2]",
     "narx_model([4; 8; 12], [1 2])": "[1;2;2]",
@@ -120,7 +120,7 @@ CALLS = {
     "narx_model([4 8], [1 2])": "[1 2]",
     "narx_model(4, [1 2])": "1",
     "size(narx_model(zeros(0, 1), [1 2]))": "[0 1]",
-    # Integers would round, and single numbers lose digits.
+    # Integer arithmetic would round, and single precision would lose digits.
     "narx_model(int8([1 8 12]), int8([1 3]))": "[1 3 1.75]",
     "class(narx_model(single([4 8 12]), single([1 2])))": "double",
 }
@@ -169,7 +169,7 @@ def test_functions_are_defined_once_after_the_model():
     assert text.count("\nend\n") == 2
 
 
-# A user's own primitives.
+# User-defined primitives.
 
 
 def saturation(a):
@@ -182,7 +182,7 @@ def blend(a, b):
 
 OWN = {
     "saturation": primitive("saturation", saturation, matlab="r = a / (1 + abs(a));"),
-    # Names of the language and of the program itself.
+    # Names of the language and of the exported program.
     "end_": primitive("end_", saturation, matlab="size = abs(a);\nr = a / (1 + size);"),
     "total": primitive("total", blend, matlab="if a > 0.5, r = 0.25*a - b; else, r = b; end"),
     "narx_model": primitive("narx_model", blend, matlab="r = b;\nif a > 0.5\n  r = 0.25*a - b;\nend"),

@@ -1,4 +1,4 @@
-"""The table of exports; the Python module computes the kernel's numbers bit for bit, whatever the model."""
+"""Table of export formats, and the Python export, which equals the kernel bit for bit for any model."""
 
 import json
 import math
@@ -24,7 +24,7 @@ from support.strategies import models
 
 
 def module(exported):
-    """Run an exported module in a namespace of its own."""
+    """Run an exported module in a separate namespace."""
     namespace = {}
     exec(export(exported, "python"), namespace)
     return namespace
@@ -53,7 +53,7 @@ def test_the_python_module_simulates_like_the_kernel(name):
 
 
 def test_a_zero_input_gives_no_negative_zero():
-    # The kernel adds its terms to zero.
+    # The kernel adds the terms to zero.
     at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)
     exported = model({"u(k-1)": -0.5, "y(k-1)": -0.25})
     assert bits(simulated(exported, at_rest)) == [0] * 9
@@ -64,7 +64,7 @@ def test_a_zero_input_gives_no_negative_zero():
 def test_the_python_module_equals_the_model_bit_for_bit(random_model, seed):
     data = record(2, seed)
     run = free_run(random_model, data)
-    # A diverging free run ends at the bound; Python goes on, to infinity or an error of its math.
+    # The kernel stops a diverging free run at the bound; Python continues to infinity or to a math error.
     assume(run.outcome)
     try:
         theirs = simulated(random_model, data)
@@ -103,7 +103,7 @@ def test_a_column_name_cannot_break_the_module(name):
     assert made["simulate"]([1.0, 2.0], [0.5]) == [0.5, 2.0]
 
 
-# A user's own primitives.
+# User-defined primitives.
 
 STRENGTH, OFFSET = 2.0, 3
 SHARE = np.float64(0.25)
@@ -164,7 +164,7 @@ OWN = {
     "a function of math": taken_from_math,
     "a name of the export": predict,
     "a name of a signal": u,
-    "a function of its own": nested,
+    "a nested function": nested,
     "a closure": limited(0.5),
 }
 
@@ -246,7 +246,7 @@ def test_a_number_with_a_name_of_the_export_is_refused():
     assert "'own' uses MAXIMUM_LAG, a name that means something else" in refused(with_a_taken_name)
 
 
-# The other kinds.
+# Other formats.
 
 
 def test_other_formats_are_equations_and_the_model_file():

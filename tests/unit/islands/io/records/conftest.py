@@ -1,4 +1,4 @@
-"""What the tests of the readers share: files as MATLAB saves them, and refusals that take no memory."""
+"""Fixtures for the readers: files as MATLAB saves them, and refusals with a memory limit."""
 
 import tracemalloc
 
@@ -15,7 +15,7 @@ _CLASSES = {"float64": "double", "float32": "single", "bool": "logical"}
 
 
 def _hdf5(path, variables):
-    """Write version 7.3: 512 bytes of MATLAB's own, then HDF5 with turned axes and classes as attributes."""
+    """Write version 7.3: a header of 512 bytes, then HDF5 with reversed axes and classes as attributes."""
     with h5py.File(path, "w", userblock_size=512) as file:
         file.create_group("#refs#")
         for name, value in variables.items():
@@ -75,7 +75,7 @@ _SAVERS = {
 
 @pytest.fixture
 def save(tmp_path):
-    """Write variables as ``save -v4``, ``-v6``, ``-v7`` and ``-v7.3`` do; a dictionary is a structure."""
+    """Write variables like ``save -v4``, ``-v6``, ``-v7`` and ``-v7.3``; a dictionary is a structure."""
 
     def save(version, name="r.mat", **variables):
         _SAVERS[version](tmp_path / name, variables)
@@ -86,7 +86,7 @@ def save(tmp_path):
 
 @pytest.fixture
 def refusal():
-    """Read a record that is refused, which takes some megabytes at most; return the words."""
+    """Read a record that is refused, with a memory limit of some megabytes; return the message."""
 
     def refusal(file, inputs=("x",), output="y"):
         tracemalloc.start()

@@ -1,4 +1,4 @@
-"""NumPy archives that are no record are refused with a message that says what to do."""
+"""NumPy archives without a valid record are refused with a message that says what to do."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_a_damaged_archive_is_refused(tmp_path):
 def test_a_truncated_archive_is_refused(tmp_path):
     np.savez(tmp_path / "whole.npz", u=np.arange(500.0), y=np.arange(500.0), dt=0.01)
     content = (tmp_path / "whole.npz").read_bytes()
-    # The directory at the archive's end stays, so that it still counts as an archive.
+    # The directory at the end is kept, so that the file is still recognised as an archive.
     message = refusal(tmp_path, content[:200] + content[-230:], inputs=["u"], output="y", name="bad.npz")
     assert "bad.npz" in message
     assert "write it again" in message

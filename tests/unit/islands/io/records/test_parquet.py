@@ -1,4 +1,4 @@
-"""Parquet files: numbers of every kind by name, times in the unit of their name, and no belief in claims."""
+"""Parquet files: types of numbers, times in the unit of their name, and checks of declared sizes."""
 
 import struct
 import sys
@@ -22,7 +22,7 @@ U, Y, T = K % 7 - 3.0, K * K % 11 + 0.5, K / 8
 
 @pytest.fixture
 def write(tmp_path):
-    """Write columns beside t_s, u_V and y_um, which they may replace; some may be dropped."""
+    """Write t_s, u_V and y_um, which may be replaced or dropped, and further columns."""
 
     def write(options=None, drop=(), **columns):
         table = pa.table({"t_s": T, "u_V": U, "y_um": Y} | columns).drop_columns(list(drop))
@@ -120,7 +120,7 @@ TICKS = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
 
 def stamps(unit, step=0.125, zone=None):
-    """Points in time from 2023-11-14 on, by so many seconds."""
+    """Return points in time from 2023-11-14 on with a step in seconds."""
     ticks = [1_700_000_000 * TICKS[unit] + round(k * step * TICKS[unit]) for k in range(SAMPLES)]
     return pa.array(ticks, pa.timestamp(unit, zone))
 
@@ -140,7 +140,7 @@ def test_points_in_time_are_relative_to_the_first_in_any_unit(write, name, colum
 
 
 def test_nanoseconds_keep_their_precision(write):
-    """As seconds since 1970 in double precision these stamps would jitter by a quarter of their step."""
+    """In seconds since 1970, double precision would give these stamps a jitter of a quarter of their step."""
     record = read_record(timed(write, "time", stamps("ns", 1e-6)), ["u_V"], "y_um")
     assert record.dt == pytest.approx(1e-6, rel=1e-9)
 
@@ -177,7 +177,7 @@ def test_a_gap_in_time_is_refused_by_sample(write):
     assert "sample 31, column time follows a gap" in refusal(timed(write, "time", pa.array(column)))
 
 
-# Damage, lies, and the extra
+# Damaged files, wrong sizes, and the optional dependency
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_a_file_truncated_at_any_position_is_refused(write):
 
 
 def varint(number):
-    """Write an integer as the footer does: zigzag, seven bits a byte."""
+    """Encode an integer like the footer: zigzag, seven bits per byte."""
     number *= 2
     written = b""
     while number > 127:
@@ -212,7 +212,7 @@ def varint(number):
 
 
 def claiming(file, rows, everywhere=True):
-    """Exchange the number of rows in the footer: everywhere, or where it is first, for the whole file."""
+    """Replace the number of rows in the footer: everywhere, or only the first one, for the whole file."""
     content = file.read_bytes()
     length = struct.unpack("<I", content[-8:-4])[0]
     footer = content[-8 - length : -8].replace(varint(1234), varint(rows), -1 if everywhere else 1)

@@ -1,4 +1,4 @@
-"""A preview describes every column of a file and says in `read_record`'s words what stands against it."""
+"""Preview: every column of a file, with the messages of `read_record` as its problems."""
 
 import json
 import subprocess
@@ -17,7 +17,7 @@ T, U, Y = K / 100, K % 7 - 3.0, K * K % 11 + 0.5
 
 
 def table(tmp_path, separator=",", comma=False, drop=(), **columns):
-    """Write t_s, u_V and y_um and what else is given as text; return the file."""
+    """Write t_s, u_V, y_um and further text columns; return the file."""
     columns = {
         name: column
         for name, column in ({"t_s": T, "u_V": U, "y_um": Y} | columns).items()
@@ -35,7 +35,7 @@ def archive(tmp_path, **arrays):
 
 
 def cells(values, **changed):
-    """Return values as cells, some of them changed: ``c5="off"``."""
+    """Return values as text cells, with some cells replaced: ``c5="off"``."""
     texts = [str(value) for value in values]
     for place, text in changed.items():
         texts[int(place[1:])] = text

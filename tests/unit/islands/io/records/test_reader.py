@@ -1,4 +1,4 @@
-"""Reading records: in whatever dialect or format, what was written comes back with names, units and times."""
+"""Reading of records: every dialect and format gives back numbers, names, units and times."""
 
 import hashlib
 from pathlib import Path
@@ -31,7 +31,7 @@ def written(
 
 
 def archive(path: Path, **arrays: object) -> Path:
-    """Write a NumPy archive with U and Y, changed and completed by the given arrays."""
+    """Write a NumPy archive with U and Y, which the given arrays replace or complete."""
     file = path / "r.npz"
     np.savez(file, **({"u": U, "y": Y} | arrays))
     return file
@@ -318,7 +318,7 @@ def test_an_unused_array_does_no_harm(tmp_path):
     assert read_record(file, ["u"], "y").samples == SAMPLES
 
 
-# What else a file tells
+# Column names and fingerprints
 
 
 def test_columns_are_listed_in_the_files_order(tmp_path):
@@ -359,7 +359,7 @@ def test_a_column_name_with_the_suffix_plus_one_is_not_shifted(tmp_path):
     assert read_record(file, ["u+1"], "y").u[3, 0] == -3.0
 
 
-# Files that are none
+# Invalid files
 
 
 def test_a_missing_file_is_refused(tmp_path):

@@ -1,4 +1,4 @@
-"""The measured records are read, or refused with the reason."""
+"""Measured records: each is read, or refused with the reason."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""NumPy archives that lie about their size: header, directory and bytes are held against each other."""
+"""NumPy archives with wrong sizes: header, directory and stored bytes are checked against each other."""
 
 import io
 import struct
@@ -15,7 +15,7 @@ U, Y = K % 7 - 3.0, K * K % 11 + 0.5
 
 
 def member(array, shape=None):
-    """Write an array as numpy.save does, its header claiming another shape if one is given."""
+    """Write an array like numpy.save; ``shape`` replaces the shape in its header."""
     stream = io.BytesIO()
     header = {"descr": np.lib.format.dtype_to_descr(array.dtype), "fortran_order": False}
     np.lib.format.write_array_header_1_0(stream, header | {"shape": array.shape if shape is None else shape})
@@ -24,7 +24,7 @@ def member(array, shape=None):
 
 @pytest.fixture
 def archive(tmp_path):
-    """Write an archive of sound arrays u, y and dt beside what is given as bytes."""
+    """Write an archive of the valid arrays u, y and dt and of further members given as bytes."""
 
     def archive(packing=zipfile.ZIP_STORED, **members):
         sound = {"u": member(U), "y": member(Y), "dt": member(np.array(0.1))}
@@ -66,7 +66,7 @@ def test_a_header_with_an_impossible_shape_is_refused(archive, refusal):
 
 @pytest.mark.parametrize("packing", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
 def test_a_directory_size_above_the_compression_limit_is_refused(archive, packing, refusal):
-    """The directory at the archive's end says 512 MB, and so does the header of the array."""
+    """Both the directory of the archive and the header of the array declare 512 MB."""
     content = member(U, (2**26,))
     claimed = len(content) - U.nbytes + 8 * 2**26
     file = archive(packing, x=content)
@@ -77,7 +77,7 @@ def test_a_directory_size_above_the_compression_limit_is_refused(archive, packin
     file.write_bytes(written[: entry + 24] + struct.pack("<I", claimed) + written[entry + 28 :])
     message = refusal(file)
     assert f"column x declares {claimed} bytes, but the file stores" in message
-    assert message.count(", packed") == (packing == zipfile.ZIP_DEFLATED)
+    assert message.count(", compressed") == (packing == zipfile.ZIP_DEFLATED)
 
 
 def test_a_directory_size_above_that_of_the_file_is_refused(archive, refusal):
@@ -91,7 +91,9 @@ def test_a_directory_size_above_that_of_the_file_is_refused(archive, refusal):
 
 @pytest.mark.parametrize("packing", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_an_archive_with_another_compression_is_refused(archive, packing, refusal):
-    assert "cannot be read (its compression method is not used by numpy.savez" in refusal(archive(packing), ["u"])
+    assert "cannot be read (its compression method is not used by numpy.savez" in refusal(
+        archive(packing), ["u"]
+    )
 
 
 def test_an_array_with_unicode_field_names_is_refused(archive, refusal):

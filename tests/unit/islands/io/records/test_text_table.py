@@ -1,4 +1,4 @@
-"""Text tables that are no record are refused with a message that says what to do."""
+"""Text tables without a valid record are refused with a message that says what to do."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every bad record is refused with a message that names file, row and column and says what to do."""
+"""Validation: messages name file, row and column and say what to do."""
 
 import numpy as np
 import pytest

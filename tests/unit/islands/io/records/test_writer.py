@@ -1,4 +1,4 @@
-"""Writing records and simulations: what was written is read back exactly."""
+"""Writing of records and simulations: files are read back exactly."""
 
 import math
 

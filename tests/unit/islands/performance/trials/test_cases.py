@@ -1,4 +1,4 @@
-"""The simulations in trials: what each can name, the model that is identified, and the oracle."""
+"""Trial cases: nameable faults, the identified model, and the oracle."""
 
 from dataclasses import replace
 
@@ -18,32 +18,33 @@ from islands.simulation.predictors import free_run
 def test_nameable_faults_are_those_with_an_effect(name: str) -> None:
     simulated = CASES[name]
     system = simulated.system
-    hiding = inject(
+    faulty = inject(
         [], np.random.default_rng(4), system.seconds / 3, system=system, perturbed=simulated.perturbed
     )
-    core = simulated.make(hiding)
-    scene = make_context(hiding.record, core, count_fitted_samples(hiding.record))
-    found = {effect.name.partition(":")[0] for effect in select_effects(core, scene, simulated.tolerance)}
+    simulator = simulated.make(faulty)
+    context = make_context(faulty.record, simulator, count_fitted_samples(faulty.record))
+    effects = select_effects(simulator, context, simulated.tolerance)
+    found = {effect.name.partition(":")[0] for effect in effects}
     assert set(simulated.nameable) == found & set(system.known)
     assert set(simulated.nameless) == (set(system.known) - found) | set(system.unknown)
 
 
 def test_an_identified_model_follows_a_clean_record() -> None:
-    """It is another model than the truth: what it lacks is within the size of the noise."""
-    hiding = inject([], np.random.default_rng(4), 40.0)
-    record = hiding.record
+    """The model differs from the plant; its error is of the order of the noise."""
+    faulty = inject([], np.random.default_rng(4), 40.0)
+    record = faulty.record
     alone = type(record)(u=record.u[:, :1], y=record.y, dt=record.dt)
     model = identify_actuator(alone[:3000])
     missed = (free_run(model, alone).y - record.y)[model.maximum_lag :]
-    assert np.std(missed[:3000]) < 1.5 * hiding.sigma
-    assert np.std(missed[3000:]) < 2.5 * hiding.sigma
+    assert np.std(missed[:3000]) < 1.5 * faulty.sigma
+    assert np.std(missed[3000:]) < 2.5 * faulty.sigma
     assert model.size == 8
 
 
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
-    hiding = inject(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), perturbed=False)
-    return diagnose(hiding.record, CASES["column"].make(hiding))
+    faulty = inject(["even-nonlinearity"], np.random.default_rng(4), 10.0, band=(2.0, 4.0), perturbed=False)
+    return diagnose(faulty.record, CASES["column"].make(faulty))
 
 
 def test_a_correct_diagnosis_improves_as_much_as_the_oracle(found: Diagnosis) -> None:
@@ -52,8 +53,8 @@ def test_a_correct_diagnosis_improves_as_much_as_the_oracle(found: Diagnosis) ->
 
 
 def test_an_empty_diagnosis_has_no_improvement(found: Diagnosis) -> None:
-    silent = replace(found, best=found.base)
-    assert share_of_gain(silent, ["even-nonlinearity"], {}) == 0.0
+    empty = replace(found, best=found.base)
+    assert share_of_gain(empty, ["even-nonlinearity"], {}) == 0.0
 
 
 def test_the_oracle_ratio_is_none_without_a_name_or_an_improvement(found: Diagnosis) -> None:
@@ -63,10 +64,10 @@ def test_the_oracle_ratio_is_none_without_a_name_or_an_improvement(found: Diagno
 
 @pytest.mark.ci
 def test_the_oracle_fits_two_faults_in_turn() -> None:
-    hiding = inject(
+    faulty = inject(
         ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), perturbed=False
     )
-    found = diagnose(hiding.record, CASES["column"].make(hiding))
+    found = diagnose(faulty.record, CASES["column"].make(faulty))
     share = share_of_gain(found, ["offset", "even-nonlinearity"], {})
     assert share == pytest.approx(1.0, abs=0.05)
 

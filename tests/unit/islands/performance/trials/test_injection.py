@@ -1,4 +1,4 @@
-"""What hides effects: solved right, hidden in the band that was asked for, and the same each time."""
+"""Fault injection: accurate plants, misfits within the band, and reproducible records."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from islands.performance.trials.injection.plant import Force, simulate_plant
 from islands.performance.trials.injection.rig import Rig
 from islands.performance.trials.injection.tanks import TANKS, Tanks
 
-#: Every system, with a record that is quickly made.
+#: Every system, with the length of a short record in seconds.
 SYSTEMS = {"piezo": (PIEZO, 5.0), "oscillator": (OSCILLATOR, 4.0), "tanks": (TANKS, 2048.0)}
 
 
@@ -24,7 +24,7 @@ def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> FaultyRe
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("variant", [False, True], ids=["usual", "variant"])
+@pytest.mark.parametrize("variant", [False, True], ids=["standard", "variant"])
 @pytest.mark.parametrize("system", ["piezo", "tanks", "oscillator"])
 def test_every_fault_reaches_a_band_of_misfits(system: str, variant: bool) -> None:
     for name in SYSTEMS[system][0].known:
@@ -56,7 +56,7 @@ def test_a_clean_record_has_noise_only(system: str) -> None:
 
 
 def test_changes_within_tolerances_are_not_a_misfit() -> None:
-    """Of a gain only what no admissible parameters can take up is left."""
+    """For a gain error, only the part that no admissible parameters absorb counts."""
     gain = PIEZO.known["sensor-gain"]
     small, large = (
         replace(PIEZO, known={"sensor-gain": replace(gain, minimum=k, maximum=k)}) for k in (0.015, 0.08)
@@ -85,16 +85,16 @@ def test_a_fault_next_to_a_gain_error_keeps_its_misfit() -> None:
 def test_the_oscillator_matches_a_reference_solution(force: object) -> None:
     rng = np.random.default_rng(2)
     made: tuple[Force, ...] = () if force is None else (force(rng, 0.1),)  # type: ignore[operator]
-    truth = Oscillator(forces=made)
+    plant = Oscillator(forces=made)
     drive = OSCILLATOR.excitation(rng, 2.0)
-    y = simulate_plant(truth, drive)
+    y = simulate_plant(plant, drive)
 
     def slope(t: float, state: np.ndarray) -> list[float]:
         x, v, z = state
         strength, change = made[0](x / OUTPUT, v / SPEED, z) if made else (0.0, 0.0)
         u = np.interp(t, drive.time, drive.u)
-        total = u + truth.k * OUTPUT * strength - truth.c * v - truth.k * x
-        return [v, total / truth.m, change * v / OUTPUT]
+        total = u + plant.k * OUTPUT * strength - plant.c * v - plant.k * x
+        return [v, total / plant.m, change * v / OUTPUT]
 
     ideal = scipy.integrate.solve_ivp(
         slope, (0.0, drive.time[-1]), [0.0, 0.0, 0.0], t_eval=drive.time, max_step=5e-4, rtol=1e-6
@@ -104,17 +104,17 @@ def test_the_oscillator_matches_a_reference_solution(force: object) -> None:
 
 def test_the_tanks_match_a_reference_solution() -> None:
     drive = TANKS.excitation(np.random.default_rng(2), 800.0)
-    truth = Tanks(leaks=(0.002, 0.001), inflows=(0.01, -0.005))
+    plant = Tanks(leaks=(0.002, 0.001), inflows=(0.01, -0.005))
 
     def slope(t: float, x: np.ndarray) -> list[float]:
-        fallen = truth.k1 * np.sqrt(x[0]) + 0.002 * x[0]
-        filled = truth.k4 * np.interp(t, drive.time, drive.u)
-        return [filled + 0.01 - fallen, fallen - 0.005 - truth.k3 * np.sqrt(x[1]) - 0.001 * x[1]]
+        fallen = plant.k1 * np.sqrt(x[0]) + 0.002 * x[0]
+        filled = plant.k4 * np.interp(t, drive.time, drive.u)
+        return [filled + 0.01 - fallen, fallen - 0.005 - plant.k3 * np.sqrt(x[1]) - 0.001 * x[1]]
 
     ideal = scipy.integrate.solve_ivp(
-        slope, (0.0, drive.time[-1]), truth.start, t_eval=drive.time, max_step=1.0, rtol=1e-8
+        slope, (0.0, drive.time[-1]), plant.start, t_eval=drive.time, max_step=1.0, rtol=1e-8
     ).y[1]
-    assert np.max(np.abs(simulate_plant(truth, drive) - ideal)) < 1e-3
+    assert np.max(np.abs(simulate_plant(plant, drive) - ideal)) < 1e-3
 
 
 def test_a_tank_overflows_at_its_edge_into_the_lower_tank() -> None:
@@ -130,13 +130,13 @@ def test_a_tank_overflows_at_its_edge_into_the_lower_tank() -> None:
 
 
 def test_a_gain_step_changes_the_output_only_after_its_time() -> None:
-    for system, truth in ((PIEZO, Piezo()), (OSCILLATOR, Oscillator()), (TANKS, Tanks())):
+    for system, plant in ((PIEZO, Piezo()), (OSCILLATOR, Oscillator()), (TANKS, Tanks())):
         drive = system.excitation(np.random.default_rng(2), 0.3 * system.seconds)
         half = float(drive.time[-1]) / 2
         changed = simulate_plant(
-            replace(truth, gain_profile=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive
+            replace(plant, gain_profile=lambda time, half=half: 1.0 + 0.1 * (time > half)), drive
         )
-        moved = np.abs(changed - simulate_plant(truth, drive)) > 1e-9
+        moved = np.abs(changed - simulate_plant(plant, drive)) > 1e-9
         assert not moved[: moved.size // 2].any()
         assert moved[moved.size // 2 + 10 :].mean() > 0.9
 
@@ -157,7 +157,7 @@ def test_an_unreachable_misfit_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.ci
 def test_a_record_in_which_a_fault_is_invisible_is_redrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The highest peak of this one is in the part that is locked away: cut off there, nobody sees it."""
+    """The highest peak of the first record is in the held-out part, where saturation is not visible."""
 
     def hidden_peak() -> FaultyRecord:
         return inject(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))

@@ -1,4 +1,4 @@
-"""The tally of trials: what is counted, and its bounds."""
+"""Scores of trials: counts, bounds and targets."""
 
 import pytest
 
@@ -107,7 +107,7 @@ def test_oracle_ratios_are_taken_over_detected_faults() -> None:
 
 
 def test_confidences_are_compared_with_frequencies() -> None:
-    """Of four names said with 0.95 three are right, of two with 0.55 one; a name for nothing is wrong."""
+    """Three of four names with confidence 0.95 and one of two with 0.55 are right; false names are wrong."""
     outcomes = [
         *[outcome(("delay",), ("delay",), confidence=0.95)] * 3,
         outcome((), ("offset",), confidence=0.95),
@@ -144,7 +144,7 @@ def test_targets_are_undecided_without_trials() -> None:
 
 
 def test_bounds_are_the_clopper_pearson_interval() -> None:
-    """0 of 300 allows 1.2 %, 97 of 100 stands for 91.5 to 99.4 %."""
+    """0 of 300 gives an upper bound of 1.2 %; 97 of 100 gives 91.5 to 99.4 %."""
     assert Proportion("", 0, 300).bounds == pytest.approx((0.0, 1.2221), abs=1e-3)
     assert Proportion("", 97, 100).bounds == pytest.approx((91.482, 99.377), abs=1e-2)
     assert Proportion("", 5, 5).bounds[1] == 100.0

@@ -1,4 +1,4 @@
-"""MAT-files: what MATLAB saves comes back, whatever the version; what is no channel does no harm."""
+"""MAT-files of every version: columns are read back, and other variables do no harm."""
 
 import shutil
 import subprocess
@@ -169,7 +169,7 @@ def test_a_structure_with_a_name_like_time_is_not_the_time(save):
     assert read_record(file, ["u"], "y").dt == pytest.approx(0.01)
 
 
-# What is no channel
+# Unsupported classes
 
 
 NO_CHANNELS = {
@@ -183,9 +183,7 @@ NO_CHANNELS = {
 @pytest.mark.parametrize("version", WITH_STRUCTURES)
 @pytest.mark.parametrize("kind", NO_CHANNELS)
 @pytest.mark.parametrize("place", ["odd", "run.odd"])
-def test_an_unsupported_class_is_refused_with_advice_only_when_read(
-    save, version, kind, place
-):
+def test_an_unsupported_class_is_refused_with_advice_only_when_read(save, version, kind, place):
     odd = NO_CHANNELS[kind]
     file = save(
         version, u=U, y=Y, Ts=0.1, **({"odd": odd} if place == "odd" else {"run": {"odd": odd, "v": U}})
@@ -223,13 +221,13 @@ def test_advice_has_one_placeholder():
         assert "{" not in advice.format(x="run.u").replace("{1}", "")
 
 
-# Files of others
+# Files of other programs
 
 
 def numbers_by_scipy(file):
     try:
         variables = scipy.io.loadmat(file)
-    except Exception:  # some are damaged on purpose
+    except Exception:  # some are intentionally damaged
         return {}
     return {
         name: value
@@ -239,7 +237,7 @@ def numbers_by_scipy(file):
 
 
 def test_samples_of_matlab_4_to_7_4_have_the_same_numbers_as_in_scipy():
-    """Files of MATLAB itself, on Solaris, Linux and Windows, of either byte order."""
+    """The files were written by MATLAB on Solaris, Linux and Windows, in both byte orders."""
     folder = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
     compared = 0
     for file in folder.glob("*.mat"):

@@ -1,4 +1,4 @@
-"""MAT-files that are damaged or lie: each is refused in words, before memory is taken for what it claims."""
+"""Damaged or malicious MAT-files: each is refused with a message, before memory is allocated for it."""
 
 import struct
 import zlib
@@ -19,7 +19,7 @@ CLASSES = {"cell": 1, "struct": 2, "double": 6, "function_handle": 16}
 
 
 def element(kind, content, size=None):
-    """Write an element of version 5; a size that is given is a lie."""
+    """Write an element of version 5; ``size`` replaces the correct size."""
     written = struct.pack("<2I", kind, len(content) if size is None else size) + content
     return written + b"\0" * (0 if kind == COMPRESSED else -len(content) % 8)
 
@@ -52,7 +52,7 @@ def packed(variable):
 
 @pytest.fixture
 def write(tmp_path):
-    """Write a MAT-file of version 5 from elements, u, y and Ts always among them."""
+    """Write a MAT-file of version 5 with u, y, Ts and further elements."""
 
     def write(*elements):
         header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x100) + b"IM"
@@ -72,9 +72,7 @@ def test_the_valid_file_of_these_tests_is_read(write):
 
 @pytest.mark.parametrize("kind", ["timeseries", "timetable", "iddata", "mine"])
 @pytest.mark.parametrize("wrapped", [bytes, packed])
-def test_an_object_named_ts_is_refused_with_advice_only_when_read(
-    write, kind, wrapped, refusal
-):
+def test_an_object_named_ts_is_refused_with_advice_only_when_read(write, kind, wrapped, refusal):
     file = write(wrapped(opaque("ts", kind)))
     assert read_record(file, ["u"], "y").dt == pytest.approx(0.1)
     message = refusal(file, ["ts"])
@@ -91,7 +89,7 @@ def test_a_function_handle_is_refused_with_advice(write, refusal):
     assert "column x holds function_handle" in refusal(write(matrix("x", "function_handle", (1, 1))))
 
 
-# Other files, and parts of files
+# Other formats and truncated files
 
 
 @pytest.mark.parametrize(
@@ -137,7 +135,7 @@ def test_a_flipped_bit_in_compressed_numbers_affects_one_column_only(write, refu
     ("change", "words"),
     [
         (lambda stream: stream[:-4] + bytes(4), "incorrect data check"),
-        (lambda stream: stream[:-9], "it claims 4056 bytes but contains a different number"),
+        (lambda stream: stream[:-9], "it declares 4056 bytes but contains a different number"),
     ],
 )
 def test_compressed_numbers_with_a_wrong_checksum_or_no_end_are_refused(write, change, words, refusal):
@@ -155,14 +153,14 @@ def test_more_compressed_bytes_than_declared_are_refused(write, refusal):
 
 
 def test_numbers_of_an_unknown_type_are_refused(write, refusal):
-    """SciPy 1.17 looks this type up behind the end of its table and ends the process."""
+    """SciPy 1.17 reads past the end of a table for this type and terminates the process."""
     file = write(numbers("x", U, kind=0xFFFF))
     assert "column x cannot be read (its numbers have the unknown type 65535)" in refusal(file)
 
 
 def test_a_damaged_structure_does_no_harm(write, refusal):
-    lie = matrix("", "double", (60, 1), element(DOUBLE, U.tobytes()), size=8000)
-    file = write(packed(structure("s", a=numbers("", Y), b=lie)), structure("r", b=lie))
+    corrupt = matrix("", "double", (60, 1), element(DOUBLE, U.tobytes()), size=8000)
+    file = write(packed(structure("s", a=numbers("", Y), b=corrupt)), structure("r", b=corrupt))
     assert read_record(file, ["u"], "y").samples == len(U)
     for name in "sr":
         assert f"column {name} cannot be read (an element declares 8000 bytes" in refusal(file, [name])
@@ -177,7 +175,7 @@ def test_an_empty_field_may_have_no_bytes(write, refusal):
 def test_a_damaged_field_does_no_harm(write, refusal):
     file = write(structure("s", a=numbers("", Y, shape=(61, 1)), b=numbers("", U)))
     assert read_record(file, ["s.b"], "y").samples == len(U)
-    assert "column s.a cannot be read (it claims the shape (61, 1)" in refusal(file, ["s.a"])
+    assert "column s.a cannot be read (it declares the shape (61, 1)" in refusal(file, ["s.a"])
 
 
 def test_the_nesting_of_structures_is_limited(write, refusal):
@@ -195,13 +193,13 @@ def test_a_file_with_too_many_variables_is_refused(write, monkeypatch, refusal):
     assert "bad.mat has more than 50 variables" in refusal(write(*many))
 
 
-# Lies
+# Wrong sizes
 
 
 def test_a_shape_with_too_few_numbers_is_refused(write, refusal):
     for variable in (numbers("x", U, shape=(2**27, 1)), packed(numbers("x", U, shape=(2**27, 1)))):
         message = refusal(write(variable))
-        assert "it claims the shape (134217728, 1) and holds 60 numbers" in message
+        assert "it declares the shape (134217728, 1) but has 60 numbers" in message
 
 
 @pytest.mark.parametrize("shape", [(2**28, 1), (2**31 - 1, 2**31 - 1)])
@@ -227,13 +225,13 @@ def test_an_element_larger_than_its_parent_is_refused(write, refusal):
 def test_a_short_element_has_at_most_four_bytes(write, refusal):
     dimensions = struct.pack("<2H", INT32, 8) + struct.pack("<2i", 60, 1)
     flags = element(UINT32, struct.pack("<2I", CLASSES["double"], 0))
-    lie = element(MATRIX, flags + dimensions + element(INT8, b"x") + element(DOUBLE, U.tobytes()))
-    assert "bad.mat is damaged or truncated (an element declares 8 bytes" in refusal(write(lie))
+    corrupt = element(MATRIX, flags + dimensions + element(INT8, b"x") + element(DOUBLE, U.tobytes()))
+    assert "bad.mat is damaged or truncated (an element declares 8 bytes" in refusal(write(corrupt))
 
 
 def test_a_size_above_the_compression_limit_is_refused(write, refusal):
-    lie = matrix("x", "double", (2**20, 1), element(DOUBLE, U.tobytes(), 2**23), size=2**23 + 48)
-    message = refusal(write(packed(lie)))
+    corrupt = matrix("x", "double", (2**20, 1), element(DOUBLE, U.tobytes(), 2**23), size=2**23 + 48)
+    message = refusal(write(packed(corrupt)))
     assert "column x cannot be read (it declares 8388656 bytes, compressed to" in message
 
 
@@ -242,14 +240,14 @@ def test_a_variable_of_version_4_with_too_large_a_size_is_refused(save, refusal)
     content = bytearray(file.read_bytes())
     content[4:8] = struct.pack("<i", 2**28)
     file.write_bytes(content)
-    assert f"r.mat is damaged or truncated (variable u declares {8 * 60 * 2**28} bytes where" in refusal(file)
+    assert f"r.mat is damaged or truncated (variable u declares {8 * 60 * 2**28} bytes but" in refusal(file)
 
 
 @pytest.mark.parametrize(
     ("place", "number"), [(0, 2000), (0, 60), (4, -60), (8, -1), (12, 2), (16, 1), (16, 2**20)]
 )
 def test_an_invalid_header_of_version_4_is_refused(save, place, number, refusal):
-    """Byte orders of VAX, unknown types, negative dimensions, names of no length."""
+    """VAX byte orders, unknown types, negative dimensions, empty names."""
     file = save("4", u=U, y=Y)
     content = bytearray(file.read_bytes())
     content[place : place + 4] = struct.pack("<i", number)

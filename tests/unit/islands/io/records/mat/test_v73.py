@@ -1,4 +1,4 @@
-"""MAT-files of version 7.3 that lie or point elsewhere: HDF5 offers more ways to do so than other formats."""
+"""Malicious MAT-files of version 7.3: wrong sizes, and references to other files, which HDF5 allows."""
 
 import h5py
 import numpy as np
@@ -15,7 +15,7 @@ U, Y = K % 7 - 3.0, K * K % 11 + 0.5
 
 @pytest.fixture
 def hdf5(save):
-    """Change a sound file of version 7.3."""
+    """Change a valid file of version 7.3."""
 
     def hdf5(change):
         path = save("7.3", u=U, y=Y, Ts=0.1, run={"w": U})
@@ -58,7 +58,7 @@ def test_a_nearly_constant_signal_may_use_the_full_compression_ratio(hdf5, shuff
 
 
 def test_other_files_are_never_read(hdf5, tmp_path, refusal):
-    """Each of these shows the secret to whoever opens it with h5py alone."""
+    """With h5py alone, each of these references discloses the secret."""
     secret = np.arange(60.0) + 1000
     (tmp_path / "secret.bin").write_bytes(secret.tobytes())
     with h5py.File(tmp_path / "other.h5", "w") as other:
@@ -70,7 +70,7 @@ def test_other_files_are_never_read(hdf5, tmp_path, refusal):
         file["external"] = h5py.ExternalLink(outside, "/x")
         file["group"] = h5py.ExternalLink(outside, "/group")
         file["soft"] = h5py.SoftLink("/group/x")
-        file.create_dataset("group.x", data=secret[None, :])  # taken for a path, it leads through the link
+        file.create_dataset("group.x", data=secret[None, :])  # as a path, it leads through the link
         file.create_dataset("raw", (1, 60), "f8", external=[(str(tmp_path / "secret.bin"), 0, 480)])
         layout = h5py.VirtualLayout((1, 60), "f8")
         layout[:] = h5py.VirtualSource(outside, "x", (1, 60))
@@ -82,8 +82,8 @@ def test_other_files_are_never_read(hdf5, tmp_path, refusal):
     assert set(read_columns(file)) == {"u", "y", "Ts", "run.w", "external", "group", "soft", "raw", "virtual"}
     for name in ("external", "group", "soft", "raw", "virtual"):
         assert refusal(file, [name]) == (
-            f"r.mat: column {name} holds link where real numbers are expected: it points to another place, "
-            "which is never followed; save the values themselves"
+            f"r.mat: column {name} holds link where real numbers are expected: it refers to another place, "
+            "and references are never followed; save the values themselves"
         )
 
 
