@@ -1,10 +1,10 @@
-"""How many islands a coordinator can lead: epochs of next to no work, for more and more islands.
+"""Number of islands that one coordinator can schedule, measured with epochs of almost no work.
 
     python benchmarks/coordinator.py [--json FILE]
 
-Watched, not asserted. A model, seconds = a + b n, is fitted to the time of an epoch of n islands: with
-nothing to compute, b is what an island costs the coordinator, its actors and the machine between them. What
-the coordinator's own process spends of it is its CPU time: the limit where islands have cores of their own.
+Results are printed, not asserted. The model seconds = a + b n is fitted to the time of an epoch of n islands.
+Without computation, b is the cost of an island for the coordinator, the actors and the communication. The CPU
+time of the coordinator's process is its share of this cost: the limit if every island has a separate core.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from islands_service.engines import ENGINES
 
 ISLANDS = (2, 10, 30, 100, 300, 1000)
 
-#: Epochs that are timed, behind the first.
+#: Number of timed epochs, after the first one.
 TIMED = 10
 
 
@@ -52,7 +52,7 @@ def tiny(islands: int, topology: str, population: int) -> Problem:
 
 
 def epoch(engine, problem: Problem) -> tuple[float, float]:
-    """Seconds of an epoch, and of the coordinator's CPU in it."""
+    """Return the seconds of an epoch and the CPU seconds of the coordinator in it."""
     wall, cpu = [], []
     for _ in engine.run(problem, empty_archipelago(problem.settings.islands, 0), never):
         wall.append(time.perf_counter())
@@ -77,7 +77,7 @@ def main() -> None:
                     flush=True,
                 )
             n, wall, cpu = np.array(points).T
-            # Relative errors count: a thousand islands do not outweigh ten.
+            # Relative errors, so that a thousand islands do not outweigh ten.
             design = np.column_stack([np.ones_like(n), n])
             (a, b), (c, d) = (
                 np.linalg.lstsq(design / y[:, None], np.ones_like(y), rcond=None)[0] for y in (wall, cpu)

@@ -1,11 +1,11 @@
-"""What the discrepancy analysis says of measured records, beside published figures.
+"""Discrepancy analysis of measured records, compared with published figures.
 
     python benchmarks/measured_discrepancies.py [NAME ...] [--clean N] [--injected N] [--json FILE]
 
-A simulation that is known to lack something is held against a part of each record. What is then named is put
-into the simulation, and that is run on parts of the record, or on records of their own, that nothing above
-has seen. Surrogates have the noise of a record and nothing that the simulation lacks, or one effect that was
-put in. The records are looked for in $ISLANDS_DATA_DIR.
+A simulation with a known model error is compared with a part of each record. The simulation extended by the
+named effects is then run on test data: unused parts of the record or separate records. Surrogates have the
+noise of a record and either no model error or one injected effect. The records are read from
+$ISLANDS_DATA_DIR.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from pathlib import Path
 for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(library, "1")
 
-import numpy as np  # noqa: E402 - after what it reads
+import numpy as np  # noqa: E402 - after the environment is set
 
 import islands  # noqa: E402
 from islands.discrepancy.detectability import diagnose_surrogate  # noqa: E402
@@ -35,18 +35,18 @@ DATA = Path(os.environ.get("ISLANDS_DATA_DIR", Path(__file__).parents[2] / "shar
 
 @dataclass(frozen=True)
 class Case:
-    """A record, a naive simulation of it, and what the extended one is then run on.
+    """A record, a naive simulation of it, and the test data of the extended simulation.
 
     Attributes
     ----------
     record : callable
-        Makes the record that is diagnosed.
+        Reads the record to diagnose.
     simulation : str
     tests : mapping of str to callable
-        Records that nothing has seen; ``skip`` first samples of each are not counted.
+        Test records; the first ``skip`` samples of each are not counted.
     skip : int
     scale, unit : float, str
-        Of the errors as they are printed.
+        Scale and unit of the printed errors.
     published : str
     """
 
@@ -82,7 +82,7 @@ def silverbox(part: str, length: int | None = None):
         stored = np.load(DATA / "silverbox.npz")
         start, stop = stored[f"idx_{part}"]
         stop = stop if length is None else start + length
-        # The means of the whole recording are those of its electronics: 6 mV at the input.
+        # The means of the whole recording are offsets of the electronics: 6 mV at the input.
         u, y = (stored[name] - stored[name].mean() for name in ("u", "y"))
         return dataset(u[start:stop], y[start:stop], 1 / 610.35, ("V", "V"))
 
@@ -172,7 +172,7 @@ CASES = {
 
 
 def errors(case: Case, record: islands.Dataset, found) -> dict[str, list[float]]:
-    """Return the RMSE on each test, of the simulation alone and with what was found in it."""
+    """Return the RMSE on each test record, of the simulation alone and with the named effects."""
     rows = {}
     for name, made in case.tests.items():
         test = made()
@@ -184,26 +184,26 @@ def errors(case: Case, record: islands.Dataset, found) -> dict[str, list[float]]
 
 
 def probes(case: Case, found: islands.Diagnosis, clean: int, injected: int) -> dict:
-    """Return what is said of surrogates of a record: clean ones, and ones with an effect put in.
+    """Return the diagnoses of surrogates of a record, without and with an injected effect.
 
-    Effects take turns, each with a misfit of one to three standard deviations of what the best simulation
-    leaves, so that it is more than half of what is wrong.
+    Effects are injected in random order, with a misfit of one to four standard deviations of the residual of
+    the best simulation, so that the effect is the larger part of the misfit.
     """
     core = make_simulator(case.simulation, found.record)
     source = make_surrogates(found, core, {})
     called = [diagnose_surrogate(source, SurrogateCase(None, seed)).named for seed in range(clean)]
-    rng, told = np.random.default_rng(1), []
+    rng, diagnoses = np.random.default_rng(1), []
     names = rng.permutation(sorted(source.effects)).tolist()
-    while names and len(told) < injected:
+    while names and len(diagnoses) < injected:
         strong = [
             each
             for each in injection_strengths(source, source.effects[names.pop()], rng)
             if 1.0 < each.misfit < 4.0
         ]
         if strong:
-            answer = diagnose_surrogate(source, SurrogateCase(strong[0], len(told)))
-            told.append((strong[0].cause, answer.named, answer.recognised))
-    return {"clean": called, "injected": told}
+            answer = diagnose_surrogate(source, SurrogateCase(strong[0], len(diagnoses)))
+            diagnoses.append((strong[0].cause, answer.named, answer.recognised))
+    return {"clean": called, "injected": diagnoses}
 
 
 def measured(case: Case, clean: int = 0, injected: int = 0) -> dict:
@@ -239,17 +239,17 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help=", ".join(CASES))
     parser.add_argument("--json", type=Path)
     parser.add_argument("--clean", type=int, default=0, help="clean surrogates of each record")
-    parser.add_argument("--injected", type=int, default=0, help="surrogates of each with an effect put in")
+    parser.add_argument("--injected", type=int, default=0, help="surrogates of each with an injected effect")
     asked = parser.parse_args()
     rows = {}
     for name in asked.names or CASES:
         row = rows[name] = measured(CASES[name], asked.clean, asked.injected)
         print(f"{name} ({row['simulation']}, {row['samples']} samples, {row['cpu_s']:.0f} s of CPU)")
         names, first = ", ".join(row["names"]) or "-", ", ".join(row["candidates"])
-        print(f"    {row['verdict']}: {names}   (ladder: {first})")
+        print(f"    {row['verdict']}: {names}   (screened first: {first})")
         if row["locked"] is not None:
             before, after, low, high = row["locked"]
-            print(f"    locked {before:.4g} -> {after:.4g} {row['unit']} ({low:.0f} to {high:.0f} % less)")
+            print(f"    held out {before:.4g} -> {after:.4g} {row['unit']} ({low:.0f} to {high:.0f} % less)")
         for test, (before, after) in row["tests"].items():
             print(f"    {test}: {before:.4g} -> {after:.4g} {row['unit']}")
         said = row["surrogates"]
@@ -258,7 +258,7 @@ def main() -> None:
         if said["injected"]:
             first = sum(hidden == called for hidden, called, _ in said["injected"])
             among = sum(recognised for *_, recognised in said["injected"])
-            print(f"    put in: {len(said['injected'])}, named first {first}, among the names {among}")
+            print(f"    injected: {len(said['injected'])}, named first {first}, among the names {among}")
             print(f"        {[each[:2] for each in said['injected'] if each[0] != each[1]]}")
         if row["published"]:
             print(f"    {row['published']}")

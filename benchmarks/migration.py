@@ -1,9 +1,10 @@
-"""Does migration help? The error at equal evaluations, over topologies and seeds.
+"""Effect of migration on the error at an equal number of evaluations, over topologies and seeds.
 
     python benchmarks/migration.py [--preset paper-case1] [--seeds 10] [--json FILE]
 
-Watched, not asserted: the figures are in docs/decisions. The error is the RMSE of multiple shooting on the
-estimation data, which evolution minimises: of the best model of any size, and of six terms at most.
+Results are printed, not asserted; the figures are in docs/decisions. The error is the RMSE of multiple
+shooting on the estimation data, which evolution minimises, for the best model of any size and of at most six
+terms.
 """
 
 import argparse
@@ -20,7 +21,7 @@ from islands.evolution.presets import PRESETS
 from islands.evolution.problem import problem
 from islands.systems.catalogue import make_record
 
-#: Individuals in all populations together, and generations, by preset: case 1 has the paper's evaluations.
+#: Total number of individuals, and generations, by preset. Case 1 has the number of evaluations of the paper.
 BUDGETS = {"paper-case1": (500, 500), "hysteresis": (300, 80)}
 
 WAYS = {

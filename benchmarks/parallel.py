@@ -1,9 +1,10 @@
-"""What Ray costs and gives on two cores: efficiency, Ray's share, memory, recovery, cancelling.
+"""Cost and benefit of Ray on two cores: efficiency, overhead, memory, recovery, cancellation.
 
     python benchmarks/parallel.py [--json FILE]
 
-Watched, not asserted; leave the machine alone meanwhile. Two islands of the paper's case 1, isolated so that
-their work is the same however it is carried out: one alone, two in processes without Ray, two on Ray.
+Results are printed, not asserted; the machine must be idle otherwise. Two islands of the paper's case 1
+without migration, so that their work does not depend on the engine: one alone, two in processes without Ray,
+two on Ray.
 """
 
 import argparse
@@ -29,7 +30,7 @@ from islands.systems.catalogue import make_record
 from islands_service.engines import ENGINES
 from support.processes import actors, descendants, kill
 
-#: Generations of an epoch, and epochs that are timed behind the first two.
+#: Generations of an epoch, and number of epochs that are timed after the first two.
 EPOCHS = {"0.1 s": (2, 40), "1 s": (22, 6), "10 s": (220, 2)}
 
 
@@ -49,7 +50,7 @@ def never() -> bool:
 
 
 def seconds(epochs) -> tuple[float, list[float]]:
-    """Seconds from the end of the first epoch after the first populations, and between two."""
+    """Return the seconds from the end of the first epoch to the end, and between two epochs."""
     times = [time.perf_counter() for _ in epochs][1:]
     return times[-1] - times[0], [after - before for before, after in pairwise(times)]
 
@@ -72,7 +73,7 @@ def apart(problem: Problem) -> float:
 
 
 def memory(pid: int) -> float:
-    """Proportional share of memory of a process and its descendants, in MB."""
+    """Return the proportional set size of a process and its descendants in MB."""
     total = 0
     for each in (pid, *descendants(pid)):
         try:
@@ -84,14 +85,14 @@ def memory(pid: int) -> float:
 
 
 def killed(engine, problem: Problem) -> tuple[float, float]:
-    """Seconds of a run, and of the same with an island killed in the middle of an epoch."""
+    """Return the seconds of a run without and with an island killed during an epoch."""
     took = []
     for disturbed in (False, True):
         began, lost = None, []
         for count, _ in enumerate(engine.run(problem, empty_archipelago(2, 0), never)):
             if count == 1:
                 began = time.perf_counter()
-            # When there is one who stands in; the first two are those that the islands are on.
+            # By then a spare actor exists; the islands run on the first two actors.
             if disturbed and not lost and began and time.perf_counter() - began > 34.0:
                 lost.append(sorted(actors())[0])
                 kill(lost[0])
@@ -100,16 +101,16 @@ def killed(engine, problem: Problem) -> tuple[float, float]:
 
 
 def cancelled(engine, problem: Problem, after: float) -> float:
-    """Seconds from the wish to stop to the end, so many seconds into an epoch of ten."""
-    wished = []
+    """Return the seconds from a stop request, ``after`` seconds into an epoch of ten, to the end."""
+    requested = []
 
     def stop() -> bool:
-        return bool(wished) and wished[0] < time.perf_counter()
+        return bool(requested) and requested[0] < time.perf_counter()
 
     for count, _ in enumerate(engine.run(problem, empty_archipelago(2, 0), stop)):
         if count == 0:
-            wished.append(time.perf_counter() + after)
-    return time.perf_counter() - wished[0]
+            requested.append(time.perf_counter() + after)
+    return time.perf_counter() - requested[0]
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Hashes of results: run the same commands in two checkouts and compare what they write, bit for bit.
+"""Hashes of results: run the same commands in two checkouts and compare their output files bit for bit.
 
     python benchmarks/result_hashes.py CHECKOUT --out before.json
     python benchmarks/result_hashes.py CHECKOUT --out after.json --against before.json

@@ -1,4 +1,4 @@
-"""One job in many ways: the sha256 of its hall of fame, over seeds. Every line has to say `same`.
+"""SHA-256 of the hall of fame of one job that is run in several ways, over seeds. Every line must say `same`.
 
     python benchmarks/same_bits.py [--seeds 5]
 

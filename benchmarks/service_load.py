@@ -1,9 +1,9 @@
-"""How much a service takes: durable accepts, looks at jobs, event streams.
+"""Load of a service: durable job submissions, requests of jobs, event streams.
 
     python benchmarks/service_load.py [store accept get events] [--repeat 5] [--json FILE]
 
-Watched, not asserted: the goals are those of the service's design. The doors are those of `islands serve`, on
-SQLite, without a coordinator; the clients are this process, with connections that are kept open.
+Results are printed, not asserted; the targets are those of the service's design. The server is `islands
+serve` with SQLite and without a coordinator; the clients are this process with persistent connections.
 """
 
 import asyncio
@@ -27,30 +27,45 @@ from islands_service.domain.job import ProgressReport, Submission
 from islands_service.store import Store
 from support.service_processes import SPEC, Service, serving
 
-#: Clients at a time, jobs of each, and jobs of the one client that is alone.
-CLIENTS, EACH, ALONE = 16, 60, 200
+#: Number of concurrent clients.
+CLIENTS = 16
 
-#: Seconds of looking at a job, and connections.
-LOOKING, CONNECTIONS = 5.0, 16
+#: Number of jobs of each concurrent client.
+EACH = 60
 
-#: Streams, and events that are sent through them, so many seconds apart.
-STREAMS, EVENTS, APART = 500, 10, 0.7
+#: Number of jobs of a single client.
+ALONE = 200
 
-#: Nobody carries the jobs out: they wait.
-DOORS = {"ISLANDS_COORDINATORS": "0"}
+#: Duration of the requests of a job in seconds.
+LOOKING = 5.0
+
+#: Number of connections that request a job.
+CONNECTIONS = 16
+
+#: Number of event streams.
+STREAMS = 500
+
+#: Number of events sent to every stream.
+EVENTS = 10
+
+#: Interval between events in seconds.
+EVENT_INTERVAL = 0.7
+
+#: Without a coordinator, jobs stay in the queue.
+ENVIRONMENT = {"ISLANDS_COORDINATORS": "0"}
 
 
 @contextmanager
-def doors() -> Iterator[Service]:
+def start_service() -> Iterator[Service]:
     with (
         tempfile.TemporaryDirectory(prefix="islands-load-") as folder,
-        serving(Path(folder) / "data", environment=DOORS) as service,
+        serving(Path(folder) / "data", environment=ENVIRONMENT) as service,
     ):
         yield service
 
 
 class Connection:
-    """A connection that is kept open: a tenth of what a whole client costs, for the doors are measured."""
+    """Persistent HTTP connection. Costs a tenth of a full client, so that the server dominates."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, port: int) -> None:
         self._reader, self._writer, self._port = reader, writer, port
@@ -92,7 +107,7 @@ def body(service: Service) -> bytes:
 
 
 async def together(count: int, each: Callable[[int], Awaitable[list[float]]]) -> tuple[list[float], float]:
-    """Let so many clients do the same at a time; return what each took, and the seconds of all."""
+    """Run an action in concurrent clients; return the duration of each call and of all."""
     began = time.perf_counter()
     taken = await asyncio.gather(*(each(number) for number in range(count)))
     return [one for some in taken for one in some], time.perf_counter() - began
@@ -119,10 +134,12 @@ async def accepted(service: Service, clients: int, jobs: int, turn: int) -> tupl
 
 
 def accept(repeat: int) -> Iterator[Figure]:
-    """Jobs that are durable before they are acknowledged, over HTTP."""
+    """Measure submissions over HTTP, which are durable before they are acknowledged."""
     alone, slow, rate = [], [], []
     for turn in range(repeat):
-        with doors() as service:  # a new database each time: what waits in it is counted at every submission
+        with (
+            start_service() as service
+        ):  # a new database each time, because every submission counts the queued jobs
             taken, _ = asyncio.run(accepted(service, 1, ALONE, turn))
             alone.append(1e3 * percentile(taken, 0.5))
             taken, seconds = asyncio.run(accepted(service, CLIENTS, EACH, turn))
@@ -134,7 +151,7 @@ def accept(repeat: int) -> Iterator[Figure]:
 
 
 def store(repeat: int) -> Iterator[Figure]:
-    """The same at the store itself, from threads."""
+    """Measure submissions to the store from threads."""
     alone, slow, rate = [], [], []
 
     def submit(opened: Store, client: int, jobs: int) -> list[float]:
@@ -162,9 +179,9 @@ def store(repeat: int) -> Iterator[Figure]:
 
 
 def get(repeat: int) -> Iterator[Figure]:
-    """Looks at one job."""
+    """Measure requests of one job."""
     slow, rate = [], []
-    with doors() as service:
+    with start_service() as service:
         job = service.submit(5)
         for _ in range(repeat):
             at, p99 = _by_wrk(service, job) if shutil.which("wrk") else asyncio.run(_looked(service, job))
@@ -175,7 +192,7 @@ def get(repeat: int) -> Iterator[Figure]:
 
 
 def _by_wrk(service: Service, job: str) -> tuple[float, float]:
-    """Measure with wrk, which takes next to nothing of the processor."""
+    """Measure with wrk, which uses almost no processor time."""
     command = ["wrk", "-t1", f"-c{CONNECTIONS}", f"-d{LOOKING:.0f}s", "--latency"]
     said = subprocess.run(
         [*command, f"{service.url}/v1/jobs/{job}"], capture_output=True, text=True, check=True
@@ -208,10 +225,10 @@ async def _looked(service: Service, job: str) -> tuple[float, float]:
 
 
 def events(repeat: int) -> Iterator[Figure]:
-    """An event on its way from the store to all who watch the job."""
+    """Measure the delay of an event from the store to all streams of the job."""
     middle, slow, until_all = [], [], []
     for _ in range(repeat):
-        with doors() as service:
+        with start_service() as service:
             job = service.submit(5)
             taken, connecting = asyncio.run(_fanned_out(service, job))
             middle.append(percentile(taken, 0.5))
@@ -223,7 +240,7 @@ def events(repeat: int) -> Iterator[Figure]:
 
 
 async def _fanned_out(service: Service, job: str) -> tuple[list[float], float]:
-    """Return the seconds from an event's commit until each watcher has it, and those until all had begun."""
+    """Return the seconds from an event's commit to each stream, and the seconds until all were connected."""
     taken: list[float] = []
     sent: dict[int, float] = {}
     begun = asyncio.Semaphore(0)
@@ -255,15 +272,15 @@ async def _fanned_out(service: Service, job: str) -> tuple[list[float], float]:
 
 
 def _tell(service: Service, job: str, sent: dict[int, float]) -> None:
-    """Report progress, as a coordinator would."""
+    """Report progress like a coordinator."""
     with Store(f"sqlite:///{service.folder / 'islands.db'}") as opened:
         lease = opened.leases.claim("load", 3600.0)
         assert lease is not None
         assert lease.job.id == job
         version = lease.job.version
         for number in range(EVENTS):
-            time.sleep(APART)
-            # Known before it can be seen: the report returns when it is durable.
+            time.sleep(EVENT_INTERVAL)
+            # The time is taken before the event is visible: the report returns when it is durable.
             sent[version + 1 + number] = time.perf_counter()
             opened.leases.report(lease, ProgressReport(_progress(number)))
 

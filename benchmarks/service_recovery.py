@@ -1,9 +1,9 @@
-"""How soon a service is there, and how soon it is back when a part of it is killed or hangs.
+"""Startup time of a service, and recovery time after a part of it is killed or hangs.
 
     python benchmarks/service_recovery.py [MEASURE ...] [--repeat 5] [--json FILE]
 
-Measures: start, cancel, doors, coordinator, hung, island, ray, node; all of them by default.
-Watched, not asserted: the goals are those of the service's design.
+Measures: start, cancel, api, coordinator, hung, island, ray, node; all of them by default.
+Results are printed, not asserted; the targets are those of the service's design.
 """
 
 import os
@@ -26,22 +26,25 @@ from service_table import Figure, percentile, run
 from support.processes import alive, descendants, eventually, kill
 from support.service_processes import ROLES, Service, serving
 
-#: Generations of a job that does not end by itself, and of one of a few seconds.
-ENDLESS, LONG = 100_000, 1500
+#: Generations of a job that does not end by itself.
+ENDLESS = 100_000
 
-#: Jobs that are cancelled while they run.
+#: Generations of a job of a few seconds.
+LONG = 1500
+
+#: Number of running jobs that are cancelled.
 CANCELS = 30
 
-#: Seconds after which the supervisor starts a child again at once.
+#: Seconds of uptime after which the supervisor restarts a child without a delay.
 PROVEN = 10.5
 
-#: Seconds of a lease, by default.
+#: Default duration of a lease in seconds.
 LEASE = 5.0
 
-#: Generations that may be under way at once, and more.
+#: Upper bound of the generations that are computed ahead at the same time.
 AHEAD = 20
 
-#: How soon a cluster's head misses a machine: as `docs/how-to/deploy-the-service.md` configures it.
+#: Health checks of a cluster's head, as configured in `docs/how-to/deploy-the-service.md`.
 HEALTH = {
     "RAY_health_check_initial_delay_ms": "1000",
     "RAY_health_check_period_ms": "500",
@@ -60,7 +63,7 @@ def service(**environment: str) -> Iterator[Service]:
 
 
 def until(what: Callable[[], object], began: float, seconds: float = 120.0) -> float:
-    """Seconds from a moment on until something is true."""
+    """Return the seconds from a time until a condition is true."""
     while not what():
         assert time.monotonic() - began < seconds, "it never came true"
         time.sleep(0.005)
@@ -68,13 +71,13 @@ def until(what: Callable[[], object], began: float, seconds: float = 120.0) -> f
 
 
 def warm() -> None:
-    """Have the kernels compiled, and everything read from the disk once."""
+    """Compile the kernels, and read all files from the disk once."""
     with service() as running:
         running.found(running.submit(5))
 
 
 def start(repeat: int) -> Iterator[Figure]:
-    """From `islands serve` until jobs are accepted, and until the first one has its first populations."""
+    """Measure the time from `islands serve` until jobs are accepted, and until the first generation."""
     warm()
     ready, first = [], []
     for _ in range(repeat):
@@ -90,7 +93,7 @@ def start(repeat: int) -> Iterator[Figure]:
 
 
 def cancel(repeat: int) -> Iterator[Figure]:
-    """A running job until it is cancelled."""
+    """Measure the cancellation of a running job."""
     taken = []
     with service() as running:
         for _ in range(CANCELS):
@@ -103,8 +106,8 @@ def cancel(repeat: int) -> Iterator[Figure]:
     yield Figure(f"cancel of {CANCELS} running jobs: p99", "s", 1.5, (percentile(taken, 0.99),))
 
 
-def doors(repeat: int) -> Iterator[Figure]:
-    """The API, killed, until it answers again."""
+def api(repeat: int) -> Iterator[Figure]:
+    """Measure the time until the API answers after it was killed."""
     back = []
     with service() as running:
         for _ in range(repeat):
@@ -115,12 +118,12 @@ def doors(repeat: int) -> Iterator[Figure]:
 
 
 def coordinator(repeat: int) -> Iterator[Figure]:
-    """A coordinator, killed in a job, until the job is somebody's again."""
+    """Measure the time until a job is reclaimed after its coordinator was killed."""
     yield from _reclaimed(repeat, "coordinator killed, until its job is reclaimed", 1.0, kill, 1)
 
 
 def hung(repeat: int) -> Iterator[Figure]:
-    """A coordinator that hangs in a job, until the job is somebody's again."""
+    """Measure the time until a job is reclaimed after its coordinator hangs."""
     for count in (1, 2):
         name = f"coordinator hung, {count} in all, until its job is reclaimed"
         yield from _reclaimed(repeat, name, LEASE + 1.0, lambda pid: os.kill(pid, signal.SIGSTOP), count)
@@ -148,7 +151,7 @@ def _reclaimed(
 
 
 def island(repeat: int) -> Iterator[Figure]:
-    """What the loss of an island's process costs a job of some seconds."""
+    """Measure the delay of a job of some seconds by the loss of an island's process."""
     costs, same = [], []
     with service() as running:
         began = time.monotonic()
@@ -169,7 +172,7 @@ def island(repeat: int) -> Iterator[Figure]:
 
 
 def ray(repeat: int) -> Iterator[Figure]:
-    """Ray's own processes, killed in a job, until it comes on."""
+    """Measure the time until a job continues after Ray's processes were killed."""
     for role in ("head", "gcs", "raylet"):
         going = []
         with service() as running:
@@ -188,7 +191,7 @@ def ray(repeat: int) -> Iterator[Figure]:
 
 
 def node(repeat: int) -> Iterator[Figure]:
-    """A machine of a cluster, killed or frozen in a job, until the job comes on with those that are left."""
+    """Measure the time until a job continues after one machine of a cluster is killed or frozen."""
     with nodes() as machines, service_on(machines) as running:
         for name, goal, sign in (
             ("killed", 5.0, signal.SIGKILL),
@@ -217,7 +220,7 @@ def node(repeat: int) -> Iterator[Figure]:
 
 @contextmanager
 def nodes() -> Iterator[Any]:
-    """Two machines of a cluster on this one: a head that carries nothing, and one with a CPU."""
+    """Start two nodes of a cluster on this machine: a head without CPUs, and a node with one CPU."""
     os.environ.update(HEALTH, RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="0" * 32)
     # Only now: how its processes know each other is settled when it is imported.
     from ray.cluster_utils import Cluster
@@ -257,14 +260,14 @@ def _answers(running: Service) -> bool:
 
 
 def _stored(running: Service, column: str, job: str) -> object:
-    """What the database says of a job: to ask the doors would take some of what is measured."""
+    """Return a column of a job from the database; requests to the API would disturb the measurement."""
     path = running.folder / "islands.db"
     with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as database:
         return database.execute(f"SELECT {column} FROM jobs WHERE id = ?", (job,)).fetchone()[0]
 
 
 def _owner(running: Service, job: str) -> int:
-    """The process of the coordinator that has a job."""
+    """Return the process of the coordinator that has leased a job."""
     name = str(_stored(running, "lease_owner", job))
     return next(
         pid
@@ -276,7 +279,7 @@ def _owner(running: Service, job: str) -> int:
 MEASURES = {
     "start": start,
     "cancel": cancel,
-    "doors": doors,
+    "api": api,
     "coordinator": coordinator,
     "hung": hung,
     "island": island,

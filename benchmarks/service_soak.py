@@ -1,9 +1,9 @@
-"""A soak: processes of a service are killed at random while jobs come, go and are cancelled.
+"""Soak test: random kills of a service's processes while jobs are submitted, run and cancelled.
 
     python benchmarks/service_soak.py [--kills 500] [--seed 0] [--json FILE]
 
-At the end nothing that was accepted may be lost, nothing done twice, and every result has to be, byte for
-byte, that of the same job before the first kill. The exit status is 1 where that is not so.
+At the end no accepted job may be lost, none may be run twice, and every result must equal that of the same
+job before the first kill byte for byte. Otherwise the exit status is 1.
 """
 
 import argparse
@@ -25,26 +25,38 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support.processes import alive, kill
 from support.service_processes import TERMINAL, Service, serving
 
-#: Who is killed, and how often in relation to the others. What needs Ray needs seconds after its loss.
+#: Processes to kill, with relative frequencies. After the loss of a Ray process, recovery takes seconds.
 VICTIMS = {"island": 10, "api": 4, "coordinator": 2, "raylet": 0.3, "gcs": 0.3, "head": 0.3}
 
-#: Seconds between two kills, on a machine that takes so many seconds for a job; on one that is slower or busy
-#: they are longer, or nothing would come on between two of them.
-PAUSE, JOB = (0.5, 2.0), 3.0
+#: Range of the seconds between two kills if a job takes `JOB` seconds; scaled with the duration of a job, so
+#: that jobs make progress between two kills on slower machines too.
+PAUSE = (0.5, 2.0)
 
-#: Different jobs, their generations, and how many wait or run at a time.
-SEEDS, GENERATIONS, ACTIVE = 5, 40, 4
+#: Reference duration of a job in seconds.
+JOB = 3.0
 
-#: Shares of the jobs that are cancelled, and of the cancelled ones that are resumed.
-CANCELLED, RESUMED = 0.3, 0.5
+#: Number of different jobs.
+SEEDS = 5
 
-#: Seconds that everything may take to end once nobody is killed any more.
+#: Generations of a job.
+GENERATIONS = 40
+
+#: Number of jobs that are queued or running at the same time.
+ACTIVE = 4
+
+#: Fraction of the jobs that are cancelled.
+CANCELLED = 0.3
+
+#: Fraction of the cancelled jobs that are resumed.
+RESUMED = 0.5
+
+#: Time limit in seconds for all jobs to end after the last kill.
 CALM = 600.0
 
 
 @dataclass
 class Found:
-    """What a soak has brought; the last three are to be 0."""
+    """Result of a soak test; the last three fields must be 0."""
 
     kills: dict[str, int] = field(default_factory=Counter)
     jobs: int = 0
@@ -65,7 +77,7 @@ class Found:
 
 
 class Killer(Thread):
-    """Kills one process after the other until it has killed so many."""
+    """Kills a given number of processes, one after the other."""
 
     def __init__(self, service: Service, kills: int, chance: random.Random, found: Found) -> None:
         super().__init__(name="killer", daemon=True)
@@ -85,12 +97,12 @@ class Killer(Thread):
 
 
 class Soak:
-    """A client that submits jobs and remembers every promise that it was given.
+    """Client that submits jobs and records every acknowledged submission.
 
     Attributes
     ----------
     promised : dict
-        The id that was given for every idempotency key.
+        Job id that was returned for every idempotency key.
     """
 
     def __init__(self, service: Service, chance: random.Random, found: Found) -> None:
@@ -103,7 +115,7 @@ class Soak:
         self._expected: dict[int, bytes] = {}
 
     def prepare(self) -> None:
-        """Have every job carried out once without any disturbance."""
+        """Run every job once without kills."""
         jobs = {seed: self._submit(f"undisturbed {seed}", seed) for seed in range(SEEDS)}
         self._expected = {0: self._service.found(jobs[0])}  # and Ray has started
         began = time.monotonic()
@@ -113,7 +125,7 @@ class Soak:
         self._open.clear()
 
     def step(self) -> None:
-        """Bring in new jobs, ask for some twice, cancel some, and look who has ended."""
+        """Submit new jobs, repeat some submissions, cancel some jobs, and check which have ended."""
         while len(self._open) < ACTIVE:
             number = len(self.promised)
             job = self._submit(f"job {number}", number % SEEDS)
@@ -124,7 +136,7 @@ class Soak:
             self._look(job)
 
     def finish(self) -> None:
-        """Wait for all that is still open."""
+        """Wait for all jobs that have not ended."""
         until = time.monotonic() + CALM
         while self._open and time.monotonic() < until:
             for job in sorted(self._open):
@@ -132,7 +144,7 @@ class Soak:
             time.sleep(0.1)
 
     def judge(self) -> None:
-        """Hold what there is against what was promised."""
+        """Compare the stored jobs with the acknowledged submissions."""
         listed = self._listed()
         known = set(self.promised.values())
         self._found.jobs = len(known)
@@ -155,7 +167,7 @@ class Soak:
             self._found.lost += 1
 
     def _once(self, job: str) -> bool:
-        """Whether a job's events have no gap, and it has succeeded once."""
+        """Return whether a job's events have no gap and it has succeeded exactly once."""
         text = self._service.ask("GET", f"/v1/jobs/{job}/events").text
         events = [
             dict(line.split(": ", 1) for line in each.splitlines()) for each in text.split("\n\n") if each
@@ -204,20 +216,21 @@ class Soak:
 
 
 def soak(folder: Path, kills: int, seed: int) -> Found:
-    """Kill so many processes of a service, and say what became of its jobs."""
+    """Kill processes of a service at random; return what happened to its jobs."""
     found, began = Found(), time.monotonic()
     with serving(folder, patience=CALM) as service:
         client = Soak(service, random.Random(seed), found)
         client.prepare()
         killer = Killer(service, kills, random.Random(seed + 1), found)
         killer.start()
-        told = 0
+        reported = 0
         while not killer.over.wait(0.1):
             client.step()
-            if sum(found.kills.values()) >= told + 20:
-                told = sum(found.kills.values())
+            if sum(found.kills.values()) >= reported + 20:
+                reported = sum(found.kills.values())
                 print(
-                    f"{told} kills, {len(client.promised)} jobs, {time.monotonic() - began:.0f} s", flush=True
+                    f"{reported} kills, {len(client.promised)} jobs, {time.monotonic() - began:.0f} s",
+                    flush=True,
                 )
         client.finish()
         client.judge()

@@ -1,4 +1,4 @@
-"""Figures of the service beside what was promised, as a table and as JSON."""
+"""Measured figures of the service and their targets, as a table and as JSON."""
 
 import argparse
 import json
@@ -11,12 +11,14 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure that was measured several times; `goal` is what its median is held against.
+    """Figure that was measured several times.
 
     Attributes
     ----------
+    goal : float or None
+        Target of the median.
     most : bool
-        The goal is the most that is allowed; else it is the least.
+        Whether the target is an upper limit; otherwise it is a lower limit.
     """
 
     name: str
@@ -47,16 +49,18 @@ class Figure:
 
 
 def percentile(values: Sequence[float], share: float) -> float:
-    """The smallest value that so large a share does not exceed."""
+    """Return the smallest value that is not exceeded by the given fraction of the values."""
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
 
 
 def run(measures: Mapping[str, Callable[[int], Sequence[Figure]]], description: str | None) -> int:
-    """Carry out the measurements that the command line names, all by default, and show their figures."""
+    """Run the measurements given on the command line, all by default, and show their figures."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("measures", nargs="*", help=f"Some of: {', '.join(measures)}.")
-    parser.add_argument("--repeat", type=int, default=5, help="How often; median and spread are shown.")
+    parser.add_argument(
+        "--repeat", type=int, default=5, help="Number of repetitions; median and range are shown."
+    )
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     if unknown := set(given.measures) - set(measures):

@@ -1,6 +1,6 @@
-"""One reader of the environment: what can be set stands in one place, and nothing else is a hidden switch.
+"""Only one module reads environment variables, so that there are no undocumented settings.
 
-To write into it is another thing: it tells libraries, and processes that are started, how to behave.
+Writing environment variables is allowed: it configures libraries and child processes.
 """
 
 import ast
@@ -11,7 +11,7 @@ from support.repository import ROOT
 
 READER = "services/islands_service/settings.py"
 
-#: Names of `os` that are the environment.
+#: Names in `os` that read the environment.
 NAMES = {"environ", "environb", "getenv", "getenvb"}
 
 SOURCES = sorted(
@@ -22,9 +22,9 @@ SOURCES = sorted(
 
 
 def reads(text):
-    """Lines in which a module reads the environment, by whatever name it knows `os`."""
+    """Return the lines in which a module reads the environment, for any alias of `os`."""
     tree = ast.parse(text)
-    written = {id(node) for statement in ast.walk(tree) for node in _written(statement)}
+    written = {id(node) for statement in ast.walk(tree) for node in _write_targets(statement)}
     return sorted(node.lineno for node in ast.walk(tree) if _is_environment(node) and id(node) not in written)
 
 
@@ -37,8 +37,8 @@ def _is_environment(node):
     return False
 
 
-def _written(statement):
-    """Return where a statement writes into the environment, and takes nothing out of it."""
+def _write_targets(statement):
+    """Return the nodes through which a statement writes the environment without reading it."""
     match statement:
         case ast.Expr(value=ast.Call(func=ast.Attribute(value=environment, attr="setdefault" | "update"))):
             return [environment]

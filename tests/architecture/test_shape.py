@@ -1,4 +1,4 @@
-"""The shape of the repository: imports, packages, sizes, and documentation of what can be added to."""
+"""Structure of the repository: imports, packages, names and sizes of files."""
 
 import ast
 import subprocess
@@ -24,7 +24,7 @@ SHARED_MODULE_NAMES = {"app", "errors", "second_order", "settings"}
 
 
 def test_imports_keep_the_contracts() -> None:
-    """Layers point down, siblings do not see each other, the core knows no clock and no environment."""
+    """The contracts are in ``pyproject.toml``."""
     command = Path(sysconfig.get_path("scripts")) / "lint-imports"
     done = subprocess.run([command, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -54,7 +54,7 @@ def test_most_source_files_are_above_the_length_minimum() -> None:
 
 
 def test_a_class_name_is_unique() -> None:
-    """A name that stands for two things cannot be searched for."""
+    """Searching for a class name must find one class only."""
     places: dict[str, set[Path]] = defaultdict(set)
     for path in SOURCES:
         for node in ast.parse(path.read_text()).body:

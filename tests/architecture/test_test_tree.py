@@ -1,4 +1,4 @@
-"""The shape of the tests: unit tests mirror the sources, files are short, collection loads nothing heavy."""
+"""Structure of the tests: unit tests mirror the sources, files are short, imports are light."""
 
 import ast
 from collections.abc import Iterator
@@ -12,17 +12,17 @@ from support.repository import ROOT
 TESTS = ROOT / "tests"
 UNIT = TESTS / "unit"
 
-#: Where the sources are that a folder of the unit tests mirrors.
+#: Source folders that the folders of the unit tests mirror.
 SOURCES = {
     "islands": ROOT / "src" / "islands",
     "islands_service": ROOT / "services" / "islands_service",
     "islands_api": ROOT / "api" / "islands_api",
 }
 
-#: Lines of a file of tests.
-LONGEST = 400
+#: Largest number of lines of a test file.
+MAX_LINES = 400
 
-#: What takes half a second or more to load.
+#: Packages that take half a second or more to import.
 HEAVY = {"matplotlib", "numba", "ray"}
 
 
@@ -31,13 +31,13 @@ def files_of_tests(folder: Path) -> list[Path]:
 
 
 def mirrored(folder: Path) -> Path:
-    """Return the place in the sources of a folder of unit tests."""
+    """Return the source path that a folder of unit tests mirrors."""
     package, *inner = folder.relative_to(UNIT).parts
     return SOURCES[package].joinpath(*inner)
 
 
 def parts(package: Path) -> set[str]:
-    """Return the names of the modules and of the packages of a package."""
+    """Return the names of the modules and subpackages of a package."""
     modules = {path.stem for path in package.glob("*.py")}
     return {
         name.strip("_") for name in modules | {path.parent.name for path in package.glob("*/__init__.py")}
@@ -45,7 +45,7 @@ def parts(package: Path) -> set[str]:
 
 
 def at_collection(nodes: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """Yield the statements that run when a module is loaded, but those for a checker of types."""
+    """Yield the statements that run when a module is imported, without those for type checkers."""
     for node in nodes:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             continue
@@ -58,7 +58,7 @@ def at_collection(nodes: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 @cache
 def imported(path: Path) -> set[str]:
-    """Return the names of the packages that a module imports when it is loaded."""
+    """Return the names of the packages that a module imports at import time."""
     found = set()
     for node in at_collection(ast.parse(path.read_text(encoding="utf-8")).body):
         if isinstance(node, ast.Import):
@@ -69,32 +69,32 @@ def imported(path: Path) -> set[str]:
 
 
 def test_every_folder_of_unit_tests_mirrors_a_package_or_a_module() -> None:
-    """A module whose tests fill several files has a folder of its own."""
+    """Tests of a module that need several files are in a folder with the name of the module."""
     folders = {path.parent for path in files_of_tests(UNIT)}
-    lost = [
+    unmatched = [
         str(folder.relative_to(UNIT))
         for folder in sorted(folders)
         if not (mirrored(folder) / "__init__.py").exists()
         and not mirrored(folder).with_suffix(".py").exists()
     ]
-    assert not lost
+    assert not unmatched
 
 
 def test_every_unit_test_file_is_named_after_a_module() -> None:
-    """A subject may stand behind the name of the module or package: ``test_matlab_damage``."""
-    nameless = []
+    """A subject may follow the name of the module or package: ``test_matlab_damage``."""
+    unmatched = []
     for path in files_of_tests(UNIT):
         place, name = mirrored(path.parent), path.stem.removeprefix("test_")
         if place.is_dir() and not any(name == part or name.startswith(f"{part}_") for part in parts(place)):
-            nameless.append(str(path.relative_to(UNIT)))
-    assert not nameless
+            unmatched.append(str(path.relative_to(UNIT)))
+    assert not unmatched
 
 
 def test_test_files_are_below_the_length_limit() -> None:
     long = {
         str(path.relative_to(TESTS)): count
         for path in files_of_tests(TESTS)
-        if (count := len(path.read_text(encoding="utf-8").splitlines())) > LONGEST
+        if (count := len(path.read_text(encoding="utf-8").splitlines())) > MAX_LINES
     }
     assert not long
 
