@@ -11,7 +11,8 @@ _FILE = """\
 {heading}
  *
  * C99. If it is compiled with -ffp-contract=off and without -ffast-math, its results equal those of the
- search * bit for bit. The last bits of exp, log, sin, cos and tanh depend on the C library. */
+ * search bit for bit. The last bits of exp, log, sin, cos and tanh depend on the C library.
+ */
 
 #include <math.h>
 #include <stddef.h>
