@@ -11,13 +11,13 @@ from islands.performance.trials.targets import EXACT, Targets
 from islands.performance.trials.trial import TrialOutcome
 
 #: Lower bound of the weak misfits, in standard deviations of the noise.
-FAINT = 0.05
+WEAK_MISFIT = 0.05
 
 #: Lower bound of the middle misfits; smaller ones do not count in the scores of names.
-FROM = 0.2
+MIDDLE_MISFIT = 0.2
 
 #: Lower bound of the strong misfits.
-STRONG = 1.0
+STRONG_MISFIT = 1.0
 
 #: Number of bins of the confidence, of equal width.
 BINS = 10
@@ -145,7 +145,7 @@ def score(
     clean = [each for each in known if not each.trial.effects]
     open_set = [each for each in outcomes if each not in known]
     every = [each for each in known if len(each.trial.effects) == 1]
-    single = [each for each in every if each.misfit > FROM]
+    single = [each for each in every if each.misfit > MIDDLE_MISFIT]
     pairs = [each for each in known if len(each.trial.effects) == 2]
     triples = [each for each in known if len(each.trial.effects) == 3]
     detected = [each for each in single if each.noticed]
@@ -167,9 +167,9 @@ def score(
         return proportion(f"detected, misfit {name} sigma", among, lambda each: each.noticed, goal)
 
     return [
-        detection_rate(f"{FAINT:g} to {FROM:g}", FAINT, FROM, goals.weak),
-        detection_rate(f"{FROM:g} to {STRONG:g}", FROM, STRONG, goals.middle),
-        detection_rate(f"> {STRONG:g}", STRONG, float("inf"), goals.strong),
+        detection_rate(f"{WEAK_MISFIT:g} to {MIDDLE_MISFIT:g}", WEAK_MISFIT, MIDDLE_MISFIT, goals.weak),
+        detection_rate(f"{MIDDLE_MISFIT:g} to {STRONG_MISFIT:g}", MIDDLE_MISFIT, STRONG_MISFIT, goals.middle),
+        detection_rate(f"> {STRONG_MISFIT:g}", STRONG_MISFIT, float("inf"), goals.strong),
         proportion("named first, where detected", detected, lambda each: each.first_right, goals.first),
         proportion(
             "among the first three, where detected",

@@ -158,7 +158,7 @@ def test_dt_and_standard_errors_may_be_missing():
 
 BROKEN = {
     "no field": ("{}", "inputs: Field required"),
-    "no json": ("y(k) = 1", "the file: Invalid JSON"),
+    "not JSON": ("y(k) = 1", "the file: Invalid JSON"),
     "a list": ("[]", "the file: Input should be an object"),
     "another schema": (document(schema="islands.model/2"), "schema: Input should be 'islands.model/1'"),
     "unknown field": (document(author="me"), "author: Extra inputs are not permitted"),
@@ -170,14 +170,14 @@ BROKEN = {
     "inputs as a number": (document(inputs=1), "inputs: Input should be a valid array"),
     "no output": (document(output=...), "output: Field required"),
     "dt of zero": (document(dt=0.0), "dt: Input should be greater than 0"),
-    "dt without end": (document(dt=1.5).replace("1.5", "Infinity"), "dt: Input should be a finite number"),
+    "infinite dt": (document(dt=1.5).replace("1.5", "Infinity"), "dt: Input should be a finite number"),
     "no terms": (document(terms=[]), "terms: Tuple should have at least 1 item"),
     "no parameter": (document(terms=[{"regressor": "u(k-1)"}]), "terms.0.parameter: Field required"),
-    "parameter as a word": (
+    "parameter as text": (
         document(terms=[term("u(k-1)"), term("y(k-1)", "much")]),
         "terms.1.parameter: Input should be a valid number",
     ),
-    "parameter that is none": (
+    "parameter that is not a number": (
         document(terms=[term("u(k-1)", 1.5)]).replace("1.5", "NaN"),
         "terms.0.parameter: Input should be a finite number",
     ),
@@ -193,7 +193,7 @@ BROKEN = {
         document(terms=[term("relu(u(k-1))")]),
         "terms.0.regressor: unknown function 'relu'",
     ),
-    "the present": (
+    "present input": (
         document(terms=[term("u(k)")]),
         "terms.0.regressor: a regressor reads only past samples: channel 1 has lag 0",
     ),
@@ -201,11 +201,11 @@ BROKEN = {
         document(terms=[term("u(k-1) - u(k-1)")]),
         "terms.0.regressor: 'u(k-1) - u(k-1)' is identically zero",
     ),
-    "twice": (
+    "repeated regressor": (
         document(terms=[term("u(k-1)*y(k-1)"), term("2*y(k-1)*u(k-1)")]),
         "terms.1.regressor: '2*y(k-1)*u(k-1)' is given twice",
     ),
-    "an input too many": (
+    "too many inputs": (
         document(terms=[term("u2(k-1)")]),
         "inputs: the model reads input 2 and has 1: ('u_V',)",
     ),
@@ -217,7 +217,7 @@ BROKEN = {
         document(terms=[term("u(k-1)"), term("y(k-1)", standard_error=0.1)]),
         "standard_error is given for some terms only: give it for all or for none",
     ),
-    "too large with its factor": (
+    "overflow with its factor": (
         document(terms=[term("1e10*u(k-1)", 1e300)]),
         "terms.0.parameter: 1e+300 overflows with the regressor's factor 10000000000.0",
     ),

@@ -121,7 +121,7 @@ def inject(
         if faulty is not None:
             break
     else:
-        raise ValueError(f"{' and '.join(names)} cannot be hidden with a misfit within {band} sigma")
+        raise ValueError(f"{' and '.join(names)} cannot be injected with a misfit within {band} sigma")
     y = observer.clean if faulty is plant else observer.simulate(faulty)
     noise = observer.sigma * _draw_noise(rng, y.size, pole)
     record = Dataset(

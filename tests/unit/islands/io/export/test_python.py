@@ -160,7 +160,7 @@ def renamed(factor):
 OWN = {
     "numbers of its module": saturation,
     "a NumPy number": shared,
-    "math by another name": by_another_name,
+    "math under another name": by_another_name,
     "a function of math": taken_from_math,
     "a name of the export": predict,
     "a name of a signal": u,

@@ -18,9 +18,9 @@ from islands.performance.trials.injection.tanks import TANKS, Tanks
 SYSTEMS = {"piezo": (PIEZO, 5.0), "oscillator": (OSCILLATOR, 4.0), "tanks": (TANKS, 2048.0)}
 
 
-def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> FaultyRecord:
-    which, seconds = SYSTEMS[system]
-    return inject(names, np.random.default_rng(seed), seconds, system=which, **asked)  # type: ignore[arg-type]
+def faulty_record(system: str, *names: str, seed: int = 1, **options: object) -> FaultyRecord:
+    rig, seconds = SYSTEMS[system]
+    return inject(names, np.random.default_rng(seed), seconds, system=rig, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.ci
@@ -28,7 +28,7 @@ def hidden(system: str, *names: str, seed: int = 1, **asked: object) -> FaultyRe
 @pytest.mark.parametrize("system", ["piezo", "tanks", "oscillator"])
 def test_every_fault_reaches_a_band_of_misfits(system: str, variant: bool) -> None:
     for name in SYSTEMS[system][0].known:
-        found = hidden(system, name, band=(0.3, 2.0), variant=variant)
+        found = faulty_record(system, name, band=(0.3, 2.0), variant=variant)
         assert 0.3 <= found.misfit <= 2.0, name
         assert np.isfinite(found.record.y).all(), name
 
@@ -36,23 +36,23 @@ def test_every_fault_reaches_a_band_of_misfits(system: str, variant: bool) -> No
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_unknown_faults_are_visible(system: str) -> None:
     for name in SYSTEMS[system][0].unknown:
-        assert hidden(system, name).misfit > 0.5, name
+        assert faulty_record(system, name).misfit > 0.5, name
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_equal_seeds_inject_equal_faults(system: str) -> None:
-    first, again, other = (hidden(system, "jump", "delay", seed=seed) for seed in (5, 5, 6))
+    first, again, other = (faulty_record(system, "jump", "delay", seed=seed) for seed in (5, 5, 6))
     assert np.array_equal(first.record.y, again.record.y)
     assert not np.array_equal(first.record.u, other.record.u)
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_a_clean_record_has_noise_only(system: str) -> None:
-    found = hidden(system, perturbed=False)
+    found = faulty_record(system, perturbed=False)
     left = found.record.y - found.nominal
     assert found.misfit == 0.0
     assert np.std(left) == pytest.approx(found.sigma, rel=0.1)
-    assert np.std(hidden(system).record.y - found.nominal) > 1.1 * found.sigma
+    assert np.std(faulty_record(system).record.y - found.nominal) > 1.1 * found.sigma
 
 
 def test_changes_within_tolerances_are_not_a_misfit() -> None:
@@ -71,7 +71,7 @@ def test_changes_within_tolerances_are_not_a_misfit() -> None:
 
 
 def test_a_fault_next_to_a_gain_error_keeps_its_misfit() -> None:
-    assert hidden("piezo", "sensor-gain", "periodic-disturbance", band=(2.0, 3.0)).misfit > 2.0
+    assert faulty_record("piezo", "sensor-gain", "periodic-disturbance", band=(2.0, 3.0)).misfit > 2.0
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_only_the_piezo_has_gain_faults() -> None:
 
 def test_an_unreachable_misfit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measurement, "_MAX_RECORDS", 2)
-    with pytest.raises(ValueError, match=r"delay cannot be hidden with a misfit within"):
+    with pytest.raises(ValueError, match=r"delay cannot be injected with a misfit within"):
         inject(["delay"], np.random.default_rng(1), 512.0, system=TANKS, band=(1e6, 1e7))
 
 
@@ -159,10 +159,10 @@ def test_an_unreachable_misfit_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_record_in_which_a_fault_is_invisible_is_redrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """The highest peak of the first record is in the held-out part, where saturation is not visible."""
 
-    def hidden_peak() -> FaultyRecord:
+    def saturated_record() -> FaultyRecord:
         return inject(["output-saturation"], np.random.default_rng(6), 10.0, band=(0.3, 2.0))
 
-    assert 0.3 <= hidden_peak().misfit <= 2.0
+    assert 0.3 <= saturated_record().misfit <= 2.0
     monkeypatch.setattr(measurement, "_MAX_RECORDS", 1)
-    with pytest.raises(ValueError, match="cannot be hidden"):
-        hidden_peak()
+    with pytest.raises(ValueError, match="cannot be injected"):
+        saturated_record()

@@ -15,14 +15,16 @@ from islands.performance.trials.trial import Trial, TrialOutcome
 
 
 def outcome(
-    hidden: tuple[str, ...], named: tuple[str, ...], misfit: float = 1.5, **said: object
+    injected: tuple[str, ...], named: tuple[str, ...], misfit: float = 1.5, **options: object
 ) -> TrialOutcome:
-    verdict = said.pop("verdict", "named" if named else "nothing")
-    sets = said.pop("equivalents", ((),) * len(named))
-    sure, gain = said.pop("confidence", 0.9), said.pop("gain_share", None)
-    form = said.pop("form", False)
-    assert not said
-    return TrialOutcome(Trial(hidden, 1), misfit, str(verdict), named, (), sets, named[:1], sure, gain, form)  # type: ignore[arg-type]
+    verdict = options.pop("verdict", "named" if named else "nothing")
+    sets = options.pop("equivalents", ((),) * len(named))
+    confidence, gain = options.pop("confidence", 0.9), options.pop("gain_share", None)
+    form = options.pop("form", False)
+    assert not options
+    return TrialOutcome(
+        Trial(injected, 1), misfit, str(verdict), named, (), sets, named[:1], confidence, gain, form
+    )  # type: ignore[arg-type]
 
 
 def counted(*outcomes: TrialOutcome) -> dict[str, tuple[int, int]]:
@@ -131,9 +133,9 @@ def test_full_confidence_is_in_the_last_bin() -> None:
 
 
 def test_targets_depend_on_the_kind_of_simulation() -> None:
-    said = [outcome(("delay",), (name,)) for name in ["delay"] * 9 + ["jump"]]
+    outcomes = [outcome(("delay",), (name,)) for name in ["delay"] * 9 + ["jump"]]
     kept = [
-        {row.name: row.kept for row in score(said, [], goals)}["named first, where detected"]
+        {row.name: row.kept for row in score(outcomes, [], goals)}["named first, where detected"]
         for goals in (EXACT, IDENTIFIED)
     ]
     assert kept == [False, True]
