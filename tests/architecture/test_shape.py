@@ -64,7 +64,7 @@ def test_a_class_name_is_unique() -> None:
 
 
 def test_module_names_are_unique() -> None:
-    """Folders of commands, routes and faults name a module after what it exposes or injects."""
+    """Modules of commands, routes and faults are named after their subject and are exempt."""
     places: dict[str, set[Path]] = defaultdict(set)
     for path in SOURCES:
         if path.parent.name not in {"commands", "routes", "injection"} and "__" not in path.stem:
