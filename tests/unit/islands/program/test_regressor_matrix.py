@@ -46,7 +46,9 @@ def test_regressor_matrix_has_the_value_of_each_term_on_every_row(record, terms)
     for item, column in zip(terms, found.tolist(), strict=True):
         for sample, number in zip(samples, column, strict=True):
             expected = settled_value(
-                item.expression, lambda channel, lag, at=sample: float(channels[channel, at - lag]), perturbations=2
+                item.expression,
+                lambda channel, lag, at=sample: float(channels[channel, at - lag]),
+                perturbations=2,
             )
             assert expected is None or nearly(number, expected)
 
