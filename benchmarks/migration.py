@@ -18,7 +18,7 @@ import numpy as np
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.presets import PRESETS
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands.systems.catalogue import make_record
 
 #: Total number of individuals, and generations, by preset. Case 1 has the number of evaluations of the paper.
@@ -45,7 +45,7 @@ def error(preset: str, islands: int, samples: int, way: str, seed: int) -> tuple
     changes = {"islands": islands, **WAYS[way]}
     settings = replace(PRESETS[preset], generations=generations, **changes)
     settings = replace(settings, population=everybody // settings.islands)
-    posed = problem(make_record("bouc-wen-piezo", "authors", "estimation")[:samples], settings)
+    posed = make_problem(make_record("bouc-wen-piezo", "authors", "estimation")[:samples], settings)
     *_, last = SerialEngine().run(posed, empty_archipelago(settings.islands, seed), lambda: False)
     best = last.archipelago.hall_of_fame.best()
     found = [min(entry.fitness for size, entry in best.items() if size <= most) ** 0.5 for most in (6, 99)]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from islands.evolution.engine import SerialEngine
-from islands_service.coordinator.identification_job import identification
+from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.settings import ServiceSettings
 from islands_service.store.blobs import Blobs
 from support.played import stored
@@ -52,7 +52,7 @@ def finished(service: Service) -> str:
     with stored(service) as store:
         lease = taken(store, job)
         blobs = Blobs(ServiceSettings(data_dir=service.folder).blobs)
-        outcome = identification(lease, store, blobs, SerialEngine(), lambda: None, LONG)
+        outcome = run_identification_job(lease, store, blobs, SerialEngine(), lambda: None, LONG)
         store.leases.finish(lease, outcome)
     return job
 

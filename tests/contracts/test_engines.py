@@ -16,7 +16,7 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.epoch import run_epoch, select_migrants
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.expression import Lagged
@@ -61,7 +61,7 @@ def never_stop():
 
 @pytest.fixture(scope="module")
 def search_problem():
-    return problem(record(300), SETTINGS)
+    return make_problem(record(300), SETTINGS)
 
 
 @pytest.fixture(params=ENGINES, scope="module")

@@ -10,7 +10,7 @@ from islands.data.dataset import Dataset
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.simulation.predictors import free_run
 from islands.systems.catalogue import make_record
-from islands.systems.published_models import PUBLISHED, published
+from islands.systems.published_models import PUBLISHED, get_published_model
 from islands.validation.metrics import Metrics, metrics
 from islands.validation.physics import check_physics, cluster_sums
 
@@ -32,14 +32,14 @@ def errors(model, records) -> tuple[Metrics, Metrics]:
     ],
 )
 def test_printed_parameters_reproduce_table_1(records, number, mape, r2):
-    found = errors(published(number).model, records)
+    found = errors(get_published_model(number).model, records)
     assert [part.mape for part in found] == pytest.approx(mape, rel=0.02)
     assert [part.r2 for part in found] == pytest.approx(r2, abs=6e-6)
 
 
 def test_re_estimated_model_13_has_the_error_of_table_1(records):
     """The estimation error is 0.31189 as in Table 1, so structure and record are those of the paper."""
-    estimated = estimate(published("13").model.regressors, records[0], "hysteresis")
+    estimated = estimate(get_published_model("13").model.regressors, records[0], "hysteresis")
     assert isinstance(estimated, FittedStructure)
     estimation, validation = errors(estimated.model, records)
     assert estimation.mape == pytest.approx(0.31189, rel=0.002)
@@ -49,7 +49,9 @@ def test_re_estimated_model_13_has_the_error_of_table_1(records):
 
 @pytest.mark.parametrize("number", ["12", "13", "14"])
 def test_published_cluster_sums_meet_their_targets(number):
-    sums = {entry.cluster: (entry.sum, entry.target) for entry in cluster_sums(published(number).model)}
+    sums = {
+        entry.cluster: (entry.sum, entry.target) for entry in cluster_sums(get_published_model(number).model)
+    }
     expected = {"12": {"y"}, "13": {"y"}, "14": {"y", "u", "y*u"}}[number]
     assert set(sums) == expected
     assert all(value == pytest.approx(target, abs=1e-12) for value, target in sums.values())
@@ -57,7 +59,7 @@ def test_published_cluster_sums_meet_their_targets(number):
 
 @pytest.mark.parametrize("number", ["12", "13"])
 def test_published_models_have_property_1(records, number):
-    checked = check_physics(published(number).model, records[0])
+    checked = check_physics(get_published_model(number).model, records[0])
     assert checked.property_1
     assert len(checked.holds) == 10
     assert checked.hold_drift_percent < 1e-9

@@ -11,7 +11,7 @@ from islands.evolution.generation.evaluation import Evaluator, Limits
 from islands.evolution.gp.individual import Individual
 from islands.evolution.hall_of_fame import DEPTH
 from islands.evolution.island import _abandon_threshold, _thresholds_by_size, first_generation, step
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands.simulation.outcome import Status
 from support.searches import SMALL, exactly, islands_of, record
 
@@ -116,7 +116,7 @@ def test_abandonment_does_not_change_a_search_with_a_library():
     setting = replace(
         SMALL, library="phi-polynomial", library_degree=3, from_library=0.5, structure="increment"
     )
-    search_problem = problem(record(), setting)
+    search_problem = make_problem(record(), setting)
     ends = []
     for abandon in (True, False):
         evaluator = Evaluator(search_problem.record, setting, abandon=abandon)

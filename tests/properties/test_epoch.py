@@ -8,7 +8,7 @@ from islands.evolution.epoch import next_stop, receive_migrants, run_epoch, sele
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island, first_generation, step
-from islands.evolution.problem import Problem, problem
+from islands.evolution.problem import Problem, make_problem
 from support.migrations import (
     SETTINGS,
     evaluator,
@@ -35,7 +35,7 @@ def search_problem():
         from_library=0.5,
         characters=("pruner", "explorer"),
     )
-    return problem(recorded(), setting)
+    return make_problem(recorded(), setting)
 
 
 def run_first_epochs(search_problem, index=0):

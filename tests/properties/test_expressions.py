@@ -14,7 +14,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from islands.errors import ModelError
-from islands.model.expression import Apply, Constant, Lagged, Shift, content, lags, unshifted, value, walk
+from islands.model.expression import Apply, Constant, Lagged, Shift, content, lags, remove_shifts, value, walk
 from islands.model.parsing import parse
 from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.model.regressor import canonical, regressor
@@ -150,7 +150,7 @@ def test_phi_is_antisymmetric(phi):
 
 @given(expressions(), st.integers(1, 5), st.integers(1, 5))
 def test_back_shifts_add(expression, first, second):
-    assert unshifted(Shift(first, Shift(second, expression))) == unshifted(expression, first + second)
+    assert remove_shifts(Shift(first, Shift(second, expression))) == remove_shifts(expression, first + second)
 
 
 @given(expressions(height=2), st.integers(1, 5), signals())
@@ -158,7 +158,7 @@ def test_back_shift_delays_every_signal_under_it(expression, samples, signal):
     now = settled_value(expression, lambda channel, lag: signal(channel, lag + samples))
     assume(now is not None)
     assert value(Shift(samples, expression), signal) == now
-    assert value(unshifted(Shift(samples, expression)), signal) == now
+    assert value(remove_shifts(Shift(samples, expression)), signal) == now
 
 
 def test_two_back_shifts_of_five_give_lag_eleven():

@@ -15,7 +15,7 @@ from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.island import Island, select_elite
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES
-from islands.evolution.migration.topology import topology
+from islands.evolution.migration.topology import parse_topology
 from islands.evolution.problem import Problem
 from islands.simulation.outcome import Status
 from support.migrations import (
@@ -144,7 +144,7 @@ def run_epochs(setting, abandon, seed=5):
         Problem(recorded(), setting),
         Evaluator(recorded(), setting, abandon=abandon),
     )
-    sources = topology(setting.topology, setting.islands, seed).sources
+    sources = parse_topology(setting.topology, setting.islands, seed).sources
     archipelago, leaving = empty_archipelago(setting.islands, seed).islands, [()] * setting.islands
     found, abandoned = [], 0
     while archipelago[0].generation < setting.generations:

@@ -17,7 +17,7 @@ from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.island import first_generation, select_elite, step
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands.io.checkpoints import write_checkpoint
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
@@ -32,7 +32,7 @@ def digest():
     setting = replace(
         SMALL, structure="increment", characters=("plain", "recombiner"), **library, **migration
     )
-    for epoch in SerialEngine().run(problem(record(), setting), empty_archipelago(2, 11), lambda: False):
+    for epoch in SerialEngine().run(make_problem(record(), setting), empty_archipelago(2, 11), lambda: False):
         last = epoch.archipelago
     assert last.generation == 10
     with tempfile.TemporaryDirectory() as folder:
@@ -202,7 +202,7 @@ def test_hall_of_fame_keeps_models_that_the_population_has_lost():
 
 def test_first_population_begins_with_the_seeds():
     setting = replace(SMALL, prune=0.0, library="phi-polynomial", library_degree=3, library_lags=3)
-    search_problem = problem(record(), setting)
+    search_problem = make_problem(record(), setting)
     assert [len(genes) for genes in search_problem.seeds] == sorted(
         len(genes) for genes in search_problem.seeds
     )

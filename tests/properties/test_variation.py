@@ -21,7 +21,7 @@ from islands.evolution.gp.gene_structure import phi
 from islands.evolution.gp.individual import Individual, make_regressor
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.island import first_generation, step
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
 from islands.model.expression import Apply, Lagged, Shift, children, walk
 from islands.model.parsing import parse
@@ -231,7 +231,7 @@ def test_offspring_of_library_genes_are_valid(library, structure, max_height):
         structure=structure,
         shifts=(5,),
     )
-    search_problem = problem(record(), setting)
+    search_problem = make_problem(record(), setting)
     assert search_problem.pool
     assert [
         faults((gene, Lagged(0)), replace(setting, structure="phi"), 1) for gene in search_problem.pool

@@ -9,7 +9,7 @@ from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.gp.individual import Individual
 from islands.evolution.migration.schedule import Schedule
-from islands.evolution.migration.topology import topology
+from islands.evolution.migration.topology import parse_topology
 from islands.evolution.problem import Problem
 from islands_service.runtime.epoch_scheduler import MAX_EPOCHS_AHEAD, EpochScheduler, EpochTask
 from support.searches import SMALL, record
@@ -66,7 +66,7 @@ def get_emigrants(epoch):
 def run_in_lockstep(problem_, ends, first=-1):
     """Yield the expected epochs of all islands, computed one after the other."""
     islands = problem_.settings.islands
-    sources = topology(problem_.settings.topology, islands, SEED).sources
+    sources = parse_topology(problem_.settings.topology, islands, SEED).sources
     epochs = [
         IslandEpoch(replace(each, generation=first), (), ())
         for each in empty_archipelago(islands, SEED).islands
@@ -94,7 +94,7 @@ class PlayedRun:
         self.scheduler = EpochScheduler(
             problem_, start or empty_archipelago(problem_.settings.islands, SEED), keep_epoch, ahead
         )
-        self.sources = topology(problem_.settings.topology, problem_.settings.islands, SEED).sources
+        self.sources = parse_topology(problem_.settings.topology, problem_.settings.islands, SEED).sources
         self.out, self.held, self.done = [], {}, []
         self.sent = []
 

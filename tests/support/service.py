@@ -227,7 +227,7 @@ def hidden(folder: Path, seconds: float = 4.0) -> bytes:
 def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     """Upload a record, submit a diagnosis and execute it in this process; return the id of the job."""
     from islands.evolution.engine import SerialEngine
-    from islands_service.coordinator.diagnosis_job import discrepancy
+    from islands_service.coordinator.diagnosis_job import run_diagnosis_job
 
     dataset = service.upload(content).json()["id"]
     asked = held(dataset, channels=["T_K"], tolerance=KNOWN, **changes)
@@ -236,7 +236,7 @@ def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
     assert lease is not None
     assert lease.job.id == job["id"]
     blobs = Blobs(service.settings.blobs)
-    outcome = discrepancy(lease, service.store, blobs, SerialEngine(), lambda: None, 600.0, map)
+    outcome = run_diagnosis_job(lease, service.store, blobs, SerialEngine(), lambda: None, 600.0, map)
     service.store.leases.finish(lease, outcome)
     return str(job["id"])
 
@@ -248,7 +248,7 @@ QUICK = {"population": 20, "generations": 2, "max_terms": 3, "max_height": 2, "s
 def run_identification(service: Service, islands: int = 1) -> str:
     """Upload a record, submit an identification and execute it in this process; return the id of the job."""
     from islands.evolution.engine import SerialEngine
-    from islands_service.coordinator.identification_job import identification
+    from islands_service.coordinator.identification_job import run_identification_job
 
     dataset = service.upload(csv(400)).json()["id"]
     settings = {**QUICK, "islands": islands}
@@ -256,7 +256,7 @@ def run_identification(service: Service, islands: int = 1) -> str:
     lease = service.store.leases.claim("test", 600.0)
     assert lease is not None
     assert lease.job.id == job["id"]
-    outcome = identification(
+    outcome = run_identification_job(
         lease, service.store, Blobs(service.settings.blobs), SerialEngine(), lambda: None, 600.0
     )
     service.store.leases.finish(lease, outcome)

@@ -12,7 +12,7 @@ from islands.io.records import read_record
 from islands.io.records.row_range import overlap, parse_rows
 from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, is_extended, parse_spec
 from islands.model.model import Model
-from islands.systems.published_models import published
+from islands.systems.published_models import get_published_model
 
 Record = Annotated[
     Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point), NPZ, MAT or Parquet.")
@@ -136,5 +136,5 @@ def extended(text: str) -> LocalExtendedSpec | None:
 def model(text: str) -> Model:
     """Read a model file, or return a published model such as ``published:12``."""
     if text.startswith(PUBLISHED):
-        return published(text.removeprefix(PUBLISHED)).model
+        return get_published_model(text.removeprefix(PUBLISHED)).model
     return read_model(text)

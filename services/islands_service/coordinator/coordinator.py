@@ -55,15 +55,15 @@ JobRunner = Callable[[Lease, Store, Blobs, "Engine", Callable[[], None], float],
 
 def _run_identification(*arguments: object) -> JobOutcome:
     # These imports take half a second: claim the job before them.
-    from islands_service.coordinator.identification_job import identification  # noqa: PLC0415
+    from islands_service.coordinator.identification_job import run_identification_job  # noqa: PLC0415
 
-    return identification(*arguments)  # type: ignore[arg-type]
+    return run_identification_job(*arguments)  # type: ignore[arg-type]
 
 
 def _run_diagnosis(*arguments: object) -> JobOutcome:
-    from islands_service.coordinator.diagnosis_job import discrepancy  # noqa: PLC0415
+    from islands_service.coordinator.diagnosis_job import run_diagnosis_job  # noqa: PLC0415
 
-    return discrepancy(*arguments)  # type: ignore[arg-type]
+    return run_diagnosis_job(*arguments)  # type: ignore[arg-type]
 
 
 #: Runner of each kind of job.
@@ -184,7 +184,7 @@ class Coordinator:
         except (LeaseLostError, CoordinatorStopping, ClusterError, StoreError):
             raise
         except IslandsError as error:
-            return JobOutcome(JobState.FAILED, problem=make_problem(error))
+            return JobOutcome(JobState.FAILED, problem=make_problem_document(error))
         except Exception as error:
             log.error("job failed", trace=traceback.format_exc())
             return JobOutcome(
@@ -282,7 +282,7 @@ class Coordinator:
         log.info("swept", blobs=removed)
 
 
-def make_problem(error: IslandsError) -> dict[str, str]:
+def make_problem_document(error: IslandsError) -> dict[str, str]:
     """Describe to the owner of a job why it failed."""
     kind = PROBLEM_TYPES.get(type(error).__name__, "job-failed")
     return {"type": kind, "title": "The job failed", "detail": str(error)}

@@ -13,7 +13,7 @@ from islands.io.diagnosis_json import diagnosis_document
 from islands.io.simulator_spec.document import extended_json
 from islands.io.simulator_spec.factory import make_simulator
 from islands_service.domain.job import EXTENDED, REPORT, JobOutcome, JobState, Lease, ProgressReport
-from islands_service.domain.job_spec import discrepancy_of
+from islands_service.domain.job_spec import parse_discrepancy
 from islands_service.intake.job_inputs import read_record_and_columns
 from islands_service.reports.diagnosis_report import diagnosis_report, summarise
 from islands_service.runtime.parallel_map import ray_map
@@ -24,7 +24,7 @@ from islands_service.store.database import StoreError
 log = structlog.get_logger()
 
 
-def discrepancy(
+def run_diagnosis_job(
     lease: Lease,
     store: Store,
     blobs: Blobs,
@@ -59,7 +59,7 @@ def discrepancy(
             # Continue the analysis. The next message reports the progress.
             log.warning("report failed", job=lease.job.id, reason=str(error))
 
-    spec = discrepancy_of(lease.job.spec)
+    spec = parse_discrepancy(lease.job.spec)
     stored = store.datasets.get(lease.job.owner, spec.dataset)
     report("reading the record")
     record, columns = read_record_and_columns(spec, stored, blobs)

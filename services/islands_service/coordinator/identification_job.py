@@ -25,7 +25,7 @@ from islands.io.models import model_json
 from islands.io.result_folder import result_document
 from islands.model.equations import equation
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport
-from islands_service.domain.job_spec import identification_of
+from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -40,7 +40,7 @@ REPORT_EVERY = 0.5
 CHECKPOINT_SHARE = 0.05
 
 
-def identification(
+def run_identification_job(
     lease: Lease, store: Store, blobs: Blobs, engine: Engine, check: Callable[[], None], every: float
 ) -> JobOutcome:
     """Run an identification job from its last checkpoint.
@@ -58,7 +58,7 @@ def identification(
         The record or the settings are unusable, the cluster failed, or any error that ``check`` raises.
     """
     job = lease.job
-    spec = identification_of(job.spec)
+    spec = parse_identification(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
     start, spent = _load_checkpoint(job, blobs)

@@ -191,7 +191,7 @@ class Discrepancy(BaseModel):
         return (self.input, *self.channels, *self.recorded_columns)
 
 
-def identification_of(document: Mapping[str, Any]) -> Identification:
+def parse_identification(document: Mapping[str, Any]) -> Identification:
     """Parse a stored identification job.
 
     Raises
@@ -202,7 +202,7 @@ def identification_of(document: Mapping[str, Any]) -> Identification:
     return _parse(Identification, document)
 
 
-def discrepancy_of(document: Mapping[str, Any]) -> Discrepancy:
+def parse_discrepancy(document: Mapping[str, Any]) -> Discrepancy:
     """Parse a stored discrepancy job.
 
     Raises

@@ -26,7 +26,7 @@ from islands.io.models import model_from_json
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands_service.domain.job import REPORT, Job
-from islands_service.domain.job_spec import identification_of
+from islands_service.domain.job_spec import parse_identification
 from islands_service.intake.job_inputs import read_record_and_validation
 from islands_service.reports.identification_report import identification_report
 from islands_service.settings import ServiceSettings, service_settings
@@ -97,7 +97,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     IslandsError
         The job, its data or the model no longer exists.
     """
-    spec = identification_of(job.spec)
+    spec = parse_identification(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
     split = split_data(record, validation)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from islands.estimation.least_squares import Estimate, factor, failed_estimate, solve
+from islands.estimation.least_squares import Estimate, factorise, failed_estimate, solve
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 #: A normalised row of S with a smaller pivot is a linear combination of the other rows. Also the relative
@@ -36,9 +36,9 @@ def constrained_least_squares(
     -------
     Estimate
         INFEASIBLE if a constraint is zero or redundant or contradicts the others, or if there are more
-        constraints than terms. TOO_FEW_ROWS or SINGULAR as in `factor`.
+        constraints than terms. TOO_FEW_ROWS or SINGULAR as in `factorise`.
     """
-    factors = factor(psi, y)
+    factors = factorise(psi, y)
     if isinstance(factors, EvaluationOutcome):
         return failed_estimate(len(psi), factors)
     found = null_space(S / factors.scale, c)

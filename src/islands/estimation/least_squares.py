@@ -62,7 +62,7 @@ class QRFactor:
     rows: int
 
 
-def factor(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | EvaluationOutcome:
+def factorise(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | EvaluationOutcome:
     """Factor a regressor matrix.
 
     Parameters
@@ -107,7 +107,7 @@ def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
     y : ndarray, shape (rows,)
         The target.
     """
-    factors = factor(psi, y)
+    factors = factorise(psi, y)
     if isinstance(factors, EvaluationOutcome):
         return failed_estimate(len(psi), factors)
     return solve(factors, np.zeros(len(psi)), np.eye(len(psi)))

@@ -8,7 +8,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.island import StepInfo
-from islands.evolution.migration.topology import Topology, topology
+from islands.evolution.migration.topology import Topology, parse_topology
 from islands.evolution.problem import Problem
 
 #: Returns true if the search must end.
@@ -81,4 +81,4 @@ class SerialEngine:
 def make_topology(problem: Problem, archipelago: Archipelago) -> Topology:
     """Return the topology for the number of islands and the seed of an archipelago."""
     islands = archipelago.islands
-    return topology(problem.settings.topology, len(islands), islands[0].seed)
+    return parse_topology(problem.settings.topology, len(islands), islands[0].seed)

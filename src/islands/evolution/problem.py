@@ -41,7 +41,7 @@ class Problem:
         return replace(self.settings, **ISLAND_PROFILES[profiles[island % len(profiles)]])
 
 
-def problem(record: Dataset, settings: Settings) -> Problem:
+def make_problem(record: Dataset, settings: Settings) -> Problem:
     """Make a search problem; run the forward selection if the settings have a library.
 
     Regressors of the library that exceed the maximum height of a gene are left out.

@@ -10,9 +10,9 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_structure import STRUCTURES
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION_POLICIES
-from islands.evolution.migration.schedule import Schedule, schedule
-from islands.evolution.migration.topology import TOPOLOGIES, topology
-from islands.model.candidate_library import library_named
+from islands.evolution.migration.schedule import Schedule, parse_schedule
+from islands.evolution.migration.topology import TOPOLOGIES, parse_topology
+from islands.model.candidate_library import get_library
 from islands.model.primitives import PRIMITIVES
 
 #: Maximum number of islands, limited by the memory of a coordinator.
@@ -184,7 +184,7 @@ class Settings:
         if not (self.primitives or self.shifts):
             raise SettingsError("genes are made of primitives and back-shifts: give at least one of them")
         if self.library:
-            library_named(self.library)
+            get_library(self.library)
         lookup(STRUCTURES, self.structure, "structure")
         lookup(CONSTRAINTS, self.constraints, "constraints")
         lookup(FITNESSES, self.fitness, "fitness")
@@ -207,7 +207,7 @@ class Settings:
             lookup(ISLAND_PROFILES, name, "character")
         _ = self.stops
         most = max(count for _, count in self.leaving.pieces)
-        arriving = most * topology(self.topology, self.islands, 0).in_degree
+        arriving = most * parse_topology(self.topology, self.islands, 0).in_degree
         if arriving > self.population:
             raise SettingsError(
                 f"{arriving} individuals would arrive on an island of {self.population}: fewer migrants, "
@@ -217,12 +217,12 @@ class Settings:
     @property
     def stops(self) -> Schedule:
         """Schedule of the intervals between migrations, in generations."""
-        return schedule(self.migrate_every, 1, "migrate_every")
+        return parse_schedule(self.migrate_every, 1, "migrate_every")
 
     @property
     def leaving(self) -> Schedule:
         """Schedule of the number of emigrants per neighbour."""
-        return schedule(self.migrants, 0, "migrants")
+        return parse_schedule(self.migrants, 0, "migrants")
 
     @property
     def maximum_lag(self) -> int:

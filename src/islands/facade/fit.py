@@ -12,7 +12,7 @@ from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
-from islands.model.candidate_library import candidates, full_set, library_named
+from islands.model.candidate_library import candidates, full_set, get_library
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 
@@ -68,7 +68,7 @@ def fit(
     RecordError
         The record is too short or incomplete, or the validation data has other columns or sampling time.
     """
-    entry = library_named(library)
+    entry = get_library(library)
     degree = entry.degree if degree is None else degree
     lags = entry.lags if lags is None else lags
     constraints = entry.constraints if constraints is None else constraints

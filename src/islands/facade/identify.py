@@ -16,7 +16,7 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.individual import make_regressor
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import resolve_settings
-from islands.evolution.problem import Problem, problem
+from islands.evolution.problem import Problem, make_problem
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
@@ -94,7 +94,7 @@ def identify(
         raise SettingsError(f"a seed is not negative, got {seed}")
     split = split_data(record, validation)
     _check_validation_length(split.validation, settings)
-    search_problem = problem(split.estimation, settings)
+    search_problem = make_problem(split.estimation, settings)
     stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [

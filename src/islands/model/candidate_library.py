@@ -54,7 +54,7 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
     """
     if degree < 1 or lags < 1:
         raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
-    library = library_named(name)
+    library = get_library(name)
     count = library.count(degree, lags, inputs)
     if count > MAX_CANDIDATES:
         raise SettingsError(
@@ -65,7 +65,7 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
     return tuple(canonical_order(item for item in regressors if item))
 
 
-def library_named(name: str) -> Library:
+def get_library(name: str) -> Library:
     """Return a library by name.
 
     Raises

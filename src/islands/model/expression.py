@@ -137,15 +137,15 @@ def height(expression: Expression) -> int:
     return max((1 + height(child) for child in children(expression)), default=0)
 
 
-def unshifted(expression: Expression, samples: int = 0) -> Expression:
+def remove_shifts(expression: Expression, samples: int = 0) -> Expression:
     """Replace every back-shift by larger lags at the leaves, and add ``samples`` to all lags."""
     match expression:
         case Lagged(channel, lag):
             return Lagged(channel, lag + samples)
         case Shift(more, argument):
-            return unshifted(argument, samples + more)
+            return remove_shifts(argument, samples + more)
         case Apply(primitive, arguments):
-            return Apply(primitive, tuple(unshifted(argument, samples) for argument in arguments))
+            return Apply(primitive, tuple(remove_shifts(argument, samples) for argument in arguments))
         case Constant():
             return expression
 
@@ -153,7 +153,7 @@ def unshifted(expression: Expression, samples: int = 0) -> Expression:
 def lags(expression: Expression) -> frozenset[tuple[int, int]]:
     """Return the pairs (channel, lag) that the expression reads."""
     return frozenset(
-        (node.channel, node.lag) for node in walk(unshifted(expression)) if isinstance(node, Lagged)
+        (node.channel, node.lag) for node in walk(remove_shifts(expression)) if isinstance(node, Lagged)
     )
 
 

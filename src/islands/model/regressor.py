@@ -18,7 +18,7 @@ from islands.model.expression import (
     Shift,
     content,
     lags,
-    unshifted,
+    remove_shifts,
 )
 from islands.model.primitives import ADD, MUL, SIGN, SUB
 from islands.model.rendering import plain
@@ -102,7 +102,7 @@ def _canonical(expression: Expression) -> tuple[float, Expression]:
         case Constant(number):
             return number, _ONE
         case Shift():
-            return canonical(unshifted(expression))
+            return canonical(remove_shifts(expression))
         case Apply(primitive, arguments):
             parts = [canonical(argument) for argument in arguments]
             if primitive == MUL:

@@ -43,7 +43,7 @@ class Elements(NamedTuple):
 
 
 @cache
-def compiled(function):
+def compile_law(function):
     """Compile a scalar function of an element; `Elements` stores its ``address``."""
     return cfunc(_SIGNATURE, error_model="numpy")(function)
 

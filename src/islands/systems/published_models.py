@@ -94,7 +94,7 @@ PUBLISHED: Mapping[str, Published] = MappingProxyType(
 )
 
 
-def published(number: str) -> Published:
+def get_published_model(number: str) -> Published:
     """Return a published model by its equation number.
 
     Raises

@@ -19,7 +19,7 @@ from islands_api.web.problems import RESPONSES, ResourceNotFoundError
 from islands_api.web.routes.jobs import Id
 from islands_api.web.routes.models import Rank, get_model
 from islands_service.domain.job import IDENTIFICATION, REPORT
-from islands_service.domain.job_spec import identification_of
+from islands_service.domain.job_spec import parse_identification
 from islands_service.store.blobs import BlobNotFoundError
 from islands_service.store.database import StorageFullError, StoreUnavailableError
 
@@ -191,7 +191,7 @@ async def _figure_response(
 
 async def _draw(state: AppState, caller: Principal, job: str, rank: int | None) -> None:
     found = await get_job_of_kind(state, caller, job, IDENTIFICATION)
-    for dataset in identification_of(found.spec).datasets:
+    for dataset in parse_identification(found.spec).datasets:
         await state.run_blocking(state.store.datasets.get, caller.owner, dataset)  # raises if it was deleted
     _FAILURES.refuse(job, rank)
     try:

@@ -85,7 +85,7 @@ OF_EACH: Mapping[str, EffectTemplate] = {
 }
 
 
-def summary_of(name: str) -> str:
+def get_summary(name: str) -> str:
     """Return the summary of an effect, given its name with or without a state or parameter."""
     cause = name.partition(":")[0]
     return (CATALOGUE.get(cause) or OF_EACH[cause]).summary

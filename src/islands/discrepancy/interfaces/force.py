@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from islands.discrepancy.interfaces.context import Signal, SimulationContext
-from islands.systems.mechanics import WIDTH, Elements, compiled, integrate_along
+from islands.systems.mechanics import WIDTH, Elements, compile_law, integrate_along
 
 #: ``(coordinate, rate, internal state, numbers) -> number``: a scalar function that Numba can compile.
 Law = Callable[[float, float, float, Any], float]
@@ -57,10 +57,10 @@ def pack_force_laws(
         given = (*values, *element.constants(context))
         row[: len(given)] = given
     return Elements(
-        np.array([compiled(element.force).address for element, _ in forces], dtype=np.int64),
+        np.array([compile_law(element.force).address for element, _ in forces], dtype=np.int64),
         np.array(
             [
-                compiled(element.state_derivative).address if element.state_derivative else 0
+                compile_law(element.state_derivative).address if element.state_derivative else 0
                 for element, _ in forces
             ],
             dtype=np.int64,

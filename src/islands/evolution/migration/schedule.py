@@ -40,7 +40,7 @@ class Schedule:
 
 
 @lru_cache(typed=True)
-def schedule(text: int | str, least: int, what: str) -> Schedule:
+def parse_schedule(text: int | str, least: int, what: str) -> Schedule:
     """Parse a schedule.
 
     Parameters

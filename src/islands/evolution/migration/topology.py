@@ -48,7 +48,7 @@ class Topology:
 
 
 @lru_cache
-def topology(text: str, islands: int, seed: int) -> Topology:
+def parse_topology(text: str, islands: int, seed: int) -> Topology:
     """Build a topology.
 
     Parameters

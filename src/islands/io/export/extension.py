@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from islands.discrepancy.effects import summary_of
+from islands.discrepancy.effects import get_summary
 from islands.errors import lookup
 from islands.io.simulator_spec.specification import LocalExtendedSpec
 
@@ -20,7 +20,7 @@ def as_text(spec: LocalExtendedSpec) -> str:
         values = ", ".join(
             f"{name} = {each.value:.6g} {each.unit}" for name, each in effect.parameters.items()
         )
-        lines.append(f"{effect.name} ({effect.site}): {summary_of(effect.name)}")
+        lines.append(f"{effect.name} ({effect.site}): {get_summary(effect.name)}")
         lines.append(f"    {values}")
     return "\n".join(lines) + "\n"
 

@@ -17,7 +17,9 @@ _STARTS = 3
 _MIN_IMPROVEMENT = 0.01
 
 
-def share_of_gain(found: Diagnosis, names: Sequence[str], tolerance: Mapping[str, float]) -> float | None:
+def compute_gain_share(
+    found: Diagnosis, names: Sequence[str], tolerance: Mapping[str, float]
+) -> float | None:
     """Return the improvement of a diagnosis on the held-out samples relative to that of the oracle.
 
     Parameters

@@ -9,7 +9,7 @@ from islands.discrepancy.effects import CATALOGUE, model_form
 from islands.performance.trials.cases import CASES
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO
-from islands.performance.trials.oracle import share_of_gain
+from islands.performance.trials.oracle import compute_gain_share
 
 #: Stated tolerances of the piezo's parameters.
 TOLERANCE = PIEZO.tolerance
@@ -159,7 +159,7 @@ def run_trial(trial: Trial) -> TrialOutcome:
         tuple(finding.equivalents for finding in causes),
         tuple(each.name for each in found.candidates if each.name != model_form.CORE_SHAPE)[:3],
         causes[0].confidence if causes else 0.0,
-        share_of_gain(found, trial.effects, simulated.tolerance) if use_oracle else None,
+        compute_gain_share(found, trial.effects, simulated.tolerance) if use_oracle else None,
         any(finding.name == model_form.CORE_SHAPE for finding in found.effects),
     )
 

@@ -11,7 +11,7 @@ from islands.estimation.forward_selection import forward_selection
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.individual import make_regressor
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
-from islands.evolution.problem import Problem, problem
+from islands.evolution.problem import Problem, make_problem
 from islands.evolution.settings import Settings
 from islands.model.candidate_library import candidates
 from islands.model.expression import Apply, height, walk
@@ -33,12 +33,12 @@ def record(**changes):
 
 
 def test_problem_without_a_library_has_no_seeds_and_no_pool():
-    search_problem = problem(record(), Settings())
+    search_problem = make_problem(record(), Settings())
     assert (search_problem.seeds, search_problem.pool) == ((), ())
 
 
 def test_pool_is_the_library_and_seeds_are_its_forward_selection():
-    search_problem = problem(record(), SETTINGS)
+    search_problem = make_problem(record(), SETTINGS)
     library = candidates("phi-polynomial", 3, 3, 1)
     assert [make_regressor(gene) for gene in search_problem.pool] == list(library)
     expected = forward_selection(library, record(), "hysteresis", SETTINGS.max_terms)
@@ -49,7 +49,7 @@ def test_library_genes_use_phi_functions():
     """Constrained presets do not use ``sub`` and ``sign``, whose arguments variation may replace."""
     names = {
         node.primitive.name
-        for gene in problem(record(), SETTINGS).pool
+        for gene in make_problem(record(), SETTINGS).pool
         for node in walk(gene)
         if isinstance(node, Apply)
     }
@@ -78,13 +78,13 @@ def test_with_phi_replaces_differences_of_one_input(canonical, written):
 )
 def test_regressors_above_the_height_limit_are_left_out_of_the_library(max_height, pool):
     setting = replace(SETTINGS, max_height=max_height, initial_height=0)
-    search_problem = problem(record(), setting)
+    search_problem = make_problem(record(), setting)
     assert sorted(plain(gene) for gene in search_problem.pool) == sorted(pool)
     assert all(height(gene) <= max_height for genes in search_problem.seeds for gene in genes)
 
 
 def test_seeds_have_at_most_max_terms_genes():
-    search_problem = problem(record(), replace(SETTINGS, max_terms=3, initial_terms=(1, 3)))
+    search_problem = make_problem(record(), replace(SETTINGS, max_terms=3, initial_terms=(1, 3)))
     assert [len(genes) for genes in search_problem.seeds] == [1, 2, 3]
 
 
@@ -112,9 +112,9 @@ def test_islands_without_profiles_have_equal_settings():
 
 def test_too_large_library_and_incomplete_record_raise_an_error():
     with pytest.raises(SettingsError, match="more than a library may have"):
-        problem(record(), replace(SETTINGS, library="polynomial", library_degree=5, library_lags=11))
+        make_problem(record(), replace(SETTINGS, library="polynomial", library_degree=5, library_lags=11))
     whole = record()
     y = whole.y.copy()
     y[100] = np.nan
     with pytest.raises(RecordError, match="missing at sample 100"):
-        problem(replace(whole, y=y), SETTINGS)
+        make_problem(replace(whole, y=y), SETTINGS)

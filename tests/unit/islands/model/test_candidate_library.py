@@ -6,7 +6,7 @@ from math import comb
 import pytest
 
 from islands.errors import SettingsError
-from islands.model.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, library_named
+from islands.model.candidate_library import LIBRARIES, MAX_CANDIDATES, candidates, full_set, get_library
 from islands.model.clusters import steady_state
 from islands.model.expression import Apply
 from islands.model.model import canonical_order
@@ -150,7 +150,7 @@ def test_candidate_limit_applies_to_the_library_not_the_full_set():
     assert len(candidates("phi-polynomial", 5, 16, 1)) == 1 + 15 * 16 * 15 == 3601 <= MAX_CANDIDATES
 
 
-@pytest.mark.parametrize("look_up", [library_named, lambda name: candidates(name, 2, 2, 1)])
+@pytest.mark.parametrize("look_up", [get_library, lambda name: candidates(name, 2, 2, 1)])
 def test_unknown_library_error_lists_the_known_libraries(look_up):
     with pytest.raises(SettingsError) as caught:
         look_up("wavelets")

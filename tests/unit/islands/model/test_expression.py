@@ -12,7 +12,7 @@ from islands.model.expression import (
     content,
     height,
     lags,
-    unshifted,
+    remove_shifts,
     value,
     walk,
 )
@@ -65,7 +65,7 @@ def test_height_counts_edges_from_the_root_to_the_deepest_leaf(text, edges):
 
 def test_back_shifts_add_to_the_lags_of_all_leaves_below():
     expression = Shift(2, Apply(MUL, (Lagged(0, 1), Shift(3, Lagged(2, 4)), Constant(7.0))))
-    assert unshifted(expression) == Apply(MUL, (Lagged(0, 3), Lagged(2, 9), Constant(7.0)))
+    assert remove_shifts(expression) == Apply(MUL, (Lagged(0, 3), Lagged(2, 9), Constant(7.0)))
     assert lags(expression) == {(0, 3), (2, 9)}
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from islands.discrepancy.effects import hysteresis
-from islands.systems.mechanics import WIDTH, Elements, compiled, integrate_along, integrate_motion
+from islands.systems.mechanics import WIDTH, Elements, compile_law, integrate_along, integrate_motion
 
 Array = NDArray[np.float64]
 
@@ -50,8 +50,8 @@ def elements(*parts) -> Elements:
     for row, part in zip(numbers, parts, strict=True):
         row[: len(part[4])] = part[4]
     return Elements(
-        np.array([compiled(part[0]).address for part in parts], dtype=np.int64),
-        np.array([compiled(part[1]).address if part[1] else 0 for part in parts], dtype=np.int64),
+        np.array([compile_law(part[0]).address for part in parts], dtype=np.int64),
+        np.array([compile_law(part[1]).address if part[1] else 0 for part in parts], dtype=np.int64),
         np.array([part[2] for part in parts], dtype=float),
         np.array([part[3] for part in parts], dtype=float),
         numbers,

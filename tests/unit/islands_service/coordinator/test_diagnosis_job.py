@@ -12,8 +12,8 @@ from islands.discrepancy.inference import noise_floor
 from islands.errors import RecordError, SettingsError
 from islands.evolution.engine import SerialEngine
 from islands.io.records.preview import preview
-from islands_service.coordinator.coordinator import make_problem
-from islands_service.coordinator.diagnosis_job import discrepancy
+from islands_service.coordinator.coordinator import make_problem_document
+from islands_service.coordinator.diagnosis_job import run_diagnosis_job
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.domain.job import (
     DISCREPANCY,
@@ -77,7 +77,7 @@ def claim(store: Store) -> Lease:
 
 
 def run_job(lease: Lease, store: Any, blobs: Blobs, check: Callable[[], None] = lambda: None) -> JobOutcome:
-    return discrepancy(lease, store, blobs, SerialEngine(), check, 1.0, map)
+    return run_diagnosis_job(lease, store, blobs, SerialEngine(), check, 1.0, map)
 
 
 def phases(store: Store, job: Job) -> list[str]:
@@ -145,7 +145,7 @@ def test_unusable_record_or_simulation_becomes_a_problem_of_the_job(
     with pytest.raises(kind, match=words) as caught:
         run_job(claim(store), store, blobs)
     expected = {RecordError: "invalid-record", SettingsError: "invalid-settings"}[kind]
-    assert make_problem(caught.value)["type"] == expected
+    assert make_problem_document(caught.value)["type"] == expected
 
 
 class Away:

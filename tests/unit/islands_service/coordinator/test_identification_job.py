@@ -11,7 +11,7 @@ import pytest
 from islands.evolution.engine import SerialEngine
 from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import JobCancelled
-from islands_service.coordinator.identification_job import identification
+from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
@@ -28,7 +28,7 @@ def claim(store: Store, name: str = "me") -> Lease:
 
 
 def run_job(lease: Lease, store: Any, blobs: Any, check: Callable[[], None] = lambda: None) -> JobOutcome:
-    return identification(lease, store, blobs, SerialEngine(), check, 1e-9)
+    return run_identification_job(lease, store, blobs, SerialEngine(), check, 1e-9)
 
 
 def get_models(outcome: JobOutcome) -> list[Any]:
@@ -121,7 +121,9 @@ def test_wall_time_includes_all_attempts(
 def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:
     """Otherwise a job that soon ends its coordinator would never make progress."""
     with pytest.raises(JobCancelled):
-        identification(claim(store), store, blobs, SerialEngine(), Interruption(store, job, 0), 3600.0)
+        run_identification_job(
+            claim(store), store, blobs, SerialEngine(), Interruption(store, job, 0), 3600.0
+        )
     assert store.jobs.get(ALICE, job.id).checkpoint is not None
 
 
@@ -174,6 +176,6 @@ def test_unavailable_store_does_not_cause_repeated_checkpoints(
     monkeypatch.setattr(work, "REPORT_EVERY", 0.0)
     before = set(dict(blobs.all()))
     flaky = Flaky(store, lambda number: number < 20)
-    identification(claim(store), flaky, blobs, SerialEngine(), lambda: None, 3600.0)  # type: ignore[arg-type]
+    run_identification_job(claim(store), flaky, blobs, SerialEngine(), lambda: None, 3600.0)  # type: ignore[arg-type]
     assert flaky.reports >= 20
     assert len(set(dict(blobs.all())) - before) == 1

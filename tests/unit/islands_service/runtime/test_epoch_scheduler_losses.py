@@ -10,7 +10,7 @@ from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import IslandEpoch, run_epoch, select_migrants
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
 
 #: The record is not used, since numbers replace islands.
@@ -102,7 +102,7 @@ def evolving():
         emigrants="random",
         characters=("plain", "pruner"),
     )
-    return problem(record(150), setting)
+    return make_problem(record(150), setting)
 
 
 def test_scheduler_begins_with_the_emigrants_of_its_start(evolving):

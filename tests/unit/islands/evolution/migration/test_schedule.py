@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.errors import SettingsError
-from islands.evolution.migration.schedule import Schedule, schedule
+from islands.evolution.migration.schedule import Schedule, parse_schedule
 from support.strategies import schedule_text, schedules
 
 END = 70
@@ -59,16 +59,20 @@ def test_stops_do_not_depend_on_interruptions(pieces, interrupted):
 
 
 def test_schedule_with_two_pieces_has_the_documented_meaning():
-    read = schedule("5,100:20", 1, "migrate_every")
+    read = parse_schedule("5,100:20", 1, "migrate_every")
     assert [read.at(generation) for generation in (0, 99, 100, 10_000)] == [5, 5, 20, 20]
     assert list(takewhile(lambda stop: stop <= 140, stops_after(read, 90))) == [95, 100, 120, 140]
     # The beginning of a piece cuts the interval before it.
-    assert list(takewhile(lambda stop: stop < 12, stops_after(schedule("4,6:3", 1, "it"), 0))) == [4, 6, 9]
+    assert list(takewhile(lambda stop: stop < 12, stops_after(parse_schedule("4,6:3", 1, "it"), 0))) == [
+        4,
+        6,
+        9,
+    ]
 
 
 @given(schedules(least=0))
 def test_text_of_a_schedule_is_parsed_back(pieces):
-    assert schedule(schedule_text(pieces), 0, "migrants") == Schedule(pieces)
+    assert parse_schedule(schedule_text(pieces), 0, "migrants") == Schedule(pieces)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +91,7 @@ def test_text_of_a_schedule_is_parsed_back(pieces):
     ],
 )
 def test_valid_forms_of_a_schedule_are_parsed(text, pieces):
-    assert schedule(text, 1, "migrate_every").pieces == pieces
+    assert parse_schedule(text, 1, "migrate_every").pieces == pieces
 
 
 @pytest.mark.parametrize(
@@ -113,7 +117,7 @@ def test_valid_forms_of_a_schedule_are_parsed(text, pieces):
 )
 def test_invalid_text_raises_settings_error_with_the_setting(text, message):
     with pytest.raises(SettingsError) as refused:
-        schedule(text, 1, "migrate_every")
+        parse_schedule(text, 1, "migrate_every")
     assert str(refused.value).startswith(message)
 
 
@@ -121,21 +125,21 @@ def test_invalid_text_raises_settings_error_with_the_setting(text, message):
 def test_cached_schedule_does_not_accept_equal_values_of_other_types(known, equal):
     assert known == equal
     for _ in range(2):
-        assert schedule(known, 1, "migrate_every").pieces == ((0, known),)
+        assert parse_schedule(known, 1, "migrate_every").pieces == ((0, known),)
         with pytest.raises(SettingsError, match=f"cannot read migrate_every {re.escape(repr(equal))}: write"):
-            schedule(equal, 1, "migrate_every")
+            parse_schedule(equal, 1, "migrate_every")
 
 
 def test_smallest_value_is_a_parameter():
-    assert schedule("0,5:2", 0, "migrants").at(3) == 0
+    assert parse_schedule("0,5:2", 0, "migrants").at(3) == 0
     with pytest.raises(SettingsError, match="migrants is at least 3, got '3,9:2'"):
-        schedule("3,9:2", 3, "migrants")
+        parse_schedule("3,9:2", 3, "migrants")
 
 
 @given(st.text("0123456789,: -x", max_size=12))
 def test_arbitrary_text_is_parsed_or_raises_settings_error(text):
     try:
-        read = schedule(text, 1, "migrate_every")
+        read = parse_schedule(text, 1, "migrate_every")
     except SettingsError:
         return
     begins = [begin for begin, _ in read.pieces]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from islands.errors import SettingsError
-from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE, topology
+from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE, parse_topology
 from support.strategies import edges, layouts
 
 #: Numbers of islands: primes, squares and numbers with many divisors.
@@ -19,7 +19,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def sources(text, islands, seed=0):
-    return topology(text, islands, seed).sources
+    return parse_topology(text, islands, seed).sources
 
 
 def out_degrees(built):
@@ -51,7 +51,7 @@ def strongly_connected(built):
 @given(layouts(40), seeds)
 def test_sources_are_ascending_valid_and_exclude_the_island(layout, seed):
     text, islands = layout
-    built = topology(text, islands, seed)
+    built = parse_topology(text, islands, seed)
     assert len(built.sources) == islands
     for island, each in enumerate(built.sources):
         assert list(each) == sorted(set(each))
@@ -63,7 +63,7 @@ def test_sources_are_ascending_valid_and_exclude_the_island(layout, seed):
 def test_equal_arguments_give_equal_topologies(layout, seed):
     """The test bypasses the cache, which would hide differences."""
     text, islands = layout
-    assert topology.__wrapped__(text, islands, seed) == topology.__wrapped__(text, islands, seed)
+    assert parse_topology.__wrapped__(text, islands, seed) == parse_topology.__wrapped__(text, islands, seed)
 
 
 @pytest.mark.parametrize("name", [name for name in TOPOLOGIES if name != "isolated"])
@@ -75,7 +75,7 @@ def test_named_topologies_are_strongly_connected(name):
 @pytest.mark.parametrize("name", NAMED)
 def test_single_island_has_no_sources(name):
     assert sources(name, 1) == ((),)
-    assert topology(name, 1, 0).in_degree == 0
+    assert parse_topology(name, 1, 0).in_degree == 0
 
 
 # Definitions of the topologies.
@@ -84,7 +84,7 @@ def test_single_island_has_no_sources(name):
 def test_isolated_islands_have_no_sources():
     for islands in NUMBERS:
         assert sources("isolated", islands) == ((),) * islands
-        assert topology("isolated", islands, 0).in_degree == 0
+        assert parse_topology("isolated", islands, 0).in_degree == 0
 
 
 def test_ring_islands_receive_from_the_previous_island():
@@ -272,15 +272,15 @@ def test_edge_leads_from_its_first_island_to_its_second():
 )
 def test_invalid_topologies_raise_settings_error_with_a_reason(text, islands, message):
     with pytest.raises(SettingsError) as refused:
-        topology(text, islands, 0)
+        parse_topology(text, islands, 0)
     assert str(refused.value).startswith(message)
 
 
 @pytest.mark.ci
 def test_largest_random_regular_graphs_are_built():
-    assert topology.__wrapped__("random-regular:1", 50_000, 0).in_degree == 1
-    assert topology.__wrapped__("random-regular:99", 100, 0).in_degree == 99
-    assert topology.__wrapped__("random-regular:10", 30, 0).in_degree == 10
+    assert parse_topology.__wrapped__("random-regular:1", 50_000, 0).in_degree == 1
+    assert parse_topology.__wrapped__("random-regular:99", 100, 0).in_degree == 99
+    assert parse_topology.__wrapped__("random-regular:10", 30, 0).in_degree == 10
 
 
 def test_edge_accepts_island_numbers_of_nine_digits():
@@ -288,13 +288,13 @@ def test_edge_accepts_island_numbers_of_nine_digits():
 
 
 def test_thousand_islands_can_be_fully_connected():
-    assert topology.__wrapped__("fully-connected", 1000, 0).in_degree == 999
+    assert parse_topology.__wrapped__("fully-connected", 1000, 0).in_degree == 999
 
 
 @given(st.text("0123> ,:ring", max_size=10), st.integers(1, 4))
 def test_arbitrary_text_is_built_or_raises_settings_error(text, islands):
     try:
-        built = topology(text, islands, 0)
+        built = parse_topology(text, islands, 0)
     except SettingsError:
         return
     assert len(built.sources) == islands

@@ -10,7 +10,7 @@ from islands.data.split import split
 from islands.errors import RecordError, SettingsError
 from islands.estimation.estimate import estimate
 from islands.evolution.presets import PRESETS, resolve_settings
-from islands.evolution.problem import problem
+from islands.evolution.problem import make_problem
 from islands.facade.identify import identify
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
@@ -53,7 +53,7 @@ def test_result_is_never_worse_than_its_forward_selection_seeds(seed, changes):
     found = identify(data, **budget, seed=seed)
     errors = {fitted.model.size: fitted.metrics["validation"]["free_run"].rmse for fitted in found.models}
     compared = 0
-    for genes in problem(parts.estimation, settings).seeds:
+    for genes in make_problem(parts.estimation, settings).seeds:
         seeded = estimate(distinct_genes(genes), parts.estimation, "hysteresis", settings.maximum_lag).model
         simulated = free_run(seeded, parts.validation, settings.maximum_lag)
         if simulated.outcome and check_physics(seeded, parts.estimation).property_1:

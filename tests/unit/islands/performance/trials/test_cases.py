@@ -10,7 +10,7 @@ from islands.discrepancy.diagnosis import Diagnosis, diagnose
 from islands.performance.trials.cases import CASES, identify_actuator
 from islands.performance.trials.injection.measurement import inject
 from islands.performance.trials.injection.piezo import PIEZO
-from islands.performance.trials.oracle import share_of_gain
+from islands.performance.trials.oracle import compute_gain_share
 from islands.simulation.predictors import free_run
 
 
@@ -49,17 +49,17 @@ def found() -> Diagnosis:
 
 def test_a_correct_diagnosis_improves_as_much_as_the_oracle(found: Diagnosis) -> None:
     assert [effect.name for effect in found.effects] == ["even-nonlinearity"]
-    assert share_of_gain(found, ["even-nonlinearity"], {}) == pytest.approx(1.0, abs=0.02)
+    assert compute_gain_share(found, ["even-nonlinearity"], {}) == pytest.approx(1.0, abs=0.02)
 
 
 def test_an_empty_diagnosis_has_no_improvement(found: Diagnosis) -> None:
     empty = replace(found, best=found.base)
-    assert share_of_gain(empty, ["even-nonlinearity"], {}) == 0.0
+    assert compute_gain_share(empty, ["even-nonlinearity"], {}) == 0.0
 
 
 def test_the_oracle_ratio_is_none_without_a_name_or_an_improvement(found: Diagnosis) -> None:
-    assert share_of_gain(found, ["delay"], {}) is None
-    assert share_of_gain(found, ["periodic-disturbance"], {}) is None
+    assert compute_gain_share(found, ["delay"], {}) is None
+    assert compute_gain_share(found, ["periodic-disturbance"], {}) is None
 
 
 @pytest.mark.ci
@@ -68,7 +68,7 @@ def test_the_oracle_fits_two_faults_in_turn() -> None:
         ["offset", "even-nonlinearity"], np.random.default_rng(6), 10.0, band=(1.0, 3.0), perturbed=False
     )
     found = diagnose(faulty.record, CASES["column"].make(faulty))
-    share = share_of_gain(found, ["offset", "even-nonlinearity"], {})
+    share = compute_gain_share(found, ["offset", "even-nonlinearity"], {})
     assert share == pytest.approx(1.0, abs=0.05)
 
 

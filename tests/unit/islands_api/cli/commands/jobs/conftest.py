@@ -11,7 +11,7 @@ import pytest
 
 from islands.evolution.engine import SerialEngine
 from islands_api.cli.commands import jobs as command
-from islands_service.coordinator.identification_job import identification
+from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import JobOutcome, Submission
 from islands_service.store.blobs import Blobs
 from support.service import FIGURES, Service, ahead, csv
@@ -67,7 +67,7 @@ def found(service: Service) -> JobOutcome:
     job, _ = service.store.jobs.submit(Submission("local", spec, priority=100))
     blobs = Blobs(service.settings.blobs)
     lease = taken(service.store, job.id)
-    return identification(lease, service.store, blobs, SerialEngine(), lambda: None, LONG)
+    return run_identification_job(lease, service.store, blobs, SerialEngine(), lambda: None, LONG)
 
 
 @pytest.fixture
