@@ -47,7 +47,7 @@ def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
         assert len(full) > 1
         for answer in full:
             assert "is full" in problem_of(answer, 507, "storage-full")
-            assert "make room" in answer.json()["detail"]
+            assert "free some space" in answer.json()["detail"]
             assert answer.headers["retry-after"] == "30"
         assert service.client.get(f"/v1/jobs/{job['id']}").json() == job
         assert service.client.get(f"/v1/datasets/{dataset}").status_code == 200
@@ -67,7 +67,7 @@ def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
     with serve(disk) as service:
         path = f"/v1/jobs/{run_identification(service)}/models/1/figures/loop.svg"
         filler = filled(disk)
-        assert "make room" in problem_of(service.client.get(path), 507, "storage-full")
+        assert "free some space" in problem_of(service.client.get(path), 507, "storage-full")
         filler.unlink()
         assert service.client.get(path).status_code == 200
 
