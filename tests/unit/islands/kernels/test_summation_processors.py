@@ -23,7 +23,7 @@ import hashlib
 import numpy as np
 from islands.data.dataset import Dataset
 from islands.estimation.froe import froe
-from islands.estimation.least_squares import factor
+from islands.estimation.least_squares import factorise
 from islands.kernels import simulate as kernel
 from islands.kernels.population import Groups, PopulationContext, empty_results, evaluate
 from islands.model.expression import Lagged
@@ -47,7 +47,7 @@ for k in range(2, 3100):
 record = Dataset(u, y + 0.01 * rng.normal(size=3100), 0.1, segments=(2200, 5, 895))
 psi = regressor_matrix([*terms, Lagged(0, 0)], record, 4)
 gram = gram_matrix([*terms, Lagged(0, 0)], record, 4)
-made, chosen = factor(psi[:-1], psi[-1]), froe(gram)
+made, chosen = factorise(psi[:-1], psi[-1]), froe(gram)
 found = {"columns": psi, "gram": gram, "triangle": made.triangle, "projection": made.projection,
          "order": np.array(chosen.order), "err": np.array(chosen.err)}
 
