@@ -14,17 +14,10 @@ from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.constrained_least_squares import null_space
 from islands.estimation.parameter_constraints import constraint
-from islands.kernels.simulate import DIVERGED, Layout, simulate
-from islands.kernels.summation import dot
+from islands.estimation.shooting_residual import ShootingResidual
 from islands.model.model import Model
-from islands.program.term_pool import link
-from islands.simulation.layout import layout
 from islands.simulation.outcome import EvaluationOutcome, Status
-from islands.simulation.predictors import divergence_bound, multiple_shooting
-
-#: Step of a central difference in units of the parameters' magnitudes, a compromise between truncation and
-#: rounding errors.
-_DIFFERENCE_STEP = 1e-5
+from islands.simulation.predictors import multiple_shooting
 
 #: Initial damping.
 _INITIAL_DAMPING = 1e-3
@@ -113,7 +106,7 @@ def refine(
     if isinstance(found, EvaluationOutcome):
         return found
     directions = unit[:, None] * found[1]
-    residual = _Residual(model, record, interval, warm_up)
+    residual = ShootingResidual(model, record, interval, warm_up)
     error = residual(theta)
     assert error is not None, "the initial simulation did not diverge"
     before = residual.mean_square(error)
@@ -136,53 +129,3 @@ def refine(
     covariance = directions @ np.linalg.pinv(normal) @ directions.T
     errors = np.sqrt(variance) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return RefinedModel(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)
-
-
-class _Residual:
-    """The multiple-shooting residual as a function of the parameters, with sums in a fixed order."""
-
-    def __init__(self, model: Model, record: Dataset, interval: int | None, warm_up: int | None) -> None:
-        first = model.maximum_lag if warm_up is None else warm_up
-        self._program = link(model.regressors)
-        self._cut: Layout = layout(record, first, interval)
-        self._y, self._bound = record.y, divergence_bound(record)
-        self._predicted = np.zeros(record.samples, bool)
-        for start, length in zip(self._cut.start, self._cut.length, strict=True):
-            self._predicted[start : start + length] = True
-
-    def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Return prediction minus measurement over all predicted samples, or None after a divergence."""
-        lanes = len(self._cut.start)
-        predicted = np.empty(len(self._y))
-        error, diverged = np.empty(lanes), np.empty(lanes, np.int64)
-        ending = simulate(
-            self._program, theta, self._cut, self._bound, np.inf, False, error, diverged, predicted
-        )
-        if ending == DIVERGED:
-            return None
-        return np.ascontiguousarray((predicted - self._y)[self._predicted])
-
-    def mean_square(self, error: NDArray[np.float64]) -> float:
-        """Return the mean square of a residual."""
-        return float(dot(error, 0, error, 0, error.size)) / error.size
-
-    def normal_equations(
-        self, theta: NDArray[np.float64], error: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return J'J and J'r for steps along the directions; a direction that diverges contributes zeros."""
-        free = directions.shape[1]
-        jacobian: NDArray[np.float64] = np.zeros((free, error.size))
-        for j in range(free):
-            forward, backward = (
-                self(theta + sign * _DIFFERENCE_STEP * directions[:, j]) for sign in (1.0, -1.0)
-            )
-            if forward is not None and backward is not None:
-                jacobian[j] = (forward - backward) / (2.0 * _DIFFERENCE_STEP)
-        normal: NDArray[np.float64] = np.empty((free, free))
-        gradient: NDArray[np.float64] = np.empty(free)
-        flat, rows = jacobian.reshape(-1), error.size
-        for i in range(free):
-            gradient[i] = dot(flat, i * rows, error, 0, rows)
-            for j in range(i + 1):
-                normal[i, j] = normal[j, i] = dot(flat, i * rows, flat, j * rows, rows)
-        return normal, gradient

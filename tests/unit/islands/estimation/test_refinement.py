@@ -8,7 +8,8 @@ import pytest
 from islands.data.dataset import Dataset, join
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.estimation.estimate import estimate
-from islands.estimation.refinement import RefinedModel, _Residual, refine
+from islands.estimation.refinement import RefinedModel, refine
+from islands.estimation.shooting_residual import ShootingResidual
 from islands.model.model import make_model
 from islands.model.parsing import parse
 from islands.simulation.outcome import EvaluationOutcome, Status
@@ -173,7 +174,7 @@ def test_jacobian_matches_higher_order_finite_differences(interval):
     record = make_record(HYSTERESIS, noise=0.02)
     start = perturb(HYSTERESIS)
     theta = np.array(start.parameters)
-    residual = _Residual(start, record, interval, None)
+    residual = ShootingResidual(start, record, interval, None)
     error = residual(theta)
     directions = np.diag(np.abs(theta))
     normal, gradient = residual.normal_equations(theta, error, directions)
@@ -192,7 +193,7 @@ def test_residual_is_prediction_minus_measurement():
     record = make_record(HYSTERESIS, noise=0.02)
     start = perturb(HYSTERESIS)
     expected = multiple_shooting(start, record, 30, 5)
-    error = _Residual(start, record, 30, 5)(np.array(start.parameters))
+    error = ShootingResidual(start, record, 30, 5)(np.array(start.parameters))
     assert error == pytest.approx((expected.y - record.y)[5:], abs=1e-15)
 
 
@@ -205,14 +206,14 @@ def test_segments_are_refined_together():
 def test_diverging_steps_are_rejected(monkeypatch):
     """From a distant start the first steps overshoot; the damping increases until a step succeeds."""
     diverged = []
-    original = _Residual.__call__
+    original = ShootingResidual.__call__
 
     def record_divergence(self, theta):
         error = original(self, theta)
         diverged.append(error is None)
         return error
 
-    monkeypatch.setattr(_Residual, "__call__", record_divergence)
+    monkeypatch.setattr(ShootingResidual, "__call__", record_divergence)
     start = model(dict(zip(HYSTERESIS, (0.93, 0.46, -0.28, 0.39), strict=True)))
     found = refine_model(start, make_record(HYSTERESIS), None)
     assert sum(diverged) >= 1
@@ -223,12 +224,12 @@ def test_diverging_direction_contributes_zeros(monkeypatch):
     record = make_record(HYSTERESIS)
     start = perturb(HYSTERESIS)
     theta = np.array(start.parameters)
-    residual = _Residual(start, record, 30, None)
+    residual = ShootingResidual(start, record, 30, None)
     error = residual(theta)
     complete, _ = residual.normal_equations(theta, error, np.eye(4))
-    original = _Residual.__call__
+    original = ShootingResidual.__call__
     monkeypatch.setattr(
-        _Residual, "__call__", lambda self, at: None if at[1] > theta[1] else original(self, at)
+        ShootingResidual, "__call__", lambda self, at: None if at[1] > theta[1] else original(self, at)
     )
     normal, gradient = residual.normal_equations(theta, error, np.eye(4))
     assert not normal[1].any()
