@@ -8,7 +8,6 @@ restricted to their null space.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
