@@ -108,7 +108,10 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
     assessed = tuple(
-        RankedModel(model, assess(model, split, settings.shooting, settings.maximum_lag)) for model in models
+        RankedModel(
+            model, assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
+        )
+        for model in models
     )
     search = _search(document["search"], store.results.history(job.id))
     return SearchResult(record, split, spec.seed, document["settings"], search, assessed)

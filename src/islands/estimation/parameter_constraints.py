@@ -199,3 +199,14 @@ def constraint(name: str) -> Constraint:
         No constraint has that name.
     """
     return lookup(CONSTRAINTS, name, "constraints")
+
+
+def count_free_parameters(regressors: Sequence[Regressor], name: str) -> int:
+    """Return the number of parameters that remain free: the dimension of the null space.
+
+    A structure that cannot meet the constraint was not estimated under it; all of its parameters count.
+    """
+    constrained = constraint(name).constrain(regressors)
+    if isinstance(constrained, EvaluationOutcome):
+        return len(regressors)
+    return len(constrained.regressors) - len(constrained.c)

@@ -94,7 +94,8 @@ def fit(
             outcomes[estimated.verdict.name.lower()] += 1
             continue
         outcomes["ok"] += 1
-        models.append(RankedModel(estimated.model, assess(estimated.model, parts, shooting, warm_up)))
+        assessment = assess(estimated.model, parts, shooting, warm_up, constraints)
+        models.append(RankedModel(estimated.model, assessment))
         progress(f"model of {estimated.model.size} terms", done / len(structures))
     if not models:
         raise SettingsError(

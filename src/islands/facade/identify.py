@@ -153,7 +153,7 @@ def select_final_models(hall_of_fame: HallOfFame, problem: Problem, split: Split
     for entries in found.values():
         entries.sort(key=lambda entry: (entry[0], tuple(item.text for item in entry[1].regressors)))
         for _, model in entries:
-            assessment = assess(model, split, settings.shooting, settings.maximum_lag)
+            assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
             if settings.constraints == "none" or assessment.physics.property_1:
                 kept.append(RankedModel(model, assessment))
                 break

@@ -9,6 +9,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import RecordError
+from islands.estimation.parameter_constraints import count_free_parameters
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import multiple_shooting
@@ -40,8 +41,8 @@ class Assessment:
     outcomes : mapping
         ``outcomes[part][mode]``.
     information : InformationCriteria
-        Information criteria of the one-step-ahead residual on the estimation data. NaN if it diverged. Every
-        term counts as a parameter; constraints are not subtracted.
+        Information criteria of the one-step-ahead residual on the estimation data. NaN if it diverged. The
+        number of parameters is that of the free ones: the terms minus the independent constraints.
     residual_tests : ResidualTests
         Tests of the one-step-ahead residual on the longest recording of the validation data. If the
         prediction diverged, all tests failed and their notes give the reason.
@@ -58,7 +59,9 @@ class Assessment:
     warm_up: int
 
 
-def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None) -> Assessment:
+def assess(
+    model: Model, split: Split, shooting: int, warm_up: int | None = None, constraints: str = "none"
+) -> Assessment:
     """Assess a model on the estimation data and the validation data.
 
     Parameters
@@ -69,6 +72,8 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
         Length of a multiple-shooting interval in samples.
     warm_up : int or None
         Number of samples before the first prediction. None is the model's largest lag.
+    constraints : str
+        Constraints under which the parameters were estimated, by name.
 
     Raises
     ------
@@ -78,8 +83,8 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
         A part has a different number of inputs, missing outputs, or is too short for a prediction, or the
         validation data is too short for the residual tests.
     SettingsError
-        The warm-up is shorter than the model's largest lag, the interval is less than 1, or the estimation
-        data has too few samples for the number of terms.
+        The warm-up is shorter than the model's largest lag, the interval is less than 1, the estimation data
+        has too few samples for the number of free parameters, or the constraint is unknown.
     """
     intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}
@@ -93,19 +98,22 @@ def assess(model: Model, split: Split, shooting: int, warm_up: int | None = None
     return Assessment(
         errors,
         outcomes,
-        _compute_information(model, split.estimation, warm_up),
+        _compute_information(model, split.estimation, warm_up, constraints),
         _test_residual(model, split.validation, warm_up),
         check_physics(model, split.estimation),
         model.maximum_lag if warm_up is None else warm_up,
     )
 
 
-def _compute_information(model: Model, record: Dataset, warm_up: int | None) -> InformationCriteria:
+def _compute_information(
+    model: Model, record: Dataset, warm_up: int | None, constraints: str
+) -> InformationCriteria:
     run = multiple_shooting(model, record, 1, warm_up)
     if not run.outcome:
         return InformationCriteria(nan, nan, nan)
     residual = (record.y - run.y)[~np.isnan(run.y)]
-    return information_criteria(float(np.add.reduce(residual**2)), len(residual), model.size)
+    free = count_free_parameters(model.regressors, constraints)
+    return information_criteria(float(np.add.reduce(residual**2)), len(residual), free)
 
 
 def _test_residual(model: Model, record: Dataset, warm_up: int | None) -> ResidualTests:

@@ -84,6 +84,26 @@ def test_information_criteria_use_the_one_step_ahead_estimation_residual():
     assert found.fpe == pytest.approx(squares / 195 * 198 / 192, rel=1e-12)
 
 
+@pytest.mark.parametrize(("constraints", "free"), [("none", 6), ("hysteresis", 4)])
+def test_information_criteria_count_only_free_parameters(constraints, free):
+    # Two clusters, {y(k-1), y(k-2)} and {u(k-1), u(k-2)}, impose one constraint each.
+    terms = {
+        "y(k-1)": 0.9,
+        "y(k-2)": 0.1,
+        "u(k-1)": 0.5,
+        "u(k-2)": -0.5,
+        "phi2(u(k-1), u(k-2))": 0.1,
+        "u(k-1)*phi1(u(k-1), u(k-2))": 0.1,
+    }
+    data = PARTS_OF_DATA.estimation
+    residual = data.y - one_step_ahead(model(terms), data).y
+    squares = float(np.nansum(residual**2))
+    found = assess(model(terms), PARTS_OF_DATA, SHOOTING, constraints=constraints).information
+    assert found.aic == pytest.approx(198 * math.log(squares / 198) + 2 * free, rel=1e-12)
+    assert found.bic == pytest.approx(198 * math.log(squares / 198) + free * math.log(198), rel=1e-12)
+    assert found.fpe == pytest.approx(squares / 198 * (198 + free) / (198 - free), rel=1e-12)
+
+
 def test_residual_tests_use_the_one_step_ahead_validation_residual():
     data = PARTS_OF_DATA.validation
     found = assess(LINEAR, PARTS_OF_DATA, SHOOTING).residual_tests
