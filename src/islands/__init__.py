@@ -33,7 +33,8 @@ _PUBLIC = {
     "io.records": ("read_record", "write_record"),
     "model.model": ("Model", "make_model"),
     "model.parsing": ("parse",),
-    "model.primitives": ("PRIMITIVES", "primitive"),
+    "model.primitives": ("PRIMITIVES",),
+    "model.user_primitive": ("primitive",),
 }
 _MODULES = {name: module for module, names in _PUBLIC.items() for name in names}
 

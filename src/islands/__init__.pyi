@@ -32,6 +32,6 @@ from islands.model.model import Model as Model
 from islands.model.model import make_model as make_model
 from islands.model.parsing import parse as parse
 from islands.model.primitives import PRIMITIVES as PRIMITIVES
-from islands.model.primitives import primitive as primitive
+from islands.model.user_primitive import primitive as primitive
 
 __version__: str

@@ -46,6 +46,12 @@ def test_function_that_is_zero_at_zero_vanishes_with_its_phi(phi, name):
     assert clusters([make_regressor(Apply(PRIMITIVES[name], (phi,)))]) == ()
 
 
+@given(phi_factors(), leaves())
+def test_quotient_of_a_phi_and_a_signal_vanishes_and_its_inverse_too(phi, leaf):
+    for quotient in ((phi, leaf), (leaf, phi)):
+        assert clusters([make_regressor(Apply(PRIMITIVES["div"], quotient))]) == ()
+
+
 @given(phi_factors(), st.sampled_from(["exp", "cos"]))
 def test_exp_and_cos_of_a_phi_are_one_in_steady_state(phi, name):
     assert steady_state(make_regressor(Apply(PRIMITIVES[name], (phi,)))) == canonical(parse("1"))

@@ -10,12 +10,13 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.estimation.estimate import estimate
 from islands.estimation.least_squares import least_squares
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
@@ -294,14 +295,36 @@ def test_theta_scales_with_the_units_of_the_record(volts, metres):
     factor = np.array([metres / (volts**a * metres**b) for a, b in TERMS.values()])
     S = np.array([[1.0, 1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0, 1.0]])
     c = np.array([0.9, 0.0])
-    for estimate in (
+    for method in (
         lambda psi: least_squares(psi[:-1], psi[-1]),
         lambda psi: constrained_least_squares(psi[:-1], psi[-1], S, c),
     ):
-        before, after = estimate(here), estimate(there)
+        before, after = method(here), method(there)
         np.testing.assert_allclose(after.theta, factor * before.theta, rtol=1e-8, atol=0)
         np.testing.assert_allclose(after.standard_errors, factor * before.standard_errors, rtol=1e-8, atol=0)
         assert after.residual_variance == pytest.approx(metres**2 * before.residual_variance, rel=1e-10)
+
+
+QUOTIENTS = {
+    "y(k-1)": (0, 1),
+    "u(k-1)": (1, 0),
+    "u(k-1)/y(k-1)": (1, -1),
+    "y(k-2)^2/u(k-2)": (-1, 2),
+    "y(k-3)/y(k-2)": (0, 0),
+}
+
+
+@given(st.integers(-160, 160), st.integers(-160, 160))
+@example(-40, -40)  # amplitudes of 1e-12
+def test_theta_of_quotients_scales_exactly_with_units_of_powers_of_two(volts, metres):
+    u, y = np.random.default_rng(19).normal([[0.0], [1.0]], size=(2, 100))
+    u[::9] = 0.0
+    here = estimate(make_regressors(*QUOTIENTS), Dataset(u, y, 0.1))
+    there = estimate(make_regressors(*QUOTIENTS), Dataset(np.ldexp(u, volts), np.ldexp(y, metres), 0.1))
+    exponents = dict(zip(make_regressors(*QUOTIENTS), QUOTIENTS.values(), strict=True))
+    shifts = [metres - volts * a - metres * b for a, b in map(exponents.get, here.model.regressors)]
+    assert there.model.theta == tuple(np.ldexp(here.model.theta, shifts))
+    assert there.model.standard_errors == tuple(np.ldexp(here.model.standard_errors, shifts))
 
 
 # Bits do not depend on the number of threads.

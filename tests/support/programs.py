@@ -4,7 +4,7 @@ import numpy as np
 
 import islands
 from islands.data.dataset import Dataset
-from islands.model.primitives import PRIMITIVES, TINY
+from islands.model.primitives import PRIMITIVES
 from islands.systems.published_models import PUBLISHED
 
 SAMPLES = 60
@@ -73,8 +73,11 @@ CASES = {
 }
 
 
+#: Smallest argument whose quotients with the others are finite.
+_SMALLEST = 1e-300
+
 #: Arguments at which primitives jump, are protected or clipped, and their neighbours.
-_EDGES = [0.0, -0.0, 1.0, -1.0, TINY, -TINY, 0.999 * TINY, -0.999 * TINY, 49.9, 50.1, 700.0, -700.0]
+_EDGES = [0.0, -0.0, 1.0, -1.0, _SMALLEST, -_SMALLEST, 1e-9, -1e-9, 49.9, 50.1, 700.0, -700.0]
 
 
 def at_the_edges(name):

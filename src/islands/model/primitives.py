@@ -1,25 +1,14 @@
 """Table of primitives: the functions that can be evolved, compiled, written and parsed.
 
 The paper uses multiplication, subtraction and sign (its phi1 and phi2) and the back-shifts q1 .. q5. Users
-define further primitives from scalar functions with `primitive` and pass them in a separate table.
+define further primitives from scalar functions with `primitive`.
 """
 
-import inspect
-import keyword
 import math
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 
-from islands.errors import ModelError
 from islands.model.expression import Apply, Constant, Expression, Primitive
-from islands.model.primitive_checks import check
-
-#: Names of signals, time and back-shifts in text.
-SIGNALS = re.compile(r"y|u\d*|k|q\d+")
-
-#: A divisor or argument of a logarithm with a smaller absolute value counts as zero.
-TINY = 1e-9
 
 #: Arguments of exp are clipped here, so that the bound of a free run detects divergence before an overflow.
 LARGEST_EXPONENT = 50.0
@@ -46,7 +35,8 @@ def _sign_of_difference(a: float, b: float) -> float:
 
 
 def _divide(a: float, b: float) -> float:
-    return 1.0 if abs(b) < TINY else a / b
+    # Another value at zero, or a threshold for small divisors, would depend on the units (decision 0015).
+    return 0.0 if b == 0.0 else a / b
 
 
 def _absolute(a: float) -> float:
@@ -70,7 +60,7 @@ def _exponential(a: float) -> float:
 
 
 def _logarithm(a: float) -> float:
-    return 0.0 if abs(a) < TINY else math.log(abs(a))
+    return 0.0 if a == 0.0 else math.log(abs(a))
 
 
 def _sine(a: float) -> float:
@@ -135,11 +125,27 @@ def _replace_cube(a: Expression) -> Expression:
 
 
 def _simplify_quotient(a: Expression, b: Expression) -> Expression | None:
-    if a == b:
-        return Constant(1.0)
-    if isinstance(b, Constant):
-        return Constant(1.0) if abs(b.value) < TINY else Apply(MUL, (Constant(1.0 / b.value), a))
-    return None
+    (over, above), (under, below) = _split_factor(a), _split_factor(b)
+    if 0.0 in (over, under):
+        return Constant(0.0)
+    factor = Constant(over / under)
+    if below == Constant(1.0):
+        return Apply(MUL, (factor, above))
+    if above == below:
+        return Apply(MUL, (factor, Apply(SIGN, (above,)), Apply(SIGN, (above,))))
+    if over == under == 1.0:
+        return None
+    return Apply(MUL, (factor, Apply(PRIMITIVES["div"], (above, below))))
+
+
+def _split_factor(expression: Expression) -> tuple[float, Expression]:
+    match expression:
+        case Constant(number):
+            return number, Constant(1.0)
+        case Apply(primitive, (Constant(number), first, *others)) if primitive == MUL:
+            return number, Apply(MUL, (first, *others)) if others else first
+        case _:
+            return 1.0, expression
 
 
 def _simplify_extremum(a: Expression, b: Expression) -> Expression | None:
@@ -167,10 +173,10 @@ _BUILT_IN = (
         2,
         _divide,
         r"\frac{{{0}}}{{{1}}}",
-        c=f"return fabs(b) < {TINY} ? 1.0 : a / b;",
-        matlab=f"if abs(b) < {TINY}, r = 1; else, r = a / b; end",
+        c="return b == 0.0 ? 0.0 : a / b;",
+        matlab="if b == 0, r = 0; else, r = a / b; end",
         simplify=_simplify_quotient,
-        summary=f"`a/b`; 1 if the divisor is smaller than {TINY}, so that `x/x` is 1 everywhere",
+        summary="`a/b`; 0 if the divisor is zero, so that `x/x` is `sign(x)^2`",
     ),
     Primitive(
         "abs", 1, _absolute, r"\left|{0}\right|", "return fabs(a);", "r = abs(a);", 1, 1.0, summary="`|a|`"
@@ -202,10 +208,10 @@ _BUILT_IN = (
         1,
         _logarithm,
         r"\ln\left|{0}\right|",
-        c=f"return fabs(a) < {TINY} ? 0.0 : log(fabs(a));",
-        matlab=f"if abs(a) < {TINY}, r = 0; else, r = log(abs(a)); end",
+        c="return a == 0.0 ? 0.0 : log(fabs(a));",
+        matlab="if a == 0, r = 0; else, r = log(abs(a)); end",
         parity=1,
-        summary=f"Natural logarithm of the absolute value; 0 if that is smaller than {TINY}",
+        summary="Natural logarithm of the absolute value; 0 if that is zero",
     ),
     Primitive("sin", 1, _sine, r"\sin({0})", "return sin(a);", "r = sin(a);", parity=-1),
     Primitive("cos", 1, _cosine, r"\cos({0})", "return cos(a);", "r = cos(a);", parity=1),
@@ -233,68 +239,3 @@ _BUILT_IN = (
 )
 
 PRIMITIVES: Mapping[str, Primitive] = MappingProxyType({entry.name: entry for entry in _BUILT_IN})
-
-
-def primitive(
-    name: str,
-    scalar: Callable[..., float],
-    latex: str = "",
-    parity: int = 0,
-    commutative: bool = False,
-    c: str = "",
-    matlab: str = "",
-) -> Primitive:
-    """Make a user-defined primitive from a scalar function, and check its declared properties.
-
-    Parameters
-    ----------
-    name : str
-        A Python identifier that differs from the names of built-in primitives and signals.
-    scalar : callable
-        Maps one or two floats to a float with arithmetic and the functions of ``math``.
-    latex : str
-        Format string with ``{0}`` and ``{1}``. If empty, it is derived from the name.
-    parity : -1, 0 or 1
-        Parity as in `Primitive`.
-    commutative : bool
-        Whether the arguments can be exchanged, as in `Primitive`.
-    c, matlab : str
-        Function bodies as in `Primitive`. Required only to export models to C or MATLAB.
-
-    Raises
-    ------
-    ModelError
-        The name is taken or invalid, the function does not take one or two arguments, it is not finite at
-        zero, a negative or a large argument, it lacks a declared property, or the LaTeX is not a format
-        string.
-    """
-    free = name not in PRIMITIVES and not keyword.iskeyword(name) and not SIGNALS.fullmatch(name)
-    if not (free and name.isidentifier()):
-        raise ModelError(
-            f"{name!r} cannot name a primitive: use an identifier that is not in use and not y, u, k, q1 .."
-        )
-    arity = _count_arguments(name, scalar)
-    if arity not in (1, 2):
-        raise ModelError(f"primitive {name!r} takes {arity} arguments: a primitive must take one or two")
-    upright = name.replace("_", r"\_")
-    entry = Primitive(
-        name,
-        arity,
-        scalar,
-        latex or rf"\operatorname{{{{{upright}}}}}(" + ", ".join(f"{{{i}}}" for i in range(arity)) + ")",
-        c=c,
-        matlab=matlab,
-        parity=parity,
-        commutative=commutative,
-    )
-    check(entry)
-    return entry
-
-
-def _count_arguments(name: str, scalar: Callable[..., float]) -> int:
-    try:
-        return len(inspect.signature(scalar).parameters)
-    except ValueError as error:
-        raise ModelError(
-            f"primitive {name!r} has no signature: wrap it in a function of one or two arguments"
-        ) from error

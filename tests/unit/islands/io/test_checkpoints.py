@@ -17,7 +17,8 @@ from islands.io.checkpoints import HALL_SCHEMA, SCHEMA, read_checkpoint, write_c
 from islands.model.expression import Apply
 from islands.model.model import canonical_order
 from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES, primitive
+from islands.model.primitives import PRIMITIVES
+from islands.model.user_primitive import primitive
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 
 #: Floats that only an exact round trip preserves.

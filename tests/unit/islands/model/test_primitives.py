@@ -9,9 +9,11 @@ import pytest
 from islands.errors import ModelError
 from islands.model.expression import Lagged, Primitive
 from islands.model.parsing import parse
-from islands.model.primitives import LARGEST_EXPONENT, PRIMITIVES, TINY, check, primitive
+from islands.model.primitive_checks import check
+from islands.model.primitives import LARGEST_EXPONENT, PRIMITIVES
 from islands.model.regressor import canonical
 from islands.model.rendering import latex, plain
+from islands.model.user_primitive import primitive
 
 
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
@@ -38,7 +40,10 @@ def test_built_in_primitive_can_be_pickled(entry):
         ("phi2", (4.0, 7.0), -1.0),
         ("phi2", (4.0, 4.0), 0.0),
         ("div", (1.0, 8.0), 0.125),
-        ("div", (5.0, 0.9 * TINY), 1.0),
+        ("div", (5.0, 0.0), 0.0),
+        ("div", (0.0, -0.0), 0.0),
+        ("div", (4e-10, 2e-10), 2.0),
+        ("div", (0.0, 5e-324), 0.0),
         ("abs", (-2.5,), 2.5),
         ("square", (-3.0,), 9.0),
         ("cube", (-3.0,), -27.0),
@@ -47,6 +52,7 @@ def test_built_in_primitive_can_be_pickled(entry):
         ("exp", (1e6,), math.exp(LARGEST_EXPONENT)),
         ("log", (-math.e,), 1.0),
         ("log", (0.0,), 0.0),
+        ("log", (-math.exp(-30.0),), -30.0),
         ("sin", (math.pi / 2,), 1.0),
         ("cos", (math.pi,), -1.0),
         ("tanh", (1e3,), 1.0),

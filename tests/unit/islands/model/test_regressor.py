@@ -6,9 +6,10 @@ from islands.errors import ModelError
 from islands.model.clusters import steady_state
 from islands.model.expression import Apply, Constant, Lagged
 from islands.model.parsing import parse
-from islands.model.primitives import MUL, PRIMITIVES, primitive
+from islands.model.primitives import MUL, PRIMITIVES
 from islands.model.regressor import canonical, regressor
 from islands.model.rendering import plain
+from islands.model.user_primitive import primitive
 
 
 def canonical_text(text):
@@ -40,9 +41,14 @@ def canonical_text(text):
         ("sign(u(k-1))^5*y(k-1)", 1.0, "y(k-1)*sign(u(k-1))"),
         ("sign(u(k-1))^4", 1.0, "sign(u(k-1))^2"),
         ("sign(u(k-1))*sign(y(k-1))*sign(u(k-1))", 1.0, "sign(y(k-1))*sign(u(k-1))^2"),
-        ("u(k-1)/u(k-1)", 1.0, "1"),
+        ("u(k-1)/u(k-1)", 1.0, "sign(u(k-1))^2"),
+        ("3*u(k-1)/(2*u(k-1))", 1.5, "sign(u(k-1))^2"),
         ("u(k-1)/(-4)", -0.25, "u(k-1)"),
-        ("u(k-1)/1e-12", 1.0, "1"),
+        ("u(k-1)/1e-12", 1e12, "u(k-1)"),
+        ("y(k-1) + u(k-1)/0", 1.0, "y(k-1)"),
+        ("u(k-1) + 0/y(k-1)", 1.0, "u(k-1)"),
+        ("(u(k-2) - u(k-1))/(-4*y(k-1))", 0.25, "(u(k-1) - u(k-2))/y(k-1)"),
+        ("8/(2*y(k-1))", 4.0, "1/y(k-1)"),
         ("max(u(k-1), y(k-1))", 1.0, "max(y(k-1), u(k-1))"),
         ("min(2*u(k-1), u(k-1) + u(k-1))", 2.0, "u(k-1)"),
         ("log(-u(k-1))", 1.0, "log(u(k-1))"),
@@ -75,11 +81,6 @@ def test_square_of_a_sign_is_not_simplified_to_one():
     _, square = regressor(parse("sign(u(k-1) - u(k-2))^2"))
     assert square.expression != Constant(1.0)
     assert square.lags == {(1, 1), (1, 2)}
-
-
-def test_protected_quotient_keeps_the_factor_of_its_numerator():
-    # If y is zero, 2*u/y is 1, not 2.
-    assert canonical_text("(2*u(k-1))/y(k-1)") == (1.0, "(2*u(k-1))/y(k-1)")
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,9 @@ from islands.errors import RecordError, SettingsError
 from islands.kernels.summation import CHUNK, dot
 from islands.model.expression import Constant, Lagged
 from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES, primitive
+from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
+from islands.model.user_primitive import primitive
 from islands.program.regressor_matrix import gram_matrix, regressor_matrix, select_rows
 from support.oracles import side_by_side
 from support.strategies import INPUTS, nearly, records, regressors, settled_value

@@ -15,8 +15,9 @@ from islands.kernels.interpreter import (
 )
 from islands.model.expression import Constant, Lagged, value
 from islands.model.parsing import parse
-from islands.model.primitives import PRIMITIVES, primitive
+from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import regressor
+from islands.model.user_primitive import primitive
 from islands.program.primitive_functions import row_address
 from islands.program.term_pool import TermPool, link
 from support.oracles import NUMBERS

@@ -13,7 +13,8 @@ from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.io.export import export
 from islands.io.export.parts import functions
-from islands.model.primitives import PRIMITIVES, primitive
+from islands.model.primitives import PRIMITIVES
+from islands.model.user_primitive import primitive
 from islands.performance.benchmark.compiled_c import compile_model, find_compiler
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 import islands
 from islands.io.export import export
-from islands.model.primitives import PRIMITIVES, primitive
+from islands.model.primitives import PRIMITIVES
+from islands.model.user_primitive import primitive
 from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
 from support.programs import CASES, HOSTILE_NAMES, at_the_edges, model, record, record_of

@@ -15,8 +15,9 @@ from islands.errors import ModelError, SettingsError
 from islands.io.export import EXPORTS, export
 from islands.io.models import model_json
 from islands.model.equations import mathml_equation
-from islands.model.primitives import PRIMITIVES, primitive
+from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor
+from islands.model.user_primitive import primitive
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from support.programs import CASES, HOSTILE_NAMES, SAMPLES, bits, model, record, record_of
@@ -183,13 +184,13 @@ def test_two_primitives_may_have_functions_of_the_same_name():
 
 def test_constants_are_defined_once_under_their_names():
     known = PRIMITIVES | {"a": primitive("a", saturation)}
-    text = export(model({"a(u(k-1)) + log(u(k-2))": 1.0}, primitives=known), "python")
+    text = export(model({"a(u(k-1)) + exp(u(k-2))": 1.0}, primitives=known), "python")
     lines = text.splitlines()
     assert [line for line in lines if " = " in line and line[0].isupper() and "Inputs" not in line] == [
         "MAXIMUM_LAG = 2",
         "STRENGTH = 2.0",
         "OFFSET = 3",
-        "TINY = 1e-09",
+        "LARGEST_EXPONENT = 50.0",
     ]
 
 

@@ -1,0 +1,79 @@
+"""Primitives of users, made from scalar functions."""
+
+import inspect
+import keyword
+import re
+from collections.abc import Callable
+
+from islands.errors import ModelError
+from islands.model.expression import Primitive
+from islands.model.primitive_checks import check
+from islands.model.primitives import PRIMITIVES
+
+#: Names of signals, time and back-shifts in text.
+_SIGNALS = re.compile(r"y|u\d*|k|q\d+")
+
+
+def primitive(
+    name: str,
+    scalar: Callable[..., float],
+    latex: str = "",
+    parity: int = 0,
+    commutative: bool = False,
+    c: str = "",
+    matlab: str = "",
+) -> Primitive:
+    """Make a user-defined primitive from a scalar function, and check its declared properties.
+
+    Parameters
+    ----------
+    name : str
+        A Python identifier that differs from the names of built-in primitives and signals.
+    scalar : callable
+        Maps one or two floats to a float with arithmetic and the functions of ``math``.
+    latex : str
+        Format string with ``{0}`` and ``{1}``. If empty, it is derived from the name.
+    parity : -1, 0 or 1
+        Parity as in `Primitive`.
+    commutative : bool
+        Whether the arguments can be exchanged, as in `Primitive`.
+    c, matlab : str
+        Function bodies as in `Primitive`. Required only to export models to C or MATLAB.
+
+    Raises
+    ------
+    ModelError
+        The name is taken or invalid, the function does not take one or two arguments, it is not finite at
+        zero, a negative or a large argument, it lacks a declared property, or the LaTeX is not a format
+        string.
+    """
+    free = name not in PRIMITIVES and not keyword.iskeyword(name) and not _SIGNALS.fullmatch(name)
+    if not (free and name.isidentifier()):
+        raise ModelError(
+            f"{name!r} cannot name a primitive: use an identifier that is not in use and not y, u, k, q1 .."
+        )
+    arity = _count_arguments(name, scalar)
+    if arity not in (1, 2):
+        raise ModelError(f"primitive {name!r} takes {arity} arguments: a primitive must take one or two")
+    upright = name.replace("_", r"\_")
+    entry = Primitive(
+        name,
+        arity,
+        scalar,
+        latex or rf"\operatorname{{{{{upright}}}}}(" + ", ".join(f"{{{i}}}" for i in range(arity)) + ")",
+        c=c,
+        matlab=matlab,
+        parity=parity,
+        commutative=commutative,
+    )
+    check(entry)
+    return entry
+
+
+def _count_arguments(name: str, scalar: Callable[..., float]) -> int:
+    try:
+        return len(inspect.signature(scalar).parameters)
+    except ValueError as error:
+        raise ModelError(
+            f"primitive {name!r} has no signature: wrap it in a function of one or two arguments"
+        ) from error
