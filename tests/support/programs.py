@@ -35,9 +35,9 @@ HOSTILE_NAMES = [
 ]
 
 
-def record(inputs=1, seed=0):
+def record(inputs=1, seed=0, dt=0.1):
     rng = np.random.default_rng(seed)
-    return Dataset(rng.normal(size=(SAMPLES, inputs)), rng.normal(size=SAMPLES), 0.1)
+    return Dataset(rng.normal(size=(SAMPLES, inputs)), rng.normal(size=SAMPLES), dt)
 
 
 def model(terms, names=("u",), primitives=PRIMITIVES):
@@ -90,7 +90,7 @@ def at_the_edges(name):
 
 def record_of(name):
     """Return the record of a case."""
-    return record(CASES[name].inputs)
+    return record(CASES[name].inputs, dt=CASES[name].dt or 0.1)
 
 
 def bits(numbers):

@@ -11,7 +11,7 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import islands
-from islands.data.dataset import SAME_DT
+from islands.data.compatibility import match_record
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
@@ -178,11 +178,8 @@ def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], setti
                 "--test has samples that are used for estimation or validation: exclude them by --rows and "
                 "--validation"
             )
-    dt, lag = others[0].dt, settings.maximum_lag
-    if abs(test_data.dt - dt) > SAME_DT * dt:
-        raise RecordError(
-            f"the test data was sampled at {test_data.dt} s, the record at {dt} s: resample one of them"
-        )
+    match_record(others[0], test_data, "the record", "the test data")
+    lag = settings.maximum_lag
     if test_data.samples <= lag:
         raise RecordError(
             f"the test data has {test_data.samples} samples, and the largest lag is {lag}: give more samples"

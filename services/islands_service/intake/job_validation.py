@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any
 
+from islands.data.compatibility import check_dt
 from islands.errors import RecordError, SettingsError
 from islands.io.models import model_from_json
 from islands.io.records.column_names import find_column
@@ -54,13 +55,16 @@ def validate_job(
     DatasetNotFoundError
         The owner has no such data set.
     RecordError
-        A column is missing or unusable.
+        A column is missing or unusable, or the data sets have different sampling times.
     ModelError
         The simulation contains an invalid model.
     """
     pending = []
-    for part in _parts(spec, settings):
-        dataset = store.datasets.get(owner, part.dataset)
+    parts = _parts(spec, settings)
+    datasets = [store.datasets.get(owner, part.dataset) for part in parts]
+    if spec.dt is None:
+        _check_sampling(datasets)
+    for part, dataset in zip(parts, datasets, strict=True):
         if not _is_readable(spec, part, dataset.preview, dataset.name):
             pending.append(
                 PendingInspection(dataset, InspectionRequest(spec.inputs, spec.output, spec.dt, part.rows))
@@ -86,6 +90,14 @@ def _check_identification(spec: Identification, settings: ServiceSettings) -> li
                 "take another data set for the validation"
             )
     return parts
+
+
+def _check_sampling(datasets: list[StoredDataset]) -> None:
+    """Reject data sets with different sampling times, as far as their previews contain them."""
+    estimation, *validation = (dataset.preview["dt"] for dataset in datasets)
+    for dt in validation:
+        if dt is not None:
+            check_dt(estimation, dt, "the data set", "the data set of the validation")
 
 
 def _check_discrepancy(spec: Discrepancy) -> list[Part]:

@@ -169,6 +169,11 @@ def _number_names(names: tuple[str, ...], inputs: int) -> tuple[str, ...]:
     raise RecordError(f"{inputs} inputs need {inputs} names, got {names}")
 
 
+def same_dt(one: float, other: float) -> bool:
+    """Return whether two sampling times are equal within `SAME_DT`."""
+    return abs(one - other) <= SAME_DT * min(one, other)
+
+
 def join(recordings: tuple[Dataset, ...]) -> Dataset:
     """Join several recordings of one system; each remains a separate segment.
 
@@ -186,7 +191,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
             raise RecordError(
                 "recordings of one system must have the same columns and units: rename or convert them first"
             )
-        if abs(other.dt - first.dt) > SAME_DT * first.dt:
+        if not same_dt(first.dt, other.dt):
             raise RecordError(
                 f"recordings were sampled at {first.dt} s and {other.dt} s: resample one of them"
             )

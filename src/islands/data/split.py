@@ -2,43 +2,36 @@
 
 from dataclasses import dataclass
 
-from islands.data.dataset import SAME_DT, Dataset
-from islands.errors import RecordError, SettingsError
+from islands.data.compatibility import match_record
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
 
 
 @dataclass(frozen=True, slots=True)
 class Split:
     """Estimation data and validation data.
 
-    Parameters are estimated on the estimation data. Models are selected on the validation data. Column names
-    may differ (``u_est_V``, ``u_val_V``), because inputs are matched by position.
+    Parameters are estimated on the estimation data. Models are selected on the validation data. Inputs are
+    matched by name; if no name occurs in both, by position (``u_est_V``, ``u_val_V``). See `match_record`.
 
     Attributes
     ----------
     estimation, validation : Dataset
-        Records of the same system.
+        Records of the same system. The inputs of the validation data are brought into the order of the
+        estimation data.
 
     Raises
     ------
     RecordError
-        The records differ in the number of inputs or in sampling time.
+        The records differ in their columns, units or sampling time.
     """
 
     estimation: Dataset
     validation: Dataset
 
     def __post_init__(self) -> None:
-        estimation, validation = self.estimation, self.validation
-        if estimation.inputs != validation.inputs:
-            raise RecordError(
-                f"the estimation data has {estimation.inputs} inputs, the validation data "
-                f"{validation.inputs}: give both the same inputs in the same order"
-            )
-        if abs(estimation.dt - validation.dt) > SAME_DT * estimation.dt:
-            raise RecordError(
-                f"the estimation data was sampled at {estimation.dt} s, the validation data at "
-                f"{validation.dt} s: resample one of them"
-            )
+        matched = match_record(self.estimation, self.validation, "the estimation data", "the validation data")
+        object.__setattr__(self, "validation", matched)
 
 
 def split(record: Dataset, fraction: float = 0.25) -> Split:
@@ -65,7 +58,7 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
     Raises
     ------
     RecordError
-        The validation data has a different number of inputs or sampling time.
+        The validation data has other columns, units or another sampling time.
     SettingsError
         The fraction leaves a part empty.
     """

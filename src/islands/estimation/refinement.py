@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.constrained_least_squares import null_space
@@ -80,7 +81,7 @@ def refine(
     ModelError
         The model has no parameters.
     RecordError
-        The record is incomplete, has a different number of inputs, or is too short.
+        The record is incomplete, does not match the model (see `match_record`), or is too short.
     SettingsError
         The warm-up is shorter than the model's largest lag, the interval is less than 1, or the constraint
         is unknown.
@@ -92,6 +93,7 @@ def refine(
         return EvaluationOutcome(
             Status.INFEASIBLE, "the constraint forces a parameter to zero: remove its term"
         )
+    record = match_record(model, record)
     # This call also checks the inputs, the lags and the length of the record, which the kernel does not.
     started = multiple_shooting(model, record, interval, warm_up)
     if not started.outcome:

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
-from islands.errors import RecordError, SettingsError
+from islands.errors import SettingsError
 from islands.kernels.simulate import simulate
 from islands.kernels.summation import total
 from islands.model.model import Model
@@ -74,14 +75,12 @@ def multiple_shooting(
     ModelError
         The model has no parameters.
     RecordError
-        The record has a different number of inputs, is too short, or its output is missing in a warm-up.
+        The record does not match the model (see `match_record`), is too short, or its output is missing in a
+        warm-up.
     SettingsError
         The warm-up is shorter than the model's largest lag, or the interval is less than 1.
     """
-    if model.inputs != record.inputs:
-        raise RecordError(
-            f"the model has {model.inputs} inputs {model.input_names}, the record {record.inputs}"
-        )
+    record = match_record(model, record)
     if warm_up is None:
         warm_up = model.maximum_lag
     if warm_up < model.maximum_lag:

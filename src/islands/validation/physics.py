@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset, join
 from islands.estimation.parameter_constraints import PROPERTY_1
 from islands.model import rendering
@@ -148,6 +149,7 @@ def check_physics(model: Model, record: Dataset) -> PhysicsChecks:
     record : Dataset
         Complete record that defines the ranges, the rate, the bound and the initial output.
     """
+    record = match_record(model, record)
     period = _choose_period(record, model.maximum_lag)
     scenarios = [*_make_holds(period), *_make_excursions(period)]
     simulated = list(_simulate(model, record, [signal for _, signal in scenarios]))

@@ -8,7 +8,7 @@ import typer
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.errors import ModelError, SettingsError
+from islands.errors import SettingsError
 from islands.facade.fit import SHOOTING
 from islands.facade.result import simulate as run
 from islands.io.records import read_record, write_simulation
@@ -50,10 +50,6 @@ def simulate(
         parse_rows(rows),
         missing_output=True,
     )
-    if chosen.dt is not None and abs(data.dt - chosen.dt) > 0.01 * chosen.dt:
-        raise ModelError(
-            f"the model is valid for a sampling time of {chosen.dt:g} s, the record has {data.dt:g} s"
-        )
     compile_kernels()
     simulation = run(chosen, data, mode, shooting)
     _print_metrics(data, simulation.y, f"{mode}: {simulation.outcome}", out)

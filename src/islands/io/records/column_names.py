@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterable
 
+from islands.data.channel_names import AT_ONCE, parse_unit
 from islands.errors import RecordError
 
 #: Units of time columns in seconds. A column without a unit is in seconds.
@@ -12,23 +13,7 @@ TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0
 #: Units with which a capital T means a temperature.
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
-#: Suffix of an input's name: read the column one sample early, for a system that responds within the sample.
-AT_ONCE = "+1"
-
 _TIME = re.compile(r"t(_.*|\s*[\[(].*)?|time.*", re.IGNORECASE)
-_BRACKETED = re.compile(r".*[\[(]\s*([^\[\]()]*?)\s*[\])]")
-
-
-def parse_unit(name: str) -> str:
-    """Return the unit in a column's name: ``V`` for ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
-
-    The unit is the text in brackets or the text after the last underscore, unless that is a number (``u_1``).
-    Empty if the name has no unit.
-    """
-    if bracketed := _BRACKETED.fullmatch(name):
-        return bracketed[1]
-    suffix = name.rpartition("_")[2] if "_" in name else ""
-    return "" if suffix.isdigit() else suffix
 
 
 def split_structures(names: Iterable[str]) -> dict[str, str]:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
-from islands.io.records.column_names import parse_unit, split_structures, time_column
+from islands.io.records.column_names import split_structures, time_column
 from islands.io.records.reader import open_record
 from islands.io.records.sampling import find_sampling
 from islands.io.records.table import Columns, RowRange, Table

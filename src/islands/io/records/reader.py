@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
-from islands.io.records.column_names import find_column, parse_unit, split_structures, time_column
+from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.mat.mat_file import read_matlab
 from islands.io.records.npz import read_archive
 from islands.io.records.parquet import read_parquet

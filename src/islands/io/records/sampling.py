@@ -7,8 +7,9 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
-from islands.io.records.column_names import TIME_UNITS, looks_like_time, parse_unit, seconds_per_unit
+from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
 from islands.io.records.table import Columns, RowRange, Table
 
 #: Tolerance relative to a step: deviation of time stamps from the grid, and difference of two sampling times.

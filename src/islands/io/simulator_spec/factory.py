@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import estimation_part, make_context
 from islands.discrepancy.effects import CATALOGUE
@@ -206,14 +207,12 @@ def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[st
     """Make a simulator of an identified model; its free run starts from the first measured outputs."""
     name = spec.name
     model = model_from_json(json.dumps(spec.model), name)
-    if model.dt is not None and abs(model.dt - record.dt) > 1e-3 * record.dt:
-        raise SettingsError(
-            f"{name} was identified at {model.dt:g} s, the record is sampled at {record.dt:g} s: give a "
-            "model and a record with the same sampling time"
-        )
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
-    return NarxSimulator(model, name, record.y[: model.maximum_lag])
+    simulator = NarxSimulator(model, name, record.y[: model.maximum_lag])
+    # Further columns of the record are channels, which the model does not read.
+    match_record(model, record.first_inputs(1), name)
+    return simulator
 
 
 def _check_parameters(entry: SimulatorEntry, given: Mapping[str, float]) -> None:

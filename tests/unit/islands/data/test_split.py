@@ -49,20 +49,16 @@ def test_fraction_that_leaves_a_part_empty_is_refused(fraction):
         split(record(), fraction)
 
 
-def test_columns_of_the_two_parts_may_have_different_names():
-    parts = Split(record(output_name="y_est_V"), record(output_name="y_val_V"))
-    assert parts.validation.output_name == "y_val_V"
+def test_validation_inputs_take_the_order_of_the_estimation_data():
+    columns = np.arange(6.0).reshape(3, 2)
+    estimation = Dataset(columns, np.zeros(3), 0.1, ("a", "b"))
+    parts = Split(estimation, Dataset(columns[:, ::-1], np.ones(3), 0.1, ("b", "a")))
+    assert parts.validation.u.tolist() == columns.tolist()
+    assert parts.validation.input_names == ("a", "b")
 
 
-def test_parts_with_different_numbers_of_inputs_are_refused():
-    with pytest.raises(RecordError, match="estimation data has 1 inputs, the validation data 2"):
-        Split(record(), record(inputs=2))
-
-
-def test_parts_with_different_sampling_times_are_refused():
-    with pytest.raises(RecordError, match=r"sampled at 0\.1 s, the validation data at 0\.1005 s: resample"):
+def test_parts_that_do_not_match_are_refused():
+    with pytest.raises(
+        RecordError, match=r"estimation data has a sampling time of 0\.1 s, the validation data"
+    ):
         Split(record(), record(dt=0.1005))
-
-
-def test_sampling_times_of_parts_may_differ_by_rounding():
-    assert Split(record(), record(dt=0.100001)).estimation.dt == 0.1

@@ -219,9 +219,9 @@ def test_validation_data_need_the_same_inputs_and_sampling_time():
     made = islands.fit(record, renamed, max_terms=2)
     assert made.best.model.input_names == ("u_V",)
     two = Dataset(walk(200, 0, inputs=2), piezo(200).y, 0.01)
-    with pytest.raises(RecordError, match=r"has 1 inputs, the validation data 2: give both the same inputs"):
+    with pytest.raises(RecordError, match=r"has 1 inputs \(u_V\), the validation data 2 \(u1, u2\)"):
         islands.fit(record, two)
-    with pytest.raises(RecordError, match=r"sampled at 0\.01 s, the validation data at 0\.02 s: resample"):
+    with pytest.raises(RecordError, match=r"of 0\.01 s, the validation data of 0\.02 s: resample"):
         islands.fit(record, piezo(200, dt=0.02))
 
 

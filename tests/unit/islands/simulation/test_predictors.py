@@ -225,10 +225,20 @@ def test_missing_output_in_a_warm_up_is_refused(simulate):
     assert "fill the gap" in str(caught.value)
 
 
-def test_record_with_a_different_number_of_inputs_is_refused():
-    data = Dataset(np.zeros((9, 2)), np.zeros(9), 0.1)
-    with pytest.raises(RecordError, match=re.escape("the model has 1 inputs ('u',), the record 2")):
-        free_run(model((1.0, "u(k-1)")), data)
+def test_record_is_matched_with_the_model_by_columns_and_sampling_time():
+    chosen = make_model([(parse("u1(k-1)"), 1.0), (parse("u2(k-1)"), 10.0)], ("a_V", "b_V"), dt=0.1)
+    u = np.arange(18.0).reshape(9, 2)
+    data = Dataset(u, np.zeros(9), 0.1, ("a_V", "b_V"))
+    swapped = Dataset(u[:, ::-1], np.zeros(9), 0.1, ("b_V", "a_V"))
+    assert free_run(chosen, swapped).y[1:].tolist() == free_run(chosen, data).y[1:].tolist()
+    assert free_run(chosen, data).y[1] == 10.0
+    for changes, message in (
+        ({"dt": 1.0}, "the model has a sampling time of 0.1 s"),
+        ({"input_names": ("a_V", "b_mV"), "input_units": ("V", "mV")}, "some names occur in both"),
+        ({"input_units": ("mV", "V")}, "multiply a_V by 0.001"),
+    ):
+        with pytest.raises(RecordError, match=message):
+            free_run(chosen, replace(data, **changes))
 
 
 def test_model_without_parameters_is_refused():

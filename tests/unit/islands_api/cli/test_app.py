@@ -199,7 +199,7 @@ def test_simulate_rejects_another_sampling_time(run):
     write_record(Dataset(record().u, record().y, 0.0011, ("u_V",), "y_um"), "slow.csv")
     code, _, err = run("simulate", "published:12", "slow.csv")
     assert code == 2
-    assert "the model is valid for a sampling time of 0.001 s, the record has 0.0011 s" in err
+    assert "the model has a sampling time of 0.001 s, the record of 0.0011 s: resample the record" in err
 
 
 def test_systems_make_writes_into_a_folder_with_brackets(run):

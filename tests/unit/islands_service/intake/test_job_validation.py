@@ -77,6 +77,15 @@ def test_record_with_an_insufficient_preview_is_inspected(record, changes):
     assert (pending.dataset, pending.request) == (record, asked)
 
 
+def test_data_sets_with_different_sampling_times_are_refused():
+    validation = {"validation": {"dataset": OTHER}}
+    with pytest.raises(RecordError, match=r"0\.01 s, the data set of the validation of 0\.02 s: resample"):
+        pending_inspections(dataset(), dataset(OTHER, dt=0.02), **validation)
+    for other in (dataset(OTHER, dt=0.010001), dataset(OTHER, dt=None)):
+        assert len(pending_inspections(dataset(), other, **validation)) == (other.preview["dt"] is None)
+    assert len(pending_inspections(dataset(), dataset(OTHER, dt=0.02), dt=0.01, **validation)) == 2
+
+
 def test_validation_record_is_checked_like_the_estimation_record():
     other = dataset(OTHER, y_um="NaN in line 7")
     (pending,) = pending_inspections(dataset(), other, validation={"dataset": OTHER})

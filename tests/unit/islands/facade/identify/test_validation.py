@@ -143,7 +143,7 @@ def test_too_short_records_raise_an_error_before_the_search(data):
 def test_validation_data_of_another_system_raise_an_error(data):
     with pytest.raises(RecordError, match="the validation data 2"):
         identify(data, two_inputs(seed=1), progress=pytest.fail)
-    with pytest.raises(RecordError, match="resample one of them"):
+    with pytest.raises(RecordError, match="resample the validation data"):
         identify(data, replace(data, dt=0.5), progress=pytest.fail)
 
 

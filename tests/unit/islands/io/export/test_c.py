@@ -105,7 +105,7 @@ def test_a_zero_input_gives_no_negative_zero(folder):
 
 @needs_compiler
 def test_predict_reads_past_samples_only(folder):
-    data, exported = record(), PUBLISHED["12"].model
+    data, exported = record(dt=1e-3), PUBLISHED["12"].model
     predict = compile_model(export(exported, "c"), FLAGS, folder).predict
     predict.restype = ctypes.c_double
     predicted = []

@@ -76,7 +76,7 @@ def test_the_python_module_equals_the_model_bit_for_bit(random_model, seed):
 
 
 def test_predict_is_one_step_ahead():
-    data, chosen = record(), PUBLISHED["12"].model
+    data, chosen = record(dt=1e-3), PUBLISHED["12"].model
     predict = module(chosen)["predict"]
     predicted = [predict(k, data.y.tolist(), *columns(data)) for k in range(3, SAMPLES)]
     assert bits(predicted) == bits(one_step_ahead(chosen, data).y[3:])

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
 from islands.io.records import READERS, fingerprint, read_columns, read_record
-from islands.io.records.column_names import looks_like_time, parse_unit, time_column
+from islands.io.records.column_names import looks_like_time, time_column
 from support.bad_records import lines, refusal
 
 SAMPLES = 50

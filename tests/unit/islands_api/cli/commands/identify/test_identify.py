@@ -142,7 +142,7 @@ def test_diverging_test_has_an_outcome_and_no_metrics(tmp_path, capsys):
         (("--rows", "100:700", "--test", "r.csv"), "samples that are used for estimation or validation"),
         (("--test", "nowhere.csv"), "--test nowhere.csv: give a file that exists"),
         (("--test", "1.5"), "lies between 0 and 1, got 1.5"),
-        (("--test", "slow.csv"), "sampled at 0.05 s, the record at 0.01 s: resample"),
+        (("--test", "slow.csv"), "time of 0.01 s, the test data of 0.05 s: resample"),
         (
             ("--rows", "0:660", "--test", "660:700", "--max-height", "12"),
             f"the test data has 40 samples, and the largest lag is {DEEPEST}: give more samples",

@@ -1,0 +1,76 @@
+"""Parts of a channel's name: the stem, the unit, and the mark of an input that acts at once."""
+
+import re
+from dataclasses import dataclass
+
+#: Suffix of an input's name: read the column one sample early, for a system that responds within the sample.
+AT_ONCE = "+1"
+
+_BRACKETED = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]")
+
+#: Exponents of ten of the SI prefixes.
+_PREFIXES = {"": 0, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
+
+#: Units: those without a prefix, or a prefix and a symbol.
+_UNIT = re.compile(
+    r"(?:%|min|h|d|deg|°|°C|degC|°F|degF|rpm|psi|dB)"
+    r"|([pnumcdkMGT]?)(m|g|s|A|K|mol|cd|Hz|N|Pa|J|W|C|V|F|ohm|S|Wb|T|H|L|l|bar|eV|rad)"
+)
+
+#: Spellings of the same symbol.
+_SPELLINGS = str.maketrans({"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm"})
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelName:
+    """A name in parts: ``u_mV+1`` has the base ``u_mV``, the stem ``u``, the unit ``mV``, and acts at once.
+
+    The stem is the base without the unit, if the unit is known; otherwise it is the base.
+    """
+
+    base: str
+    stem: str
+    unit: str
+    at_once: bool
+
+
+def parse_channel_name(name: str) -> ChannelName:
+    """Return the parts of the name of an input or an output."""
+    base = name.removesuffix(AT_ONCE)
+    unit = parse_unit(base)
+    stem = base
+    if is_unit(unit):
+        bracketed = _BRACKETED.fullmatch(base)
+        stem = bracketed[1] if bracketed else base.rpartition("_")[0]
+    return ChannelName(base, stem or base, unit, base != name)
+
+
+def parse_unit(name: str) -> str:
+    """Return the unit in a column's name: ``V`` for ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
+
+    The unit is the text in brackets or the text after the last underscore, unless that is a number (``u_1``).
+    Empty if the name has no unit.
+    """
+    if bracketed := _BRACKETED.fullmatch(name):
+        return bracketed[2]
+    suffix = name.rpartition("_")[2] if "_" in name else ""
+    return "" if suffix.isdigit() else suffix
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit, or a product or quotient of units, such as ``m/s2``."""
+    factors = re.split(r"[/.*·]", normalise_unit(text))
+    return all(_UNIT.fullmatch(re.sub(r"\^?-?[0-9]$", "", factor)) for factor in factors)
+
+
+def normalise_unit(text: str) -> str:
+    """Return a unit in one spelling: ``um`` for ``µm``, ``kohm`` for ``kΩ`` and ``kOhm``."""
+    return text.translate(_SPELLINGS).replace("Ohm", "ohm")
+
+
+def conversion_factor(unit: str, other: str) -> float | None:
+    """Return the factor from a unit to the same unit with another prefix, None for two other units."""
+    one, two = (_UNIT.fullmatch(normalise_unit(text)) for text in (unit, other))
+    if one is None or two is None or one[2] is None or one[2] != two[2]:
+        return None
+    return float(f"1e{_PREFIXES[one[1]] - _PREFIXES[two[1]]}")
