@@ -29,7 +29,7 @@ def forward_selection(
     Parameters
     ----------
     library : sequence of Regressor
-        Candidates in canonical order. Ties go to the first.
+        Candidates in canonical order. Ties go to the candidate of the lowest degree, then to the first.
     record : Dataset
     constraints : str
         Name of an entry of ``CONSTRAINTS``.
@@ -45,11 +45,13 @@ def forward_selection(
     if isinstance(found, EvaluationOutcome):
         return found
     warm_up = max(item.maximum_lag for item in library)
-    gram = gram_matrix([*(direction.expression for direction in found.free), found.target], record, warm_up)
+    # Ties go to the first candidate: take the one of the lowest degree.
+    free = sorted(found.free, key=lambda direction: max(item.degree for item in direction.regressors))
+    gram = gram_matrix([*(direction.expression for direction in free), found.target], record, warm_up)
     structures = [tuple(found.fixed)] if found.fixed else []
     selected: list[Regressor] = list(found.fixed)
     for position in froe(gram, max_terms=max_terms).order:
-        selected += found.free[position].regressors
+        selected += free[position].regressors
         structure = tuple(canonical_order(selected))
         if len(structure) > max_terms:
             break

@@ -1,18 +1,27 @@
 """Forward selection over a candidate library, (constrained) least squares, assessment."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import SettingsError
-from islands.estimation.estimate import estimate
-from islands.estimation.forward_selection import forward_selection
+from islands.estimation.deviations import (
+    OPERATING_POINT,
+    Offsets,
+    estimate_deviations,
+    find_offsets,
+    no_offsets,
+    subtract_offsets,
+)
+from islands.estimation.forward_selection import Structure, forward_selection
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import candidates, full_set, get_library
+from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 
@@ -83,15 +92,15 @@ def fit(
     pool = candidates(library, degree, lags, record.inputs)
     warm_up = max(item.maximum_lag for item in pool)
     progress(f"inner products of {len(pool)} candidates", 0.0)
-    structures = forward_selection(pool, parts.estimation, constraints, max_terms)
-    if isinstance(structures, EvaluationOutcome):
-        raise SettingsError(f"nothing can be fitted with these settings: {structures}")
+    structures = _select(pool, parts.estimation, constraints, max_terms)
     outcomes: Counter[str] = Counter()
     models = []
-    for done, structure in enumerate(structures, start=1):
-        estimated = estimate(structure, parts.estimation, constraints, warm_up)
+    for done, (structure, offsets) in enumerate(structures, start=1):
+        estimated = estimate_deviations(structure, offsets, parts.estimation, constraints, warm_up)
         if isinstance(estimated, EvaluationOutcome):
             outcomes[estimated.verdict.name.lower()] += 1
+            continue
+        if estimated.model.size > max_terms:
             continue
         outcomes["ok"] += 1
         assessment = assess(estimated.model, parts, shooting, warm_up, constraints)
@@ -101,6 +110,9 @@ def fit(
         raise SettingsError(
             f"no model could be estimated: {dict(outcomes)}; take another library or a longer record"
         )
+    best_of_size: dict[int, RankedModel] = {}
+    for ranked in rank_models(models):
+        best_of_size.setdefault(ranked.model.size, ranked)
     rows = sum(max(0, length - warm_up) for length in parts.estimation.segments)
     count = full_set(degree, lags, lags, record.inputs)
     search = SearchStatistics(
@@ -116,4 +128,19 @@ def fit(
         "shooting": shooting,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
-    return Result(SearchResult(record, parts, seed, settings, search, rank_models(models)))
+    return Result(SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values())))
+
+
+def _select(
+    pool: Sequence[Regressor], record: Dataset, constraints: str, max_terms: int
+) -> list[tuple[Structure, Offsets]]:
+    """Return the structures to estimate, each with the offsets of the signals that it is written in."""
+    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
+    # in deviations from it. The validation data tell which one holds.
+    found = []
+    for offsets in dict.fromkeys((no_offsets(record), find_offsets(record, OPERATING_POINT))):
+        structures = forward_selection(pool, subtract_offsets(record, offsets), constraints, max_terms)
+        if isinstance(structures, EvaluationOutcome):
+            raise SettingsError(f"nothing can be fitted with these settings: {structures}")
+        found += [(structure, offsets) for structure in structures]
+    return found

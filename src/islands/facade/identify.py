@@ -8,7 +8,15 @@ from typing import Any
 from islands.data.dataset import Dataset
 from islands.data.split import Split, split_data
 from islands.errors import RecordError, SettingsError
-from islands.estimation.estimate import estimate
+from islands.estimation.deviations import (
+    LARGE_OFFSET,
+    SHIFTABLE,
+    Offsets,
+    estimate_deviations,
+    find_offsets,
+    no_offsets,
+    subtract_offsets,
+)
 from islands.estimation.refinement import refine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine, SerialEngine, Stop
@@ -94,7 +102,8 @@ def identify(
         raise SettingsError(f"a seed is not negative, got {seed}")
     split = split_data(record, validation)
     _check_validation_length(split.validation, settings)
-    search_problem = make_problem(split.estimation, settings)
+    offsets = _find_search_offsets(split.estimation, settings)
+    search_problem = make_problem(subtract_offsets(split.estimation, offsets), settings)
     stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
@@ -111,7 +120,7 @@ def identify(
                 progress(state, settings)
     if state.archipelago.generation < 0:
         raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
-    models = select_final_models(state.archipelago.hall_of_fame, search_problem, split)
+    models = select_final_models(state.archipelago.hall_of_fame, search_problem, split, offsets)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
@@ -135,7 +144,18 @@ def _check_validation_length(validation: Dataset, settings: Settings) -> None:
         )
 
 
-def select_final_models(hall_of_fame: HallOfFame, problem: Problem, split: Split) -> tuple[RankedModel, ...]:
+def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
+    # A function such as a square root of a deviation differs from that of the signal.
+    return (
+        find_offsets(record, LARGE_OFFSET)
+        if SHIFTABLE.issuperset(settings.primitives)
+        else no_offsets(record)
+    )
+
+
+def select_final_models(
+    hall_of_fame: HallOfFame, problem: Problem, split: Split, offsets: Offsets
+) -> tuple[RankedModel, ...]:
     """Validate the hall of fame and return the best model of every size, best first.
 
     Candidates are the models of the hall of fame with estimated and with refined parameters, and the
@@ -144,7 +164,7 @@ def select_final_models(hall_of_fame: HallOfFame, problem: Problem, split: Split
     """
     settings = problem.settings
     found: dict[int, list[tuple[float, Model]]] = {}
-    for model in _estimate_candidates(hall_of_fame, problem):
+    for model in _estimate_candidates(hall_of_fame, problem, split.estimation, offsets):
         simulated = free_run(model, split.validation, settings.maximum_lag)
         if simulated.outcome:
             rmse = metrics(split.validation.y, simulated.y).rmse
@@ -160,8 +180,10 @@ def select_final_models(hall_of_fame: HallOfFame, problem: Problem, split: Split
     return rank_models(kept)
 
 
-def _estimate_candidates(hall_of_fame: HallOfFame, problem: Problem) -> list[Model]:
-    record, settings = problem.record, problem.settings
+def _estimate_candidates(
+    hall_of_fame: HallOfFame, problem: Problem, record: Dataset, offsets: Offsets
+) -> list[Model]:
+    settings = problem.settings
     interval = FITNESSES[settings.fitness](settings.shooting)
     structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall_of_fame.entries}
     for genes in problem.seeds:
@@ -169,8 +191,10 @@ def _estimate_candidates(hall_of_fame: HallOfFame, problem: Problem) -> list[Mod
         structures.setdefault(tuple(canonical_order(regressors)))
     models = []
     for structure in structures:
-        estimated = estimate(structure, record, settings.constraints, settings.maximum_lag)
-        if isinstance(estimated, EvaluationOutcome):
+        estimated = estimate_deviations(
+            structure, offsets, record, settings.constraints, settings.maximum_lag
+        )
+        if isinstance(estimated, EvaluationOutcome) or estimated.model.size > settings.max_terms:
             continue
         models.append(estimated.model)
         if settings.refine:

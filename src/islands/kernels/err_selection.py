@@ -12,6 +12,9 @@ from islands.kernels.jit_cache import kernel
 #: float64 the Gram matrix has sixteen digits of the squares, so fewer than six of the remainder.
 DEPENDENT = 1e-10
 
+#: Error reduction ratios with a smaller relative difference are equal: rounding must not decide between them.
+TIE = 1e-9
+
 
 @kernel
 def select(
@@ -22,7 +25,10 @@ def select(
     order,  # out, int64 [limit]
     err,  # out, float64 [limit]: error reduction ratio of each, given those selected before it
 ):
-    """Select candidates one after the other and return their number; ties go to the first candidate."""
+    """Select candidates one after the other and return their number.
+
+    Candidates whose error reduction ratios differ by rounding tie, and the first one is selected.
+    """
     energy = gram[candidates, candidates]
     if not (energy > 0.0 and np.isfinite(energy)):
         return 0
@@ -42,7 +48,7 @@ def select(
         for j in range(candidates):
             if left[j] > DEPENDENT:
                 share = correlation[j] * correlation[j] / left[j] / energy
-                if share > ratio:
+                if share > ratio * (1.0 + TIE if best >= 0 else 1.0):
                     best, ratio = j, share
         if best < 0:
             break

@@ -155,14 +155,15 @@ def _sum(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
     if len(scaled) == 1:
         return leading, scaled[0][0]
     (first, _), (second, ratio) = scaled[:2]
-    if len(scaled) == 2 and ratio == -1.0:
-        return leading, Apply(SUB, (first, second))
+    if len(scaled) == 2 and (ratio == -1.0 or (ratio < 0.0 and second == _ONE)):
+        return leading, Apply(SUB, (first, _multiply(-ratio, second)))
     return leading, Apply(ADD, tuple(_multiply(ratio, core) for core, ratio in scaled))
 
 
 def _get_terms(core: Expression) -> list[tuple[float, Expression]]:
     if isinstance(core, Apply) and core.primitive == SUB:
-        return [(1.0, core.arguments[0]), (-1.0, core.arguments[1])]
+        number, subtracted = canonical(core.arguments[1])
+        return [(1.0, core.arguments[0]), (-number, subtracted)]
     if isinstance(core, Apply) and core.primitive == ADD:
         return [canonical(term) for term in core.arguments]
     return [(1.0, core)]

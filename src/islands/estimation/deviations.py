@@ -1,0 +1,128 @@
+"""Deviations of signals from large offsets, in which structures are selected.
+
+A signal with a large mean and a small range, such as a pressure of 101300 Pa that varies by 100 Pa, makes all
+its powers proportional to each other in floating point: their inner products have no digits left that
+distinguish them. The selection therefore subtracts a constant, the offset, from such signals. A structure in
+deviations is then written in the units of the record: a linear term requires a constant, and a
+product contains differences such as ``u(k-1) - 101300``. Differences between lags do not change.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.estimation.estimate import FittedStructure, estimate
+from islands.model.expression import Apply, Constant, Expression, Lagged
+from islands.model.model import canonical_order
+from islands.model.primitives import SUB
+from islands.model.regressor import Regressor, regressor
+from islands.simulation.outcome import EvaluationOutcome
+
+#: Mean in standard deviations from which a signal may be meant as a deviation from an operating point.
+OPERATING_POINT = 3.0
+
+#: Mean in standard deviations from which the powers of a signal are too similar for inner products.
+LARGE_OFFSET = 30.0
+
+#: Functions whose expressions keep their form in deviations: polynomials and differences of lags.
+SHIFTABLE = frozenset({"mul", "add", "sub", "phi1", "phi2", "square", "cube"})
+
+#: Offset of the output and of every input; 0 for a signal that is not taken as a deviation.
+Offsets = tuple[float, ...]
+
+_ONE = Constant(1.0)
+
+
+def no_offsets(record: Dataset) -> Offsets:
+    """Return offsets of 0."""
+    return (0.0,) * (1 + record.inputs)
+
+
+def find_offsets(record: Dataset, limit: float) -> Offsets:
+    """Return the offsets of the signals whose mean exceeds ``limit`` standard deviations.
+
+    An offset is the number with the fewest digits within one standard deviation of the signal's mean.
+    """
+    return tuple(_find_offset(signal, limit) for signal in (record.y[~np.isnan(record.y)], *record.u.T))
+
+
+def _find_offset(signal: NDArray[np.float64], limit: float) -> float:
+    if not signal.size:
+        return 0.0
+    middle = float(signal[0]) + float(np.mean(signal - signal[0]))
+    deviation = float(np.std(signal - middle))
+    if not abs(middle) > limit * deviation > 0.0:
+        return 0.0
+    decimals = -ceil(log10(abs(middle)))
+    while abs(round(middle, decimals) - middle) > deviation:
+        decimals += 1
+    return round(middle, decimals)
+
+
+def subtract_offsets(record: Dataset, offsets: Offsets) -> Dataset:
+    """Return the record in deviations; the record itself if all offsets are 0."""
+    if not any(offsets):
+        return record
+    return replace(record, y=record.y - offsets[0], u=record.u - np.array(offsets[1:]), sha256="")
+
+
+def add_offsets(structure: Sequence[Regressor], offsets: Offsets) -> tuple[Regressor, ...]:
+    """Express a structure in deviations in the units of the record, in canonical order."""
+    if not any(offsets):
+        return tuple(structure)
+    restored: list[Regressor | None] = []
+    constant = offsets[0] != 0.0
+    for item in structure:
+        if isinstance(item.expression, Lagged):
+            constant |= offsets[item.expression.channel] != 0.0
+            restored.append(item)
+        else:
+            restored.append(regressor(_subtract(item.expression, offsets))[1])
+    if constant:
+        restored.append(regressor(_ONE)[1])
+    return tuple(canonical_order(item for item in restored if item))
+
+
+def _subtract(expression: Expression, offsets: Offsets) -> Expression:
+    match expression:
+        case Lagged(channel, _) if offsets[channel]:
+            return Apply(SUB, (expression, Constant(offsets[channel])))
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(_subtract(argument, offsets) for argument in arguments))
+    return expression
+
+
+def estimate_deviations(
+    structure: Sequence[Regressor],
+    offsets: Offsets,
+    record: Dataset,
+    constraints: str = "none",
+    warm_up: int | None = None,
+) -> FittedStructure | EvaluationOutcome:
+    """Estimate a structure in deviations on the record in its own units.
+
+    The constant that the offsets require is left out if it does not reduce the Bayesian information
+    criterion.
+
+    Parameters
+    ----------
+    structure : sequence of Regressor
+        Regressors in deviations, without back-shifts.
+    offsets : tuple of float
+    record, constraints, warm_up
+        As in `estimate`.
+    """
+    restored = add_offsets(structure, offsets)
+    found = estimate(restored, record, constraints, warm_up)
+    smaller = [item for item in restored if item.expression != _ONE]
+    if len(restored) == len(structure) or not smaller or isinstance(found, EvaluationOutcome):
+        return found
+    without = estimate(smaller, record, constraints, warm_up)
+    if isinstance(without, EvaluationOutcome):
+        return found
+    largest_ratio = record.samples ** (1.0 / record.samples)
+    return without if without.residual_variance <= largest_ratio * found.residual_variance else found

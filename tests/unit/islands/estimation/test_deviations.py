@@ -1,0 +1,141 @@
+"""Deviations from large offsets: the same law is found at every operating point of the signals."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.estimation.deviations import (
+    LARGE_OFFSET,
+    add_offsets,
+    estimate_deviations,
+    find_offsets,
+    subtract_offsets,
+)
+from islands.estimation.estimate import estimate
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.model.rendering import plain
+
+STEPS = np.random.default_rng(3)
+U = np.repeat(STEPS.uniform(-1, 1, 100), 8) + 0.1 * STEPS.normal(size=800)
+NOISE = np.random.default_rng(9).normal(size=800)
+
+OFFSETS = [(1e3, 1e3), (1e5, 0.0), (0.0, 1e5), (1e6, -1e6)]
+
+
+def simulate(law):
+    y = np.zeros(len(U))
+    for k in range(2, len(U)):
+        y[k] = law(y, U, k)
+    return y
+
+
+LAWS = {
+    "linear": (
+        simulate(lambda y, u, k: 0.7 * y[k - 1] - 0.2 * y[k - 2] + 0.4 * u[k - 1]),
+        ["y(k-1)", "y(k-2)", "u(k-1)"],
+    ),
+    "cubic": (
+        simulate(lambda y, u, k: 0.6 * y[k - 1] + 0.5 * u[k - 1] - 0.3 * u[k - 1] ** 3),
+        ["y(k-1)", "u(k-1)", "u(k-1)^3"],
+    ),
+}
+
+
+def structure(*texts):
+    return tuple(regressor(parse(text))[1] for text in texts)
+
+
+def texts(model):
+    return {plain(item.expression) for item in model.regressors}
+
+
+def error(result, size):
+    """Return the error of the model of a size, as a fraction of the output's standard deviation."""
+    sized = next(entry for entry in result.models if entry.model.size == size)
+    return sized.metrics["validation"]["free_run"].rmse / np.std(result.search_result.record.y)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize(("output", "source"), OFFSETS)
+@pytest.mark.parametrize("law", LAWS)
+def test_fit_finds_the_law_at_every_offset(law, output, source, noise):
+    y, expected = LAWS[law]
+    record = Dataset(U + source, y + output + noise * y.std() * NOISE, 0.1)
+    found = islands.fit(record, library="polynomial", degree=3, lags=2, max_terms=6)
+    model = next(entry.model for entry in found.models if entry.model.size == len(expected) + 1)
+    expected = {text.replace("u(k-1)^3", plain_cube(source)) for text in expected}
+    assert texts(model) == expected | {"1"}
+    assert error(found, len(expected) + 1) < (0.015 if noise else 1e-8)
+
+
+def plain_cube(offset):
+    return "u(k-1)^3" if not offset else f"(u(k-1) {'-' if offset > 0 else '+'} {abs(offset):.0f})^3"
+
+
+def test_law_in_absolute_units_keeps_its_terms():
+    steps = np.random.default_rng(5)
+    u = 10.0 + np.repeat(steps.uniform(-1.7, 1.7, 150), 8) + 0.1 * steps.normal(size=1200)
+    y = np.full(len(u), 10.0)
+    for k in range(2, len(u)):
+        y[k] = 0.6 * y[k - 1] + 0.7 * u[k - 1] - 0.03 * y[k - 1] * u[k - 2]
+    found = islands.fit(Dataset(u, y, 0.1), library="polynomial", degree=3, lags=3, max_terms=5)
+    assert error(found, 3) < 1e-10
+    assert {"y(k-1)", "u(k-1)", "y(k-1)*u(k-2)"} <= texts(found.best.model)
+
+
+@pytest.mark.parametrize(("output", "source"), OFFSETS)
+def test_constraint_holds_exactly_at_every_offset(output, source):
+    y = np.zeros(len(U))
+    for k in range(2, len(U)):
+        step = U[k - 1] - U[k - 2]
+        y[k] = y[k - 1] + 0.8 * step - 0.3 * y[k - 1] * abs(step)
+    record = Dataset(U + source, y + output, 0.1)
+    found = islands.fit(record, library="phi-polynomial", degree=2, lags=2, max_terms=4)
+    assert all(entry.physics.property_1 for entry in found.models)
+    assert error(found, 3) < 1e-8
+
+
+def test_constant_is_left_out_if_the_law_has_none():
+    y = simulate(lambda y, u, k: 0.7 * y[k - 1] - 0.2 * y[k - 2] + 0.5 * u[k - 1])
+    record, terms = Dataset(U + 1e5, y + 1e5, 0.1), structure("y(k-1)", "y(k-2)", "u(k-1)")
+    found = estimate_deviations(terms, (1e5, 1e5), record)
+    assert found.model.theta == pytest.approx((0.7, -0.2, 0.5), abs=1e-7)
+    shifted = estimate_deviations(terms, (1e5, 2e5), Dataset(U + 2e5, y + 1e5, 0.1))
+    assert shifted.model.theta[-1] == pytest.approx(-5e4, abs=1.0)
+
+
+def test_structure_has_the_same_residual_in_deviations_and_in_units():
+    terms = structure("y(k-1)", "u(k-1)^2*y(k-1)", "(u(k-1) - u(k-2))*y(k-2)", "sign(u(k-1) - u(k-2))*u(k-1)")
+    record = Dataset(U + 5e4, LAWS["cubic"][0] - 3e3 + 0.1 * NOISE, 0.1)
+    offsets = find_offsets(record, LARGE_OFFSET)
+    assert {plain(item.expression) for item in add_offsets(terms, offsets)} == {
+        "1",
+        "y(k-1)",
+        "(y(k-1) + 3000)*(u(k-1) - 50000)^2",
+        "(y(k-2) + 3000)*(u(k-1) - u(k-2))",
+        "sign(u(k-1) - u(k-2))*(u(k-1) - 50000)",
+    }
+    centred = estimate((*terms, *structure("1")), subtract_offsets(record, offsets))
+    found = estimate_deviations(terms, offsets, record)
+    assert found.residual_variance == pytest.approx(centred.residual_variance, rel=1e-6)
+
+
+def test_offset_has_the_fewest_digits_within_one_standard_deviation_of_the_mean():
+    spread = np.tile([-1.0, 1.0], 50)
+    pressure = Dataset(np.full(100, 7.0), 101_325.0 + 100 * spread, 0.1)
+    assert find_offsets(pressure, 30.0) == (101_300.0, 0.0)
+    temperature = Dataset(293.15 + 0.2 * spread, -1013.0 + spread, 0.1)
+    assert find_offsets(temperature, 30.0) == (-1013.0, 293.0)
+    small = Dataset(29.0 + spread, 3.12e-8 + 1e-9 * spread, 0.1)
+    assert find_offsets(small, 30.0) == (3.1e-8, 0.0)
+    assert find_offsets(small, 3.0) == (3.1e-8, 30.0)
+    assert subtract_offsets(small, (0.0, 0.0)) is small
+
+
+def test_evolution_finds_the_law_at_a_large_offset():
+    y, _ = LAWS["cubic"]
+    changes = {"generations": 2, "population": 20, "max_terms": 5, "library_lags": 2, "refine": False}
+    found = islands.identify(Dataset(U + 1e5, y + 1e5, 0.1), preset="narx", **changes)
+    assert error(found, 4) < 1e-8
