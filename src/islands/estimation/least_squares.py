@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
 from islands.errors import RecordError
+from islands.estimation.covariance import sandwich
 from islands.kernels.qr import orthogonalise
 from islands.kernels.summation import total
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
@@ -23,8 +24,8 @@ class Estimate:
     ----------
     theta : ndarray, shape (terms,)
     standard_errors : ndarray, shape (terms,)
-        Square roots of the diagonal of the parameter covariance, under the assumption of a white equation
-        error.
+        Square roots of the diagonal of the parameter covariance, which allows for a coloured residual:
+        `islands.estimation.covariance`.
     residual_variance : float
         Residual sum of squares divided by (rows - free parameters).
     outcome : EvaluationOutcome
@@ -51,15 +52,18 @@ class QRFactor:
         Q'y.
     residual : float
         Sum of squares of the part of y that is orthogonal to Psi.
-    rows : int
-        Number of rows of Psi.
+    columns : ndarray, shape (terms, rows)
+        Q, transposed.
+    orthogonal : ndarray, shape (rows,)
+        The part of y that is orthogonal to Psi.
     """
 
     triangle: NDArray[np.float64]
     scale: NDArray[np.float64]
     projection: NDArray[np.float64]
     residual: float
-    rows: int
+    columns: NDArray[np.float64]
+    orthogonal: NDArray[np.float64]
 
 
 def factorise(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | EvaluationOutcome:
@@ -94,7 +98,7 @@ def factorise(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | Ev
     if dependent >= 0:
         return EvaluationOutcome(Status.SINGULAR, f"regressor {dependent + 1} depends on those before it")
     scale = np.sqrt(np.sum(triangle**2, axis=0))
-    return QRFactor(triangle / scale, scale, projection, float(total(residual**2)), rows)
+    return QRFactor(triangle / scale, scale, projection, float(total(residual**2)), q, residual)
 
 
 def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
@@ -127,7 +131,7 @@ def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.
     terms, free = basis.shape
     remainder = factors.projection - factors.triangle @ particular
     if not free:
-        return _make_estimate(factors, particular, np.zeros((terms, terms)), float(remainder @ remainder), 0)
+        return _make_estimate(factors, particular, np.zeros(terms), float(remainder @ remainder), 0)
     q, r = qr(factors.triangle @ basis, mode="economic")
     if np.abs(np.diag(r)).min() <= DEPENDENT:
         return failed_estimate(
@@ -135,20 +139,38 @@ def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.
         )
     right = q.T @ remainder
     scaled = particular + basis @ solve_triangular(r, right)
-    spread = solve_triangular(r, basis.T, trans="T")
     unexplained = remainder - q @ right
-    return _make_estimate(factors, scaled, spread.T @ spread, float(unexplained @ unexplained), free)
+    residual = factors.orthogonal + combine(unexplained[:, None], factors.columns)[0]
+    covariance = sandwich(combine(q, factors.columns), residual)
+    spread = solve_triangular(r, basis.T, trans="T")
+    variances = np.einsum("it,ij,jt->t", spread, covariance, spread)
+    return _make_estimate(factors, scaled, variances, float(unexplained @ unexplained), free)
+
+
+def combine(weights: NDArray[np.float64], series: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``weights.T @ series`` with sums in a fixed order.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (series, combinations)
+    series : ndarray, shape (series, rows)
+    """
+    combined: NDArray[np.float64] = np.zeros((weights.shape[1], series.shape[1]))
+    for position, combination in zip(np.ndindex(weights.shape), np.ravel(weights), strict=True):
+        if combination != 0.0:
+            combined[position[1]] += combination * series[position[0]]
+    return combined
 
 
 def _make_estimate(
     factors: QRFactor,
     scaled: NDArray[np.float64],
-    covariance: NDArray[np.float64],
+    variances: NDArray[np.float64],
     unexplained: float,
     free: int,
 ) -> Estimate:
-    variance = (factors.residual + unexplained) / (factors.rows - free)
-    errors = np.sqrt(variance * np.maximum(np.diag(covariance), 0.0)) / factors.scale
+    variance = (factors.residual + unexplained) / (factors.columns.shape[1] - free)
+    errors = np.sqrt(np.maximum(variances, 0.0)) / factors.scale
     return Estimate(scaled / factors.scale, errors, variance, OK)
 
 

@@ -13,6 +13,7 @@ from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.estimation.constrained_least_squares import null_space
+from islands.estimation.covariance import sandwich_of_jacobian
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.shooting_residual import ShootingResidual
 from islands.model.model import Model
@@ -72,9 +73,9 @@ def refine(
     Returns
     -------
     RefinedModel or EvaluationOutcome
-        A model with standard errors from the final Jacobian. INFEASIBLE if the structure cannot meet the
-        constraint or contains a regressor whose parameter is forced to zero, DIVERGED if the initial model
-        diverges.
+        A model with standard errors from the final Jacobian, which allow for a coloured residual.
+        INFEASIBLE if the structure cannot meet the constraint or contains a regressor whose parameter is
+        forced to zero, DIVERGED if the initial model diverges.
 
     Raises
     ------
@@ -126,7 +127,6 @@ def refine(
         if gain < _MIN_GAIN:
             break
     after = residual.mean_square(error)
-    variance = after * error.size / max(1, error.size - directions.shape[1])
-    covariance = directions @ np.linalg.pinv(normal) @ directions.T
-    errors = np.sqrt(variance) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    covariance = sandwich_of_jacobian(residual.jacobian(theta, directions), error, residual.intervals)
+    errors = np.sqrt(np.maximum(np.einsum("ti,ij,tj->t", directions, covariance, directions), 0.0))
     return RefinedModel(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)

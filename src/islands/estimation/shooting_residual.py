@@ -39,6 +39,8 @@ class ShootingResidual:
         self._predicted = np.zeros(record.samples, bool)
         for start, length in zip(self._cut.start, self._cut.length, strict=True):
             self._predicted[start : start + length] = True
+        #: Number of samples of every interval, in the order of time.
+        self.intervals = self._cut.length[np.argsort(self._cut.start)]
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return prediction minus measurement over all predicted samples, or None after a divergence."""
