@@ -12,6 +12,7 @@ from typing import Any
 
 import islands
 from islands.data.compatibility import match_record
+from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
@@ -159,26 +160,27 @@ def _read_data(
     columns = (job["inputs"], job["output"], job["dt"])
     data = read_record(path, *columns, parse_rows(job["rows"]))
     held_out = options.validation(job["validation"], path, *columns, job["rows"])
-    if job["test"] is None:
-        return data, held_out, None
-    test_data = options.validation(job["test"], path, *columns, job["rows"], "--test")
-    if isinstance(test_data, float):
-        parts = islands.split(data, test_data)
-        data, test_data = parts.estimation, parts.validation
-    _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], settings)
+    test_data = None
+    if job["test"] is not None:
+        test_data = options.validation(job["test"], path, *columns, job["rows"], "--test")
+        if isinstance(test_data, float):
+            parts = islands.split(data, test_data)
+            data, test_data = parts.estimation, parts.validation
+        _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], settings)
+    # Check the validation data before the folder is made; the search repeats this.
+    split_data(data, held_out)
     return data, held_out, test_data
 
 
 def _check_test(test_data: islands.Dataset, others: list[islands.Dataset], settings: Settings) -> None:
     """Check that the test data overlaps no other data, has the same sampling time and is long enough."""
+    test_data = match_record(others[0], test_data, "the record", "the test data")
     for other in others:
-        offset = round((test_data.start - other.start) / other.dt)
-        if test_data.sha256 == other.sha256 and -test_data.samples < offset < other.samples:
+        if share_samples(other, test_data):
             raise SettingsError(
                 "--test has samples that are used for estimation or validation: exclude them by --rows and "
                 "--validation"
             )
-    match_record(others[0], test_data, "the record", "the test data")
     lag = settings.maximum_lag
     if test_data.samples <= lag:
         raise RecordError(

@@ -62,6 +62,7 @@ def validate_job(
     pending = []
     parts = _parts(spec, settings)
     datasets = [store.datasets.get(owner, part.dataset) for part in parts]
+    _check_disjoint(parts, datasets)
     if spec.dt is None:
         _check_sampling(datasets)
     for part, dataset in zip(parts, datasets, strict=True):
@@ -84,12 +85,17 @@ def _check_identification(spec: Identification, settings: ServiceSettings) -> li
     parts = [Part(dataset=spec.dataset, rows=spec.rows)]
     if isinstance(spec.validation, Part):
         parts.append(spec.validation)
-        if len(set(spec.datasets)) == 1 and overlap(*(parse_rows(part.rows) for part in parts)):
-            raise SettingsError(
-                "the validation shares samples with those that estimate: give rows START:STOP for each, or "
-                "take another data set for the validation"
-            )
     return parts
+
+
+def _check_disjoint(parts: list[Part], datasets: list[StoredDataset]) -> None:
+    """Reject validation data with samples of the estimation data, also if the file was uploaded twice."""
+    files = {dataset.blob for dataset in datasets}
+    if len(parts) > 1 and len(files) == 1 and overlap(*(parse_rows(part.rows) for part in parts)):
+        raise SettingsError(
+            "the validation shares samples with those that estimate: give rows START:STOP for each, or "
+            "take another data set for the validation"
+        )
 
 
 def _check_sampling(datasets: list[StoredDataset]) -> None:

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
-from islands.errors import SettingsError
+from islands.errors import RecordError, SettingsError
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +60,49 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
     Raises
     ------
     RecordError
-        The validation data has other columns, units or another sampling time.
+        The validation data has other columns, units or another sampling time, or an output is missing.
     SettingsError
-        The fraction leaves a part empty.
+        The fraction leaves a part empty, or the validation data has samples of the record.
     """
-    return Split(record, validation) if isinstance(validation, Dataset) else split(record, validation)
+    _check_complete(record, "the record")
+    if not isinstance(validation, Dataset):
+        return split(record, validation)
+    _check_complete(validation, "the validation data")
+    parts = Split(record, validation)
+    if share_samples(parts.estimation, parts.validation):
+        raise SettingsError(
+            "the validation data has samples that are used for estimation: give another recording, other "
+            "rows, or a fraction of the record"
+        )
+    return parts
+
+
+def share_samples(one: Dataset, other: Dataset) -> bool:
+    """Return whether two records with the same sampling time have samples in common.
+
+    They do if one has the samples of the other, or if they overlap in time and either are the same column of
+    one file or agree, with an output that is not constant, throughout the overlap.
+    """
+    if one.samples == other.samples and _agree(one, other):
+        return True
+    offset = round((other.start - one.start) / one.dt)
+    first, last = max(0, offset), min(one.samples, offset + other.samples)
+    if first >= last:
+        return False
+    if one.sha256 and (one.sha256, one.output_name) == (other.sha256, other.output_name):
+        return True
+    overlap = one[first:last]
+    return bool(np.ptp(overlap.y) > 0.0) and _agree(overlap, other[first - offset : last - offset])
+
+
+def _agree(one: Dataset, other: Dataset) -> bool:
+    return np.array_equal(one.y, other.y) and np.array_equal(one.u, other.u)
+
+
+def _check_complete(record: Dataset, title: str) -> None:
+    missing = np.flatnonzero(np.isnan(record.y))
+    if missing.size:
+        raise RecordError(
+            f"{title}: {record.output_name} is missing at sample {missing[0]}; a search needs every sample: "
+            "interpolate it, or cut the record there and join the parts as segments"
+        )

@@ -1,10 +1,12 @@
 """Split of records: the parts are disjoint, complete and from one system."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from islands.data.dataset import Dataset
-from islands.data.split import Split, split
+from islands.data.split import Split, share_samples, split, split_data
 from islands.errors import RecordError, SettingsError
 
 
@@ -62,3 +64,55 @@ def test_parts_that_do_not_match_are_refused():
         RecordError, match=r"estimation data has a sampling time of 0\.1 s, the validation data"
     ):
         Split(record(), record(dt=0.1005))
+
+
+# Data for a search.
+
+
+def drawn(samples: int = 50, seed: int = 0, **changes: object) -> Dataset:
+    u, y = np.random.default_rng(seed).normal(size=(2, samples))
+    return Dataset(u, y, 0.1, **changes)
+
+
+def test_estimation_data_are_refused_as_validation_data():
+    data = drawn()
+    for validation in (
+        data,
+        replace(data, start=7.0),
+        replace(data, output_name="y_val"),
+        data[30:],
+        data[:20],
+    ):
+        with pytest.raises(SettingsError, match="has samples that are used for estimation: give another"):
+            split_data(data, validation)
+    with pytest.raises(SettingsError, match="used for estimation"):
+        split_data(data[10:40], data)
+
+
+def test_other_data_are_accepted_as_validation_data():
+    data = drawn()
+    assert split_data(data[:30], data[30:]).validation.samples == 20
+    assert split_data(data, drawn(seed=1)).validation.samples == 50
+    # Two recordings that begin at rest have equal first samples.
+    u = np.concatenate([np.zeros(10), np.ones(10)])
+    early, late = Dataset(u, u, 0.1), Dataset(u, u + (u > 0), 0.1, start=-1.0)
+    assert not share_samples(early, late)
+
+
+def test_samples_of_one_file_are_shared_if_the_rows_and_the_column_are():
+    whole = drawn(sha256="a" * 64)
+    # An input that is read one sample early repeats its last value.
+    first, second = whole[:30], replace(whole[20:], u=whole.u[20:] + 1.0)
+    assert share_samples(first, second)
+    assert not share_samples(first, whole[30:])
+    assert not share_samples(first, replace(drawn(seed=1), output_name="y_val", sha256="a" * 64))
+
+
+def test_missing_validation_output_is_refused():
+    data, other = drawn(), drawn(seed=1)
+    y = other.y.copy()
+    y[17] = np.nan
+    with pytest.raises(RecordError, match="the validation data: y is missing at sample 17; a search needs"):
+        split_data(data, replace(other, y=y))
+    with pytest.raises(RecordError, match="the record: y is missing at sample 17; a search needs"):
+        split_data(replace(other, y=y), 0.8)

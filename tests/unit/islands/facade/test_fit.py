@@ -373,8 +373,8 @@ def test_shortest_possible_record_is_fitted():
 @pytest.mark.parametrize(
     ("sample", "message"),
     [
-        (100, "y_um is missing at sample 100: estimation needs every sample"),
-        (500, "the output is missing at sample 50, where a simulation starts from it"),
+        (100, "the record: y_um is missing at sample 100; a search needs every sample"),
+        (500, "the record: y_um is missing at sample 500"),
     ],
 )
 def test_incomplete_record_raises_record_error(sample, message):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from islands.errors import RecordError
+from islands.errors import RecordError, SettingsError
 from islands_service.domain.job_spec import Identification
 from islands_service.intake.file_inspection import InspectionRequest
 from islands_service.intake.job_validation import validate_job
@@ -32,7 +32,9 @@ def dataset(identity=ONE, time="t_s", dt=0.01, warnings=(), **columns):
         "dt": dt,
         "warnings": list(warnings),
     }
-    return StoredDataset("me", identity, "a.csv", ".csv", "b" * 64, 7, json.loads(json.dumps(preview)), 0.0)
+    return StoredDataset(
+        "me", identity, "a.csv", ".csv", identity[:32] * 2, 7, json.loads(json.dumps(preview)), 0.0
+    )
 
 
 def pending_inspections(*datasets, **changes):
@@ -75,6 +77,14 @@ def test_record_with_an_insufficient_preview_is_inspected(record, changes):
     inputs = tuple(changes.get("inputs", ["u_V"]))
     asked = InspectionRequest(inputs, changes.get("output", "y_um"), changes.get("dt"), changes.get("rows"))
     assert (pending.dataset, pending.request) == (record, asked)
+
+
+@pytest.mark.parametrize("other", [ONE, ONE.replace("csv", "txt")])
+def test_data_set_with_the_same_file_is_refused_for_validation(other):
+    with pytest.raises(SettingsError, match="the validation shares samples with those that estimate"):
+        pending_inspections(dataset(), dataset(other), validation={"dataset": other})
+    rows = {"rows": "0:60", "validation": {"dataset": other, "rows": "60:"}}
+    assert len(pending_inspections(dataset(), dataset(other), **rows)) == 2
 
 
 def test_data_sets_with_different_sampling_times_are_refused():

@@ -133,11 +133,11 @@ def test_invalid_setting_raises_settings_error_with_its_name(data, changes, mess
 
 def test_too_short_records_raise_an_error_before_the_search(data):
     with pytest.raises(RecordError, match="the validation data has 20 samples: lags up to"):
-        identify(data, data[:20], progress=pytest.fail, **BUDGET)
+        identify(data, record(seed=9)[:20], progress=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="the validation data has 25 samples"):
         identify(data[:100], progress=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="take a longer recording"):
-        identify(data[:20], data, progress=pytest.fail, **BUDGET)
+        identify(data[:20], record(seed=9), progress=pytest.fail, **BUDGET)
 
 
 def test_validation_data_of_another_system_raise_an_error(data):

@@ -1,6 +1,7 @@
 """``islands identify`` in this process: files of a run, test data, and options."""
 
 import json
+import shutil
 import signal
 
 import numpy as np
@@ -138,6 +139,8 @@ def test_diverging_test_has_an_outcome_and_no_metrics(tmp_path, capsys):
             "samples that are used for estimation or validation",
         ),
         (("--rows", "0:400", "--validation", "300:600"), "--validation 300:600: give --rows"),
+        (("--validation", "r.csv"), "the validation data has samples that are used for estimation"),
+        (("--rows", "0:400", "--validation", "copy.csv"), "samples that are used for estimation"),
         (("--test", "r.csv"), "samples that are used for estimation or validation"),
         (("--rows", "100:700", "--test", "r.csv"), "samples that are used for estimation or validation"),
         (("--test", "nowhere.csv"), "--test nowhere.csv: give a file that exists"),
@@ -151,6 +154,7 @@ def test_diverging_test_has_an_outcome_and_no_metrics(tmp_path, capsys):
 )
 def test_overlapping_or_unsuitable_test_data_is_rejected(run, tmp_path, options, message):
     write_record(record(dt=0.05), "slow.csv")
+    shutil.copyfile("r.csv", "copy.csv")
     assert message in refused(run("r.csv", *COLUMNS, *SMALL, "--out", "out", *options))
     assert not (tmp_path / "out").exists()
 
