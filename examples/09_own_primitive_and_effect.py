@@ -1,7 +1,7 @@
 """Your own primitive and effect: extend the tables without changing the package.
 
 Models are built from primitives such as `sin` and `abs`, and diagnoses search a catalogue of effects. This
-tutorial adds a primitive to the models and an effect to the search.
+tutorial adds a primitive to the models and their search, and an effect to the diagnosis.
 """
 
 # %%
@@ -53,6 +53,24 @@ print(f"step response: {step[1]:.4f}, {step[2]:.4f}, ..., {step[-1]:.4f}")
 # The model can be written to a file and read again with the same table.
 islands.write_model(model, out / "soft.json")
 print(islands.read_model(out / "soft.json", table) == model)
+
+# %%
+# `identify` searches with names of built-in primitives and with yours. This record follows the model, with
+# noise of a standard deviation of 0.01.
+rng = np.random.default_rng(8)
+u = 3.0 * rng.standard_normal(600)
+y = np.zeros(600)
+for k in range(1, 600):
+    y[k] = 0.9 * y[k - 1] + 0.5 * soften(u[k - 1]) + 0.01 * rng.standard_normal()
+law = islands.identify(
+    islands.Dataset(u, y, 0.1),
+    preset="narx",
+    primitives=("mul", soft),
+    max_terms=2,
+    population=50,
+    generations=10,
+).best
+print(law.equation)
 
 # %%
 # ## A record with an unknown cause
@@ -158,6 +176,7 @@ figure.savefig(out / "residuals.svg")
 assert abs(step[1] - 0.375) < 1e-12
 assert abs(step[2] - 0.7125) < 1e-12
 assert islands.read_model(out / "soft.json", table) == model
+assert {item.text for item in law.model.regressors} == {"y(k-1)", "soften(u1(k-1))"}
 assert diagnosis.verdict == "unknown"
 assert not diagnosis.effects
 assert diagnosis.residual_structure["output"] == max(diagnosis.residual_structure.values())

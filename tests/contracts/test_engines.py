@@ -13,14 +13,17 @@ import pytest
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 from islands.evolution.archipelago import Archipelago, empty_archipelago
+from islands.evolution.engine import SerialEngine
 from islands.evolution.epoch import run_epoch, select_migrants
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.hall_of_fame import merge
 from islands.evolution.problem import make_problem
 from islands.evolution.settings import Settings
+from islands.facade.identify import identify
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.expression import Lagged
 from islands_service.engines import ENGINES
+from support import own_primitive
 from support.searches import exactly, record
 
 SETTINGS = Settings(
@@ -268,3 +271,14 @@ def test_more_islands_than_processors_are_evolved(engine, search_problem):
     *_, first = engine.run(first_only, empty_archipelago(9, 1), never_stop)
     assert last.archipelago.generation == 2
     assert len({island.population for island in first.archipelago.islands}) == 9
+
+
+@separate_actors(pytest.mark.ci)
+def test_search_with_a_primitive_of_the_user_equals_that_of_the_serial_engine(engine):
+    # The workers of Ray cannot import the module of this function.
+    data = own_primitive.record()
+    changes = {**own_primitive.SEARCH, "generations": 5, "islands": 2, "migrate_every": 2, "migrants": 2}
+    here, there = (identify(data, engine=each, **changes) for each in (SerialEngine(), engine))
+    assert [exactly(each.model) for each in there.models] == [exactly(each.model) for each in here.models]
+    assert there.search_result.search.history == here.search_result.search.history
+    assert "dead_zone" in there.best.export("python")

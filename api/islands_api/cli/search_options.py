@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 import typer
 
 from islands.evolution.presets import PRESETS
-from islands.evolution.settings import Settings
+from islands.evolution.settings import Settings, get_text_type
 
 Preset = Annotated[str, typer.Option("--preset", help=", ".join(PRESETS))]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")]
@@ -58,8 +58,8 @@ def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
 def _setting_parameter(setting: Field[Any]) -> Parameter:
     """Return the parameter of a setting: repeatable for a tuple, text for a union of types."""
     declared = setting.metadata["command_line"]
-    members = get_args(setting.type)
-    kind: Any = setting.type
+    kind = get_text_type(setting)
+    members = get_args(kind)
     if members:
         kind = list[members[0]] if Ellipsis in members else str  # type: ignore[valid-type]
     option = typer.Option(declared["option"] or f"--{setting.name.replace('_', '-')}", help=declared["help"])

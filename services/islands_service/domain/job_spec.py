@@ -20,7 +20,7 @@ from pydantic import (
 
 from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS, resolve_settings
-from islands.evolution.settings import Settings
+from islands.evolution.settings import Settings, get_text_type
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
 from islands.model.candidate_library import candidates
 
@@ -84,7 +84,7 @@ def _make_settings_model() -> type[BaseModel]:
     described = _read_descriptions()
     types: dict[str, Any] = {
         each.name: (
-            each.type | None,  # type: ignore[operator]
+            get_text_type(each) | None,
             Field(default=None, description=described[each.name]),
         )
         for each in fields(Settings)

@@ -1,16 +1,19 @@
 """Pool of the actors that run islands. It grows with the cluster and replaces lost actors."""
 
+import sys
 from contextlib import suppress
 from importlib.metadata import version
 from math import inf
 from time import monotonic
 
 import ray
+from ray import cloudpickle
 from ray.actor import ActorHandle
 from ray.exceptions import RayActorError, RayTaskError
 
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback
+from islands.model.primitives import PRIMITIVES
 from islands_service.runtime.cluster import LOSS_ERRORS
 from islands_service.runtime.errors import ClusterError
 from islands_service.runtime.island_actor import IslandActor
@@ -58,7 +61,7 @@ class IslandActorPool:
     """
 
     def __init__(self, problem: Problem, islands: int, progress: ProgressCallback, title: str = "") -> None:
-        self._problem = ray.put(problem)
+        self._problem = _put(problem)
         self._islands, self._report, self._title, self._actor_count = islands, progress, title, 0
         self._size = 0
         # By slot: the actor, and a reference that resolves when the actor is prepared (joining) or dies
@@ -180,6 +183,25 @@ class IslandActorPool:
             if line != self._last_report:
                 self._report(line)
             self._last_report = line
+
+
+def _put(problem: Problem) -> "ray.ObjectRef[Problem]":
+    """Put a problem into the object store, with the code of the user's functions.
+
+    By default Ray sends the name of a function, and a worker may be unable to import its module.
+    """
+    modules = {
+        sys.modules[entry.scalar.__module__]
+        for name, entry in problem.settings.primitive_table.items()
+        if name not in PRIMITIVES and getattr(entry.scalar, "__module__", None) in sys.modules
+    }
+    for module in modules:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        return ray.put(problem)
+    finally:
+        for module in modules:
+            cloudpickle.unregister_pickle_by_value(module)
 
 
 def _find_ended(actors: dict[int, tuple[ActorHandle, ray.ObjectRef]]) -> list[int]:

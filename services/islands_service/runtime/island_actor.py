@@ -10,11 +10,10 @@ import ray
 
 from islands.evolution.epoch import run_epoch
 from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Population
 from islands.evolution.island import Island
 from islands.evolution.problem import Problem
 from islands.facade.warm_up import warm_up
-from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_island
+from islands_service.runtime.packed_epoch import PackedEpoch, pack_epoch, unpack_emigrants, unpack_island
 
 
 class IslandActor:
@@ -27,7 +26,7 @@ class IslandActor:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+        self._problem, self._primitives = problem, problem.settings.primitive_table
         self._islands: dict[int, tuple[bytes, Island]] = {}
         self._name = str(ray.get_runtime_context().get_actor_id())
 
@@ -46,16 +45,19 @@ class IslandActor:
         Event().wait()
 
     @ray.method(num_returns=2)
-    def advance(self, before: PackedEpoch, *arriving: Population) -> tuple[PackedEpoch, Population]:
-        """Run an island from its last stop to the next one; return the packed epoch and the emigrants."""
+    def advance(self, before: PackedEpoch, *arriving: bytes) -> tuple[PackedEpoch, bytes]:
+        """Run an island from its last stop to the next one; return the packed epoch and its emigrants."""
+        immigrants = [unpack_emigrants(packed, self._primitives) for packed in arriving]
         # A search that ends kills its actors, so no stop function is needed.
-        epoch = run_epoch(self._island(before), arriving, self._evaluator, self._problem, lambda: False)
+        epoch = run_epoch(self._island(before), immigrants, self._evaluator, self._problem, lambda: False)
         assert epoch is not None
         report = pack_epoch(epoch, self._name, self._evaluator.memory)
         self._islands[report.index] = report.packed, epoch.island
-        return report, epoch.emigrants
+        return report, report.emigrants
 
     def _island(self, before: PackedEpoch) -> Island:
         """Return an island, unpacked unless it is the one that was packed here last."""
         packed, island = self._islands.pop(before.index, (b"", None))
-        return island if island is not None and packed == before.packed else unpack_island(before)
+        if island is not None and packed == before.packed:
+            return island
+        return unpack_island(before.packed, self._primitives)

@@ -1,18 +1,23 @@
-"""Epochs of islands as actors return them, with the island pickled.
+"""Epochs of islands as actors return them, with the island and its emigrants pickled.
 
 The driver forwards and keeps the pickled island, and unpickles it only on access. Unpickling an island of
 five hundred individuals takes six milliseconds, everything else one.
+
+A pickle contains the name of a primitive, and the table of the problem has its function. Each process then
+has one function per primitive, which it compiles once.
 """
 
+import io
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import overload
+from typing import Any, overload
 
 from islands.evolution.engine import Caches
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.gp.individual import Population
 from islands.evolution.island import Island, StepInfo
+from islands.model.expression import Primitive
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +30,8 @@ class PackedEpoch:
         Index of the island.
     packed : bytes
         The pickled island.
-    emigrants : tuple of Individual
+    emigrants : bytes
+        The pickled emigrants.
     steps : tuple of StepInfo
         As in `islands.evolution.epoch.IslandEpoch`.
     actor : str
@@ -36,29 +42,58 @@ class PackedEpoch:
 
     index: int
     packed: bytes
-    emigrants: Population
+    emigrants: bytes
     steps: tuple[StepInfo, ...]
     actor: str = ""
     caches: Caches = field(default_factory=dict)
 
 
 def pack_epoch(epoch: IslandEpoch, actor: str = "", caches: Caches | None = None) -> PackedEpoch:
-    """Pickle the island of an epoch and keep the rest."""
-    packed = pickle.dumps(epoch.island, pickle.HIGHEST_PROTOCOL)
-    return PackedEpoch(epoch.island.index, packed, epoch.emigrants, epoch.steps, actor, caches or {})
+    """Pickle the island and the emigrants of an epoch and keep the rest."""
+    packed, emigrants = _pack(epoch.island), _pack(epoch.emigrants)
+    return PackedEpoch(epoch.island.index, packed, emigrants, epoch.steps, actor, caches or {})
 
 
-def unpack_island(report: PackedEpoch) -> Island:
-    """Unpickle the island of an epoch. The bytes come from our own actors, never from an untrusted source."""
-    island: Island = pickle.loads(report.packed)
+def unpack_island(packed: bytes, primitives: Mapping[str, Primitive]) -> Island:
+    """Unpickle an island with the primitives of its problem.
+
+    The bytes come from our own actors, never from an untrusted source.
+    """
+    island: Island = _Unpickler(packed, primitives).load()
     return island
+
+
+def unpack_emigrants(packed: bytes, primitives: Mapping[str, Primitive]) -> Population:
+    """Unpickle emigrants with the primitives of their problem."""
+    emigrants: Population = _Unpickler(packed, primitives).load()
+    return emigrants
+
+
+def _pack(value: object) -> bytes:
+    stream = io.BytesIO()
+    _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
+    return stream.getvalue()
+
+
+class _Pickler(pickle.Pickler):
+    def persistent_id(self, value: Any) -> str | None:
+        return value.name if isinstance(value, Primitive) else None
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, packed: bytes, primitives: Mapping[str, Primitive]) -> None:
+        super().__init__(io.BytesIO(packed))
+        self._primitives = primitives
+
+    def persistent_load(self, name: str) -> Primitive:
+        return self._primitives[name]
 
 
 class PackedIslands(Sequence[Island]):
     """Sequence of the islands of packed epochs, each unpickled at its first access; equal to their tuple."""
 
-    def __init__(self, reports: Sequence[PackedEpoch]) -> None:
-        self._reports = tuple(reports)
+    def __init__(self, reports: Sequence[PackedEpoch], primitives: Mapping[str, Primitive]) -> None:
+        self._reports, self._primitives = tuple(reports), primitives
         self._islands: dict[int, Island] = {}
 
     def __len__(self) -> int:
@@ -75,7 +110,7 @@ class PackedIslands(Sequence[Island]):
             raise IndexError(place)
         place %= len(self)
         if place not in self._islands:
-            self._islands[place] = unpack_island(self._reports[place])
+            self._islands[place] = unpack_island(self._reports[place].packed, self._primitives)
         return self._islands[place]
 
     def __eq__(self, other: object) -> bool:

@@ -1,6 +1,6 @@
 """Search engine on Ray: submits epochs of islands to actors and repeats those that are lost."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from time import sleep
 
 import ray
@@ -10,6 +10,7 @@ from islands.evolution.archipelago import Archipelago
 from islands.evolution.engine import ArchipelagoEpoch, Caches, Stop
 from islands.evolution.problem import Problem
 from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.model.expression import Primitive
 from islands_service.runtime.actor_pool import IslandActorPool
 from islands_service.runtime.cluster import LOSS_ERRORS
 from islands_service.runtime.epoch_scheduler import EpochScheduler, EpochTask
@@ -44,7 +45,7 @@ class RayEngine:
             return
         pool = IslandActorPool(problem, len(start.islands), self._progress, self._title)
         try:
-            yield from _run_epochs(scheduler, pool, stop)
+            yield from _run_epochs(scheduler, pool, problem.settings.primitive_table, stop)
         except RayError as error:
             raise ClusterError(f"Ray failed, and the search cannot continue: {error}") from error
         finally:
@@ -52,7 +53,10 @@ class RayEngine:
 
 
 def _run_epochs(
-    scheduler: EpochScheduler[PackedEpoch], pool: IslandActorPool, stop: Stop
+    scheduler: EpochScheduler[PackedEpoch],
+    pool: IslandActorPool,
+    primitives: Mapping[str, Primitive],
+    stop: Stop,
 ) -> Generator[ArchipelagoEpoch]:
     in_flight = _InFlight(scheduler, pool)
     while not (scheduler.finished or stop()):
@@ -65,7 +69,7 @@ def _run_epochs(
             pool.reset_losses()
             in_flight.drop_old_references()
             yield ArchipelagoEpoch(
-                Archipelago(PackedIslands(reports)),
+                Archipelago(PackedIslands(reports, primitives)),
                 tuple(report.steps for report in reports),
                 in_flight.memory,
             )

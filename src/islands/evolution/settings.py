@@ -1,8 +1,9 @@
 """Settings of an evolution. With the record and the seed they determine its result."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field
 from math import inf
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from islands.errors import SettingsError, lookup
 from islands.estimation.parameter_constraints import CONSTRAINTS
@@ -13,7 +14,9 @@ from islands.evolution.migration.policies import REPLACEMENT_POLICIES, SELECTION
 from islands.evolution.migration.schedule import Schedule, parse_schedule
 from islands.evolution.migration.topology import TOPOLOGIES, parse_topology
 from islands.model.candidate_library import get_library
+from islands.model.expression import Primitive
 from islands.model.primitives import PRIMITIVES
+from islands.model.user_primitive import primitive_table
 
 #: Maximum number of islands, limited by the memory of a coordinator.
 MOST_ISLANDS = 10_000
@@ -21,7 +24,13 @@ MOST_ISLANDS = 10_000
 T = TypeVar("T")
 
 
-def _option(default: T, help_text: str | None = None, name: str | None = None, after: str = "") -> T:
+def _option(
+    default: T,
+    help_text: str | None = None,
+    name: str | None = None,
+    after: str = "",
+    text_type: Any = None,
+) -> T:
     """Declare a setting that is also an option of the command line.
 
     Parameters
@@ -32,9 +41,11 @@ def _option(default: T, help_text: str | None = None, name: str | None = None, a
         Name of the option; ``--max-terms`` for the setting ``max_terms`` by default.
     after : str, optional
         Setting whose option precedes this one in the help; the order of the fields by default.
+    text_type : type, optional
+        Type of the setting on the command line and over REST; the type of the field by default.
     """
     metadata = {"option": name, "help": help_text, "after": after}
-    made: T = field(default=default, metadata={"command_line": metadata})
+    made: T = field(default=default, metadata={"command_line": metadata, "text_type": text_type})
     return made
 
 
@@ -61,8 +72,8 @@ class Settings:
         including back-shifts.
     shifts : tuple of int
         Back-shift operators q1, q2, ... that genes may contain.
-    primitives : tuple of str
-        Functions that genes may contain.
+    primitives : tuple of str or Primitive
+        Functions that genes may contain: names of built-in ones, and your own (`islands.primitive`).
     structure : str
         An entry of ``STRUCTURES``: constraint on the form of genes.
     constraints : str
@@ -125,8 +136,11 @@ class Settings:
     max_terms: int = _option(10)
     max_height: int = _option(5)
     shifts: tuple[int, ...] = (1, 2, 3, 4, 5)
-    primitives: tuple[str, ...] = _option(
-        ("mul", "phi1", "phi2"), f"Repeat it: {', '.join(PRIMITIVES)}.", "--primitive"
+    primitives: tuple[str | Primitive, ...] = _option(
+        ("mul", "phi1", "phi2"),
+        f"Repeat it: {', '.join(PRIMITIVES)}.",
+        "--primitive",
+        text_type=tuple[str, ...],
     )
     structure: str = "phi"
     constraints: str = _option("hysteresis", " or ".join(CONSTRAINTS))
@@ -188,8 +202,7 @@ class Settings:
         lookup(STRUCTURES, self.structure, "structure")
         lookup(CONSTRAINTS, self.constraints, "constraints")
         lookup(FITNESSES, self.fitness, "fitness")
-        for name in self.primitives:
-            lookup(PRIMITIVES, name, "primitive")
+        primitive_table(self.primitives)
         if any(shift < 1 for shift in self.shifts):
             raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")
         self._check_islands()
@@ -215,6 +228,11 @@ class Settings:
             )
 
     @property
+    def primitive_table(self) -> Mapping[str, Primitive]:
+        """Built-in primitives and those of the user, by name."""
+        return primitive_table(self.primitives)
+
+    @property
     def stops(self) -> Schedule:
         """Schedule of the intervals between migrations, in generations."""
         return parse_schedule(self.migrate_every, 1, "migrate_every")
@@ -237,6 +255,11 @@ class Settings:
     def elites(self) -> int:
         """Number of individuals in the elite, at least one."""
         return max(1, round(self.elite * self.population))
+
+
+def get_text_type(setting: "Field[Any]") -> Any:
+    """Return the type of a setting on the command line and over REST."""
+    return setting.metadata.get("text_type") or setting.type
 
 
 def _at_least(least: int, **values: int) -> None:

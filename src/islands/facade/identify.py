@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import fields
 from typing import Any
 
 from islands.data.dataset import Dataset
@@ -31,8 +31,12 @@ from islands.evolution.settings import Settings
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set
+from islands.model.expression import Primitive
 from islands.model.model import Model, canonical_order
+from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor
+from islands.model.user_primitive import get_source
+from islands.program.primitive_functions import row_address
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
@@ -81,7 +85,8 @@ def identify(
     engine : Engine, optional
         Engine that runs the epochs; `SerialEngine` by default.
     **changes
-        Settings that differ from the preset: ``generations=100, islands=4``.
+        Settings that differ from the preset: ``generations=100, islands=4``. ``primitives`` contains names of
+        built-in primitives and primitives of your own, ``("mul", islands.primitive("soften", soften))``.
 
     Returns
     -------
@@ -94,12 +99,16 @@ def identify(
         A setting is unknown or out of range, or no model was found.
     RecordError
         The record is too short or incomplete, or the validation data do not match it.
+    ModelError
+        The function of a primitive of your own does not compile.
     """
     settings = resolve_settings(
         preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
     )
     if seed < 0:
         raise SettingsError(f"a seed is not negative, got {seed}")
+    for entry in _own_primitives(settings):
+        row_address(entry)  # compile it before the search starts
     split = split_data(record, validation)
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
@@ -126,12 +135,25 @@ def identify(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
             "record"
         )
-    settings_document = {"method": "identify", "preset": preset, **asdict(settings)}
-    settings_document["validation"] = (
-        record_document(validation) if isinstance(validation, Dataset) else validation
-    )
+    described = {"method": "identify", "preset": preset, **_describe(settings)}
+    described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     statistics = _make_statistics(state, search_problem)
-    return Result(SearchResult(record, split, seed, settings_document, statistics, models))
+    return Result(SearchResult(record, split, seed, described, statistics, models))
+
+
+def _own_primitives(settings: Settings) -> list[Primitive]:
+    return [entry for name, entry in settings.primitive_table.items() if name not in PRIMITIVES]
+
+
+def _describe(settings: Settings) -> dict[str, Any]:
+    """Return settings as JSON values. The source of each primitive of the user is in ``own_primitives``."""
+    document = {each.name: getattr(settings, each.name) for each in fields(settings)}
+    document["primitives"] = tuple(
+        entry.name if isinstance(entry, Primitive) else entry for entry in settings.primitives
+    )
+    if own := _own_primitives(settings):
+        document["own_primitives"] = {entry.name: get_source(entry) for entry in own}
+    return document
 
 
 def _check_validation_length(validation: Dataset, settings: Settings) -> None:

@@ -102,7 +102,9 @@ def archipelago_from_document(
         if len({island.generation for island in islands}) != 1:
             raise ModelError("its islands are at different generations")
         return Archipelago(islands), dict(document["about"])
-    except (KeyError, TypeError, ValueError, AttributeError, ModelError) as error:
+    except ModelError as error:
+        raise ModelError(f"cannot read the checkpoint {name}: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"the checkpoint {name} is damaged: {error!r}") from error
 
 

@@ -151,7 +151,8 @@ def summary(found: SearchResult) -> str:
     full = search.full_set
     lines = [
         f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
-        ", ".join(f"{name} {value}" for name, value in found.settings.items()) + f", seed {found.seed}",
+        ", ".join(f"{name} {value}" for name, value in found.settings.items() if name != "own_primitives")
+        + f", seed {found.seed}",
         f"{search.evaluations} models estimated: {outcomes}",
         f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
         "",

@@ -111,7 +111,10 @@ def _read_call(name: str, arguments: Sequence[ast.expr], primitives: Mapping[str
     if (shift := _BACK_SHIFT.fullmatch(name)) and len(arguments) == 1:
         return Shift(int(shift[1]), _read(arguments[0], primitives))
     if name not in primitives:
-        raise ModelError(f"unknown function {name!r}: take one of {', '.join(primitives)}")
+        raise ModelError(
+            f"unknown function {name!r}: take one of {', '.join(primitives)}, or pass your own primitive in "
+            f"primitives=islands.PRIMITIVES | {{{name!r}: ...}}"
+        )
     primitive = primitives[name]
     variadic = primitive in (ADD, MUL) and len(arguments) > 1
     if len(arguments) != primitive.arity and not variadic:

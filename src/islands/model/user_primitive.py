@@ -3,9 +3,10 @@
 import inspect
 import keyword
 import re
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
 
-from islands.errors import ModelError
+from islands.errors import ModelError, SettingsError, lookup
 from islands.model.expression import Primitive
 from islands.model.primitive_checks import check
 from islands.model.primitives import PRIMITIVES
@@ -68,6 +69,38 @@ def primitive(
     )
     check(entry)
     return entry
+
+
+def primitive_table(entries: Iterable[str | Primitive]) -> Mapping[str, Primitive]:
+    """Return the built-in primitives and those of the user among the entries, by name.
+
+    Parameters
+    ----------
+    entries : iterable of str or Primitive
+        Names of built-in primitives, and primitives of the user.
+
+    Raises
+    ------
+    SettingsError
+        A name is unknown, an entry is a plain function, or two primitives have the same name.
+    """
+    table = dict(PRIMITIVES)
+    for entry in entries:
+        if callable(entry):
+            raise SettingsError(f"{entry!r} is a function: pass islands.primitive(name, function)")
+        if not isinstance(entry, Primitive):
+            lookup(PRIMITIVES, entry, "primitive")
+        elif table.setdefault(entry.name, entry).scalar is not entry.scalar:
+            raise SettingsError(f"two primitives have the name {entry.name!r}: rename one of them")
+    return table
+
+
+def get_source(entry: Primitive) -> str:
+    """Return the source of a primitive's function, or its qualified name if the source is not available."""
+    try:
+        return textwrap.dedent(inspect.getsource(entry.scalar))
+    except (OSError, TypeError):
+        return f"{entry.scalar.__module__}.{entry.scalar.__qualname__}"
 
 
 def _count_arguments(name: str, scalar: Callable[..., float]) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from islands.evolution.gp.gene_structure import LINEAR_OUTPUT, PHI, STRUCTURES, is_linear_output
 from islands.evolution.gp.rng import Stream
 from islands.evolution.settings import Settings
-from islands.model.expression import Apply, Expression, Lagged, Shift, children, height
+from islands.model.expression import Apply, Expression, Lagged, Primitive, Shift, children, height
 from islands.model.primitives import PRIMITIVES
 
 Genes = tuple[Expression, ...]
@@ -29,7 +29,8 @@ def random_gene(settings: Settings, inputs: int, rng: Stream, limit: int | None 
         return Lagged(rng.randrange(inputs + 1))
     if settings.shifts and (not settings.primitives or rng.chance(_SHIFT_PROBABILITY)):
         return Shift(rng.choice(settings.shifts), random_gene(settings, inputs, rng, limit - 1))
-    primitive = PRIMITIVES[rng.choice(settings.primitives)]
+    entry = rng.choice(settings.primitives)
+    primitive = entry if isinstance(entry, Primitive) else PRIMITIVES[entry]
     if settings.structure != "free" and primitive.name in PHI:
         channel = 1 + rng.randrange(inputs)
         arguments = [_lagged_input(settings, channel, rng, limit - 1) for _ in range(primitive.arity)]

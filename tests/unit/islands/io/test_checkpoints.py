@@ -120,7 +120,7 @@ def test_user_defined_primitives_are_read_back_from_their_table(path):
     kept = Archipelago((Island(0, 0, 0, (own,), (own,), HallOfFame((own,))),))
     write_checkpoint(kept, path, {})
     assert read_checkpoint(path, table)[0] == kept
-    with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*unknown function 'twice'"):
+    with pytest.raises(ModelError, match=r"checkpoint\.json: unknown function 'twice': .*primitives="):
         read_checkpoint(path)
 
 
@@ -295,7 +295,7 @@ def test_islands_at_different_generations_are_refused(document, path, changed):
         island["generation"] = generation
     document["islands"] = [island for island, _ in pairs]
     path.write_text(json.dumps(document))
-    with pytest.raises(ModelError, match=r"checkpoint\.json is damaged: .*at different generations"):
+    with pytest.raises(ModelError, match=r"checkpoint\.json: its islands are at different generations"):
         read_checkpoint(path)
 
 
@@ -335,5 +335,5 @@ def test_a_damaged_part_is_refused(document, path, place, value):
         part = part[step]
     part[place[-1]] = value
     path.write_text(json.dumps(document))
-    with pytest.raises(ModelError, match=r"the checkpoint .*checkpoint\.json is damaged: "):
+    with pytest.raises(ModelError, match=r"the checkpoint .*checkpoint\.json( is damaged)?: "):
         read_checkpoint(path)

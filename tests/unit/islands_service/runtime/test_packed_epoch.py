@@ -5,11 +5,15 @@ from dataclasses import replace
 
 import pytest
 
-from islands.evolution.archipelago import Archipelago
+from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.epoch import IslandEpoch
 from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.gp.individual import Individual, make_regressor
+from islands.model.expression import Apply, Lagged
+from islands.model.primitives import PRIMITIVES
 from islands_service.runtime import packed_epoch
-from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_island
+from islands_service.runtime.packed_epoch import PackedIslands, pack_epoch, unpack_emigrants, unpack_island
+from support.own_primitive import DEAD_ZONE
 from support.searches import SMALL, exactly, islands_of, record
 
 
@@ -20,12 +24,12 @@ def islands():
 
 @pytest.fixture
 def packed(islands):
-    return PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands])
+    return PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands], PRIMITIVES)
 
 
 def test_packed_island_is_unpacked_unchanged(islands):
     for island in islands:
-        back = unpack_island(pack_epoch(IslandEpoch(island, island.elite[:2], ())))
+        back = unpack_island(pack_epoch(IslandEpoch(island, island.elite[:2], ())).packed, PRIMITIVES)
         assert exactly(back) == exactly(island)
         # Genes are equal as keys, too, although hashes differ between processes and are computed again.
         assert {gene: 0 for each in back.population for gene in each.genes} == {
@@ -36,9 +40,19 @@ def test_packed_island_is_unpacked_unchanged(islands):
 def test_packed_epoch_contains_emigrants_steps_and_caches(islands):
     epoch = IslandEpoch(islands[-1], islands[-1].elite[:2], ())
     found = pack_epoch(epoch, "me", {"pairs": (1, 2)})
-    assert (found.emigrants, found.steps) == (epoch.emigrants, epoch.steps)
+    assert unpack_emigrants(found.emigrants, PRIMITIVES) == epoch.emigrants
+    assert found.steps == epoch.steps
     assert (found.actor, found.caches) == ("me", {"pairs": (1, 2)})
     assert pickle.loads(pickle.dumps(found)) == found
+
+
+def test_unpacked_trees_contain_the_primitives_of_the_table():
+    # A copy of a function in each pickle would be compiled again.
+    gene = Apply(DEAD_ZONE, (Lagged(1),))
+    emigrants = (Individual((gene,), (make_regressor(gene),)),)
+    packed = pack_epoch(IslandEpoch(empty_archipelago(1, 0).islands[0], emigrants, ())).emigrants
+    ((found,),) = (each.genes for each in unpack_emigrants(packed, {"dead_zone": DEAD_ZONE}))
+    assert found.primitive is DEAD_ZONE
 
 
 def test_packed_islands_behave_like_the_tuple_of_islands(islands, packed):
@@ -70,9 +84,9 @@ def test_index_out_of_range_raises_an_error(islands, packed):
 def test_island_is_unpacked_once_at_its_first_access(monkeypatch, islands):
     opened = []
     monkeypatch.setattr(
-        packed_epoch, "unpack_island", lambda report: opened.append(report) or unpack_island(report)
+        packed_epoch, "unpack_island", lambda *given: opened.append(given) or unpack_island(*given)
     )
-    found = PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands])
+    found = PackedIslands([pack_epoch(IslandEpoch(island, (), ())) for island in islands], PRIMITIVES)
     assert len(found) == len(islands)
     assert not opened
     assert found[2] is found[2]
