@@ -79,13 +79,12 @@ for model in sorted(evolved.models, key=lambda model: model.model.size):
 # %%
 # ## Choose a model
 #
-# `evolved.best` has the least error on the validation data. Here the errors of all models with three or
-# more terms differ by less than 5 %, so their order is chance. Take the smallest model whose error is close
-# to the least.
-least = evolved.best.metrics["validation"]["free_run"].rmse
-close = [model for model in evolved.models if model.metrics["validation"]["free_run"].rmse < 1.05 * least]
-chosen = min(close, key=lambda model: model.model.size)
+# `evolved.models[0]` has the least error on the validation data. Here the errors of all models with three or
+# more terms differ by chance only, so the recommended model is the smallest of them.
+chosen = evolved.best
 print(chosen)
+for reason in evolved.recommendation.reasons:
+    print(reason)
 
 # %%
 # The root mean square error of its free run is that of the noise, 0.01 cm.

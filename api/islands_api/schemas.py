@@ -208,7 +208,10 @@ class JobPage(ResponseModel):
 class ModelView(ResponseModel):
     """Model with its metrics, physics checks and residual tests, as in ``result.json``."""
 
-    rank: int = Field(description="1 is the best model on the validation data.")
+    rank: int = Field(description="1 is the model with the least error on the validation data.")
+    recommended: bool = Field(
+        default=False, description="Whether this is the recommended model of the job, one of all its models."
+    )
     size: int = Field(description="Number of terms.")
     equation: str
     latex: str
@@ -221,7 +224,7 @@ class ModelView(ResponseModel):
 
 
 class ModelPage(ResponseModel):
-    """All models of a job, best first."""
+    """All models of a job, least validation error first."""
 
     items: tuple[ModelView, ...]
 

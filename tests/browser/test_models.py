@@ -70,7 +70,8 @@ def test_a_finished_job_shows_its_models_with_their_metrics(
         shown = row.locator("data").evaluate_all("all => all.map((one) => Number(one.value))")
         assert shown == [*numbers, model["physics"]["hold_drift_percent"]]
         cells = row.locator("th, td").all_text_contents()
-        assert cells[:2] == [str(model["rank"]), str(model["size"])]
+        mark = " recommended" if model["recommended"] else ""
+        assert cells[:2] == [f"{model['rank']}{mark}", str(model["size"])]
         assert cells[2] == f"{numbers[0]:#.3g}"
         assert cells[3] == f"{numbers[1]:.5f}".replace("-", "−")
         assert cells[7] == ("holds" if model["physics"]["property_1"] else "fails")
@@ -157,19 +158,24 @@ def test_every_export_format_has_a_button(opened: Callable[..., Any], finished: 
 
 
 @pytest.mark.ci
-def test_a_selected_model_is_kept_by_a_reload(opened: Callable[..., Any], finished: str, expect: Any) -> None:
+def test_a_selected_model_is_kept_by_a_reload(
+    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+) -> None:
     page = opened(f"#/jobs/{finished}")
-    expect(page.get_by_role("heading", name="Model 1")).to_be_visible()
+    models = json.loads(service.models(finished))["items"]
+    first = f"Model {next(model['rank'] for model in models if model['recommended'])}"
+    other = next(model["rank"] for model in models if not model["recommended"])
+    expect(page.get_by_role("heading", name=first)).to_be_visible()
     page.evaluate("document.querySelector('h1').dataset.same = 'yes'")
-    page.get_by_role("link", name="Model 3").click()
-    expect(page.get_by_role("heading", name="Model 3")).to_be_visible()
+    page.get_by_role("link", name=f"Model {other}", exact=True).click()
+    expect(page.get_by_role("heading", name=f"Model {other}")).to_be_visible()
     assert page.locator("h1").get_attribute("data-same") == "yes"
-    assert page.locator("table.models tr.current th").text_content() == "3"
+    assert page.locator("table.models tr.current a").text_content() == str(other)
     page.reload()
-    expect(page.get_by_role("heading", name="Model 3")).to_be_visible()
-    assert page.url.endswith(f"#/jobs/{finished}/models/3")
+    expect(page.get_by_role("heading", name=f"Model {other}")).to_be_visible()
+    assert page.url.endswith(f"#/jobs/{finished}/models/{other}")
     page.go_back()
-    expect(page.get_by_role("heading", name="Model 1")).to_be_visible()
+    expect(page.get_by_role("heading", name=first)).to_be_visible()
 
 
 @pytest.mark.ci

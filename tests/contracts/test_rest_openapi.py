@@ -184,7 +184,9 @@ def test_a_model_equals_its_entry_in_the_result(service, finished):
     for model in models:
         assert service.client.get(f"/v1/jobs/{finished}/models/{model['rank']}").json() == model
     job = service.client.get(f"/v1/jobs/{finished}").json()
-    assert job["summary"]["size"] == models[0]["size"]
+    (chosen,) = (model for model in models if model["recommended"])
+    assert job["summary"]["size"] == chosen["size"]
+    assert {name: job["summary"][name] for name in ("rank", "reasons")} == result["recommended"]
     assert job["summary"]["models"] == len(models)
     assert models[0]["metrics"]["validation"]["free_run"]["mape"] < 1.0
     missing = service.client.get(f"/v1/jobs/{finished}/models/{len(models) + 1}")

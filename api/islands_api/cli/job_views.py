@@ -11,6 +11,7 @@ from typing import Any
 import typer
 from rich.table import Table
 
+from islands.io.model_table import LEGEND, MARK
 from islands_api.cli.console import output, progress
 from islands_api.client import Client
 from islands_api.schemas import JobView, ModelPage, ModelView
@@ -75,17 +76,21 @@ def _format_verdict(job: JobView) -> str:
 
 def show_models(models: Sequence[ModelView]) -> None:
     """Show the models of a job: a table of errors and physical properties, and the equations."""
-    table = Table("rank", "terms", "MAPE est. %", "MAPE val. %", "hold drift %", "Property 1")
+    # Only models of hysteresis have Property 1; the drift of others is no defect.
+    hysteresis = any(model.physics["property_1"] for model in models)
+    claims = ("hold drift %", "Property 1") if hysteresis else ()
+    table = Table("rank", "terms", "MAPE est. %", "MAPE val. %", *claims)
     for model in models:
         mape = [model.metrics[part]["free_run"]["mape"] for part in ("estimation", "validation")]
+        drift = _format_number(model.physics["hold_drift_percent"])
         table.add_row(
-            str(model.rank),
+            f"{model.rank}{MARK if model.recommended else ''}",
             str(model.size),
             *map(_format_number, mape),
-            _format_number(model.physics["hold_drift_percent"]),
-            "yes" if model.physics["property_1"] else "no",
+            *((drift, "yes" if model.physics["property_1"] else "no") if hysteresis else ()),
         )
     output.print(table)
+    output.print(LEGEND, markup=False)
     for model in models:
         output.print(f"{model.rank:2d}  {model.equation}", markup=False)
 

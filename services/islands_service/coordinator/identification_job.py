@@ -87,10 +87,13 @@ def make_outcome(found: SearchResult) -> JobOutcome:
     """Return the part of a search result that the store keeps."""
     document = result_document(found)
     models = document.pop("models")
-    best = models[0]
+    recommended = document["recommended"]
+    best = models[recommended["rank"] - 1]
     summary = {
         "models": len(models),
-        "equation": equation(found.models[0].model),
+        "rank": recommended["rank"],
+        "reasons": recommended["reasons"],
+        "equation": equation(found.recommended.model),
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],
         "property_1": best["physics"]["property_1"],

@@ -135,8 +135,9 @@ def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStat
 def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     """Render the figures and the report of a search; return them by artefact name."""
     made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](found)) for name in search_figures(found)}
-    best = {f"{name}.svg": _svg(draw(found.models[0], found.split)) for name, draw in FIGURES.items()}
-    return {**made, REPORT: identification_report(job.name or job.id, found, {**best, **made})}
+    entry = found.recommended
+    model = {f"{name}.svg": _svg(draw(entry, found.split)) for name, draw in FIGURES.items()}
+    return {**made, REPORT: identification_report(job.name or job.id, found, {**model, **made})}
 
 
 def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:

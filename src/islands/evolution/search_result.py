@@ -13,6 +13,7 @@ from islands.evolution.history import HistoryPoint
 from islands.model.equations import equation
 from islands.model.model import Model
 from islands.validation.assessment import Assessment
+from islands.validation.recommendation import Recommendation, recommend
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +86,7 @@ class SearchResult:
         Settings that determine the result, together with the record and the seed.
     search : SearchStatistics
     models : tuple of RankedModel
-        Models, best first; see `rank_models`.
+        Models, least validation error first; see `rank_models`.
     """
 
     record: Dataset
@@ -94,6 +95,31 @@ class SearchResult:
     settings: Mapping[str, Any]
     search: SearchStatistics
     models: tuple[RankedModel, ...]
+
+    @property
+    def requires_property_1(self) -> bool:
+        """Whether the search constrains the parameters of models of hysteresis."""
+        return "hysteresis" in self.settings["constraints"]
+
+    @property
+    def claims_hysteresis(self) -> bool:
+        """Whether the search is for models of hysteresis, or found a model with Property 1."""
+        return self.requires_property_1 or any(entry.assessment.physics.property_1 for entry in self.models)
+
+    @property
+    def recommendation(self) -> Recommendation:
+        """Rank of the recommended model, and the reasons."""
+        return recommend(
+            [entry.model.size for entry in self.models],
+            [entry.assessment for entry in self.models],
+            self.requires_property_1,
+            self.record.output_unit,
+        )
+
+    @property
+    def recommended(self) -> RankedModel:
+        """Recommended model."""
+        return self.models[self.recommendation.rank - 1]
 
 
 def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:

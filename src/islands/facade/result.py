@@ -18,6 +18,7 @@ from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
+from islands.validation.recommendation import Recommendation
 from islands.validation.residual_tests import ResidualTests
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class FittedModel:
     Attributes
     ----------
     rank : int
-        Rank of the model; 1 is the best.
+        Rank of the model; 1 has the least validation error.
     ranked_model : RankedModel
         Model with its errors, residual tests and physics checks.
     search_result : SearchResult
@@ -104,7 +105,7 @@ class Result:
 
     @property
     def models(self) -> tuple[FittedModel, ...]:
-        """All models, best first."""
+        """All models, in the order of their free-run error on the validation data."""
         return tuple(
             FittedModel(rank, entry, self.search_result)
             for rank, entry in enumerate(self.search_result.models, start=1)
@@ -112,15 +113,23 @@ class Result:
 
     @property
     def best(self) -> FittedModel:
-        """Model with the smallest free-run error on the validation data."""
-        return self.models[0]
+        """Recommended model: the smallest one that is as good as the one with the least validation error.
+
+        ``result.models[0]`` has the least free-run error on the validation data.
+        """
+        return self.models[self.recommendation.rank - 1]
+
+    @property
+    def recommendation(self) -> Recommendation:
+        """Rank of the recommended model, and the reasons for the choice."""
+        return self.search_result.recommendation
 
     def with_wall_time(self, seconds: float) -> "Result":
         """Return a copy of the result with the duration of the search in seconds."""
         return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
 
     def save(self, folder: str | Path) -> Path:
-        """Write ``result.json``, ``models/``, ``figures/`` (of the best model) and ``summary.txt``."""
+        """Write ``result.json``, ``models/``, ``figures/`` (of the recommended model) and ``summary.txt``."""
         from islands.figures.registry import FIGURES, SEARCH_FIGURES, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel, SearchResult
+from islands.io.model_table import table
 from islands.io.models import terms_document, write_model
 from islands.model.equations import equation, latex_equation
 from islands.validation.assessment import PARTS
@@ -28,7 +29,7 @@ def result_json(found: SearchResult) -> str:
 
 def result_document(found: SearchResult) -> dict[str, Any]:
     """Return a result as JSON values; NaN and infinity become null."""
-    search = found.search
+    search, recommendation = found.search, found.recommendation
     document = {
         "schema": SCHEMA,
         "record": record_document(found.record),
@@ -48,7 +49,11 @@ def result_document(found: SearchResult) -> dict[str, Any]:
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },
         },
-        "models": [_model_document(rank, entry) for rank, entry in enumerate(found.models, start=1)],
+        "recommended": asdict(recommendation),
+        "models": [
+            _model_document(rank, entry, rank == recommendation.rank)
+            for rank, entry in enumerate(found.models, start=1)
+        ],
     }
     described: dict[str, Any] = _finite(document)
     return described
@@ -75,10 +80,11 @@ def content_sha256(record: Dataset) -> str:
     return digest.hexdigest()
 
 
-def _model_document(rank: int, entry: RankedModel) -> dict[str, Any]:
+def _model_document(rank: int, entry: RankedModel, recommended: bool) -> dict[str, Any]:
     model, assessment = entry.model, entry.assessment
     return {
         "rank": rank,
+        "recommended": recommended,
         "size": model.size,
         "equation": equation(model),
         "latex": latex_equation(model),
@@ -156,56 +162,11 @@ def summary(found: SearchResult) -> str:
         f"{search.evaluations} models estimated: {outcomes}",
         f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
         "",
-        *table(found.models),
+        *table(found),
         "",
         *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
     ]
     return "\n".join(lines) + "\n"
-
-
-#: Headings of the table of models.
-COLUMNS = (
-    "rank",
-    "terms",
-    "MAPE est. %",
-    "MAPE val. %",
-    "R2 val.",
-    "hold drift %",
-    "Property 1",
-    "residuals",
-)
-
-
-def table(models: Sequence[RankedModel]) -> list[str]:
-    """Return a table of models as lines of equal width. Errors are those of the free run."""
-    rows = [COLUMNS, *(row(rank, entry) for rank, entry in enumerate(models, start=1))]
-    widths = [max(len(line[column]) for line in rows) for column in range(len(COLUMNS))]
-    return ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in rows]
-
-
-def row(rank: int, entry: RankedModel) -> tuple[str, ...]:
-    """Return one model's row of the table."""
-    metrics, physics = entry.assessment.metrics, entry.assessment.physics
-    estimation, validation = metrics["estimation"]["free_run"], metrics["validation"]["free_run"]
-    estimated, validated = (bool(entry.assessment.outcomes[part]["free_run"]) for part in PARTS)
-    holds_bounded = all(hold.bounded for hold in physics.holds)
-    return (
-        str(rank),
-        str(entry.model.size),
-        number(estimation.mape, "{:.4f}", estimated),
-        number(validation.mape, "{:.4f}", validated),
-        number(validation.r2, "{:.5f}", validated),
-        number(physics.hold_drift_percent, "{:.3f}", holds_bounded),
-        "yes" if physics.property_1 else "no",
-        "pass" if entry.assessment.residual_tests.passed else "fail",
-    )
-
-
-def number(value: float, form: str, bounded: bool) -> str:
-    """Format a number. Return "diverged" if its simulation diverged and "-" if the number is not finite."""
-    if not bounded:
-        return "diverged"
-    return form.format(value) if isfinite(value) else "-"
 
 
 def _finite(value: Any) -> Any:

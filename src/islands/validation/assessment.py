@@ -12,7 +12,7 @@ from islands.errors import RecordError
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import multiple_shooting
+from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics
 from islands.validation.residual_tests import ResidualTests, residual_tests
@@ -25,6 +25,9 @@ MODES = ("one_step_ahead", "multiple_shooting", "free_run")
 
 #: Metrics of a diverged simulation.
 _UNDEFINED = Metrics(nan, nan, nan, nan)
+
+#: Number of blocks of the validation data whose errors are compared between models.
+BLOCKS = 20
 
 #: Minimum number of residuals for a test at one lag.
 _MIN_RESIDUALS = 3
@@ -49,6 +52,9 @@ class Assessment:
     physics : PhysicsChecks
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
+    block_errors : tuple of float
+        Mean squared error of the free run on each of 20 consecutive blocks of the validation data (fewer if
+        there are fewer predictions), as a fraction of the squared output range. Empty if it diverged.
     """
 
     metrics: Mapping[str, Mapping[str, Metrics]]
@@ -57,6 +63,7 @@ class Assessment:
     residual_tests: ResidualTests
     physics: PhysicsChecks
     warm_up: int
+    block_errors: tuple[float, ...]
 
 
 def assess(
@@ -89,6 +96,7 @@ def assess(
     intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}
     outcomes: dict[str, dict[str, EvaluationOutcome]] = {}
+    runs: dict[str, Simulation] = {}
     for part, record in zip(PARTS, (split.estimation, split.validation), strict=True):
         runs = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
         outcomes[part] = {mode: run.outcome for mode, run in runs.items()}
@@ -102,7 +110,20 @@ def assess(
         _test_residual(model, split.validation, warm_up),
         check_physics(model, split.estimation),
         model.maximum_lag if warm_up is None else warm_up,
+        # The loop ends with the validation data.
+        _compute_block_errors(split.validation, runs["free_run"]),
     )
+
+
+def _compute_block_errors(record: Dataset, run: Simulation) -> tuple[float, ...]:
+    if not run.outcome:
+        return ()
+    predicted = ~np.isnan(run.y)
+    # Dividing by the range first keeps the squares in the range of numbers.
+    error = (record.y - run.y)[predicted] / (np.ptp(record.y[predicted]) or 1.0)
+    with np.errstate(over="ignore"):
+        blocks = np.array_split(error**2, min(BLOCKS, len(error)))
+        return tuple(float(np.add.reduce(block)) / len(block) for block in blocks)
 
 
 def _compute_information(

@@ -38,35 +38,50 @@ function makeMetric(model, part, name, format) {
   return makeExactValue(value, format);
 }
 
-const HEADINGS = [
-  ...["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val."],
-  ...["Hold drift %", "Property 1", "Residuals"],
-];
+const HEADINGS = ["Rank", "Terms", "MAPE est. %", "R² est.", "MAPE val. %", "R² val.", "Residuals"];
+
+/** Headings of models of hysteresis, before the last one. */
+const HYSTERESIS_HEADINGS = ["Hold drift %", "Property 1"];
 
 const makeVerdict = (passed, positive, negative) =>
   el("span", { class: passed ? "yes" : "no" }, passed ? positive : negative);
 
-function makeRow(job, model) {
-  const { rank, physics, residual_tests: residuals } = model;
+function makeHysteresisCells(physics) {
   const drift = physics.hold_drift_percent;
-  const passed = residuals.tests.filter((test) => test.passed).length;
   return [
-    el("a", { href: `#/jobs/${job}/models/${rank}`, "aria-label": `Model ${rank}` }, String(rank)),
+    drift === null ? el("span", { class: "no" }, "diverged") : makeExactValue(drift, formatNumber),
+    makeVerdict(physics.property_1, "holds", "fails"),
+  ];
+}
+
+function makeRank(job, { rank, recommended }) {
+  const name = recommended ? `Model ${rank}, recommended` : `Model ${rank}`;
+  return el("a", { href: `#/jobs/${job}/models/${rank}`, "aria-label": name }, String(rank));
+}
+
+function makeRow(job, model, hysteresis) {
+  const { physics, recommended, residual_tests: residuals } = model;
+  const passed = residuals.tests.filter((test) => test.passed).length;
+  const mark = recommended ? el("span", { class: "recommended" }, " recommended") : "";
+  return [
+    el("span", {}, makeRank(job, model), mark),
     String(model.size),
     ...PARTS.flatMap((part) => [
       makeMetric(model, part, "mape", formatNumber),
       makeMetric(model, part, "r2", formatR2),
     ]),
-    drift === null ? el("span", { class: "no" }, "diverged") : makeExactValue(drift, formatNumber),
-    makeVerdict(physics.property_1, "holds", "fails"),
+    ...(hysteresis ? makeHysteresisCells(physics) : []),
     makeVerdict(residuals.passed, "pass", `${passed} of ${residuals.tests.length}`),
   ];
 }
 
 function makeModelTable(job, models) {
-  const headings = HEADINGS.map((name, at) => [name, at === 0 ? null : "figure"]);
-  const rows = models.map((model) => makeRow(job, model));
-  const modelTable = makeTable("Models, best on the validation data first", headings, rows);
+  // Only models of hysteresis have Property 1; the drift of others is no defect.
+  const hysteresis = models.some((model) => model.physics.property_1);
+  const names = HEADINGS.toSpliced(-1, 0, ...(hysteresis ? HYSTERESIS_HEADINGS : []));
+  const headings = names.map((name, at) => [name, at === 0 ? null : "figure"]);
+  const rows = models.map((model) => makeRow(job, model, hysteresis));
+  const modelTable = makeTable("Models, least error on the validation data first", headings, rows);
   modelTable.classList.add("models");
   return modelTable;
 }
@@ -185,7 +200,7 @@ function makeSearchFigures(job, islands, signal) {
   return node;
 }
 
-/** Make the panel of the models; `select(rank)` shows the details of a model, of the best one for null. */
+/** Make the panel of the models; `select(rank)` shows the details of a model, of the recommended one for null. */
 export function makeModelsPanel(job, rank, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   const article = el("article", { class: "model", "aria-labelledby": "model" });
@@ -194,7 +209,7 @@ export function makeModelsPanel(job, rank, signal) {
 
   function select(newRank) {
     rank = newRank;
-    const model = models.find((each) => each.rank === (newRank ?? 1)) ?? models[0];
+    const model = models.find((each) => (newRank ? each.rank === newRank : each.recommended)) ?? models[0];
     if (!model || String(model.rank) === article.dataset.rank) return;
     controller.abort();
     controller = new AbortController();

@@ -68,7 +68,7 @@ def test_best_model_has_the_documented_attributes(result):
 
 def test_models_are_ordered_by_error_and_have_ranks(result):
     assert [model.rank for model in result.models] == [1, 2, 3, 4, 5]
-    assert result.best.model == result.models[0].model
+    assert result.best.model == result.models[result.recommendation.rank - 1].model
     errors = [model.metrics["validation"]["free_run"].rmse for model in result.models]
     assert errors == sorted(errors)
     assert sorted(model.model.size for model in result.models) == [1, 2, 3, 4, 5]

@@ -11,8 +11,9 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel
+from islands.io.model_table import table
 from islands.io.models import read_model, terms_document
-from islands.io.result_folder import content_sha256, number, result_json, summary, table, write_result
+from islands.io.result_folder import content_sha256, result_json, summary, write_result
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
@@ -53,7 +54,7 @@ def with_best(findings, **changes):
 
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
-    assert list(result) == ["schema", "record", "seed", "settings", "search", "models"]
+    assert list(result) == ["schema", "record", "seed", "settings", "search", "recommended", "models"]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
@@ -61,7 +62,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
     assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
     for model in result["models"]:
         assert list(model) == [
-            *("rank", "size", "equation", "latex", "terms", "metrics", "outcomes"),
+            *("rank", "recommended", "size", "equation", "latex", "terms", "metrics", "outcomes"),
             *("information", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
@@ -72,6 +73,13 @@ def test_a_result_has_every_field_of_the_contract(findings):
                 assert set(modes) == {"one_step_ahead", "multiple_shooting", "free_run"}
                 assert all(inner is None or set(mode) == inner for mode in modes.values())
         assert set(model["information"]) == {"aic", "bic", "fpe"}
+
+
+def test_a_result_names_the_recommended_model_with_reasons(findings):
+    result = loaded(findings)
+    found = findings.recommendation
+    assert result["recommended"] == {"rank": found.rank, "reasons": list(found.reasons)}
+    assert [model["rank"] for model in result["models"] if model["recommended"]] == [found.rank]
 
 
 def test_a_result_has_the_reason_that_ended_an_evolution(findings):
@@ -149,8 +157,11 @@ def test_numbers_that_json_cannot_represent_become_null(findings):
 
 def test_numpy_numbers_in_settings_are_written_as_numbers(findings):
     settings = {"max_terms": np.int64(4), "validation": np.float64(0.25), "flag": np.bool_(True), "x": np.nan}
-    result = loaded(replace(findings, settings=settings))
-    assert result["settings"] == {"max_terms": 4, "validation": 0.25, "flag": True, "x": None}
+    result = loaded(replace(findings, settings={"constraints": "none"} | settings))
+    assert result["settings"] == {
+        "constraints": "none",
+        **{"max_terms": 4, "validation": 0.25, "flag": True, "x": None},
+    }
 
 
 # The record's hash.
@@ -218,39 +229,5 @@ def test_the_summary_shows_record_settings_table_and_equations(findings):
     assert lines[1].endswith("seed 7")
     assert lines[2] == "4 models estimated: 4 ok"
     assert lines[3].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
-    assert lines[5:10] == table(findings.models)
+    assert lines[5:10] == table(findings)
     assert lines[-4].startswith(" 1  y(k) = 1*y(k-1) ")
-
-
-def test_the_table_has_a_row_per_model_and_aligned_columns(findings):
-    head, *rows = table(findings.models)
-    assert head.split("  ")[0] == "rank"
-    assert len(rows) == 4
-    assert len({len(line) for line in (head, *rows)}) == 1
-    best = findings.models[0].assessment
-    assert rows[0].split()[:3] == [
-        "1",
-        str(findings.models[0].model.size),
-        f"{best.metrics['estimation']['free_run'].mape:.4f}",
-    ]
-    assert rows[0].split()[-2] == "yes"
-
-
-def test_the_table_distinguishes_divergence_from_an_undefined_number(findings):
-    best = findings.models[0].assessment
-    flat = replace(best.metrics["validation"]["free_run"], mape=nan, r2=nan)
-    without = {**best.metrics, "validation": {**best.metrics["validation"], "free_run": flat}}
-    cells = table(with_best(findings, metrics=without).models)[1].split()
-    assert cells[3:5] == ["-", "-"]
-    outcomes = {**best.outcomes, "validation": {**best.outcomes["validation"], "free_run": LOST}}
-    cells = table(with_best(findings, metrics=without, outcomes=outcomes).models)[1].split()
-    assert cells[2:5] == [f"{best.metrics['estimation']['free_run'].mape:.4f}", "diverged", "diverged"]
-    holds = (replace(best.physics.holds[0], bounded=False, drift_percent=inf), *best.physics.holds[1:])
-    cells = table(with_best(findings, physics=replace(best.physics, holds=holds)).models)[1].split()
-    assert cells[5:7] == ["diverged", "no"]
-
-
-def test_a_number_is_shown_in_the_given_format():
-    assert number(0.12345, "{:.3f}", True) == "0.123"
-    assert number(inf, "{:.3f}", True) == number(nan, "{:.3f}", True) == "-"
-    assert number(0.12345, "{:.3f}", False) == "diverged"

@@ -215,3 +215,20 @@ def test_constant_validation_output_has_an_rmse_but_no_mape_or_r2():
     assert found.rmse > 0.0
     assert math.isnan(found.mape)
     assert math.isnan(found.r2)
+
+
+# Errors by block.
+
+
+def test_block_errors_are_mean_squares_over_consecutive_blocks():
+    data = record(90)
+    found = assess(LINEAR, Split(record(200), data), SHOOTING).block_errors
+    error = (data.y - free_run(LINEAR, data).y)[2:] / np.ptp(data.y[2:])
+    assert len(found) == 20
+    assert found[:2] == pytest.approx([np.mean(error[:5] ** 2), np.mean(error[5:10] ** 2)])
+    assert found[-1] == pytest.approx(np.mean(error[-4:] ** 2))
+
+
+def test_block_errors_of_a_short_or_diverged_free_run():
+    assert len(assess(LINEAR, Split(record(200), record(9)), SHOOTING).block_errors) == 7
+    assert assess(EXPLOSIVE, Split(record(200), record(90, seed=1, size=3.0)), 200).block_errors == ()

@@ -1,0 +1,124 @@
+"""Choice of one model among the ranked models of a search.
+
+The model with the least validation error is rarely the right one: with noise, larger models of the same
+structure are better or worse by chance. The rule is a one-sided form of the one-standard-error rule (Breiman,
+Friedman, Olshen & Stone, "Classification and Regression Trees", Wadsworth 1984, section 3.4.3) on paired
+differences. Blocks of the validation data take the correlation of the errors into account. Decision 0017
+compares rules.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from islands.validation.assessment import Assessment
+from islands.validation.physics import PhysicsChecks
+
+#: Standard errors by which a mean squared error may exceed the least.
+STANDARD_ERRORS = 2.0
+
+#: Largest excess of an RMSE over the least, as a fraction, however uncertain the difference is.
+LARGEST_EXCESS = 0.2
+
+#: Excess of an RMSE over the least, as a fraction, that never justifies another term.
+NEGLIGIBLE_EXCESS = 0.01
+
+#: RMSE as a fraction of the output range below which errors count as equal.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Recommendation:
+    """Recommended model of a search.
+
+    Attributes
+    ----------
+    rank : int
+        Rank of the model; 1 has the least validation error.
+    reasons : tuple of str
+        Reasons for the choice, each a statement about measured quantities.
+    """
+
+    rank: int
+    reasons: tuple[str, ...]
+
+
+def recommend(
+    sizes: Sequence[int], assessments: Sequence[Assessment], hysteresis: bool, unit: str = ""
+) -> Recommendation:
+    """Choose the smallest model that is as good as the best one.
+
+    Candidates are the models whose free run on the validation data is bounded and which pass the physics
+    checks: holds and excursions stay bounded and, if the search constrains models of hysteresis, Property 1
+    holds. Of these, the one with the least RMSE is the reference. A model is as good as the reference if its
+    RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds
+    it by at most 20 % and the mean squared errors differ by at most two standard errors. The standard error
+    is that of the mean difference over blocks of the validation data.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Numbers of terms, in the order of the ranks.
+    assessments : sequence of Assessment
+        Assessments on the same validation data, best first.
+    hysteresis : bool
+        Whether models need Property 1.
+    unit : str
+        Unit of the output, for the reasons.
+    """
+    bounded = [at for at, entry in enumerate(assessments) if entry.outcomes["validation"]["free_run"]]
+    if not bounded:
+        return Recommendation(
+            1, ("the free run of every model diverges; this one has the least one-step-ahead error",)
+        )
+    sound = [at for at in bounded if is_sound(assessments[at].physics, hysteresis)]
+    candidates = sound or bounded
+    best = min(candidates, key=lambda at: (_rmse(assessments[at]), at))
+    equal = [at for at in candidates if _is_as_good(assessments[at], assessments[best])]
+    chosen = min(equal, key=lambda at: (sizes[at], at))
+    return Recommendation(
+        chosen + 1,
+        (
+            _describe_choice(chosen, best, len(equal), assessments, unit),
+            _describe_physics(bool(sound), hysteresis),
+        ),
+    )
+
+
+def is_sound(physics: PhysicsChecks, hysteresis: bool) -> bool:
+    """Return whether holds and excursions are bounded and, if required, Property 1 holds."""
+    bounded = all(hold.bounded for hold in physics.holds) and all(
+        excursion.bounded for excursion in physics.excursions
+    )
+    return bounded and (physics.property_1 or not hysteresis)
+
+
+def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
+    squared, least = np.array(entry.block_errors), np.array(reference.block_errors)
+    error, smallest = sqrt(squared.mean()), sqrt(least.mean())
+    if error <= max(ROUNDING, (1.0 + NEGLIGIBLE_EXCESS) * smallest):
+        return True
+    excess = squared - least
+    uncertainty = STANDARD_ERRORS * excess.std(ddof=1) / sqrt(len(excess)) if len(excess) > 1 else 0.0
+    return bool(error <= (1.0 + LARGEST_EXCESS) * smallest and excess.mean() <= uncertainty)
+
+
+def _describe_choice(chosen: int, best: int, count: int, assessments: Sequence[Assessment], unit: str) -> str:
+    error, least = (f"{_rmse(assessments[at]):.4g} {unit}".rstrip() for at in (chosen, best))
+    if count == 1:
+        return f"least free-run error on the validation data, RMSE {error}; no smaller model is as good"
+    return (
+        f"smallest of {count} models whose free-run errors on the validation data do not differ "
+        f"significantly from the least: RMSE {error}, least {least}"
+    )
+
+
+def _describe_physics(sound: bool, hysteresis: bool) -> str:
+    checks = "bounded in all holds and excursions" + (", and Property 1 holds" if hysteresis else "")
+    return checks if sound else f"no model passes the physics checks ({checks})"
+
+
+def _rmse(entry: Assessment) -> float:
+    return entry.metrics["validation"]["free_run"].rmse

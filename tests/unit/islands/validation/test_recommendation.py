@@ -1,0 +1,117 @@
+"""Recommended model: the smallest that is as good as the best, bounded, and with the claimed physics."""
+
+from dataclasses import dataclass
+from math import nan, sqrt
+
+import numpy as np
+import pytest
+
+from islands.simulation.outcome import OK, EvaluationOutcome, Status
+from islands.validation.assessment import Assessment
+from islands.validation.metrics import Metrics
+from islands.validation.physics import ClusterSum, ExcursionTest, HoldTest, PhysicsChecks
+from islands.validation.recommendation import recommend
+
+LOST = EvaluationOutcome(Status.DIVERGED, "at sample 3")
+
+#: Squared errors of noise with an RMSE of 1 %, in 20 blocks.
+NOISE = 1e-4 * (1.0 + 0.2 * np.random.default_rng(0).standard_normal(20))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    size: int
+    blocks: np.ndarray
+    bounded: bool = True
+    property_1: bool = True
+
+    def assessment(self):
+        physics = PhysicsChecks(
+            (ClusterSum("y", 1.0 if self.property_1 else 0.5, 1.0),),
+            (HoldTest(0.0, True, True, True, 0.0),),
+            (ExcursionTest("rate x 5", self.bounded, 0.0, 100.0),),
+        )
+        known = len(self.blocks) > 0
+        rmse = sqrt(np.mean(self.blocks)) if known else nan
+        return Assessment(
+            {"validation": {"free_run": Metrics(nan, nan, rmse, nan)}},
+            {"validation": {"free_run": OK if known else LOST}},
+            None,
+            None,
+            physics,
+            0,
+            tuple(map(float, self.blocks)),
+        )
+
+
+def chosen(*candidates, hysteresis=False):
+    """Return the size of the recommended one of candidates that are sorted by their error."""
+    ranked = sorted(candidates, key=lambda entry: np.mean(entry.blocks) if len(entry.blocks) else np.inf)
+    found = recommend([entry.size for entry in ranked], [entry.assessment() for entry in ranked], hysteresis)
+    assert found.reasons
+    return ranked[found.rank - 1].size
+
+
+def test_a_larger_model_that_is_better_by_chance_is_not_recommended():
+    difference = 4e-6 * np.random.default_rng(1).standard_normal(20)
+    luck = NOISE + difference - difference.mean() - 0.5e-6
+    assert sqrt(luck.mean()) < sqrt(NOISE.mean())
+    assert chosen(Candidate(3, NOISE), Candidate(9, luck)) == 3
+
+
+def test_a_larger_model_that_is_better_in_every_block_is_recommended():
+    assert chosen(Candidate(3, NOISE), Candidate(4, 0.9 * NOISE)) == 4
+
+
+def test_the_smallest_of_several_equal_models_is_recommended():
+    assert chosen(Candidate(2, 4 * NOISE), *(Candidate(n, NOISE * (1 - 1e-4 * n)) for n in (3, 5, 7))) == 3
+
+
+@pytest.mark.parametrize(("excess", "size"), [(0.0099, 3), (0.011, 9)])
+def test_an_excess_of_one_per_cent_never_justifies_a_term(excess, size):
+    assert chosen(Candidate(3, NOISE * (1 + excess) ** 2), Candidate(9, NOISE)) == size
+
+
+@pytest.mark.parametrize(("excess", "size"), [(0.19, 3), (0.21, 9)])
+def test_an_uncertain_excess_of_twenty_per_cent_justifies_a_term(excess, size):
+    # One block has the whole difference, so two standard errors exceed it.
+    blocks = NOISE.copy()
+    blocks[4] += ((1 + excess) ** 2 - 1) * NOISE.sum()
+    assert chosen(Candidate(3, blocks), Candidate(9, NOISE)) == size
+
+
+def test_rounding_errors_of_exact_models_do_not_matter():
+    tiny = np.full(20, 1e-32)
+    assert chosen(Candidate(2, NOISE), Candidate(3, 1e4 * tiny), Candidate(8, 0 * tiny)) == 3
+
+
+def test_a_model_that_diverges_beyond_the_record_is_not_recommended():
+    assert chosen(Candidate(3, NOISE, bounded=False), Candidate(5, 2 * NOISE)) == 5
+    assert chosen(Candidate(3, NOISE, bounded=False), Candidate(5, [])) == 3
+
+
+def test_property_1_is_required_of_models_of_hysteresis_only():
+    candidates = Candidate(3, NOISE, property_1=False), Candidate(5, 2 * NOISE)
+    assert chosen(*candidates, hysteresis=True) == 5
+    assert chosen(*candidates) == 3
+    only = Candidate(4, NOISE, property_1=False)
+    found = recommend([4], [only.assessment()], True)
+    assert found.reasons[1].startswith("no model passes the physics checks")
+
+
+def test_the_first_model_is_recommended_if_every_free_run_diverges():
+    found = recommend([5, 3], [Candidate(5, []).assessment(), Candidate(3, []).assessment()], False)
+    assert found.rank == 1
+    assert "diverges" in found.reasons[0]
+
+
+def test_reasons_give_the_errors_in_the_unit_of_the_output():
+    entries = [Candidate(9, NOISE).assessment(), Candidate(3, NOISE * 1.001).assessment()]
+    found = recommend([9, 3], entries, False, "um")
+    assert found.rank == 2
+    least = sqrt(NOISE.mean())
+    assert found.reasons[0].endswith(f"RMSE {least * sqrt(1.001):.4g} um, least {least:.4g} um")
+
+
+def test_a_single_block_has_no_standard_error():
+    assert chosen(Candidate(3, NOISE[:1] * 1.03), Candidate(9, NOISE[:1])) == 9
