@@ -160,7 +160,10 @@ def test_numpy_numbers_in_settings_are_written_as_numbers(findings):
     result = loaded(replace(findings, settings={"constraints": "none"} | settings))
     assert result["settings"] == {
         "constraints": "none",
-        **{"max_terms": 4, "validation": 0.25, "flag": True, "x": None},
+        "max_terms": 4,
+        "validation": 0.25,
+        "flag": True,
+        "x": None,
     }
 
 
