@@ -22,7 +22,7 @@ from islands.errors import SettingsError
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.settings import Settings, get_text_type
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
-from islands.model.candidate_library import candidates
+from islands.model.candidate_library import candidates, count_inputs
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -259,4 +259,5 @@ def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations
 @lru_cache
 def _check_library(name: str, degree: int, lags: int, inputs: int) -> None:
     """Raise the error of an invalid candidate library before the search does."""
-    candidates(name, degree, lags, inputs)
+    count_inputs(name, degree, lags, inputs)
+    candidates(name, 1, lags, 1)

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
+from islands.estimation.screening import screen_candidates
 from islands.evolution.generation.variation import Genes
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.settings import Settings
-from islands.model.candidate_library import candidates
 from islands.model.expression import Expression, height
 from islands.simulation.outcome import EvaluationOutcome
 
@@ -55,7 +55,9 @@ def make_problem(record: Dataset, settings: Settings) -> Problem:
     """
     if not settings.library:
         return Problem(record, settings)
-    regressors = candidates(settings.library, settings.library_degree, settings.library_lags, record.inputs)
+    regressors = screen_candidates(
+        settings.library, settings.library_degree, settings.library_lags, record, settings.constraints
+    )
     genes = {item: with_phi(item.expression) for item in regressors}
     library = [item for item in regressors if height(genes[item]) <= settings.max_height]
     selected = forward_selection(library, record, settings.constraints, settings.max_terms)

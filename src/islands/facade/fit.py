@@ -1,27 +1,25 @@
 """Forward selection over a candidate library, (constrained) least squares, assessment."""
 
 from collections import Counter
-from collections.abc import Sequence
 
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import SettingsError
 from islands.estimation.deviations import (
     OPERATING_POINT,
-    Offsets,
     estimate_deviations,
     find_offsets,
     no_offsets,
     subtract_offsets,
 )
-from islands.estimation.forward_selection import Structure, forward_selection
+from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import constraint
+from islands.estimation.screening import screen_candidates
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
-from islands.model.candidate_library import candidates, full_set, get_library
-from islands.model.regressor import Regressor
+from islands.model.candidate_library import full_set, get_library
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 
@@ -89,10 +87,18 @@ def fit(
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
 
-    pool = candidates(library, degree, lags, record.inputs)
+    structures = []
+    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
+    # in deviations from it. The validation data tell which one holds.
+    for offsets in dict.fromkeys((no_offsets(record), find_offsets(parts.estimation, OPERATING_POINT))):
+        deviations = subtract_offsets(parts.estimation, offsets)
+        pool = screen_candidates(library, degree, lags, deviations, constraints)
+        progress(f"inner products of {len(pool)} candidates", 0.0)
+        selected = forward_selection(pool, deviations, constraints, max_terms)
+        if isinstance(selected, EvaluationOutcome):
+            raise SettingsError(f"nothing can be fitted with these settings: {selected}")
+        structures += [(structure, offsets) for structure in selected]
     warm_up = max(item.maximum_lag for item in pool)
-    progress(f"inner products of {len(pool)} candidates", 0.0)
-    structures = _select(pool, parts.estimation, constraints, max_terms)
     outcomes: Counter[str] = Counter()
     models = []
     for done, (structure, offsets) in enumerate(structures, start=1):
@@ -129,18 +135,3 @@ def fit(
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
     return Result(SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values())))
-
-
-def _select(
-    pool: Sequence[Regressor], record: Dataset, constraints: str, max_terms: int
-) -> list[tuple[Structure, Offsets]]:
-    """Return the structures to estimate, each with the offsets of the signals that it is written in."""
-    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
-    # in deviations from it. The validation data tell which one holds.
-    found = []
-    for offsets in dict.fromkeys((no_offsets(record), find_offsets(record, OPERATING_POINT))):
-        structures = forward_selection(pool, subtract_offsets(record, offsets), constraints, max_terms)
-        if isinstance(structures, EvaluationOutcome):
-            raise SettingsError(f"nothing can be fitted with these settings: {structures}")
-        found += [(structure, offsets) for structure in structures]
-    return found

@@ -52,17 +52,59 @@ def candidates(name: str, degree: int, lags: int, inputs: int) -> tuple[Regresso
     SettingsError
         The library is unknown, a setting is out of range, or the library has more than `MAX_CANDIDATES`.
     """
+    check_library(name, degree, lags, inputs)
+    library = get_library(name)
+    regressors = (regressor(expression)[1] for expression in library.build(degree, lags, inputs))
+    return tuple(canonical_order(item for item in regressors if item))
+
+
+def count_inputs(name: str, degree: int, lags: int, inputs: int) -> int:
+    """Return the number of inputs that a library can combine in products, at least 1 of several inputs.
+
+    The library of these inputs, with the candidates of degree 1 of the others, has at most `MAX_CANDIDATES`.
+
+    Raises
+    ------
+    SettingsError
+        The library is unknown, a setting is out of range, or the library of one input, or that of degree 1 of
+        all inputs, has more than `MAX_CANDIDATES`.
+    """
+    check_library(name, degree, lags, min(inputs, 1))
+    check_library(name, 1, lags, inputs)
+    count = get_library(name).count
+    if count(degree, lags, inputs) <= MAX_CANDIDATES:
+        return inputs
+    room = MAX_CANDIDATES - count(1, lags, inputs)
+    return max([1, *(some for some in range(1, inputs) if count(degree, lags, some) <= room)])
+
+
+def largest_degree(name: str, degree: int, lags: int, inputs: int) -> int:
+    """Return the largest degree up to ``degree`` whose library of all inputs has at most `MAX_CANDIDATES`.
+
+    It is at least 1, even if that library is too large.
+    """
+    count = get_library(name).count
+    return max(
+        [1, *(lower for lower in range(2, degree + 1) if count(lower, lags, inputs) <= MAX_CANDIDATES)]
+    )
+
+
+def check_library(name: str, degree: int, lags: int, inputs: int) -> None:
+    """Check that a library is known, and not too large.
+
+    Raises
+    ------
+    SettingsError
+        As in `candidates`.
+    """
     if degree < 1 or lags < 1:
         raise SettingsError(f"degree and lags are at least 1, got {degree} and {lags}")
-    library = get_library(name)
-    count = library.count(degree, lags, inputs)
+    count = get_library(name).count(degree, lags, inputs)
     if count > MAX_CANDIDATES:
         raise SettingsError(
             f"{count} candidates are more than a library may have ({MAX_CANDIDATES}): take a smaller degree "
-            "or fewer lags, or search by evolution"
+            "or fewer lags"
         )
-    regressors = (regressor(expression)[1] for expression in library.build(degree, lags, inputs))
-    return tuple(canonical_order(item for item in regressors if item))
 
 
 def get_library(name: str) -> Library:

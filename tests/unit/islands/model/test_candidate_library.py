@@ -135,8 +135,7 @@ def test_too_large_library_is_refused_before_it_is_built():
     with pytest.raises(SettingsError) as caught:
         candidates("polynomial", 5, 11, 1)
     assert str(caught.value) == (
-        "80730 candidates are more than a library may have (4000): take a smaller degree or fewer lags, or "
-        "search by evolution"
+        "80730 candidates are more than a library may have (4000): take a smaller degree or fewer lags"
     )
     with pytest.raises(SettingsError, match=r"^[0-9]{30,} candidates are more"):
         candidates("polynomial", 40, 40, 3)

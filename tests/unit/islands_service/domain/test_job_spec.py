@@ -99,8 +99,10 @@ def test_settings_that_exhaust_memory_or_time_are_refused_at_once(settings, word
     assert words in refused(settings)
 
 
-def test_library_of_many_inputs_is_too_large():
-    assert "candidates are more" in refused({"library_degree": 5}, inputs=[f"u{i}" for i in range(16)])
+def test_library_of_many_inputs_is_screened():
+    inputs = [f"u{number}" for number in range(16)]
+    settings = resolve_job_settings(order(settings={"library_degree": 5}, inputs=inputs), 256, 10**9)
+    assert settings.library_degree == 5
 
 
 def test_budget_includes_the_first_population():

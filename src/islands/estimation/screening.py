@@ -1,0 +1,79 @@
+"""Candidate libraries for records with many inputs: products only of the inputs that matter.
+
+The number of products grows with a power of the number of inputs (equation (5)). If the library of all inputs
+is too large, the inputs are ranked by a forward selection over the library of the largest degree that is not
+too large, which for about twenty inputs contains the products of pairs. The library then has its full degree
+in the first inputs of the ranking, as many as its size allows, and degree 1 in the others.
+"""
+
+from collections.abc import Sequence
+
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.estimation.forward_selection import forward_selection
+from islands.model.candidate_library import candidates, count_inputs, largest_degree
+from islands.model.expression import Apply, Expression, Lagged
+from islands.model.model import canonical_order
+from islands.model.regressor import Regressor, regressor
+from islands.simulation.outcome import EvaluationOutcome
+
+#: Terms of the forward selection that ranks the inputs.
+_TERMS = 20
+
+
+def screen_candidates(
+    name: str, degree: int, lags: int, record: Dataset, constraints: str = "none"
+) -> tuple[Regressor, ...]:
+    """Return the regressors of a library for a record, in canonical order.
+
+    Equal to `candidates` if the library of all inputs is not too large.
+
+    Parameters
+    ----------
+    name : str
+        An entry of ``LIBRARIES``.
+    degree, lags : int
+        Degree and maximum lag of the library.
+    record : Dataset
+        Record that ranks the inputs.
+    constraints : str
+        Name of an entry of ``CONSTRAINTS``, under which the inputs are ranked.
+
+    Raises
+    ------
+    SettingsError
+        As in `candidates`, for the library of one input.
+    """
+    count = count_inputs(name, degree, lags, record.inputs)
+    if count == record.inputs:
+        return candidates(name, degree, lags, record.inputs)
+    kept = sorted(rank_inputs(name, degree, lags, record, constraints)[:count])
+    full = (_move_inputs(item.expression, kept) for item in candidates(name, degree, lags, count))
+    linear = candidates(name, 1, lags, record.inputs)
+    return tuple(canonical_order([*linear, *(item for each in full if (item := regressor(each)[1]))]))
+
+
+def rank_inputs(
+    name: str, degree: int, lags: int, record: Dataset, constraints: str = "none"
+) -> tuple[int, ...]:
+    """Return the numbers of all inputs, from 1, in the order in which forward selection chooses them.
+
+    Inputs that it does not choose come last, in their order in the record. Arguments and errors are those of
+    `screen_candidates`.
+    """
+    library = candidates(name, largest_degree(name, degree, lags, record.inputs), lags, record.inputs)
+    found = forward_selection(library, record, constraints, _TERMS)
+    if isinstance(found, EvaluationOutcome):
+        raise SettingsError(f"the inputs cannot be ranked with these settings: {found}")
+    chosen = [channel for structure in found for item in structure for channel, _ in sorted(item.lags)]
+    return tuple(channel for channel in dict.fromkeys([*chosen, *range(1, record.inputs + 1)]) if channel)
+
+
+def _move_inputs(expression: Expression, channels: Sequence[int]) -> Expression:
+    """Replace input 1 by the first of some channels, input 2 by the second, and so on."""
+    match expression:
+        case Lagged(channel, lag) if channel:
+            return Lagged(channels[channel - 1], lag)
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(_move_inputs(argument, channels) for argument in arguments))
+    return expression
