@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
-from islands.estimation.screening import screen_candidates
+from islands.estimation.input_ranking import screen_candidates
 from islands.evolution.generation.variation import Genes
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES

@@ -13,8 +13,8 @@ from islands.estimation.deviations import (
     subtract_offsets,
 )
 from islands.estimation.forward_selection import forward_selection
+from islands.estimation.input_ranking import screen_candidates
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.screening import screen_candidates
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
 from islands.facade.result import Result
