@@ -133,9 +133,15 @@ def _simplify_quotient(a: Expression, b: Expression) -> Expression | None:
         return Apply(MUL, (factor, above))
     if above == below:
         return Apply(MUL, (factor, Apply(SIGN, (above,)), Apply(SIGN, (above,))))
-    if over == under == 1.0:
-        return None
-    return Apply(MUL, (factor, Apply(PRIMITIVES["div"], (above, below))))
+    divide = PRIMITIVES["div"]
+    match above, below:
+        case _, Apply(inner, (upper, lower)) if inner == divide:
+            above, below = Apply(MUL, (above, lower)), upper
+        case Apply(inner, (upper, lower)), _ if inner == divide:
+            above, below = upper, Apply(MUL, (lower, below))
+        case _ if over == under == 1.0:
+            return None
+    return Apply(MUL, (factor, Apply(divide, (above, below))))
 
 
 def _split_factor(expression: Expression) -> tuple[float, Expression]:

@@ -1,0 +1,52 @@
+"""`islands.identify` on one record in different units."""
+
+import numpy as np
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+
+CHANGES = {
+    "preset": "narx",
+    "primitives": ("mul", "div"),
+    "library": "",
+    "population": 40,
+    "generations": 6,
+    "max_terms": 3,
+    "max_height": 1,
+    "shooting": 50,
+}
+
+
+def identified(volts=0, amperes=0, metres=0):
+    """Identify a ratio of two inputs in units of powers of two."""
+    rng = np.random.default_rng(1)
+    u = rng.uniform(1.0, 3.0, (300, 2))
+    u[::7, 1] = 0.0
+    y = np.zeros(300)
+    for k in range(1, 300):
+        ratio = u[k - 1, 0] / u[k - 1, 1] if u[k - 1, 1] else 0.0
+        y[k] = 0.6 * y[k - 1] + 0.8 * ratio + 0.01 * rng.standard_normal()
+    record = Dataset(np.ldexp(u, [volts, amperes]), np.ldexp(y, metres), 0.1)
+    return islands.identify(record, **CHANGES)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return identified()
+
+
+@pytest.mark.parametrize("units", [(-40, -40, -40), (-20, 10, 30)])
+def test_models_and_errors_scale_exactly_with_the_units(reference, units):
+    found = identified(*units)
+    for here, there in zip(reference.models, found.models, strict=True):
+        assert there.model.regressors == here.model.regressors
+        assert np.isin(np.frexp(np.divide(there.model.theta, here.model.theta))[0], 0.5).all()
+        for part in ("estimation", "validation"):
+            errors = (each.metrics[part]["free_run"].rmse for each in (here, there))
+            assert np.ldexp(next(errors), units[2]) == next(errors)
+
+
+def test_ratio_is_found(reference):
+    texts = {item.text for item in reference.best.model.regressors}
+    assert texts == {"y(k-1)", "u1(k-1)/u2(k-1)"}
