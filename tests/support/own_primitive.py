@@ -31,6 +31,12 @@ SEARCH = {
 LAW = {"y(k-1)": 0.7, "dead_zone(u(k-1))": 0.4}
 
 
+def law():
+    """Return the law as a model."""
+    table = islands.PRIMITIVES | {"dead_zone": DEAD_ZONE}
+    return islands.make_model([(islands.parse(text, table), value) for text, value in LAW.items()], dt=0.1)
+
+
 def record(samples=300):
     u = np.random.default_rng(3).uniform(-2.0, 2.0, samples)
     y = np.zeros(samples)

@@ -1,6 +1,7 @@
 """`diagnose`: compare a simulation with a record and name what the simulation gets wrong."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis
@@ -11,13 +12,14 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
-from islands.io.simulator_spec.factory import make_simulator
+from islands.io.simulator_spec.factory import make_model_simulator, make_simulator
 from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
+from islands.model.model import Model
 
 
 def diagnose(
     record: Dataset,
-    simulation: str | SimulationSpec | LocalSpec | Simulator,
+    simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
     *,
     tolerance: Mapping[str, float] | None = None,
     columns: Mapping[str, Signal] | None = None,
@@ -32,9 +34,9 @@ def diagnose(
     ----------
     record : Dataset
         The first input drives the simulation; further inputs are channels that may affect the output.
-    simulation : str, spec or Simulator
+    simulation : str, Model, spec or Simulator
         Text as on the command line (``second-order``, ``linear:2``, ``model:FILE.json``,
-        ``python:FILE.py:FUNCTION``, ...), a specification, or a simulator.
+        ``python:FILE.py:FUNCTION``, ...), a model, a specification, or a simulator.
     tolerance : mapping, optional
         Relative standard deviations of parameters about their nominal values. Other parameters are
         calibrated without a prior.
@@ -59,10 +61,12 @@ def diagnose(
         There is no such simulation, a tolerance belongs to no parameter, two effects have the same name, or
         an effect is invalid.
     """
-    # A specification has the attribute `kind`; a simulator does not.
-    is_spec = isinstance(simulation, str) or hasattr(simulation, "kind")
-    simulator = make_simulator(simulation, record, columns) if is_spec else simulation  # type: ignore[arg-type]
-    return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)  # type: ignore[arg-type]
+    simulator: Any = simulation
+    if isinstance(simulation, Model):
+        simulator = make_model_simulator(simulation, "the model", record)
+    elif isinstance(simulation, str) or hasattr(simulation, "kind"):  # a simulator has no `kind`
+        simulator = make_simulator(simulation, record, columns)  # type: ignore[arg-type]
+    return diagnose_simulator(record, simulator, tolerance, seed, progress, parallel_map, effects)
 
 
 def function_simulator(function: Callable[..., Signal], **nominal: float) -> Simulator:

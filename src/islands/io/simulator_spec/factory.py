@@ -40,6 +40,7 @@ from islands.io.simulator_spec.specification import (
     SimulationSpec,
     parse_spec,
 )
+from islands.model.model import Model
 
 #: Smallest number of samples from which parameters and the initial state are estimated.
 MIN_SAMPLES = 20
@@ -204,9 +205,25 @@ def make_python_function(spec: ProgramSpec, _record: Dataset, _columns: Mapping[
 
 
 def make_identified_model(spec: ModelSpec, record: Dataset, _columns: Mapping[str, Any]) -> Simulator:
-    """Make a simulator of an identified model; its free run starts from the first measured outputs."""
-    name = spec.name
-    model = model_from_json(json.dumps(spec.model), name)
+    """Make a simulator of the identified model in a specification."""
+    return make_model_simulator(model_from_json(json.dumps(spec.model), spec.name), spec.name, record)
+
+
+def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
+    """Make a simulator of a model; its free run starts from the first measured outputs.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model in reports and messages.
+
+    Raises
+    ------
+    ModelError
+        The model has no parameters, or several inputs.
+    RecordError
+        The first input of the record is not that of the model, or the sampling times differ.
+    """
     if model.theta is None:
         raise ModelError(f"{name} has no parameters: estimate them first")
     simulator = NarxSimulator(model, name, record.y[: model.maximum_lag])

@@ -1,5 +1,6 @@
 """`islands.diagnose`: user-defined effects, and simulators from Python functions."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import islands
 from islands.discrepancy.interfaces.effect import Signal, SimulationContext
+from support import own_primitive
 
 PITCH = 2.0
 
@@ -85,3 +87,14 @@ def test_function_simulator_takes_nominal_values_by_name() -> None:
     assert (parameter.name, parameter.nominal) == ("gain", 0.7)
     with pytest.raises(islands.SettingsError, match="no parameter offset"):
         islands.function_simulator(_proportional, offset=1.0)
+
+
+def test_model_with_a_primitive_of_the_user_is_diagnosed() -> None:
+    data = own_primitive.record(400)
+    model = own_primitive.law()
+    measured = replace(data, y=data.y + 0.2 + 0.01 * np.random.default_rng(0).standard_normal(400))
+    offset = tuple(effect for effect in islands.EFFECTS if effect.name == "offset")
+    found = islands.diagnose(measured, model, effects=offset)
+    (finding,) = found.effects
+    (value,) = finding.parameters.values()
+    assert value.value == pytest.approx(0.2, abs=0.02)
