@@ -13,7 +13,6 @@ import islands
 from islands.data.dataset import Dataset, join
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
-from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.model.candidate_library import candidates
 from islands.model.rendering import plain
 from islands.simulation.outcome import EvaluationOutcome, Status
@@ -126,7 +125,7 @@ def test_sparse_system_of_the_library_is_found_exactly(seed, degree, noise):
         assert error < 0.05
 
 
-@pytest.mark.parametrize("constraints", CONSTRAINTS)
+@pytest.mark.parametrize("constraints", ["none", "hysteresis"])
 @pytest.mark.parametrize("noise", [0.0, 0.005])
 @pytest.mark.parametrize("seed", range(4))
 def test_sparse_hysteresis_of_the_library_is_found_exactly(seed, noise, constraints):
@@ -171,7 +170,9 @@ def test_structures_selected_under_the_constraint_meet_it(name, degree, seed):
 def test_constrained_selection_is_better_than_repaired_free_selection():
     # The constraint removes some of the freely selected terms.
     data = measured(1)
-    free, bound = (forward_selection(library("polynomial", 2), data, name, 8) for name in CONSTRAINTS)
+    free, bound = (
+        forward_selection(library("polynomial", 2), data, name, 8) for name in ("none", "hysteresis")
+    )
     repaired = [estimate(structure, data, "hysteresis", LAGS) for structure in free]
     assert [entry.model.size for entry in repaired] == [1, 2, 3, 3, 5, 6, 6, 8]
     for size in range(3, 9):
@@ -185,7 +186,7 @@ def test_library_that_cannot_meet_the_constraint_is_infeasible():
     found = forward_selection(without, measured(), "hysteresis")
     assert isinstance(found, EvaluationOutcome)
     assert found.verdict is Status.INFEASIBLE
-    assert found.reason == "no candidate is y at rest: add y(k-1) to the library"
+    assert found.reason == "no regressor is y at rest: add y(k-1)"
 
 
 def test_constant_output_needs_no_increment():

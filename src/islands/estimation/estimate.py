@@ -7,12 +7,14 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
+from islands.estimation.constraints.constraint import Constrained
+from islands.estimation.constraints.constraint_checks import check_constraints
 from islands.estimation.parameter_constraints import constraint
 from islands.model.expression import Lagged
 from islands.model.model import Model, canonical_order
 from islands.model.regressor import Regressor
 from islands.program.regressor_matrix import regressor_matrix
-from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.outcome import EvaluationOutcome, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +35,8 @@ def estimate(
     regressors : sequence of Regressor
     record : Dataset
     constraints : str
-        Name of an entry of ``CONSTRAINTS``. Regressors whose parameter is forced to zero are removed.
+        Statements of ``constraint``. Regressors whose parameter is forced to zero are removed. While a
+        parameter has the wrong sign, the term with the smallest t-ratio of them is removed.
     warm_up : int or None
         Number of samples before the first row. None is the largest lag.
 
@@ -51,9 +54,32 @@ def estimate(
     SettingsError
         The constraint is unknown, or the warm-up is shorter than the largest lag.
     """
-    constrained = constraint(constraints).constrain(canonical_order(regressors))
-    if isinstance(constrained, EvaluationOutcome):
-        return constrained
+    kept: Sequence[Regressor] = canonical_order(regressors)
+    while True:
+        constrained = constraint(constraints).constrain(kept)
+        if isinstance(constrained, EvaluationOutcome):
+            return constrained
+        fitted = _estimate_constrained(constrained, record, warm_up)
+        if isinstance(fitted, EvaluationOutcome):
+            return fitted
+        theta, errors = np.array(fitted.model.theta), np.array(fitted.model.standard_errors)
+        if constrained.has_signs(theta):
+            break
+        # The minimum under one sign lies where the parameter is zero, because the squared error is convex.
+        ratio = constrained.signs * theta / np.maximum(errors, np.finfo(float).tiny)
+        worst = constrained.regressors[int(np.argmin(ratio))]
+        kept = [item for item in constrained.regressors if item != worst]
+    unmet = [check for check in check_constraints(fitted.model, constraints) if not check.met]
+    if unmet:
+        return EvaluationOutcome(
+            Status.INFEASIBLE, f"{unmet[0].text} is not met: the model has the value {unmet[0].value:g}"
+        )
+    return fitted
+
+
+def _estimate_constrained(
+    constrained: Constrained, record: Dataset, warm_up: int | None
+) -> FittedStructure | EvaluationOutcome:
     structure = Model(constrained.regressors, None, record.input_names, record.output_name, record.dt)
     first = structure.maximum_lag if warm_up is None else warm_up
     *psi, y = regressor_matrix([*structure.regressors, Lagged(0, 0)], record, first)

@@ -64,7 +64,7 @@ def refine(
     interval : int or None
         Length of a shooting interval in samples. None is the free run.
     constraints : str
-        Name of an entry of ``CONSTRAINTS``. The refined model meets it.
+        Statements of ``constraint``. The refined model meets them.
     warm_up : int or None
         Number of samples before the first prediction. None is the largest lag.
     max_steps : int
@@ -117,7 +117,7 @@ def refine(
     while steps < max_steps and damping < _MAX_DAMPING:
         damped = normal + damping * np.diag(np.maximum(np.diag(normal), np.finfo(float).tiny))
         candidate = theta - directions @ np.linalg.lstsq(damped, gradient, rcond=None)[0]
-        trial = residual(candidate)
+        trial = residual(candidate) if constrained.has_signs(candidate) else None
         if trial is None or not residual.mean_square(trial) < residual.mean_square(error):
             damping *= _DAMPING_INCREASE
             continue

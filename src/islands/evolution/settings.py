@@ -6,7 +6,7 @@ from math import inf
 from typing import Any, TypeVar
 
 from islands.errors import SettingsError, lookup
-from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.estimation.parameter_constraints import constraint
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_structure import STRUCTURES
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
@@ -143,7 +143,7 @@ class Settings:
         text_type=tuple[str, ...],
     )
     structure: str = "phi"
-    constraints: str = _option("hysteresis", " or ".join(CONSTRAINTS))
+    constraints: str = _option("hysteresis", "none or hysteresis")
     fitness: str = "shooting"
     shooting: int = _option(500, "Samples of a shooting interval.", after="max_height")
     tournament: int = 3
@@ -200,7 +200,10 @@ class Settings:
         if self.library:
             get_library(self.library)
         lookup(STRUCTURES, self.structure, "structure")
-        lookup(CONSTRAINTS, self.constraints, "constraints")
+        if not constraint(self.constraints).allows_offsets:
+            raise SettingsError(
+                f"an evolution cannot take the constraints {self.constraints!r}: take none or hysteresis"
+            )
         lookup(FITNESSES, self.fitness, "fitness")
         primitive_table(self.primitives)
         if any(shift < 1 for shift in self.shifts):

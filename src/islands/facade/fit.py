@@ -55,7 +55,8 @@ def fit(
     max_terms : int
         Size of the largest model.
     constraints : str, optional
-        ``hysteresis`` or ``none``; None takes the default of the library.
+        ``hysteresis``, ``none`` or statements such as ``odd; gain = 2.5``; None takes the default of the
+        library.
     shooting : int, optional
         Samples of each interval of multiple shooting.
     seed : int
@@ -79,7 +80,7 @@ def fit(
     degree = entry.degree if degree is None else degree
     lags = entry.lags if lags is None else lags
     constraints = entry.constraints if constraints is None else constraints
-    constraint(constraints)
+    constraint(constraints).check_inputs(record.inputs)
     if max_terms < 1:
         raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
     parts = split_data(record, validation)
@@ -90,7 +91,10 @@ def fit(
     structures = []
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
     # in deviations from it. The validation data tell which one holds.
-    for offsets in dict.fromkeys((no_offsets(record), find_offsets(parts.estimation, OPERATING_POINT))):
+    tried = [no_offsets(record)]
+    if constraint(constraints).allows_offsets:
+        tried.append(find_offsets(parts.estimation, OPERATING_POINT))
+    for offsets in dict.fromkeys(tried):
         deviations = subtract_offsets(parts.estimation, offsets)
         pool = screen_candidates(library, degree, lags, deviations, constraints)
         progress(f"inner products of {len(pool)} candidates", 0.0)

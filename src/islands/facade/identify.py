@@ -17,6 +17,7 @@ from islands.estimation.deviations import (
     no_offsets,
     subtract_offsets,
 )
+from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine, SerialEngine, Stop
@@ -39,7 +40,7 @@ from islands.model.user_primitive import get_source
 from islands.program.primitive_functions import row_address
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
-from islands.validation.assessment import assess
+from islands.validation.assessment import Assessment, assess
 from islands.validation.metrics import metrics
 
 #: Outcomes of individuals with estimated parameters.
@@ -168,11 +169,8 @@ def _check_validation_length(validation: Dataset, settings: Settings) -> None:
 
 def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     # A function such as a square root of a deviation differs from that of the signal.
-    return (
-        find_offsets(record, LARGE_OFFSET)
-        if SHIFTABLE.issuperset(settings.primitives)
-        else no_offsets(record)
-    )
+    shiftable = SHIFTABLE.issuperset(settings.primitives) and constraint(settings.constraints).allows_offsets
+    return find_offsets(record, LARGE_OFFSET) if shiftable else no_offsets(record)
 
 
 def select_final_models(
@@ -196,10 +194,16 @@ def select_final_models(
         entries.sort(key=lambda entry: (entry[0], tuple(item.text for item in entry[1].regressors)))
         for _, model in entries:
             assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
-            if settings.constraints == "none" or assessment.physics.property_1:
+            if _is_valid(assessment, settings):
                 kept.append(RankedModel(model, assessment))
                 break
     return rank_models(kept)
+
+
+def _is_valid(assessment: Assessment, settings: Settings) -> bool:
+    """Return whether a model meets the constraints; hysteresis also requires stable equilibria."""
+    property_1 = assessment.physics.property_1 or not constraint(settings.constraints).sums
+    return property_1 and all(check.met for check in assessment.constraints)
 
 
 def _estimate_candidates(

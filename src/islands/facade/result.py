@@ -9,6 +9,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError, lookup
+from islands.estimation.constraints.constraint_checks import ConstraintCheck
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.export import export
 from islands.io.result_folder import summary, write_result
@@ -72,6 +73,11 @@ class FittedModel:
     def physics(self) -> PhysicsChecks:
         """Physics checks: cluster sums, holds, minor loops, other amplitudes and rates."""
         return self.ranked_model.assessment.physics
+
+    @property
+    def constraints(self) -> tuple[ConstraintCheck, ...]:
+        """Constraints of the search, each with its target and the value of this model."""
+        return self.ranked_model.assessment.constraints
 
     @property
     def residual_tests(self) -> ResidualTests:

@@ -96,6 +96,7 @@ def _model_document(rank: int, entry: RankedModel, recommended: bool) -> dict[st
             part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
         },
         "information": asdict(assessment.information),
+        "constraints": [asdict(entry) for entry in assessment.constraints],
         "physics": physics_document(assessment.physics),
         "residual_tests": residual_tests_document(assessment.residual_tests),
     }

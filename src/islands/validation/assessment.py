@@ -9,6 +9,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.errors import RecordError
+from islands.estimation.constraints.constraint_checks import ConstraintCheck, check_constraints
 from islands.estimation.parameter_constraints import count_free_parameters
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
@@ -55,6 +56,8 @@ class Assessment:
     block_errors : tuple of float
         Mean squared error of the free run on each of 20 consecutive blocks of the validation data (fewer if
         there are fewer predictions), as a fraction of the squared output range. Empty if it diverged.
+    constraints : tuple of ConstraintCheck
+        The constraints, each with its target and the value of the model.
     """
 
     metrics: Mapping[str, Mapping[str, Metrics]]
@@ -64,6 +67,7 @@ class Assessment:
     physics: PhysicsChecks
     warm_up: int
     block_errors: tuple[float, ...]
+    constraints: tuple[ConstraintCheck, ...] = ()
 
 
 def assess(
@@ -80,7 +84,7 @@ def assess(
     warm_up : int or None
         Number of samples before the first prediction. None is the model's largest lag.
     constraints : str
-        Constraints under which the parameters were estimated, by name.
+        Constraints under which the parameters were estimated.
 
     Raises
     ------
@@ -112,6 +116,7 @@ def assess(
         model.maximum_lag if warm_up is None else warm_up,
         # The loop ends with the validation data.
         _compute_block_errors(split.validation, runs["free_run"]),
+        check_constraints(model, constraints),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import islands
+from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.io.records import read_record
 from islands.io.records.row_range import parse_rows
@@ -37,7 +38,11 @@ def fit(
     max_terms: Annotated[int, typer.Option("--max-terms", help="Size of the largest model.")] = 10,
     constraints: Annotated[
         str | None,
-        typer.Option("--constraints", help=f"{' or '.join(CONSTRAINTS)}; by default those of the library."),
+        typer.Option(
+            "--constraints",
+            help=f"{', '.join(CONSTRAINTS)}, or statements: {'; '.join(FORMS)}. "
+            "By default those of the library.",
+        ),
     ] = None,
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")

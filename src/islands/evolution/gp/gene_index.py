@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from islands.estimation.parameter_constraints import Constraint
+from islands.estimation.constraints.constraint import Constraint
 from islands.evolution.gp.individual import make_regressor
 from islands.kernels.codegen import NodeArrays
 from islands.kernels.population import Groups

@@ -2,8 +2,137 @@
 
 import math
 
+import numpy as np
+import pytest
+
 import islands
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+from islands.estimation.constraints.constraint_checks import check_constraints
+from islands.estimation.estimate import estimate
+from islands.estimation.refinement import refine
+from islands.model.model import canonical_order
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.simulation.predictors import free_run
 from support.identifications import BUDGET, record
+
+LAW = {"y(k-1)": 0.6, "u(k-1)": 0.5, "u(k-2)": 0.3, "u(k-1)^3": 0.1}
+
+#: Statements that the law meets.
+TRUE = (
+    "gain = 2",
+    "fixed-point = 1, 2.25",
+    "gain = 2; fixed-point = 1, 2.25",
+    "odd",
+    "[u(k-1)] - [u(k-2)] = 0.2; [y(k-1)] >= 0",
+    "odd; gain = 2.75 at 1, 2.25",
+)
+
+
+def make_record(samples=300, seed=0, noise=0.1):
+    """Return a record of the law with noise on the output."""
+    rng = np.random.default_rng(seed)
+    u, y = rng.uniform(-1, 1, samples), np.zeros(samples)
+    for k in range(2, samples):
+        y[k] = 0.6 * y[k - 1] + 0.5 * u[k - 1] + 0.3 * u[k - 2] + 0.1 * u[k - 1] ** 3
+    return Dataset(u, y + noise * rng.normal(size=samples), 1.0)
+
+
+def terms(*names):
+    return canonical_order(regressor(parse(name))[1] for name in names)
+
+
+def worst_residual(model, text):
+    """Return the largest deviation from a target, computed apart from the estimation."""
+    return max((abs(check.value - check.target) for check in check_constraints(model, text)), default=0.0)
+
+
+@pytest.mark.parametrize("text", TRUE)
+def test_fitted_and_refined_parameters_meet_the_constraints(text):
+    data = make_record()
+    fitted = estimate(terms(*LAW, "u(k-2)^3", "y(k-2)"), data, text).model
+    refined = refine(fitted, data, 30, text)
+    assert refined.after < refined.before
+    for model in (fitted, refined.model):
+        checks = check_constraints(model, text)
+        assert all(check.met for check in checks)
+        if ">=" not in text:
+            assert worst_residual(model, text) < 1e-9
+
+
+@pytest.mark.parametrize(
+    "text", ["gain = 2", "gain = 2; fixed-point = 1, 2.25", "odd; gain = 2.75 at 1, 2.25"]
+)
+def test_correct_constraint_improves_the_parameters(text):
+    """Compare the errors of the parameters over records in which noise biases least squares."""
+    errors = {text: [], "none": []}
+    for seed in range(20):
+        data = make_record(150, seed)
+        for constraints, found in errors.items():
+            theta = estimate(terms(*LAW), data, constraints).model.parameters
+            found.append(np.linalg.norm(np.array(theta) - [0.6, 0.5, 0.3, 0.1]))
+    assert np.mean(errors[text]) < 0.95 * np.mean(errors["none"])
+
+
+def test_static_gain_is_that_of_a_simulated_step():
+    text = "fixed-point = 1, 2.25; gain = 2.75 at 1, 2.25"
+    model = estimate(terms(*LAW, "u(k-1)*y(k-1)"), make_record(), text).model
+    levels = [
+        free_run(model, Dataset(np.full(400, u), np.full(400, 2.25), 1.0)).y[-1] for u in (1.0, 1.001, 0.999)
+    ]
+    assert levels[0] == pytest.approx(2.25, abs=1e-9)
+    assert (levels[1] - levels[2]) / 0.002 == pytest.approx(2.75, rel=1e-5)
+
+
+def test_odd_model_reverses_its_free_run():
+    data = make_record()
+    result = islands.fit(data, library="polynomial", degree=3, lags=2, max_terms=5, constraints="odd")
+    for fitted in result.models:
+        run = free_run(fitted.model, data).y
+        reversed_run = free_run(fitted.model, Dataset(-data.u, -data.y, 1.0)).y
+        np.testing.assert_array_equal(run, -reversed_run)
+
+
+def test_term_with_the_wrong_sign_is_removed():
+    data = make_record()
+    free = estimate(terms(*LAW), data).model
+    bound = estimate(terms(*LAW), data, "[u(k-2)] <= 0").model
+    assert free.theta[2] > 0.0
+    assert bound == estimate(terms(*(name for name in LAW if name != "u(k-2)")), data).model
+    assert estimate(terms(*LAW), data, "[u(k-2)] >= 0").model == free
+
+
+def test_sign_holds_during_refinement():
+    """The free refinement crosses zero, the bounded one does not."""
+    data = make_record()
+    start = islands.make_model([(parse(name), 0.5 * theta) for name, theta in LAW.items()], dt=1.0)
+    start = start.with_parameters([*start.theta[:2], -0.2, start.theta[3]])
+    free, bound = (refine(start, data, None, text).model for text in ("none", "[u(k-2)] <= 0"))
+    assert free.theta[2] > 0.2
+    assert -0.2 < bound.theta[2] <= 0.0
+
+
+def test_every_model_of_a_fit_meets_its_constraints():
+    result = islands.fit(
+        make_record(), library="polynomial", degree=3, lags=2, max_terms=6, constraints=TRUE[2]
+    )
+    assert len(result.models) >= 3
+    for fitted in result.models:
+        assert [check.text for check in fitted.constraints] == ["gain = 2", "fixed-point = 1, 2.25"]
+        assert all(check.met for check in fitted.constraints)
+        assert worst_residual(fitted.model, TRUE[2]) < 1e-9
+
+
+def test_integrator_is_no_model_of_a_static_gain():
+    result = islands.fit(make_record(), library="polynomial", degree=1, lags=1, constraints="gain = 2")
+    assert result.search_result.search.outcomes["infeasible"] == 1
+    assert [fitted.model.size for fitted in result.models] != [1]
+
+
+def test_statement_that_the_record_does_not_fit_raises_settings_error():
+    with pytest.raises(SettingsError, match="correct one of them"):
+        islands.fit(make_record(), constraints="fixed-point = 1, 2, 3")
 
 
 def test_information_criteria_of_a_result_count_free_parameters():

@@ -63,7 +63,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
     for model in result["models"]:
         assert list(model) == [
             *("rank", "recommended", "size", "equation", "latex", "terms", "metrics", "outcomes"),
-            *("information", "physics", "residual_tests"),
+            *("information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
             assert list(term) == ["regressor", "parameter", "standard_error"]
@@ -73,6 +73,9 @@ def test_a_result_has_every_field_of_the_contract(findings):
                 assert set(modes) == {"one_step_ahead", "multiple_shooting", "free_run"}
                 assert all(inner is None or set(mode) == inner for mode in modes.values())
         assert set(model["information"]) == {"aic", "bic", "fpe"}
+        (check,) = model["constraints"]
+        assert check == {"text": "hysteresis", "target": 0.0, "value": check["value"], "met": True}
+        assert check["value"] <= 1e-9
 
 
 def test_a_result_names_the_recommended_model_with_reasons(findings):
