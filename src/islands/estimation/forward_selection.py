@@ -20,7 +20,11 @@ Structure = tuple[Regressor, ...]
 
 
 def forward_selection(
-    library: Sequence[Regressor], record: Dataset, constraints: str = "none", max_terms: int = 10
+    library: Sequence[Regressor],
+    record: Dataset,
+    constraints: str = "none",
+    max_terms: int = 10,
+    least_gain: float = 0.0,
 ) -> tuple[Structure, ...] | EvaluationOutcome:
     """Return nested structures; each adds the candidate with the largest ERR to the previous one.
 
@@ -35,6 +39,8 @@ def forward_selection(
         Name of an entry of ``CONSTRAINTS``.
     max_terms : int
         Maximum number of regressors of a structure.
+    least_gain : float
+        Stop if the next candidate reduces the squared error by less than this fraction of it.
 
     Returns
     -------
@@ -50,7 +56,12 @@ def forward_selection(
     gram = gram_matrix([*(direction.expression for direction in free), found.target], record, warm_up)
     structures = [tuple(found.fixed)] if found.fixed else []
     selected: list[Regressor] = list(found.fixed)
-    for position in froe(gram, max_terms=max_terms).order:
+    selection = froe(gram, max_terms=max_terms)
+    remaining = 1.0
+    for position, ratio in zip(selection.order, selection.err, strict=True):
+        if ratio < least_gain * remaining:
+            break
+        remaining -= ratio
         selected += free[position].regressors
         structure = tuple(canonical_order(selected))
         if len(structure) > max_terms:

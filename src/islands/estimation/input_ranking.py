@@ -2,13 +2,15 @@
 
 The number of products grows with a power of the number of inputs (equation (5)). If the library of all inputs
 is too large, the inputs are ranked by a forward selection over the library of the largest degree that is not
-too large, which for about twenty inputs contains the products of pairs. The library then has its full degree
-in the first inputs of the ranking, as many as its size allows, and degree 1 in the others.
+too large, which for about twenty inputs contains the products of pairs. The selection uses a part of a long
+record and ends when the gain of a candidate is that of chance. The library then has its full degree in the
+inputs of the ranking, as many as its size allows, and degree 1 in the others.
 """
 
 from collections.abc import Sequence
+from math import log
 
-from islands.data.dataset import Dataset
+from islands.data.dataset import Dataset, join
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
 from islands.model.candidate_library import candidates, count_inputs, largest_degree
@@ -19,6 +21,9 @@ from islands.simulation.outcome import EvaluationOutcome
 
 #: Terms of the forward selection that ranks the inputs.
 _TERMS = 20
+
+#: Rows of that selection, at most, and the number of blocks of the record that contain them.
+_ROWS, _BLOCKS = 4000, 8
 
 
 def screen_candidates(
@@ -47,8 +52,8 @@ def screen_candidates(
     count = count_inputs(name, degree, lags, record.inputs)
     if count == record.inputs:
         return candidates(name, degree, lags, record.inputs)
-    kept = sorted(rank_inputs(name, degree, lags, record, constraints)[:count])
-    full = (_move_inputs(item.expression, kept) for item in candidates(name, degree, lags, count))
+    kept = sorted(rank_inputs(name, degree, lags, record, constraints)[:count]) or [1]
+    full = (_move_inputs(item.expression, kept) for item in candidates(name, degree, lags, len(kept)))
     linear = candidates(name, 1, lags, record.inputs)
     return tuple(canonical_order([*linear, *(item for each in full if (item := regressor(each)[1]))]))
 
@@ -56,17 +61,28 @@ def screen_candidates(
 def rank_inputs(
     name: str, degree: int, lags: int, record: Dataset, constraints: str = "none"
 ) -> tuple[int, ...]:
-    """Return the numbers of all inputs, from 1, in the order in which forward selection chooses them.
+    """Return the numbers of the inputs, from 1, in the order in which forward selection chooses them.
 
-    Inputs that it does not choose come last, in their order in the record. Arguments and errors are those of
-    `screen_candidates`.
+    Inputs that it does not choose are left out. Arguments and errors are those of `screen_candidates`.
     """
     library = candidates(name, largest_degree(name, degree, lags, record.inputs), lags, record.inputs)
-    found = forward_selection(library, record, constraints, _TERMS)
+    part = _take_blocks(record, lags)
+    # Risk inflation criterion: the largest gain of irrelevant candidates (Foster and George 1994).
+    chance = 2.0 * log(len(library)) / part.samples
+    found = forward_selection(library, part, constraints, _TERMS, chance)
     if isinstance(found, EvaluationOutcome):
         raise SettingsError(f"the inputs cannot be ranked with these settings: {found}")
     chosen = [channel for structure in found for item in structure for channel, _ in sorted(item.lags)]
-    return tuple(channel for channel in dict.fromkeys([*chosen, *range(1, record.inputs + 1)]) if channel)
+    return tuple(channel for channel in dict.fromkeys(chosen) if channel)
+
+
+def _take_blocks(record: Dataset, lags: int) -> Dataset:
+    """Return equal blocks of the record at equal distances, `_ROWS` rows in all; a shorter record itself."""
+    length = _ROWS // _BLOCKS + lags
+    if record.samples <= _BLOCKS * length:
+        return record
+    starts = [block * (record.samples - length) // (_BLOCKS - 1) for block in range(_BLOCKS)]
+    return join(tuple(record[start : start + length] for start in starts))
 
 
 def _move_inputs(expression: Expression, channels: Sequence[int]) -> Expression:
