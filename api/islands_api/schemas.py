@@ -218,6 +218,9 @@ class ModelView(ResponseModel):
     terms: list[dict[str, Any]]
     metrics: dict[str, Any] = Field(description="For example metrics.validation.free_run.mape.")
     outcomes: dict[str, Any]
+    warm_up: int | None = Field(
+        default=None, description="Samples before the first prediction of the simulations in metrics."
+    )
     information: dict[str, Any]
     physics: dict[str, Any]
     residual_tests: dict[str, Any]

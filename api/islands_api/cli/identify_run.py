@@ -160,12 +160,14 @@ def _read_data(
     columns = (job["inputs"], job["output"], job["dt"])
     data = read_record(path, *columns, parse_rows(job["rows"]))
     held_out = options.validation(job["validation"], path, *columns, job["rows"])
-    test_data = None
+    test_data: islands.Dataset | None = None
     if job["test"] is not None:
-        test_data = options.validation(job["test"], path, *columns, job["rows"], "--test")
-        if isinstance(test_data, float):
-            parts = islands.split(data, test_data)
+        given = options.validation(job["test"], path, *columns, job["rows"], "--test")
+        if isinstance(given, float):
+            parts = islands.split(data, given)
             data, test_data = parts.estimation, parts.validation
+        else:
+            test_data = given
         _check_test(test_data, [data] if isinstance(held_out, float) else [data, held_out], settings)
     # Check the validation data before the folder is made; the search repeats this.
     split_data(data, held_out)

@@ -10,6 +10,7 @@ from islands.errors import SettingsError
 from islands.io.models import read_model
 from islands.io.records import read_record
 from islands.io.records.row_range import overlap, parse_rows
+from islands.io.result_models import find_model_file
 from islands.io.simulator_spec.specification import SIMULATORS, LocalExtendedSpec, is_extended, parse_spec
 from islands.model.model import Model
 from islands.systems.published_models import get_published_model
@@ -30,7 +31,9 @@ Rows = Annotated[
 
 ModelFile = Annotated[
     str,
-    typer.Argument(help="A model file, an extended.json, or published:12, published:13, published:14."),
+    typer.Argument(
+        help="A model file, a result folder, an extended.json, or published:12, published:13, published:14."
+    ),
 ]
 Channels = Annotated[
     list[str] | None, typer.Option("--channel", help="Column that may couple in, for example a temperature.")
@@ -134,7 +137,7 @@ def extended(text: str) -> LocalExtendedSpec | None:
 
 
 def model(text: str) -> Model:
-    """Read a model file, or return a published model such as ``published:12``."""
+    """Read a model file, or the recommended model of a result folder, or return a published model."""
     if text.startswith(PUBLISHED):
         return get_published_model(text.removeprefix(PUBLISHED)).model
-    return read_model(text)
+    return read_model(find_model_file(text))

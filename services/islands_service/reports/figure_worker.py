@@ -106,15 +106,15 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     stored = store.results.models(job.id, rank)
     if document is None or not stored:
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
-    models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
-    assessed = tuple(
-        RankedModel(
-            model, assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
-        )
-        for model in models
-    )
+    assessed = []
+    for entry in stored:
+        model = model_from_json(entry.file, f"model {entry.rank}")
+        # Results of earlier versions do not state their warm-up.
+        warm_up = entry.document.get("warm_up", settings.maximum_lag)
+        assessment = assess(model, split, settings.shooting, warm_up, settings.constraints)
+        assessed.append(RankedModel(model, assessment))
     search = _search(document["search"], store.results.history(job.id))
-    return SearchResult(record, split, spec.seed, document["settings"], search, assessed)
+    return SearchResult(record, split, spec.seed, document["settings"], search, tuple(assessed))
 
 
 def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:

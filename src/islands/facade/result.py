@@ -84,9 +84,22 @@ class FittedModel:
         """Correlation tests of the one-step-ahead residual."""
         return self.ranked_model.assessment.residual_tests
 
-    def simulate(self, record: Dataset, mode: str = "free-run") -> Simulation:
-        """Simulate the model on a record; ``mode`` is one-step, shooting or free-run."""
-        return simulate(self.model, record, mode, int(self.search_result.settings["shooting"]))
+    def simulate(self, record: Dataset, mode: str = "free-run", warm_up: int | None = None) -> Simulation:
+        """Simulate the model on a record.
+
+        On the validation data, the errors of the simulation are those in `metrics`.
+
+        Parameters
+        ----------
+        record : Dataset
+        mode : str
+            ``one-step``, ``shooting`` or ``free-run``.
+        warm_up : int, optional
+            Number of samples before the first prediction; by default that of the errors in `metrics`.
+        """
+        shooting = int(self.search_result.settings["shooting"])
+        warm_up = self.ranked_model.assessment.warm_up if warm_up is None else warm_up
+        return simulate(self.model, record, mode, shooting, warm_up=warm_up)
 
     def plot(self, kind: str = "free-run") -> "Figure":
         """Draw a figure of the model; ``kind`` is a key of ``islands.figures.registry.FIGURES``."""
@@ -159,6 +172,7 @@ def simulate(
     mode: str = "free-run",
     shooting: int = 500,
     columns: Mapping[str, Any] | None = None,
+    warm_up: int | None = None,
 ) -> Simulation:
     """Simulate a record.
 
@@ -176,16 +190,20 @@ def simulate(
         Samples of each interval.
     columns : mapping, optional
         Recorded simulations by name for the simulator ``column:NAME``, each of shape (samples,).
+    warm_up : int, optional
+        Number of samples before the first prediction of a model; by default the model's largest lag.
 
     Raises
     ------
+    RecordError
+        The record does not match the model, or is too short.
     SettingsError
-        The mode or the simulator is unknown.
+        The mode or the simulator is unknown, or the warm-up is shorter than the model's largest lag.
     """
     intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
     interval = lookup(intervals, mode, "mode")
     if isinstance(model, Model):
-        return multiple_shooting(model, record, interval)
+        return multiple_shooting(model, record, interval, warm_up)
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
     # Import the simulators of the discrepancy analysis only if they are used.

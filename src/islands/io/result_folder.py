@@ -95,6 +95,7 @@ def _model_document(rank: int, entry: RankedModel, recommended: bool) -> dict[st
         "outcomes": {
             part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
         },
+        "warm_up": assessment.warm_up,
         "information": asdict(assessment.information),
         "constraints": [asdict(entry) for entry in assessment.constraints],
         "physics": physics_document(assessment.physics),

@@ -86,5 +86,5 @@ def _check_warm_up(y: NDArray[np.float64], start: NDArray[np.int64], warm_up: in
         sample = first + int(np.flatnonzero(np.isnan(y[first : first + warm_up]))[0])
         raise RecordError(
             f"the output is missing at sample {sample}, where a simulation starts from it: "
-            "use a free run, which only needs the first samples, or fill the gap"
+            "use a free run, which only needs the first samples, or a shorter warm-up, or fill the gap"
         )

@@ -13,6 +13,7 @@ from islands.facade.fit import SHOOTING
 from islands.facade.result import simulate as run
 from islands.io.records import read_record, write_simulation
 from islands.io.records.row_range import parse_rows
+from islands.io.result_models import ErrorMeasurement, find_model_file, read_error_measurement
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
@@ -34,9 +35,25 @@ def simulate(
     ] = None,
     dt: options.SamplingTime = None,
     rows: options.Rows = None,
-    shooting: Annotated[int, typer.Option("--shooting", help="Samples of a shooting interval.")] = SHOOTING,
+    shooting: Annotated[
+        int | None,
+        typer.Option(
+            "--shooting",
+            help=f"Samples of a shooting interval; by default those of the result, or {SHOOTING}.",
+        ),
+    ] = None,
+    warm_up: Annotated[
+        int | None,
+        typer.Option(
+            "--warm-up",
+            help="Samples before the first prediction; by default those of the result, or the largest lag.",
+        ),
+    ] = None,
 ) -> None:
-    """Simulate a model on a record. A free run needs only the first samples of the output."""
+    """Simulate a model on a record. A free run needs only the first samples of the output.
+
+    For a model of a result folder, the errors on the validation data are those of the result.
+    """
     extended = options.extended(model)
     if extended is not None:
         _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows)
@@ -51,8 +68,13 @@ def simulate(
         missing_output=True,
     )
     compile_kernels()
-    simulation = run(chosen, data, mode, shooting)
-    _print_metrics(data, simulation.y, f"{mode}: {simulation.outcome}", out)
+    reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
+    interval = reported.shooting if shooting is None else shooting
+    first = next(each for each in (warm_up, reported.warm_up, chosen.maximum_lag) if each is not None)
+    simulation = run(chosen, data, mode, interval, warm_up=first)
+    _print_metrics(
+        data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out
+    )
 
 
 def _simulate_extended(

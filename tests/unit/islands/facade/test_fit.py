@@ -78,11 +78,12 @@ def test_models_are_ordered_by_error_and_have_ranks(result):
 def test_model_simulates_a_record_in_three_modes(result):
     record, model = piezo(200, seed=9), result.best.model
     shooting = result.search_result.settings["shooting"]
-    assert shooting == 45
+    assert (shooting, model.maximum_lag) == (45, 2)
+    # The warm-up of the errors is the largest lag of the library.
     expected = {
-        "one-step": one_step_ahead(model, record).y,
-        "shooting": multiple_shooting(model, record, shooting).y,
-        "free-run": free_run(model, record).y,
+        "one-step": one_step_ahead(model, record, 3).y,
+        "shooting": multiple_shooting(model, record, shooting, 3).y,
+        "free-run": free_run(model, record, 3).y,
     }
     for mode, y in expected.items():
         assert np.array_equal(result.best.simulate(record, mode).y, y, equal_nan=True)
@@ -97,9 +98,11 @@ def test_model_simulates_a_record_in_three_modes(result):
 def test_free_run_uses_measured_outputs_only_in_the_warm_up(result):
     record = piezo(200, seed=9)
     y = record.y.copy()
-    y[result.best.model.maximum_lag :] = np.nan
-    blind = result.best.simulate(with_output(record, y))
-    assert np.array_equal(blind.y, result.best.simulate(record).y, equal_nan=True)
+    y[2:] = np.nan
+    blind = result.best.simulate(with_output(record, y), warm_up=2)
+    assert np.array_equal(blind.y, result.best.simulate(record, warm_up=2).y, equal_nan=True)
+    with pytest.raises(RecordError, match=r"missing at sample 2, .* a shorter warm-up"):
+        result.best.simulate(with_output(record, y))
 
 
 KINDS = ("free-run", "loop", "hold", "residuals")
@@ -124,7 +127,7 @@ def test_model_is_exported_and_read_back(result, tmp_path):
     exec(result.best.export(), namespace)
     record, lag = piezo(100, seed=9), result.best.model.maximum_lag
     simulated = namespace["simulate"](record.u[:, 0].tolist(), record.y.tolist())
-    assert simulated[lag:] == result.best.simulate(record).y[lag:].tolist()
+    assert simulated[lag:] == result.best.simulate(record, warm_up=lag).y[lag:].tolist()
     (tmp_path / "model.json").write_text(result.best.export("json"))
     assert islands.read_model(tmp_path / "model.json") == result.best.model
 

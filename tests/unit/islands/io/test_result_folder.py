@@ -63,7 +63,7 @@ def test_a_result_has_every_field_of_the_contract(findings):
     for model in result["models"]:
         assert list(model) == [
             *("rank", "recommended", "size", "equation", "latex", "terms", "metrics", "outcomes"),
-            *("information", "constraints", "physics", "residual_tests"),
+            *("warm_up", "information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
             assert list(term) == ["regressor", "parameter", "standard_error"]
@@ -132,6 +132,7 @@ def test_models_are_in_rank_order_with_their_numbers(findings):
         assert model["metrics"]["validation"]["free_run"]["mape"] == free_run.mape
         assert model["physics"]["hold_drift_percent"] == entry.assessment.physics.hold_drift_percent
         assert model["outcomes"]["validation"]["free_run"] == "ok"
+        assert model["warm_up"] == entry.assessment.warm_up == 3
 
 
 def test_numbers_that_json_cannot_represent_become_null(findings):

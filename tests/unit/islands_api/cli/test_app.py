@@ -11,7 +11,7 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.errors import IslandsError, RecordError, SettingsError
-from islands.io.models import write_model
+from islands.io.models import read_model, write_model
 from islands.io.records import write_record
 from islands.io.records.row_range import parse_rows
 from islands.systems.published_models import PUBLISHED
@@ -185,7 +185,7 @@ def test_force_replaces_a_result_and_all_its_models(run, fitted):
 def test_simulate_reads_the_columns_of_the_model(run, fitted):
     code, out, _ = run("simulate", "out/models/01.json", "r.csv", "--mode", "one-step", "--out", "s.csv")
     assert code == 0
-    assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step: ok"]
+    assert out.splitlines()[:2] == ["s.csv: 120 rows", "one-step after a warm-up of 3 samples: ok"]
     assert "um  fit" in out
     assert Path("s.csv").read_text().startswith("time,y_sim\n")
     renamed = Dataset(record().u, record().y, 0.01, ("volt_V",), "way_um")
@@ -193,6 +193,31 @@ def test_simulate_reads_the_columns_of_the_model(run, fitted):
     assert run("simulate", "out/models/01.json", "other.csv")[0] == 2
     columns = ("--input", "volt_V", "--output", "way_um")
     assert run("simulate", "out/models/01.json", "other.csv", *columns)[0] == 0
+
+
+def test_simulate_prints_the_errors_that_the_result_reports(run, fitted):
+    result = json.loads(Path("out/result.json").read_text())
+    files = {f"out/models/{entry['rank']:02d}.json": entry for entry in result["models"]}
+    files["out"] = result["models"][result["recommended"]["rank"] - 1]
+    assert min(read_model(path).maximum_lag for path in Path("out/models").iterdir()) < 3
+    for path, entry in files.items():
+        for mode, name in (("free-run", "free_run"), ("shooting", "multiple_shooting")):
+            code, out, _ = run("simulate", path, "r.csv", "--rows", "90:120", "--mode", mode)
+            errors = entry["metrics"]["validation"][name]
+            assert code == 0
+            assert f"{mode} after a warm-up of {entry['warm_up']} samples: ok" in out
+            assert f"MAPE {errors['mape']:.4f} %  R2 {errors['r2']:.5f}  RMSE {errors['rmse']:.6g} um" in out
+
+
+def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(run, fitted):
+    shutil.copyfile("out/models/01.json", "model.json")
+    lag = read_model("model.json").maximum_lag
+    assert f"after a warm-up of {lag} samples" in run("simulate", "model.json", "r.csv")[1]
+    assert "after a warm-up of 9 samples" in run("simulate", "out", "r.csv", "--warm-up", "9")[1]
+    assert "the warm-up has 0" in run("simulate", "out", "r.csv", "--warm-up", "0")[2]
+    Path("out/result.json").write_text("{}")
+    code, _, error = run("simulate", "out", "r.csv")
+    assert (code, "result.json cannot be read" in error) == (2, True)
 
 
 def test_simulate_rejects_another_sampling_time(run):

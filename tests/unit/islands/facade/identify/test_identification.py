@@ -3,6 +3,7 @@
 from dataclasses import asdict, replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from islands.data.split import split
@@ -12,8 +13,11 @@ from islands.evolution.archipelago import Archipelago, empty_archipelago
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_state import SearchState
 from islands.facade.identify import identify
+from islands.facade.result import SIMULATION_MODES
 from islands.io.checkpoints import read_checkpoint, write_checkpoint
 from islands.model.candidate_library import full_set
+from islands.validation.assessment import MODES
+from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics
 from support.identifications import BUDGET, RecordingEngine, parameters
 
@@ -202,3 +206,17 @@ def test_other_engine_gives_the_same_result(data, result):
     assert search.duplicates == sum(info.duplicates for info in infos)
     assert search.outcomes["ok"] == sum(info.outcomes["ok"] for info in infos)
     assert search.caches == engine.epochs[-1].caches
+
+
+def test_simulations_of_the_parts_have_the_reported_errors(result):
+    split = result.search_result.split
+    assert (
+        max(fitted.model.maximum_lag for fitted in result.models)
+        < result.best.ranked_model.assessment.warm_up
+    )
+    for fitted in result.models:
+        for part, data in (("estimation", split.estimation), ("validation", split.validation)):
+            for name, mode in zip(MODES, SIMULATION_MODES, strict=True):
+                assert metrics(data.y, fitted.simulate(data, mode).y) == fitted.metrics[part][name]
+    own = result.best.simulate(split.validation, warm_up=result.best.model.maximum_lag)
+    assert np.isnan(own.y).sum() == result.best.model.maximum_lag

@@ -1,0 +1,82 @@
+"""Models of a result folder, and how their errors were measured."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from islands.errors import ModelError
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorMeasurement:
+    """Settings of the simulations whose errors are in a result.
+
+    Attributes
+    ----------
+    warm_up : int or None
+        Number of samples before the first prediction. None if the result was written without it.
+    shooting : int
+        Samples of an interval of multiple shooting.
+    """
+
+    warm_up: int | None
+    shooting: int
+
+
+def find_model_file(path: str | Path) -> Path:
+    """Return the file of the recommended model of a result folder. Any other path is returned as it is.
+
+    Raises
+    ------
+    ModelError
+        The folder has no ``result.json``, or it is damaged.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        return path
+    result = path / "result.json"
+    document = _read_object(result)
+    try:
+        # Results of earlier versions recommend no model.
+        rank = int(document.get("recommended", {"rank": 1})["rank"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise _damaged(result, error) from error
+    return path / "models" / f"{rank:02d}.json"
+
+
+def read_error_measurement(model_file: str | Path) -> ErrorMeasurement | None:
+    """Return how the errors of a model in a result folder were measured.
+
+    Returns
+    -------
+    ErrorMeasurement or None
+        None if the file is not ``models/NN.json`` of a folder with a ``result.json`` that has this model.
+
+    Raises
+    ------
+    ModelError
+        ``result.json`` is damaged.
+    """
+    file = Path(model_file).absolute()
+    result = file.parent.parent / "result.json"
+    if file.parent.name != "models" or not file.stem.isdigit() or not result.is_file():
+        return None
+    document = _read_object(result)
+    try:
+        entries = {entry["rank"]: entry for entry in document["models"]}
+        entry = entries.get(int(file.stem))
+        return entry and ErrorMeasurement(entry.get("warm_up"), int(document["settings"]["shooting"]))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise _damaged(result, error) from error
+
+
+def _read_object(result: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(result.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise _damaged(result, error) from error
+
+
+def _damaged(result: Path, error: Exception) -> ModelError:
+    return ModelError(f"{result} cannot be read ({error!r}): give the file of a model outside of this folder")
