@@ -33,6 +33,15 @@ class Reference(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class ColumnReference:
+    """ColumnReference of a simulation that is neither a model nor a record."""
+
+    input_names: tuple[str, ...]
+    output_name: str
+    dt: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class _Channel:
     name: str
     parts: ChannelName

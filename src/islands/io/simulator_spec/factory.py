@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from islands.data.compatibility import match_record
+from islands.data.compatibility import ColumnReference, match_record
 from islands.data.dataset import Dataset
 from islands.discrepancy.calibration.preparation import estimation_part, make_context
 from islands.discrepancy.effects import CATALOGUE
@@ -97,9 +97,16 @@ def simulate_spec(
     Returns
     -------
     ndarray, shape (samples,)
+
+    Raises
+    ------
+    RecordError
+        The columns or units of the record are not those of the extended simulation.
     """
     if isinstance(spec, Mapping):
         spec = LocalExtendedSpec.model_validate(spec)
+    if isinstance(spec, ExtendedSpec):
+        record = match_record(ColumnReference(spec.inputs, spec.output), record, "the extended simulation")
     simulator = make_simulator(spec, record, columns)
     alone = ExtendedSimulator(simulator, (), make_context(record, simulator, record.samples))
     initial = [place for place, parameter in enumerate(alone.parameters) if parameter.initial]
@@ -124,6 +131,9 @@ def simulate_spec(
 
 
 def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
+    # The channels may be others: effects find theirs by name.
+    driving = ColumnReference(document.inputs[:1], document.output)
+    match_record(driving, record.first_inputs(1), "the extended simulation")
     simulator = make_simulator(document.core, record, columns)
     inner: Simulator = simulator
     if (document.hold, document.times) != ("first-order", 1):

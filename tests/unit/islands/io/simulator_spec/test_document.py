@@ -14,7 +14,7 @@ from islands.discrepancy.effects import CATALOGUE, catalogue_order
 from islands.discrepancy.interfaces.effect import Effect
 from islands.discrepancy.simulators.extended import ExtendedSimulator
 from islands.discrepancy.simulators.saved_extension import SavedExtension
-from islands.errors import ModelError, SettingsError
+from islands.errors import ModelError, RecordError, SettingsError
 from islands.io.export.extension import as_json
 from islands.io.simulator_spec.document import describe_extension, extended_document, extended_json
 from islands.io.simulator_spec.factory import make_simulator, simulate_spec
@@ -225,3 +225,22 @@ def test_an_invalid_document_is_refused_with_a_reason(reason: str) -> None:
     with pytest.raises(error) as raised:
         simulate_spec(document, oscillator.record)
     assert words in str(raised.value)
+
+
+def test_columns_of_a_record_are_matched_with_those_of_the_document() -> None:
+    oscillator = made()["second-order"]
+    record = oscillator.record
+    with_channel = replace(
+        record,
+        u=np.column_stack([record.u, np.zeros(record.samples)]),
+        input_names=("u_N", "T_K"),
+        input_units=("N", "K"),
+    )
+    document = extended_document(extend(oscillator, [CATALOGUE["cubic-stiffness"]]), with_channel)
+    reversed_columns = replace(
+        with_channel, u=with_channel.u[:, ::-1], input_names=("T_K", "u_N"), input_units=("K", "N")
+    )
+    expected = simulate_spec(document, with_channel)
+    assert simulate_spec(document, reversed_columns).tolist() == expected.tolist()
+    with pytest.raises(RecordError, match=r"multiply u_N by 0\.001"):
+        simulate_spec(document, replace(with_channel, input_units=("mN", "K")))
