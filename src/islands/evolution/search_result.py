@@ -1,7 +1,7 @@
 """Result of a search: ranked models and statistics."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
 
@@ -13,15 +13,26 @@ from islands.evolution.history import HistoryPoint
 from islands.model.equations import equation
 from islands.model.model import Model
 from islands.validation.assessment import Assessment
+from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
+from islands.validation.prediction_bands import BandCalibration, calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedModel:
-    """Model with its assessment."""
+    """Model with its assessment.
+
+    Attributes
+    ----------
+    model : Model
+    assessment : Assessment
+    calibration : BandCalibration or None
+        Width of its prediction bands. None without an ensemble, or if its free runs diverge.
+    """
 
     model: Model
     assessment: Assessment
+    calibration: BandCalibration | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +98,9 @@ class SearchResult:
     search : SearchStatistics
     models : tuple of RankedModel
         Models, least validation error first; see `rank_models`.
+    ensemble : Ensemble or None
+        Models that the data do not exclude. They give the inclusion probabilities of terms and the prediction
+        bands. None if every free run diverged on the validation data.
     """
 
     record: Dataset
@@ -95,6 +109,7 @@ class SearchResult:
     settings: Mapping[str, Any]
     search: SearchStatistics
     models: tuple[RankedModel, ...]
+    ensemble: Ensemble | None = None
 
     @property
     def requires_property_1(self) -> bool:
@@ -120,6 +135,21 @@ class SearchResult:
     def recommended(self) -> RankedModel:
         """Recommended model."""
         return self.models[self.recommendation.rank - 1]
+
+
+def with_bands(
+    found: SearchResult, candidates: Sequence[ValidatedModel], constraints: str, warm_up: int
+) -> SearchResult:
+    """Return a search result with the ensemble of the candidates and with calibrated bands of its models."""
+    ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed)
+    if ensemble is None:
+        return found
+    calibrations = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
+    models = tuple(
+        replace(entry, calibration=calibration)
+        for entry, calibration in zip(found.models, calibrations, strict=True)
+    )
+    return replace(found, models=models, ensemble=ensemble)
 
 
 def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:

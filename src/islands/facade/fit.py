@@ -16,12 +16,19 @@ from islands.estimation.forward_selection import forward_selection
 from islands.estimation.input_ranking import screen_candidates
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.progress import ProgressCallback, ignore_progress
-from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
+from islands.evolution.search_result import (
+    RankedModel,
+    SearchResult,
+    SearchStatistics,
+    rank_models,
+    with_bands,
+)
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set, get_library
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
+from islands.validation.ensemble import ValidatedModel
 
 #: Samples of a shooting interval (case 1 of the paper); at most a tenth of a short record.
 SHOOTING = 500
@@ -138,4 +145,9 @@ def fit(
         "shooting": shooting,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
-    return Result(SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values())))
+    found = SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values()))
+    estimates = [
+        ValidatedModel(entry.model, 1, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
+        for entry in models
+    ]
+    return Result(with_bands(found, estimates, constraints, warm_up))

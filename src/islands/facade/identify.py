@@ -1,8 +1,9 @@
 """Identification by evolution (MGGP/FROE), refinement and validation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import fields
+from math import isfinite
 from typing import Any
 
 from islands.data.dataset import Dataset
@@ -26,7 +27,13 @@ from islands.evolution.gp.individual import make_regressor
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics, rank_models
+from islands.evolution.search_result import (
+    RankedModel,
+    SearchResult,
+    SearchStatistics,
+    rank_models,
+    with_bands,
+)
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
 from islands.facade.result import Result
@@ -41,7 +48,7 @@ from islands.program.primitive_functions import row_address
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import Assessment, assess
-from islands.validation.metrics import metrics
+from islands.validation.ensemble import ValidatedModel
 
 #: Outcomes of individuals with estimated parameters.
 FEASIBLE_OUTCOMES = ("ok", "abandoned")
@@ -130,7 +137,8 @@ def identify(
                 progress(state, settings)
     if state.archipelago.generation < 0:
         raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
-    models = select_final_models(state.archipelago.hall_of_fame, search_problem, split, offsets)
+    candidates = estimate_candidates(state.archipelago.hall_of_fame, search_problem, split, offsets)
+    models = select_final_models(candidates, search_problem, split)
     if not models:
         raise SettingsError(
             f"no model was found: {dict(state.outcomes)}; take another preset, more generations or a longer "
@@ -139,7 +147,8 @@ def identify(
     described = {"method": "identify", "preset": preset, **_describe(settings)}
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     statistics = _make_statistics(state, search_problem)
-    return Result(SearchResult(record, split, seed, described, statistics, models))
+    found = SearchResult(record, split, seed, described, statistics, models)
+    return Result(with_bands(found, candidates, settings.constraints, settings.maximum_lag))
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:
@@ -174,25 +183,21 @@ def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
 
 
 def select_final_models(
-    hall_of_fame: HallOfFame, problem: Problem, split: Split, offsets: Offsets
+    candidates: Sequence[ValidatedModel], problem: Problem, split: Split
 ) -> tuple[RankedModel, ...]:
-    """Validate the hall of fame and return the best model of every size, best first.
+    """Assess the candidates and return the best model of every size, best first.
 
-    Candidates are the models of the hall of fame with estimated and with refined parameters, and the
-    structures that seeded the search, so that the result is never worse than the seeds. If the parameters are
-    constrained, a model must have Property 1; a size without such a model is left out.
+    If the parameters are constrained, a model must have Property 1; a size without such a model is left out.
     """
     settings = problem.settings
-    found: dict[int, list[tuple[float, Model]]] = {}
-    for model in _estimate_candidates(hall_of_fame, problem, split.estimation, offsets):
-        simulated = free_run(model, split.validation, settings.maximum_lag)
-        if simulated.outcome:
-            rmse = metrics(split.validation.y, simulated.y).rmse
-            found.setdefault(model.size, []).append((rmse, model))
+    found: dict[int, list[ValidatedModel]] = {}
+    for candidate in candidates:
+        if isfinite(candidate.error):
+            found.setdefault(candidate.model.size, []).append(candidate)
     kept = []
     for entries in found.values():
-        entries.sort(key=lambda entry: (entry[0], tuple(item.text for item in entry[1].regressors)))
-        for _, model in entries:
+        for candidate in sorted(entries, key=lambda entry: entry.order):
+            model = candidate.model
             assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
             if _is_valid(assessment, settings):
                 kept.append(RankedModel(model, assessment))
@@ -206,28 +211,37 @@ def _is_valid(assessment: Assessment, settings: Settings) -> bool:
     return property_1 and all(check.met for check in assessment.constraints)
 
 
-def _estimate_candidates(
-    hall_of_fame: HallOfFame, problem: Problem, record: Dataset, offsets: Offsets
-) -> list[Model]:
-    settings = problem.settings
+def estimate_candidates(
+    hall_of_fame: HallOfFame, problem: Problem, split: Split, offsets: Offsets
+) -> list[ValidatedModel]:
+    """Estimate and refine the models of the hall of fame, and validate them.
+
+    The structures that seeded the search are added, so that the result is never worse than the seeds.
+    """
+    record, settings = split.estimation, problem.settings
     interval = FITNESSES[settings.fitness](settings.shooting)
     structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall_of_fame.entries}
     for genes in problem.seeds:
         regressors = (item for gene in genes if (item := make_regressor(gene)))
         structures.setdefault(tuple(canonical_order(regressors)))
-    models = []
+    found = []
+
+    def validate(model: Model, interval: int | None) -> None:
+        simulated = free_run(model, split.validation, settings.maximum_lag)
+        found.append(ValidatedModel(model, interval, simulated.mean_squared_error))
+
     for structure in structures:
         estimated = estimate_deviations(
             structure, offsets, record, settings.constraints, settings.maximum_lag
         )
         if isinstance(estimated, EvaluationOutcome) or estimated.model.size > settings.max_terms:
             continue
-        models.append(estimated.model)
+        validate(estimated.model, 1)
         if settings.refine:
             refined = refine(estimated.model, record, interval, settings.constraints, settings.maximum_lag)
             if not isinstance(refined, EvaluationOutcome):
-                models.append(refined.model)
-    return models
+                validate(refined.model, interval)
+    return found
 
 
 def _make_statistics(state: SearchState, problem: Problem) -> SearchStatistics:

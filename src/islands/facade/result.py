@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from islands.data.dataset import Dataset
-from islands.errors import SettingsError, lookup
+from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.constraint_checks import ConstraintCheck
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.export import export
@@ -17,8 +17,10 @@ from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
+from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
+from islands.validation.prediction_bands import LEVEL, PredictionBand, predict_band
 from islands.validation.recommendation import Recommendation
 from islands.validation.residual_tests import ResidualTests
 
@@ -100,6 +102,51 @@ class FittedModel:
         shooting = int(self.search_result.settings["shooting"])
         warm_up = self.ranked_model.assessment.warm_up if warm_up is None else warm_up
         return simulate(self.model, record, mode, shooting, warm_up=warm_up)
+
+    @property
+    def inclusion(self) -> tuple[float, ...]:
+        """Inclusion probability of every term, in the order of the model.
+
+        Raises
+        ------
+        ModelError
+            The result has no ensemble.
+        """
+        ensemble = self._ensemble
+        return tuple(ensemble.inclusion(item) for item in self.model.regressors)
+
+    def bands(self, record: Dataset, level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
+        """Simulate the model on a record, with a band that contains a measured sample with a probability.
+
+        Parameters
+        ----------
+        record : Dataset
+            Inputs, and the output of the warm-up.
+        level : float
+            Probability, between 0.5 and 0.99.
+        warm_up : int or None
+            Number of samples before the first prediction. None is the model's largest lag.
+
+        Raises
+        ------
+        ModelError
+            The free runs of the model diverged on the data that calibrate the bands.
+        SettingsError
+            The level is out of range.
+        """
+        calibration = self.ranked_model.calibration
+        if calibration is None:
+            raise ModelError(
+                f"model {self.rank} has no prediction bands: its free run diverged, take another"
+            )
+        return predict_band(self.model, self._ensemble, calibration, record, level, warm_up)
+
+    @property
+    def _ensemble(self) -> Ensemble:
+        ensemble = self.search_result.ensemble
+        if ensemble is None:
+            raise ModelError("the result has no ensemble: the free run of every model diverged")
+        return ensemble
 
     def plot(self, kind: str = "free-run") -> "Figure":
         """Draw a figure of the model; ``kind`` is a key of ``islands.figures.registry.FIGURES``."""

@@ -12,10 +12,12 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel, SearchResult
+from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.model_table import table
 from islands.io.models import terms_document, write_model
 from islands.model.equations import equation, latex_equation
 from islands.validation.assessment import PARTS
+from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
 from islands.validation.residual_tests import ResidualTests
 
@@ -51,9 +53,10 @@ def result_document(found: SearchResult) -> dict[str, Any]:
         },
         "recommended": asdict(recommendation),
         "models": [
-            _model_document(rank, entry, rank == recommendation.rank)
+            _model_document(rank, entry, rank == recommendation.rank, found.ensemble)
             for rank, entry in enumerate(found.models, start=1)
         ],
+        "ensemble": ensemble_document(found.ensemble),
     }
     described: dict[str, Any] = _finite(document)
     return described
@@ -80,15 +83,22 @@ def content_sha256(record: Dataset) -> str:
     return digest.hexdigest()
 
 
-def _model_document(rank: int, entry: RankedModel, recommended: bool) -> dict[str, Any]:
+def _model_document(
+    rank: int, entry: RankedModel, recommended: bool, ensemble: Ensemble | None
+) -> dict[str, Any]:
     model, assessment = entry.model, entry.assessment
+    terms = [
+        {**term, "inclusion": None if ensemble is None else ensemble.inclusion(item)}
+        for term, item in zip(terms_document(model), model.regressors, strict=True)
+    ]
     return {
         "rank": rank,
         "recommended": recommended,
         "size": model.size,
         "equation": equation(model),
         "latex": latex_equation(model),
-        "terms": terms_document(model),
+        "terms": terms,
+        "bands": bands_document(entry.calibration),
         "metrics": {
             part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
         },

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
-from islands.kernels.simulate import simulate
+from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
 from islands.model.model import Model
 from islands.program.term_pool import link
@@ -92,14 +92,57 @@ def multiple_shooting(
     diverged = np.empty(len(cut.start), np.int64)
     predicted = np.full(record.samples, np.nan)
     simulate(link(model.regressors), theta, cut, bound, np.inf, True, squared_error, diverged, predicted)
-    failed = np.flatnonzero(diverged >= 0)
-    for lane in failed:
-        predicted[cut.start[lane] + diverged[lane] : cut.start[lane] + cut.length[lane]] = np.nan
+    failed = _remove_diverged(predicted, cut, diverged)
     if failed.size:
         sample = int((cut.start + diverged)[failed].min())
         reason = f"|y| left {bound:.3g} at sample {sample}"
         return Simulation(predicted, np.inf, EvaluationOutcome(Status.DIVERGED, reason))
     return Simulation(predicted, float(total(squared_error) / cut.length.sum()), OK)
+
+
+def free_runs(
+    model: Model, thetas: NDArray[np.float64], record: Dataset, warm_up: int
+) -> NDArray[np.float64]:
+    """Simulate every segment of a record once for each of several parameter vectors of a structure.
+
+    Parameters
+    ----------
+    model : Model
+        Structure; its parameters are not used.
+    thetas : ndarray, shape (vectors, terms)
+    record : Dataset
+        Record with the inputs of the model.
+    warm_up : int
+        Number of samples before the first prediction, at least the largest lag of the model.
+
+    Returns
+    -------
+    ndarray, shape (vectors, samples)
+        NaN during the warm-up of every segment, and from a divergence to the end of its segment.
+
+    Raises
+    ------
+    RecordError
+        The record does not match the model, is too short, or its output is missing in a warm-up.
+    """
+    record = match_record(model, record)
+    program, cut, bound = link(model.regressors), layout(record, warm_up), divergence_bound(record)
+    squared_error, diverged = np.empty(len(cut.start)), np.empty(len(cut.start), np.int64)
+    predicted = np.full((len(thetas), record.samples), np.nan)
+    for theta, run in zip(thetas, predicted, strict=True):
+        simulate(program, theta, cut, bound, np.inf, True, squared_error, diverged, run)
+        _remove_diverged(run, cut, diverged)
+    return predicted
+
+
+def _remove_diverged(
+    predicted: NDArray[np.float64], cut: Layout, diverged: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Set the predictions after a divergence to NaN; return the lanes that diverged."""
+    failed = np.flatnonzero(diverged >= 0)
+    for lane in failed:
+        predicted[cut.start[lane] + diverged[lane] : cut.start[lane] + cut.length[lane]] = np.nan
+    return failed
 
 
 def divergence_bound(record: Dataset) -> float:

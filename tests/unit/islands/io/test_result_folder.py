@@ -54,7 +54,9 @@ def with_best(findings, **changes):
 
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
-    assert list(result) == ["schema", "record", "seed", "settings", "search", "recommended", "models"]
+    assert list(result) == [
+        *("schema", "record", "seed", "settings", "search", "recommended", "models", "ensemble")
+    ]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
@@ -62,11 +64,11 @@ def test_a_result_has_every_field_of_the_contract(findings):
     assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
     for model in result["models"]:
         assert list(model) == [
-            *("rank", "recommended", "size", "equation", "latex", "terms", "metrics", "outcomes"),
+            *("rank", "recommended", "size", "equation", "latex", "terms", "bands", "metrics", "outcomes"),
             *("warm_up", "information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
-            assert list(term) == ["regressor", "parameter", "standard_error"]
+            assert list(term) == ["regressor", "parameter", "standard_error", "inclusion"]
         for named, inner in (("metrics", {"mape", "r2", "rmse", "fit_percent"}), ("outcomes", None)):
             assert set(model[named]) == {"estimation", "validation"}
             for modes in model[named].values():
@@ -127,7 +129,8 @@ def test_models_are_in_rank_order_with_their_numbers(findings):
     assert [model["rank"] for model in result["models"]] == [1, 2, 3, 4]
     for model, entry in zip(result["models"], findings.models, strict=True):
         assert model["size"] == entry.model.size == len(model["terms"])
-        assert model["terms"] == terms_document(entry.model)
+        for term, expected in zip(model["terms"], terms_document(entry.model), strict=True):
+            assert term == {**expected, "inclusion": term["inclusion"]}
         free_run = entry.assessment.metrics["validation"]["free_run"]
         assert model["metrics"]["validation"]["free_run"]["mape"] == free_run.mape
         assert model["physics"]["hold_drift_percent"] == entry.assessment.physics.hold_drift_percent

@@ -97,7 +97,9 @@ def test_each_model_can_be_exported_in_each_form(reader: Any, job: str, form: st
 def test_exported_model_file_can_be_read_back(reader: Any, job: str) -> None:
     best = reader.models(job)[0]
     text = reader.export(job, 1, "json")
-    assert json.loads(text)["terms"] == best.terms
+    assert json.loads(text)["terms"] == [
+        {name: value for name, value in term.items() if name != "inclusion"} for term in best.terms
+    ]
     assert model_from_json(text, "model 1").regressors
 
 

@@ -1,0 +1,171 @@
+"""Ensemble and prediction bands of a result as JSON values, and reading them from a result folder."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from islands.errors import ModelError
+from islands.io.models import terms_document
+from islands.model.expression import Primitive
+from islands.model.model import Model
+from islands.model.parsing import parse
+from islands.model.primitives import PRIMITIVES
+from islands.model.regressor import Regressor, regressor
+from islands.model.rendering import plain
+from islands.validation.ensemble import Ensemble, EnsembleStructure
+from islands.validation.prediction_bands import BandCalibration
+
+#: File of a result folder that contains the ensemble.
+RESULT = "result.json"
+
+
+class StructureDocument(BaseModel):
+    """A structure of an ensemble: its weight, its terms, and the parameters of its members."""
+
+    model_config = ConfigDict(frozen=True)
+
+    weight: Annotated[FiniteFloat, Field(gt=0, le=1)]
+    regressors: Annotated[tuple[str, ...], Field(min_length=1)]
+    parameters: Annotated[tuple[tuple[FiniteFloat, ...], ...], Field(min_length=1)]
+
+
+class BandsDocument(BaseModel):
+    """Width of the bands of a model: the noise, and the factors by level."""
+
+    model_config = ConfigDict(frozen=True)
+
+    noise: Annotated[FiniteFloat, Field(ge=0)]
+    levels: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
+    factors: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
+
+
+def ensemble_document(ensemble: Ensemble | None) -> list[dict[str, Any]] | None:
+    """Return the structures of an ensemble as JSON values, None for no ensemble."""
+    if ensemble is None:
+        return None
+    return [
+        {
+            "weight": each.weight,
+            "regressors": [plain(item.expression, each.model.inputs) for item in each.model.regressors],
+            "parameters": each.parameters.tolist(),
+        }
+        for each in ensemble.structures
+    ]
+
+
+def ensemble_from_document(
+    document: Any, model: Model, primitives: Mapping[str, Primitive] = PRIMITIVES
+) -> Ensemble | None:
+    """Return the ensemble of a document.
+
+    Parameters
+    ----------
+    document : list or None
+        Value made by `ensemble_document`.
+    model : Model
+        A model of the result. It gives the names of the columns and the sampling time.
+    primitives : mapping
+        Primitives that expressions may contain.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    if document is None:
+        return None
+    try:
+        structures = [StructureDocument.model_validate(each) for each in document]
+        return Ensemble(tuple(_structure(each, model, primitives) for each in structures))
+    except (ModelError, TypeError, ValueError) as error:
+        raise ModelError(f"the ensemble of the result is damaged: {error}") from error
+
+
+def _structure(
+    document: StructureDocument, model: Model, primitives: Mapping[str, Primitive]
+) -> EnsembleStructure:
+    terms = tuple(_regressor(text, primitives) for text in document.regressors)
+    parameters = np.array(document.parameters, dtype=np.float64)
+    if parameters.shape[1] != len(terms):
+        raise ValueError(f"{parameters.shape[1]} parameters for {len(terms)} terms")
+    found = Model(terms, None, model.input_names, model.output_name, model.dt)
+    return EnsembleStructure(found, document.weight, parameters)
+
+
+def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:
+    factor, item = regressor(parse(text, primitives))
+    if item is None or factor != 1.0:
+        raise ModelError(f"{text!r} is not a canonical term")
+    return item
+
+
+def bands_document(calibration: BandCalibration | None) -> dict[str, Any] | None:
+    """Return the width of the bands of a model as JSON values, None for no bands."""
+    if calibration is None:
+        return None
+    return {
+        "noise": calibration.noise,
+        "levels": list(calibration.factors),
+        "factors": list(calibration.factors.values()),
+    }
+
+
+def bands_from_document(document: Any) -> BandCalibration | None:
+    """Return the width of the bands of a document.
+
+    Raises
+    ------
+    ModelError
+        The document is damaged.
+    """
+    if document is None:
+        return None
+    try:
+        found = BandsDocument.model_validate(document)
+        return BandCalibration(found.noise, dict(zip(found.levels, found.factors, strict=True)))
+    except ValueError as error:
+        raise ModelError(f"the bands of the result are damaged: {error}") from error
+
+
+def read_bands(path: str | Path, model: Model) -> tuple[Ensemble, BandCalibration]:
+    """Read the ensemble and the width of the bands of a model of a result folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        Model file ``FOLDER/models/NN.json`` of the folder.
+    model : Model
+        Model of that file.
+
+    Raises
+    ------
+    ModelError
+        The folder has no ``result.json``, its result lacks the model, or the model has no bands.
+    """
+    file = Path(path).resolve().parent.parent / RESULT
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+        entries = document["models"]
+        ensemble = ensemble_from_document(document["ensemble"], model)
+        found = next(
+            (each for each in entries if _terms(each["terms"]) == _terms(terms_document(model))), None
+        )
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise ModelError(
+            f"prediction bands need a model file of a result folder with a {RESULT} of this version: "
+            f"cannot read them from {file}: {error!r}"
+        ) from error
+    if found is None:
+        raise ModelError(f"{path} is not a model of {file}: give a file of its folder models/")
+    calibration = bands_from_document(found.get("bands"))
+    if ensemble is None or calibration is None:
+        raise ModelError(f"{path} has no prediction bands, because its free run diverged: take another model")
+    return ensemble, calibration
+
+
+def _terms(terms: list[dict[str, Any]]) -> list[tuple[str, float]]:
+    return [(each["regressor"], each["parameter"]) for each in terms]

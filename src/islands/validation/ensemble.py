@@ -1,0 +1,250 @@
+"""Ensemble of the models that the data do not exclude: structures of a search, with bootstrap parameters.
+
+A structure has a weight, and each of its members has parameters from a block bootstrap of the estimation
+data. The weight of a structure of ``k`` terms with the mean squared error ``e`` of its free run on the
+validation data is proportional to ``exp(-(n log e + k log n) / 2)``: the Bayesian information criterion with
+the effective number ``n`` of validation samples, which accounts for the correlation of the residual. The
+penalty of the size is necessary for inclusion probabilities. Without it the larger of two structures with
+equal errors has the same weight, and terms that are not in the law of the system have probabilities of up to
+one half.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.estimation.block_bootstrap import draw_parameters
+from islands.model.model import Model
+from islands.model.regressor import Regressor
+from islands.simulation.predictors import free_run, free_runs
+
+#: Members of an ensemble, up to rounding.
+MEMBERS = 64
+
+#: Structures with a smaller weight are left out.
+_MIN_WEIGHT = 0.5 / MEMBERS
+
+#: A member is left out if the squared error of its free run on the validation data exceeds that of its
+#: structure by this factor: a replicate is a linear step, which may leave the stable models.
+_IMPLAUSIBLE = 4.0
+
+#: Errors below this fraction of the output range are rounding errors and are equal.
+_ROUNDING = 1e-9
+
+#: Fraction of the weight within the spread of an ensemble.
+_INSIDE = 0.9
+
+#: Half-width of that central part of a normal distribution, in standard deviations.
+_DEVIATIONS = 1.645
+
+
+@dataclass(frozen=True, slots=True)
+class ValidatedModel:
+    """A model with the error of its free run, which may become part of an ensemble.
+
+    Attributes
+    ----------
+    model : Model
+    interval : int or None
+        Shooting interval of the error that its parameters minimise, in samples: 1 for least squares, None for
+        the free run.
+    error : float
+        Mean squared error of the free run on the validation data; not finite if it diverged.
+    """
+
+    model: Model
+    interval: int | None
+    error: float
+
+    @property
+    def order(self) -> tuple[float, tuple[str, ...], tuple[float, ...]]:
+        """Sort key: the error; ties are broken by the text of the terms and by the parameters."""
+        texts = tuple(item.text for item in self.model.regressors)
+        return self.error, texts, self.model.parameters
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnsembleStructure:
+    """A structure of an ensemble.
+
+    Attributes
+    ----------
+    model : Model
+        Model with estimated parameters.
+    weight : float
+        Weight of the structure. Its members have equal weights.
+    parameters : ndarray, shape (members, terms)
+        Parameters of the members.
+    """
+
+    model: Model
+    weight: float
+    parameters: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ensemble:
+    """Structures in the order of their weights, which sum to 1."""
+
+    structures: tuple[EnsembleStructure, ...]
+
+    def inclusion(self, regressor: Regressor) -> float:
+        """Return the inclusion probability of a term: the weight of the structures that contain it."""
+        return min(1.0, sum(each.weight for each in self.structures if regressor in each.model.regressors))
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Weight of every member, in the order of the structures; shape (members,)."""
+        shares = [
+            np.full(len(each.parameters), each.weight / len(each.parameters)) for each in self.structures
+        ]
+        return np.concatenate(shares)
+
+    def simulate(self, record: Dataset, warm_up: int) -> NDArray[np.float64]:
+        """Return the free runs of all members.
+
+        Parameters
+        ----------
+        record : Dataset
+        warm_up : int
+            Number of samples before the first prediction. Members with larger lags start later.
+
+        Returns
+        -------
+        ndarray, shape (members, samples)
+            The measured output before the first prediction, and NaN after a divergence.
+        """
+        runs = []
+        for each in self.structures:
+            first = max(warm_up, each.model.maximum_lag)
+            found = free_runs(each.model, each.parameters, record, first)
+            for begin, end in record.bounds:
+                started = slice(begin, min(begin + first, end))
+                found[:, started] = record.y[started]
+            runs.append(found)
+        return np.concatenate(runs)
+
+    def spread(self, runs: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the spread of free runs about a simulation, in the scale of a standard deviation.
+
+        Parameters
+        ----------
+        runs : ndarray, shape (members, samples)
+            Result of `simulate`, or some of its columns.
+        centre : ndarray, shape (samples,)
+            Simulated output.
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+            Half-width about the centre that contains nine tenths of the weight, divided by 1.645. Infinite
+            where more than a tenth of the weight has diverged. NaN where the centre is NaN.
+        """
+        distances = np.ascontiguousarray(np.abs(runs - centre).T)
+        distances[np.isnan(distances)] = np.inf
+        order = np.argsort(distances, axis=1, kind="stable")
+        reached = np.cumsum(self.weights[order], axis=1) >= _INSIDE
+        found = np.take_along_axis(distances, order, axis=1)[np.arange(len(centre)), reached.argmax(axis=1)]
+        return np.where(np.isnan(centre), np.nan, found / _DEVIATIONS)
+
+
+def make_ensemble(
+    candidates: Sequence[ValidatedModel], split: Split, constraints: str, warm_up: int, seed: int
+) -> Ensemble | None:
+    """Make the ensemble of the candidates.
+
+    Parameters
+    ----------
+    candidates : sequence of ValidatedModel
+        Models with parameters. Of several candidates with one structure, the one with the least validation
+        error counts. Their order has no effect.
+    split : Split
+        Estimation data, from which the members draw their parameters, and validation data, which give the
+        weights.
+    constraints : str
+        Statements of ``constraint``, met by the candidates and then by every member.
+    warm_up : int
+        Number of samples before the first prediction of every free run.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    Ensemble or None
+        None if the free run of every candidate diverges on the validation data.
+    """
+    structures = []
+    floor = (_ROUNDING * split.validation.output_range) ** 2
+    kept = _weigh(_best_of_each_structure(candidates), split.validation, floor, warm_up)
+    for position, (candidate, weight) in enumerate(kept):
+        model, count = candidate.model, max(1, round(MEMBERS * weight))
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(position,)))
+        drawn = draw_parameters(model, split.estimation, candidate.interval, constraints, warm_up, count, rng)
+        error = split.validation.y - free_runs(model, drawn, split.validation, warm_up)
+        # The divergence of a member gives NaN, which is not plausible either.
+        predicted = ~np.isnan(free_run(model, split.validation, warm_up).y)
+        plausible = np.mean(error[:, predicted] ** 2, axis=1) <= _IMPLAUSIBLE * candidate.error + floor
+        members = drawn[plausible] if plausible.any() else np.array([model.parameters])
+        structure = replace(model, theta=None, standard_errors=None)
+        structures.append(EnsembleStructure(structure, weight, members))
+    return Ensemble(tuple(structures)) if structures else None
+
+
+def _best_of_each_structure(candidates: Sequence[ValidatedModel]) -> list[ValidatedModel]:
+    """Return the candidate with the least error of each structure, in the order of their errors."""
+    found: dict[tuple[Regressor, ...], ValidatedModel] = {}
+    for candidate in sorted(candidates, key=lambda each: each.order):
+        if np.isfinite(candidate.error):
+            found.setdefault(candidate.model.regressors, candidate)
+    return list(found.values())
+
+
+def _weigh(
+    candidates: list[ValidatedModel], validation: Dataset, floor: float, warm_up: int
+) -> list[tuple[ValidatedModel, float]]:
+    """Return the candidates of relevant weight with their weights, largest weight first."""
+    if not candidates:
+        return []
+    best = free_run(candidates[0].model, validation, warm_up).y
+    count = effective_samples((validation.y - best)[~np.isnan(best)])
+    errors = np.array([candidate.error for candidate in candidates]) + floor + np.finfo(float).tiny
+    sizes = np.array([candidate.model.size for candidate in candidates])
+    scores = -0.5 * (count * np.log(errors / errors.min()) + np.log(count) * sizes)
+    weights = np.exp(scores - scores.max())
+    weights /= weights.sum()
+    order = [int(index) for index in np.argsort(-weights, kind="stable") if weights[index] >= _MIN_WEIGHT]
+    kept = weights[order] / weights[order].sum()
+    return [(candidates[index], float(weight)) for index, weight in zip(order, kept, strict=True)]
+
+
+def effective_samples(residual: NDArray[np.float64]) -> float:
+    """Return the number of independent samples whose mean has the variance of the mean of a residual.
+
+    The sum of the autocorrelations ends before the first pair of lags with a negative sum (Geyer, Statist.
+    Sci. 7 (1992) 473-483).
+
+    Parameters
+    ----------
+    residual : ndarray, shape (samples,)
+
+    Returns
+    -------
+    float
+        Between 2 and the number of samples; the number of samples if the residual is constant.
+    """
+    samples = len(residual)
+    centred = residual - residual.mean()
+    # A power of two: the transform of a length with a large prime factor is slow.
+    spectrum = np.fft.rfft(centred, 1 << (2 * samples - 1).bit_length())
+    correlation = np.fft.irfft(spectrum * spectrum.conj())[:samples]
+    if samples < 4 or not correlation[0] > 0.0:
+        return float(max(2, samples))
+    correlation = correlation[: samples // 2 * 2] / correlation[0]
+    pairs = correlation[::2] + correlation[1::2]
+    negative = np.flatnonzero(pairs <= 0.0)
+    kept = pairs[: negative[0]] if negative.size else pairs
+    return float(np.clip(samples / max(1.0, 2.0 * kept.sum() - 1.0), 2.0, samples))

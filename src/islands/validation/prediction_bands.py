@@ -1,0 +1,184 @@
+"""Prediction bands of a free run for the measured output.
+
+A band of level ``p`` contains a new measured sample with probability ``p``. Its half-width at sample ``k`` is
+``q sqrt(noise^2 + spread(k)^2)``. The spread of the ensemble varies with time: it is the uncertainty of the
+parameters and of the structure. The noise is the part of the residual that the spread does not explain:
+measurement noise, equation noise and the common error of all members.
+
+The factor ``q`` is the quantile ``p`` of the normalised residuals of the free run on the estimation and the
+validation data, a conformal prediction with a normalised score (Lei et al., J. Am. Statist. Assoc. 113 (2018)
+1094-1111). No distribution is assumed. Correlated residuals are not exchangeable, so ``p`` is increased for
+the effective number of samples. The coverage holds for records of the same kind: inputs, noise and sampling
+time like those of the data. It is an average over samples; in one record, adjacent samples are inside or
+outside together.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.errors import SettingsError
+from islands.model.model import Model
+from islands.simulation.predictors import free_run
+from islands.validation.ensemble import Ensemble, effective_samples
+
+#: Levels whose factors are stored; others are interpolated.
+LEVELS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, 0.99)
+
+#: Largest number of samples of a part that calibrate the bands; free runs are smooth.
+_SAMPLES = 5000
+
+#: Level of a band unless another is given.
+LEVEL = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class BandCalibration:
+    """Width of the bands of a model.
+
+    Attributes
+    ----------
+    noise : float
+        Root mean square of the residual of the free run that the spread of the ensemble does not explain, in
+        the unit of the output.
+    factors : mapping
+        Half-width of a band in units of ``sqrt(noise^2 + spread^2)``, by level.
+    """
+
+    noise: float
+    factors: Mapping[float, float]
+
+    def factor(self, level: float) -> float:
+        """Return the factor of a level, interpolated linearly.
+
+        Raises
+        ------
+        SettingsError
+            The level is outside the stored ones.
+        """
+        check_level(level)
+        levels = sorted(self.factors)
+        return float(np.interp(level, levels, [self.factors[each] for each in levels]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictionBand:
+    """Free run of a model with a band that contains a measured sample with a given probability.
+
+    Attributes
+    ----------
+    level : float
+        Probability, between 0.5 and 0.99.
+    y, lower, upper : ndarray, shape (samples,)
+        Free run and limits of the band, in the unit of the output. NaN during the warm-up and after a
+        divergence. The limits are infinite where more than a tenth of the ensemble has diverged.
+    """
+
+    level: float
+    y: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+
+def check_level(level: float) -> None:
+    """Raise a `SettingsError` if no band has this level."""
+    if not LEVELS[0] <= level <= LEVELS[-1]:
+        raise SettingsError(f"the level of a band lies between {LEVELS[0]} and {LEVELS[-1]}, got {level}")
+
+
+def calibrate_bands(
+    models: Sequence[Model], ensemble: Ensemble, split: Split, warm_up: int
+) -> tuple[BandCalibration | None, ...]:
+    """Calibrate the bands of models.
+
+    Parameters
+    ----------
+    models : sequence of Model
+        Models whose free runs are the centres of the bands.
+    ensemble : Ensemble
+    split : Split
+        Estimation and validation data.
+    warm_up : int
+        Number of samples before the first prediction.
+
+    Returns
+    -------
+    tuple of BandCalibration or None
+        None for a model that diverges on the estimation or the validation data.
+    """
+    parts = [(record, *_runs(record, ensemble, warm_up)) for record in (split.estimation, split.validation)]
+    return tuple(_calibrate(model, ensemble, parts, warm_up) for model in models)
+
+
+def _runs(record: Dataset, ensemble: Ensemble, warm_up: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return samples of a record at equal distances, and the free runs of the ensemble at them."""
+    samples = np.arange(0, record.samples, -(-record.samples // _SAMPLES))
+    return samples, ensemble.simulate(record, warm_up)[:, samples]
+
+
+def _calibrate(
+    model: Model,
+    ensemble: Ensemble,
+    parts: Sequence[tuple[Dataset, NDArray[np.int64], NDArray[np.float64]]],
+    warm_up: int,
+) -> BandCalibration | None:
+    residuals, spreads, count = [], [], 0.0
+    for record, samples, runs in parts:
+        run = free_run(model, record, warm_up)
+        if not run.outcome:
+            return None
+        residual = record.y - run.y
+        count += effective_samples(residual[~np.isnan(residual)])
+        spread = ensemble.spread(runs, run.y[samples])
+        known = ~np.isnan(residual[samples]) & np.isfinite(spread)
+        residuals.append(np.abs(residual[samples][known]))
+        spreads.append(spread[known])
+    residual, spread = np.concatenate(residuals), np.concatenate(spreads)
+    if not residual.size:
+        return None
+    unexplained = np.add.reduce(residual**2) - np.add.reduce(spread**2)
+    noise = float(np.sqrt(max(0.0, unexplained) / len(residual)))
+    width = np.sqrt(noise**2 + spread**2)
+    scores = np.sort(residual / np.where(width > 0.0, width, 1.0))
+    # The correction of a conformal prediction for a finite number of residuals.
+    ranks = [int(len(scores) * level * (1.0 + 1.0 / count)) for level in LEVELS]
+    factors = [float(scores[min(len(scores) - 1, rank)]) for rank in ranks]
+    return BandCalibration(noise, dict(zip(LEVELS, factors, strict=True)))
+
+
+def predict_band(
+    model: Model,
+    ensemble: Ensemble,
+    calibration: BandCalibration,
+    record: Dataset,
+    level: float = LEVEL,
+    warm_up: int | None = None,
+) -> PredictionBand:
+    """Simulate a record with a band of a level.
+
+    Parameters
+    ----------
+    record : Dataset
+        Inputs, and the output of the warm-up.
+    level : float
+        Probability with which the band contains a measured sample, between 0.5 and 0.99.
+    warm_up : int or None
+        Number of samples before the first prediction. None is the model's largest lag.
+
+    Raises
+    ------
+    SettingsError
+        The level is out of range.
+    RecordError
+        The record does not match the model, or is too short for it or for a member of the ensemble.
+    """
+    first = model.maximum_lag if warm_up is None else warm_up
+    factor = calibration.factor(level)
+    run = free_run(model, record, first)
+    spread = ensemble.spread(ensemble.simulate(record, first), run.y)
+    half = factor * np.sqrt(calibration.noise**2 + spread**2)
+    return PredictionBand(level, run.y, run.y - half, run.y + half)

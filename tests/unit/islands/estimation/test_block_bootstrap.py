@@ -1,0 +1,106 @@
+"""Block bootstrap of parameters: distribution, constraints, determinism."""
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.estimation.block_bootstrap import draw_parameters
+from islands.estimation.estimate import estimate
+from islands.estimation.refinement import refine
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+
+
+def terms(*texts):
+    return tuple(regressor(parse(text))[1] for text in texts)
+
+
+LINEAR = terms("y(k-1)", "u(k-1)")
+HYSTERESIS = terms("y(k-1)", "phi1(u(k-1), u(k-2))", "y(k-1)*phi1(u(k-1), u(k-2))", "y(k-1)*u(k-1)")
+
+
+def record(samples=900, noise=0.1, seed=0, scale=1.0):
+    """Return a record of a linear system with white equation noise."""
+    rng = np.random.default_rng(seed)
+    u, e = rng.standard_normal(samples), noise * rng.standard_normal(samples)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.7 * y[k - 1] + 0.5 * u[k - 1] + e[k]
+    return Dataset(u, scale * y, 0.1)
+
+
+def draw(model, data, draws=200, constraints="none", interval=1, seed=3):
+    return draw_parameters(model, data, interval, constraints, None, draws, np.random.default_rng(seed))
+
+
+def test_draws_scatter_like_the_estimate_under_white_noise():
+    data = record()
+    model = estimate(LINEAR, data).model
+    drawn = draw(model, data, draws=600)
+    psi = np.column_stack([data.y[:-1], data.u[:-1, 0]])
+    variance = np.var(data.y[1:] - psi @ np.array(model.parameters))
+    expected = np.sqrt(variance * np.diag(np.linalg.inv(psi.T @ psi)))
+    assert np.std(drawn, axis=0) == pytest.approx(expected, rel=0.25)
+    assert np.abs(drawn.mean(axis=0) - model.parameters) == pytest.approx(0.0, abs=0.2 * expected.max())
+
+
+def test_a_draw_minimises_the_weighted_squares_of_the_blocks():
+    """One Gauss-Newton step is exact for least squares."""
+    data = record(samples=401)
+    model = estimate(LINEAR, data).model
+    found = draw(model, data, draws=1)[0]
+    weights = np.repeat(np.random.default_rng(3).standard_exponential(20), 20)[:, None]
+    psi = np.column_stack([data.y[:-1], data.u[:-1, 0]])
+    expected = np.linalg.solve(psi.T @ (weights * psi), psi.T @ (weights[:, 0] * data.y[1:]))
+    assert found == pytest.approx(expected, rel=1e-7)
+
+
+def test_every_draw_meets_the_constraints():
+    data = record()
+    model = estimate(HYSTERESIS[:3], data, "hysteresis").model
+    drawn = draw(model, data, constraints="hysteresis")
+    assert np.ptp(drawn[:, 0]) == 0.0
+    assert drawn[0, 0] == pytest.approx(1.0, abs=1e-15)
+    assert (np.std(drawn[:, 1:], axis=0) > 0.0).all()
+
+
+def test_draws_of_refined_parameters_scatter_about_them():
+    data = record()
+    start = estimate(LINEAR, data).model
+    refined = refine(start, data, 30).model
+    drawn = draw(refined, data, interval=30)
+    deviation = np.std(drawn, axis=0)
+    assert np.abs(drawn.mean(axis=0) - refined.parameters) == pytest.approx(0.0, abs=0.3 * deviation.min())
+    assert (deviation > 0.0).all()
+
+
+def test_a_seed_determines_the_draws():
+    data = record(samples=300)
+    model = estimate(LINEAR, data).model
+    assert (draw(model, data) == draw(model, data)).all()
+    assert (draw(model, data) != draw(model, data, seed=4)).all()
+
+
+def test_draws_follow_the_unit_of_the_output():
+    one, thousand = record(), record(scale=1000.0)
+    drawn = draw(estimate(LINEAR, one).model, one)
+    scaled = draw(estimate(LINEAR, thousand).model, thousand)
+    assert scaled == pytest.approx(drawn * [1.0, 1000.0], rel=1e-7)
+
+
+def test_parameters_without_a_free_direction_are_repeated():
+    data = record()
+    model = estimate(terms("y(k-1)"), data, "hysteresis").model
+    assert (draw(model, data, draws=5, constraints="hysteresis") == model.parameters).all()
+
+
+def test_no_draw_has_an_excluded_sign():
+    """The law lacks the term: without the constraint, many draws have the other sign."""
+    data = record(samples=300)
+    structure = terms("y(k-1)", "u(k-1)", "u(k-2)")
+    free = estimate(structure, data).model.parameters
+    statement = f"[u(k-2)] {'>=' if free[2] > 0.0 else '<='} 0"
+    model = estimate(structure, data, statement).model
+    drawn = draw(model, data, constraints=statement)
+    assert 0 < len(drawn) < 200
+    assert (drawn[:, 2] * free[2] >= 0.0).all()

@@ -1,0 +1,139 @@
+"""Ensemble: weights of structures, inclusion probabilities, spread of the free runs."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.data.split import split
+from islands.estimation.estimate import estimate
+from islands.model.parsing import parse
+from islands.model.regressor import regressor
+from islands.simulation.predictors import free_run
+from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
+from islands.validation.prediction_bands import calibrate_bands, predict_band
+
+TRUE = ("y(k-1)", "u(k-1)", "y(k-1)*u(k-1)")
+STRUCTURES = (TRUE, TRUE[:2], (*TRUE, "u(k-2)"), (*TRUE, "y(k-2)", "u(k-1)*u(k-1)"))
+
+
+def term(text):
+    return regressor(parse(text))[1]
+
+
+@cache
+def parts(noise=0.0, samples=500, seed=0):
+    rng = np.random.default_rng(seed)
+    u = rng.uniform(-1.0, 1.0, samples)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.6 * y[k - 1] + 0.3 * u[k - 1] + 0.2 * y[k - 1] * u[k - 1]
+    return split(Dataset(u, y + noise * rng.standard_normal(samples), 0.1), 0.3)
+
+
+def candidate(texts, data):
+    model = estimate([term(text) for text in texts], data.estimation, "none", 2).model
+    return ValidatedModel(model, 1, free_run(model, data.validation, 2).mean_squared_error)
+
+
+def ensemble(data, structures=STRUCTURES, seed=0):
+    return make_ensemble([candidate(texts, data) for texts in structures], data, "none", 2, seed)
+
+
+def members(found):
+    return [(each.model, each.weight, each.parameters.tolist()) for each in found.structures]
+
+
+def test_the_terms_of_an_exact_law_have_an_inclusion_probability_of_one():
+    found = ensemble(parts())
+    assert [found.inclusion(term(text)) for text in TRUE] == pytest.approx([1.0, 1.0, 1.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_term_that_the_law_lacks_has_a_small_inclusion_probability(noise):
+    found = ensemble(parts(noise))
+    assert 0.0 < found.inclusion(term("u(k-2)")) < 0.3
+    assert found.inclusion(term("u(k-9)")) == 0.0
+
+
+def test_weights_sum_to_one_and_are_sorted():
+    found = ensemble(parts(0.02))
+    weights = [each.weight for each in found.structures]
+    assert sum(weights) == pytest.approx(1.0)
+    assert weights == sorted(weights, reverse=True)
+    assert found.weights.sum() == pytest.approx(1.0)
+
+
+def test_the_order_of_the_candidates_and_bad_candidates_have_no_effect():
+    data = parts(0.02)
+    worse = replace(candidate(TRUE, data), error=1e3)
+    diverged = replace(candidate(STRUCTURES[2], data), error=np.inf)
+    entries = [candidate(texts, data) for texts in STRUCTURES]
+    reordered = make_ensemble([worse, diverged, *reversed(entries)], data, "none", 2, 0)
+    assert members(reordered) == members(make_ensemble(entries, data, "none", 2, 0))
+
+
+def test_a_seed_determines_the_ensemble():
+    data = parts(0.02)
+    assert members(ensemble(data)) == members(ensemble(data))
+    assert members(ensemble(data)) != members(ensemble(data, seed=1))
+
+
+def test_there_is_no_ensemble_without_a_bounded_free_run():
+    data = parts()
+    assert make_ensemble([replace(candidate(TRUE, data), error=np.inf)], data, "none", 2, 0) is None
+
+
+def test_the_band_of_an_exact_law_has_the_width_of_rounding():
+    data, new = parts(), parts(seed=1)
+    found, model = ensemble(data, [TRUE]), candidate(TRUE, data).model
+    calibration = calibrate_bands([model], found, data, 2)[0]
+    band = predict_band(model, found, calibration, new.validation)
+    assert np.nanmax(band.upper - band.lower) < 1e-13
+    assert band.y[2:] == pytest.approx(new.validation.y[2:], abs=1e-13)
+
+
+def test_implausible_members_are_left_out():
+    """A structure near instability: some replicates diverge, and no member does."""
+    data = parts(0.02)
+    found = ensemble(data, [("y(k-1)", "y(k-2)", "y(k-1)*y(k-1)", "u(k-1)")])
+    errors = np.mean((found.simulate(data.validation, 2) - data.validation.y)[:, 2:] ** 2, axis=1)
+    assert errors.max() <= 4.01 * candidate(("y(k-1)", "y(k-2)", "y(k-1)*y(k-1)", "u(k-1)"), data).error
+
+
+def test_members_equal_the_measured_output_before_they_start():
+    data = parts(0.02)
+    found = ensemble(data, [("y(k-1)", "u(k-2)")])
+    runs = found.simulate(data.validation, 1)
+    assert (runs[:, :2] == data.validation.y[:2]).all()
+    assert (runs[:, 2] != data.validation.y[2]).all()
+
+
+def test_the_spread_contains_nine_tenths_of_the_weight():
+    found = Ensemble(tuple(replace(each, weight=1.0) for each in ensemble(parts(0.02)).structures[:1]))
+    count = len(found.weights)
+    runs = np.linspace(-1.0, 1.0, count)[:, None] * np.ones(3)
+    inside = np.abs(runs[:, 0]) <= 1.645 * found.spread(runs, np.zeros(3))[0]
+    assert inside.mean() == pytest.approx(0.9, abs=2.0 / count)
+
+
+def test_the_spread_is_infinite_if_a_tenth_of_the_members_has_diverged():
+    found = ensemble(parts(0.02), [TRUE])
+    runs = np.zeros((len(found.weights), 2))
+    runs[: len(runs) // 20, 0] = np.nan
+    runs[: len(runs) // 4, 1] = np.nan
+    assert found.spread(runs, np.zeros(2)).tolist() == [0.0, np.inf]
+    assert np.isnan(found.spread(runs, np.array([np.nan, 0.0]))[0])
+
+
+def test_effective_samples_of_an_autoregression():
+    """The variance of the mean of an autoregression with pole p grows by (1 + p) / (1 - p)."""
+    white = np.random.default_rng(0).standard_normal(20_000)
+    coloured = np.zeros(len(white))
+    for k in range(1, len(white)):
+        coloured[k] = 0.8 * coloured[k - 1] + white[k]
+    assert effective_samples(white) == pytest.approx(20_000, rel=0.1)
+    assert effective_samples(coloured) == pytest.approx(20_000 / 9.0, rel=0.2)
+    assert effective_samples(np.zeros(7)) == 7.0

@@ -1,0 +1,93 @@
+"""Prediction bands: order of levels, coverage, units, exact laws."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import islands
+from islands.errors import ModelError, SettingsError
+from islands.systems.signals import filtered_noise
+
+
+@cache
+def record(noise=0.02, samples=600, seed=0, scale=1.0):
+    rng = np.random.default_rng(seed)
+    u = filtered_noise(1.0, samples, 0.1, seed)
+    y = np.zeros(samples)
+    for k in range(1, samples):
+        y[k] = 0.6 * y[k - 1] + 0.3 * u[k - 1] + 0.2 * y[k - 1] * u[k - 1]
+    return islands.Dataset(u, scale * (y + noise * rng.standard_normal(samples)), 1.0)
+
+
+@cache
+def result(noise=0.02, scale=1.0):
+    return islands.fit(record(noise, scale=scale), library="polynomial", degree=2, lags=2, max_terms=4)
+
+
+def test_a_band_contains_its_free_run():
+    data = record(seed=1)
+    for model in result().models:
+        band = model.bands(data)
+        assert band.y == pytest.approx(model.simulate(data).y, nan_ok=True)
+        known = ~np.isnan(band.y)
+        assert known.sum() == data.samples - model.model.maximum_lag
+        assert (band.lower < band.y)[known].all()
+        assert (band.y < band.upper)[known].all()
+
+
+def test_a_band_of_a_higher_level_is_wider():
+    data = record(seed=1)
+    widths = [
+        np.nanmean(band.upper - band.lower)
+        for band in (result().best.bands(data, level) for level in (0.5, 0.64, 0.8, 0.9, 0.93, 0.99))
+    ]
+    assert widths == sorted(widths)
+    assert len(set(widths)) == len(widths)
+
+
+def test_the_coverage_of_new_records_is_near_the_level():
+    inside = []
+    for seed in range(1, 6):
+        data = record(seed=seed)
+        band = result().best.bands(data)
+        inside.append(np.mean(((band.lower <= data.y) & (data.y <= band.upper))[2:]))
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.04)
+
+
+def test_a_band_follows_the_unit_of_the_output():
+    band = result().best.bands(record(seed=1))
+    scaled = result(scale=1e3).best.bands(record(seed=1, scale=1e3))
+    assert scaled.upper == pytest.approx(1e3 * band.upper, rel=1e-5, nan_ok=True)
+
+
+def test_a_band_widens_outside_the_data():
+    """Parameters are less certain where the input exceeds that of the estimation data."""
+    data = record(seed=1)
+    wide = result().best.bands(replace(data, u=1.6 * data.u))
+    band = result().best.bands(data)
+    assert np.nanmax(wide.upper - wide.lower) > 1.2 * np.nanmax(band.upper - band.lower)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.49, 0.995, 1.0, float("nan")])
+def test_a_level_without_a_band_is_refused(level):
+    with pytest.raises(SettingsError, match=r"between 0\.5 and 0\.99"):
+        result().best.bands(record(), level)
+
+
+def test_a_model_without_bands_says_why():
+    best = result().best
+    unknown = replace(best, ranked_model=replace(best.ranked_model, calibration=None))
+    with pytest.raises(ModelError, match="no prediction bands"):
+        unknown.bands(record())
+    without = replace(best, search_result=replace(best.search_result, ensemble=None))
+    with pytest.raises(ModelError, match="no ensemble"):
+        _ = without.inclusion
+
+
+def test_every_term_has_an_inclusion_probability():
+    for model in result().models:
+        assert len(model.inclusion) == model.model.size
+        assert all(0.0 <= each <= 1.0 for each in model.inclusion)
+    assert result().best.inclusion[0] > 0.9
