@@ -124,8 +124,8 @@ class FittedModel:
             Inputs, and the output of the warm-up.
         level : float
             Probability, between 0.5 and 0.99.
-        warm_up : int or None
-            Number of samples before the first prediction. None is the model's largest lag.
+        warm_up : int, optional
+            Number of samples before the first prediction; by default that of the errors in `metrics`.
 
         Raises
         ------
@@ -139,6 +139,7 @@ class FittedModel:
             raise ModelError(
                 f"model {self.rank} has no prediction bands: its free run diverged, take another"
             )
+        warm_up = self.ranked_model.assessment.warm_up if warm_up is None else warm_up
         return predict_band(self.model, self._ensemble, calibration, record, level, warm_up)
 
     @property
