@@ -8,7 +8,7 @@ import pytest
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares, null_space
-from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.estimation.parameter_constraints import constraint
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import random_genes
 from islands.evolution.gp.fitness import FITNESSES
@@ -82,7 +82,11 @@ def smallest_pivot(psi, S, c):
 def expected(genes, pruned, data, setting):
     """Return regressors, and either a status or model, simulation, norms and smallest pivot."""
     warm_up = setting.maximum_lag
-    regressors = canonical_order(distinct_genes(genes))
+    regressors = [
+        item
+        for item in canonical_order(distinct_genes(genes))
+        if constraint(setting.constraints).admits(item)
+    ]
     if not regressors:
         return (), Status.INFEASIBLE
     *psi, y = regressor_matrix([*regressors, Lagged(0, 0)], data, warm_up)
@@ -91,7 +95,7 @@ def expected(genes, pruned, data, setting):
         regressors = [regressors[j] for j in prune_columns(psi, y, setting.tolerance)]
         if not regressors:
             return (), Status.INFEASIBLE
-    constrained = CONSTRAINTS[setting.constraints].constrain(regressors)
+    constrained = constraint(setting.constraints).constrain(regressors)
     if isinstance(constrained, EvaluationOutcome):
         return None, constrained.verdict
     regressors = constrained.regressors
@@ -103,6 +107,8 @@ def expected(genes, pruned, data, setting):
     assert bool(estimate.outcome) == (pivot >= UNCERTAIN_PIVOTS[1])
     if not estimate.outcome:
         return regressors, estimate.outcome.verdict
+    if not constrained.has_signs(estimate.theta):
+        return regressors, Status.INFEASIBLE
     theta = tuple(estimate.theta.tolist())
     model = Model(regressors, theta, data.input_names)
     interval = FITNESSES[setting.fitness](setting.shooting)
@@ -208,6 +214,25 @@ def test_slow_inputs_agree_with_the_oracle(constraints, rate):
     setting = replace(SETTINGS, constraints=constraints)
     seen = compare_with_oracle(draw_clustered(200), record(900, inputs=2, rate=rate), setting)
     assert seen["ill"] > 15
+
+
+@pytest.mark.parametrize(
+    ("constraints", "ends"),
+    [
+        ("fixed-point = 0.5, -0.3, 0.4", {"well", "ill", "pruned", "INFEASIBLE"}),
+        ("gain(u2) = 0.7 at 0.5, -0.3, 0.4; fixed-point = 0.5, -0.3, 0.4", {"well", "ill", "INFEASIBLE"}),
+        ("hysteresis; [u1(k-1)] - 2*[u1(k-2)] = 0.1", {"well", "INFEASIBLE"}),
+        ("hysteresis; [u1(k-1)] - 2*[u1(k-2)] = 0; [y(k-1)] - [y(k-2)] = 0", {"well", "INFEASIBLE"}),
+        ("odd; gain = 1.5; [u1(k-1)] >= 0", {"well", "INFEASIBLE"}),
+        ("[u1(k-1)] + [u1(k-2)] = 0; [u1(k-1)] - [u1(k-2)] = 0; [tanh(y(k-1))] = 0", {"well", "pruned"}),
+    ],
+)
+def test_stated_constraints_agree_with_the_oracle(constraints, ends):
+    setting = replace(SETTINGS, constraints=constraints)
+    data = record(700, inputs=2, segments=(300, 350, 50))
+    seen = compare_with_oracle([*draw_random(setting, 10), *draw_clustered(60)], data, setting)
+    assert seen.keys() >= ends
+    assert seen["well"] + seen["ill"] >= 8
 
 
 # Failures.

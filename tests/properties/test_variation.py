@@ -15,7 +15,7 @@ from islands.evolution.generation.variation import (
     random_gene,
     random_genes,
     repair_genes,
-    with_linear_output,
+    with_required_genes,
 )
 from islands.evolution.gp.gene_structure import phi
 from islands.evolution.gp.individual import Individual, make_regressor
@@ -165,14 +165,14 @@ def stream(seed, purpose=Purpose.VARIATION):
 def test_children_of_a_crossover_are_valid(drawn, seed, crossover):
     setting, inputs, (one, other) = drawn
     for child in crossover(one, other, setting, stream(seed)):
-        assert faults(with_linear_output(child, setting), setting, inputs) == []
+        assert faults(with_required_genes(child, setting), setting, inputs) == []
 
 
 @given(parents(1), seeds)
 def test_children_of_an_inner_mutation_are_valid(drawn, seed):
     setting, inputs, (genes,) = drawn
     child = inner_mutation(genes, setting, inputs, stream(seed))
-    assert faults(with_linear_output(child, setting), setting, inputs) == []
+    assert faults(with_required_genes(child, setting), setting, inputs) == []
 
 
 @given(parents(1), seeds)
@@ -182,15 +182,15 @@ def test_children_of_an_outer_mutation_are_valid(drawn, seed):
     pool = [Lagged(0), Lagged(inputs), *genes]
     for given_pool in ((), pool):
         child = outer_mutation(genes, setting, inputs, stream(seed), given_pool)
-        assert faults(with_linear_output(child, setting), setting, inputs) == []
+        assert faults(with_required_genes(child, setting), setting, inputs) == []
 
 
 @given(parents(1), seeds)
 def test_repair_does_not_change_valid_genes(drawn, seed):
     """A step therefore needs to repair only new genes."""
     setting, inputs, (genes,) = drawn
-    assert repair_genes(genes, setting) == with_linear_output(genes, setting) == genes
-    child = with_linear_output(outer_mutation(genes, setting, inputs, stream(seed), ()), setting)
+    assert repair_genes(genes, setting) == with_required_genes(genes, setting) == genes
+    child = with_required_genes(outer_mutation(genes, setting, inputs, stream(seed), ()), setting)
     assert repair_genes(child, setting) == child
 
 

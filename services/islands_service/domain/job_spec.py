@@ -19,6 +19,7 @@ from pydantic import (
 )
 
 from islands.errors import SettingsError
+from islands.estimation.parameter_constraints import constraint
 from islands.evolution.presets import PRESETS, resolve_settings
 from islands.evolution.settings import Settings, get_text_type
 from islands.io.simulator_spec.specification import ColumnSpec, SimulationSpec, innermost
@@ -245,6 +246,7 @@ def resolve_job_settings(spec: Identification, max_islands: int, max_evaluations
     if any(shift > MAX_SHIFT for shift in changes.get("shifts", ())):
         raise SettingsError(f"back-shifts are at most {MAX_SHIFT} on this service, got {changes['shifts']}")
     settings = resolve_settings(spec.preset, changes)
+    constraint(settings.constraints).check_inputs(len(spec.inputs))
     asked = settings.population * (settings.generations + 1) * settings.islands
     if asked > max_evaluations:
         raise SettingsError(

@@ -15,7 +15,7 @@ from islands.evolution.generation.variation import (
     outer_mutation,
     random_genes,
     repair_genes,
-    with_linear_output,
+    with_required_genes,
 )
 from islands.evolution.gp.individual import Individual, Population, unique_structures
 from islands.evolution.gp.rng import Purpose, Stream
@@ -145,7 +145,7 @@ def step(
                         if rng.chance(settings.outer)
                         else inner_mutation(genes, settings, inputs, rng)
                     )
-        offspring += [with_linear_output(genes, settings) for genes in pair]
+        offspring += [with_required_genes(genes, settings) for genes in pair]
     return _evaluate_generation(following, offspring[: settings.population], evaluator, settings)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.input_ranking import screen_candidates
+from islands.estimation.parameter_constraints import constraint
 from islands.evolution.generation.variation import Genes
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
@@ -49,17 +50,19 @@ def make_problem(record: Dataset, settings: Settings) -> Problem:
     Raises
     ------
     SettingsError
-        The library has too many candidates.
+        The library has too many candidates, or a constraint refers to an input that the record lacks.
     RecordError
         The record is incomplete, or not longer than the largest lag of the library.
     """
+    constraint(settings.constraints).check_inputs(record.inputs)
     if not settings.library:
         return Problem(record, settings)
     regressors = screen_candidates(
         settings.library, settings.library_degree, settings.library_lags, record, settings.constraints
     )
     genes = {item: with_phi(item.expression) for item in regressors}
-    library = [item for item in regressors if height(genes[item]) <= settings.max_height]
+    admits = constraint(settings.constraints).admits
+    library = [item for item in regressors if height(genes[item]) <= settings.max_height and admits(item)]
     selected = forward_selection(library, record, settings.constraints, settings.max_terms)
     structures = () if isinstance(selected, EvaluationOutcome) else selected
     return Problem(

@@ -6,7 +6,8 @@ from math import inf
 from typing import Any, TypeVar
 
 from islands.errors import SettingsError, lookup
-from islands.estimation.parameter_constraints import constraint
+from islands.estimation.constraints.constraint_parser import FORMS
+from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_structure import STRUCTURES
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
@@ -77,7 +78,8 @@ class Settings:
     structure : str
         An entry of ``STRUCTURES``: constraint on the form of genes.
     constraints : str
-        An entry of the parameter constraints, ``hysteresis`` or ``none``.
+        Constraints on the parameters: ``hysteresis``, ``none``, or statements with semicolons between them,
+        such as ``odd; fixed-point = 0, 0; gain = 2.5; [u(k-1)] >= 0``.
     fitness : str
         An entry of ``FITNESSES``.
     shooting : int
@@ -143,7 +145,7 @@ class Settings:
         text_type=tuple[str, ...],
     )
     structure: str = "phi"
-    constraints: str = _option("hysteresis", "none or hysteresis")
+    constraints: str = _option("hysteresis", f"{', '.join(CONSTRAINTS)}, or statements: {'; '.join(FORMS)}.")
     fitness: str = "shooting"
     shooting: int = _option(500, "Samples of a shooting interval.", after="max_height")
     tournament: int = 3
@@ -200,10 +202,7 @@ class Settings:
         if self.library:
             get_library(self.library)
         lookup(STRUCTURES, self.structure, "structure")
-        if not constraint(self.constraints).allows_offsets:
-            raise SettingsError(
-                f"an evolution cannot take the constraints {self.constraints!r}: take none or hysteresis"
-            )
+        constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")
         primitive_table(self.primitives)
         if any(shift < 1 for shift in self.shifts):

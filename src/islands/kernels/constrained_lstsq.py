@@ -1,9 +1,12 @@
-"""Constrained least squares from inner products: every constraint fixes the sum of a group of parameters.
+"""Constrained least squares from inner products: sums over groups of parameters, and general equalities.
 
-A constraint is ``sum of w_j theta_j over a group = c``; groups are disjoint (the clusters of the paper,
+A group constraint is ``sum of w_j theta_j over a group = c``; groups are disjoint (the clusters of the paper,
 section 3). One member p of each group, the pivot, is eliminated: the other members get the columns
 ``psi_j - (w_j / w_p) psi_p``, the target becomes ``y - (c / w_p) psi_p``, and the remaining parameters are
 free. This is equation (4) in the null space of its constraints, without an inverse.
+
+Any other equality is a row over all terms, from which the pivots of the groups are eliminated first; see
+`parameter_reduction`.
 
 Sums over columns that are differences are used for one individual only, so they are folded chunk by chunk.
 """
@@ -40,56 +43,6 @@ class ConstrainedFactor(NamedTuple):
     scale: NDArray[np.float64]
 
 
-class Reduction(NamedTuple):
-    """Elimination of the pivots: how all parameters follow from the free ones.
-
-    Attributes
-    ----------
-    pivot : ndarray of int64, shape (terms,)
-        Pivot of the term's group; -1 if the term has no group.
-    share : ndarray of float64, shape (terms,)
-        ``w_j / w_p``.
-    fixed : ndarray of float64, shape (terms,)
-        ``c / w_p`` for a pivot, otherwise 0.
-    free : ndarray of int64, shape (free,)
-        Terms that are not pivots.
-    """
-
-    pivot: NDArray[np.int64]
-    share: NDArray[np.float64]
-    fixed: NDArray[np.float64]
-    free: NDArray[np.int64]
-
-
-@kernel
-def reduce(
-    gram,  # float64 [term + 1, term + 1]: inner products of the terms and, last, the target
-    terms,
-    group,  # int64 [term]: group of each, -1 for none
-    weight,  # float64 [term]
-    sums,  # float64 [term]: required sum of the term's group
-):
-    """Choose the pivots: of every group the member with the largest ratio of weight to norm."""
-    pivot = np.full(terms, -1, np.int64)
-    share = np.zeros(terms)
-    fixed = np.zeros(terms)
-    for j in range(terms):
-        if group[j] < 0 or pivot[j] >= 0:
-            continue
-        best, largest = j, -1.0
-        for i in range(j, terms):
-            if group[i] == group[j]:
-                size = abs(weight[i]) / np.sqrt(gram[i, i])
-                if size > largest:
-                    best, largest = i, size
-        fixed[best] = sums[j] / weight[best]
-        for i in range(j, terms):
-            if group[i] == group[j]:
-                pivot[i] = best
-                share[i] = weight[i] / weight[best]
-    return Reduction(pivot, share, fixed, np.flatnonzero(pivot != np.arange(terms)))
-
-
 @kernel
 def from_gram(gram, terms, reduction, factor, eta):
     """Estimate the free parameters from the Gram matrix.
@@ -106,10 +59,9 @@ def from_gram(gram, terms, reduction, factor, eta):
         norms[a] = gram[free[a], free[a]]
         for b in range(a + 1):
             reduced[a, b] = _product(gram, reduction, free[a], free[b])
-        right[a] = _left(gram, reduction, free[a], terms)
-        for p in range(terms):
-            if reduction.fixed[p] != 0.0:
-                right[a] -= reduction.fixed[p] * _left(gram, reduction, free[a], p)
+        right[a] = _target_product(gram, reduction, free[a], terms)
+    if reduction.row_pivot.size > 0:
+        _reduce_products(gram, terms, reduction, reduced, right)
     least = _factorise(reduced, norms, factor)
     if least > 0.0:
         _solve(factor, right, eta)
@@ -165,14 +117,33 @@ def correct(program, rows, terms, reduction, factor, eta):
 
 
 @kernel
-def expand(reduction, eta, theta):
-    """Compute all parameters ``theta`` from the free ones; the pivots complete the sums of their groups."""
-    theta[:] = reduction.fixed
-    for a in range(eta.size):
-        j = reduction.free[a]
-        theta[j] = eta[a]
-        if reduction.pivot[j] >= 0:
-            theta[reduction.pivot[j]] -= reduction.share[j] * eta[a]
+def _reduce_products(gram, terms, reduction, reduced, right):
+    """Eliminate the pivots of the equalities from the inner products of the free columns."""
+    free, pivots, share = reduction.free, reduction.row_pivot, reduction.row_share
+    for a in range(free.size):
+        i = free[a]
+        for q in range(pivots.size):
+            right[a] -= reduction.row_fixed[q] * _product(gram, reduction, i, pivots[q])
+            product = _target_product(gram, reduction, pivots[q], terms)
+            for other in range(pivots.size):
+                product -= reduction.row_fixed[other] * _product(gram, reduction, pivots[q], pivots[other])
+            right[a] -= share[q, i] * product
+            for b in range(a + 1):
+                j = free[b]
+                product = _product(gram, reduction, i, pivots[q])
+                for other in range(pivots.size):
+                    product -= share[other, i] * _product(gram, reduction, pivots[other], pivots[q])
+                reduced[a, b] -= share[q, i] * _product(gram, reduction, pivots[q], j) + share[q, j] * product
+
+
+@kernel
+def _target_product(gram, reduction, i, terms):
+    """Return the inner product of a column and the target, both without the pivots of the groups."""
+    total = _left(gram, reduction, i, terms)
+    for p in range(terms):
+        if reduction.fixed[p] != 0.0:
+            total -= reduction.fixed[p] * _left(gram, reduction, i, p)
+    return total
 
 
 @kernel
@@ -201,6 +172,11 @@ def _reduce_columns(chunk, terms, reduction):
             _subtract_column(chunk, terms * CHUNK, reduction.fixed[j], j * CHUNK)
         if p >= 0 and p != j:
             _subtract_column(chunk, j * CHUNK, reduction.share[j], p * CHUNK)
+    for q in range(reduction.row_pivot.size):
+        column = reduction.row_pivot[q] * CHUNK
+        _subtract_column(chunk, terms * CHUNK, reduction.row_fixed[q], column)
+        for j in reduction.free:
+            _subtract_column(chunk, j * CHUNK, reduction.row_share[q, j], column)
 
 
 @kernel(forceinline=True)

@@ -16,14 +16,22 @@ from islands.kernels.constrained_lstsq import (
     SINGULAR,
     ConstrainedFactor,
     correct,
-    expand,
     from_columns,
     from_gram,
-    reduce,
 )
 from islands.kernels.err_selection import prune
 from islands.kernels.jit_cache import kernel
 from islands.kernels.pair_table import Pairs, complete_pairs, read_gram
+from islands.kernels.parameter_reduction import (
+    Groups,
+    add_equalities,
+    drop_single_members,
+    drop_zero_parameters,
+    expand,
+    get_constraint,
+    get_equalities,
+    reduce,
+)
 from islands.kernels.regressor_columns import Rows
 from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
@@ -54,27 +62,8 @@ OVERFLOW = 6
 #: Status of an individual: the record has no more rows than there are parameters.
 TOO_FEW_ROWS = 7
 
-
-class Groups(NamedTuple):
-    """Constraint on the parameters of every term in the pool: the weighted sum of each group is fixed.
-
-    Attributes
-    ----------
-    group : ndarray of int64, shape (terms,)
-        Group of the term; -1 if its parameter is free.
-    weight : ndarray of float64, shape (terms,)
-        Weight of the term's parameter in the sum.
-    sums : ndarray of float64, shape (groups,)
-        Required sum of each group. A term that is the only member of a group whose sum is zero has the
-        parameter zero and is left out.
-    required : int
-        Number of groups that need at least one member; these are the first ones.
-    """
-
-    group: NDArray[np.int64]
-    weight: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    required: int
+#: Status of an individual: a parameter has the wrong sign.
+WRONG_SIGN = 8
 
 
 class PopulationContext(NamedTuple):
@@ -191,7 +180,9 @@ def _select_terms(terms, size, pruned, context, matrix, positions):
     if pruned:
         size = prune(matrix, size, context.tolerance, positions)
     if context.groups.sums.size > 0:
-        size = _drop_single_members(terms, positions, size, context.groups)
+        size = drop_single_members(terms, positions, size, context.groups)
+    if context.groups.targets.size > 0:
+        size = drop_zero_parameters(terms, positions, size, context.groups)
     return size, OK if size > 0 else NO_TERMS
 
 
@@ -202,7 +193,7 @@ def _estimate(chosen, context, matrix, operand_index, theta):
     ``theta``, out, are the parameters. ``matrix`` is scratch memory.
     """
     size = chosen.size
-    group, weight, sums, feasible = _get_constraint(chosen, context.groups)
+    group, weight, sums, feasible = get_constraint(chosen, context.groups)
     if not feasible:
         return INFEASIBLE
     if context.rows.count <= size:
@@ -211,6 +202,11 @@ def _estimate(chosen, context, matrix, operand_index, theta):
     if not np.diag(matrix)[:size].all():  # a column is zero on the record, and was not pruned
         return DEPENDENT
     reduction = reduce(matrix, size, group, weight, sums)
+    if context.groups.targets.size > 0:
+        rows = get_equalities(chosen, context.groups)
+        reduction, feasible = add_equalities(reduction, matrix, rows, context.groups.targets)
+        if not feasible:
+            return INFEASIBLE
     count = reduction.free.size
     factor, eta = ConstrainedFactor(np.empty((count, count)), np.empty(count)), np.empty(count)
     least = from_gram(matrix, size, reduction, factor, eta)
@@ -220,37 +216,6 @@ def _estimate(chosen, context, matrix, operand_index, theta):
             return DEPENDENT
         correct(program, context.rows, size, reduction, factor, eta)
     expand(reduction, eta, theta)
+    if context.groups.signs.size > 0 and np.any(context.groups.signs[chosen] * theta < 0.0):
+        return WRONG_SIGN
     return OK
-
-
-@kernel
-def _drop_single_members(terms, positions, size, groups):
-    """Leave out terms that are the only member of a group whose sum is zero; return the number of terms."""
-    single = np.zeros(size, np.bool_)
-    for i in range(size):
-        group = groups.group[terms[positions[i]]]
-        if group < 0 or groups.sums[group] != 0.0:
-            continue
-        single[i] = True
-        for j in range(size):
-            if j != i and groups.group[terms[positions[j]]] == group:
-                single[i] = False
-    left = positions[:size][~single]
-    positions[: left.size] = left
-    return left.size
-
-
-@kernel
-def _get_constraint(chosen, groups):
-    """Return group, weight and required sum of every term, and whether all required groups have a member."""
-    group = np.empty(chosen.size, np.int64)
-    weight, sums = np.zeros(chosen.size), np.zeros(chosen.size)
-    for i in range(chosen.size):
-        group[i] = groups.group[chosen[i]]
-        if group[i] >= 0:
-            weight[i] = groups.weight[chosen[i]]
-            sums[i] = groups.sums[group[i]]
-    feasible = True
-    for required in range(groups.required):
-        feasible &= np.any(group == required)
-    return group, weight, sums, feasible

@@ -119,6 +119,12 @@ class Constraint:
         return tuple(part for part in self.parts if isinstance(part, Equality))
 
     @property
+    def required(self) -> tuple[tuple[Regressor, ...], ...]:
+        """Terms of which a structure must contain at least one, for every linear equality."""
+        equalities = (part for part in self.parts if isinstance(part, LinearEquality) and part.target)
+        return tuple(tuple(item for item, weight in part.weights.items() if weight) for part in equalities)
+
+    @property
     def signs(self) -> Mapping[Regressor, int]:
         """Sign of the parameter by regressor."""
         return {part.regressor: part.sign for part in self.parts if isinstance(part, ParameterSign)}
@@ -225,10 +231,8 @@ class Constraint:
         for row, group in enumerate(groups):
             S[row, group.members] = group.weights
         sums = [self.sums.get(group.steady_state, 0.0) for group in groups]
-        weights = np.array([self.weigh(item) for item in regressors]).reshape(len(regressors), -1)
         targets = [part.target for part in self.equalities]
-        if not len(regressors):
-            weights = np.empty((0, len(targets)))
+        weights = np.array([self.weigh(item) for item in regressors]).reshape(len(regressors), len(targets))
         return np.vstack([S, weights.T]), np.array([*sums, *missing, *targets], np.float64)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
-from islands.estimation.parameter_constraints import CONSTRAINTS
+from islands.estimation.parameter_constraints import constraint
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_index import ZERO, GeneIndex
 from islands.evolution.gp.individual import Individual
@@ -42,6 +42,7 @@ _OUTCOMES = {
     ),
     kernel.NO_TERMS: EvaluationOutcome(Status.INFEASIBLE, "no gene is left"),
     kernel.OVERFLOW: EvaluationOutcome(Status.DIVERGED, "a regressor overflows on the record"),
+    kernel.WRONG_SIGN: EvaluationOutcome(Status.INFEASIBLE, "a parameter has the wrong sign"),
     kernel.TOO_FEW_ROWS: EvaluationOutcome(Status.TOO_FEW_ROWS, "there are not more rows than parameters"),
 }
 
@@ -124,7 +125,7 @@ class Evaluator:
         self._predicted = int(self._layout.length.sum())
         self._bound = divergence_bound(record)
         self._rows = select_rows(record, self.warm_up)
-        self._constraint = CONSTRAINTS[settings.constraints]
+        self._constraint = constraint(settings.constraints)
         self._outcomes = _OUTCOMES | {
             kernel.INFEASIBLE: EvaluationOutcome(Status.INFEASIBLE, self._constraint.lacking),
         }

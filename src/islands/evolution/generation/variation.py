@@ -7,7 +7,9 @@ genes are repaired, and individuals under a parameter constraint have a linear o
 
 from collections.abc import Sequence
 
-from islands.evolution.gp.gene_structure import LINEAR_OUTPUT, PHI, STRUCTURES, is_linear_output
+from islands.estimation.parameter_constraints import constraint
+from islands.evolution.gp.gene_structure import LINEAR_OUTPUT, PHI, STRUCTURES, is_linear_output, with_phi
+from islands.evolution.gp.individual import make_regressor
 from islands.evolution.gp.rng import Stream
 from islands.evolution.settings import Settings
 from islands.model.expression import Apply, Expression, Lagged, Primitive, Shift, children, height
@@ -101,14 +103,18 @@ def outer_mutation(
 def repair_genes(genes: Genes, settings: Settings) -> Genes:
     """Repair genes from outside the search: phi functions, and a linear output gene if required."""
     repair = STRUCTURES[settings.structure]
-    return with_linear_output(tuple(repair(gene) for gene in genes), settings)
+    return with_required_genes(tuple(repair(gene) for gene in genes), settings)
 
 
-def with_linear_output(genes: Genes, settings: Settings) -> Genes:
-    """Add the linear output gene if the parameter constraint needs one and it is missing."""
-    if settings.constraints == "none" or any(is_linear_output(gene) for gene in genes):
-        return genes
-    return (LINEAR_OUTPUT, *genes[: settings.max_terms - 1])
+def with_required_genes(genes: Genes, settings: Settings) -> Genes:
+    """Add the genes that the parameter constraint needs: the linear output, and terms of its equalities."""
+    constrained = constraint(settings.constraints)
+    if constrained.sums and not any(is_linear_output(gene) for gene in genes):
+        genes = (LINEAR_OUTPUT, *genes[: settings.max_terms - 1])
+    for terms in constrained.required:
+        if not any(make_regressor(gene) in terms for gene in genes):
+            genes = (*genes[: settings.max_terms - 1], with_phi(terms[0].expression))
+    return genes
 
 
 def _with_gene(genes: Genes, position: int, gene: Expression, settings: Settings) -> Genes:

@@ -7,7 +7,7 @@ import numpy as np
 from islands.estimation.constraints.constraint import Constraint
 from islands.evolution.gp.individual import make_regressor
 from islands.kernels.codegen import NodeArrays
-from islands.kernels.population import Groups
+from islands.kernels.parameter_reduction import Groups
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor
 from islands.program.term_pool import Term, TermPool
@@ -18,7 +18,7 @@ _GENE_BYTES = 700
 #: Approximate size of a regressor with its nodes, in bytes.
 _REGRESSOR_BYTES = 1_600
 
-#: Number of a gene that is identically zero.
+#: Number of a gene that is identically zero, or whose parameter is zero under the constraint.
 ZERO = -1
 
 
@@ -43,6 +43,9 @@ class GeneIndex:
         self._groups = {state: number for number, state in enumerate(constraint.sums)}
         self._group_sums = list(constraint.sums.values())
         self._group, self._weight = np.full(64, -1), np.zeros(64)
+        self._targets = np.array([part.target for part in constraint.equalities], np.float64)
+        self._coefficients = np.zeros((64, len(self._targets)))
+        self._signs, self._sign = constraint.signs, np.zeros(64 if constraint.signs else 0)
         self._arrays: Groups | None = None
         for target in targets:
             self._store.term(target)
@@ -67,7 +70,15 @@ class GeneIndex:
         """Constraint in the layout of the kernels."""
         if self._arrays is None:
             sums = np.array(self._group_sums, np.float64)
-            self._arrays = Groups(self._group, self._weight, sums, len(self._constraint.sums))
+            self._arrays = Groups(
+                self._group,
+                self._weight,
+                sums,
+                len(self._constraint.sums),
+                self._coefficients,
+                self._targets,
+                self._sign,
+            )
         return self._arrays
 
     def index_of(self, gene: Expression) -> int:
@@ -87,7 +98,7 @@ class GeneIndex:
 
     def _add(self, gene: Expression) -> int:
         regressor = make_regressor(gene)
-        if regressor is None:
+        if regressor is None or not self._constraint.admits(regressor):
             return ZERO
         number = self._store.term(regressor)
         if number not in self._regressors:
@@ -99,6 +110,13 @@ class GeneIndex:
         if number >= len(self._group):
             self._group = np.append(self._group, np.full(number, -1))
             self._weight = np.append(self._weight, np.zeros(number))
+            more = np.zeros((number, len(self._targets)))
+            self._coefficients = np.vstack([self._coefficients, more])
+            if self._signs:
+                self._sign = np.append(self._sign, np.zeros(number))
+        self._coefficients[number] = self._constraint.weigh(regressor)
+        if self._signs:
+            self._sign[number] = self._signs.get(regressor, 0)
         weight, state = self._constraint.group(regressor)
         if weight:
             if state not in self._groups:

@@ -130,9 +130,53 @@ def test_integrator_is_no_model_of_a_static_gain():
     assert [fitted.model.size for fitted in result.models] != [1]
 
 
+#: Settings with which a search takes a fraction of a second and has few seeds.
+SEARCH = {
+    "preset": "narx",
+    "population": 40,
+    "generations": 1,
+    "max_terms": 5,
+    "shooting": 30,
+    "library_degree": 3,
+    "library_lags": 2,
+    "islands": 1,
+}
+
+
+@pytest.mark.parametrize("text", [*TRUE, "[u(k-2)] - [u(k-1)] = -0.2", "hysteresis; [u(k-1)] >= 0"])
+def test_every_identified_model_meets_its_constraints(text):
+    result = islands.identify(make_record(), **SEARCH, constraints=text)
+    assert result.models
+    assert result.search_result.settings["constraints"] == text
+    for fitted in result.models:
+        assert all(check.met for check in fitted.constraints)
+        if ">=" not in text:
+            assert worst_residual(fitted.model, text) < 1e-9
+    outcomes = result.search_result.search.outcomes
+    assert outcomes["ok"] + outcomes.get("abandoned", 0) > 0.5 * sum(outcomes.values())
+
+
+def test_correct_constraints_improve_an_identified_model():
+    """Compare the free runs on a record without noise."""
+    text = "[u(k-1)] - [u(k-2)] = 0.2; odd; gain = 2; fixed-point = 1, 2.25"
+    clean, errors = make_record(400, 99, noise=0.0), {text: 0.0, "none": 0.0}
+    for seed in range(3):
+        for constraints in errors:
+            data = make_record(150, seed, noise=0.2)
+            best = islands.identify(data, **SEARCH, seed=seed, constraints=constraints).best
+            errors[constraints] += np.mean((free_run(best.model, clean).y[9:] - clean.y[9:]) ** 2)
+    assert errors[text] < 0.5 * errors["none"]
+
+
+def test_search_under_constraints_can_be_repeated():
+    first, again = (islands.identify(make_record(), **SEARCH, constraints=TRUE[5]) for _ in range(2))
+    assert [fitted.model for fitted in first.models] == [fitted.model for fitted in again.models]
+
+
 def test_statement_that_the_record_does_not_fit_raises_settings_error():
-    with pytest.raises(SettingsError, match="correct one of them"):
-        islands.fit(make_record(), constraints="fixed-point = 1, 2, 3")
+    for search in (islands.fit, islands.identify):
+        with pytest.raises(SettingsError, match="correct one of them"):
+            search(make_record(), constraints="fixed-point = 1, 2, 3")
 
 
 def test_information_criteria_of_a_result_count_free_parameters():

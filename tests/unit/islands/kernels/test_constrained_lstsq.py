@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
-from islands.kernels import constrained_lstsq
+from islands.kernels import parameter_reduction
 from islands.kernels.constrained_lstsq import (
     ILL_CONDITIONED,
     SINGULAR,
     ConstrainedFactor,
     correct,
-    expand,
     from_columns,
     from_gram,
 )
+from islands.kernels.parameter_reduction import expand
 from islands.model.expression import Lagged
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
@@ -61,7 +61,7 @@ def reduced(gram, group=None, weight=None):
     group = np.full(terms, -1) if group is None else np.array(group)
     weight = np.ones(terms) if weight is None else np.array(weight)
     wanted = np.array([WANTED[name] if name >= 0 else 0.0 for name in group])
-    return constrained_lstsq.reduce(gram, terms, group, weight, wanted)
+    return parameter_reduction.reduce(gram, terms, group, weight, wanted)
 
 
 #: Smallest relative squared pivot for which each route is trusted.
@@ -323,7 +323,7 @@ def test_inputs_are_not_changed(route):
     program, rows = columns_as_record(psi, y)
     given_ = [gram, *reduced(gram, [0, 0, -1, 1]), rows.signals]
     before = [array.copy() for array in given_]
-    assert solved(route, gram, program, rows, constrained_lstsq.Reduction(*given_[1:5])) is not None
+    assert solved(route, gram, program, rows, parameter_reduction.Reduction(*given_[1:8])) is not None
     for left, right in zip(given_, before, strict=True):
         assert np.array_equal(left, right)
 
@@ -345,7 +345,7 @@ def test_gram_matrix_may_be_larger_than_the_terms():
     larger[:4, :4] = gram
     found = []
     for matrix in (gram, larger):
-        reduction = constrained_lstsq.reduce(
+        reduction = parameter_reduction.reduce(
             matrix, 3, np.array([0, -1, 0]), np.ones(3), np.array([1.0, 0.0, 1.0])
         )
         factor, eta = ConstrainedFactor(np.empty((2, 2)), np.empty(2)), np.empty(2)

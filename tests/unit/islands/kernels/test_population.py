@@ -64,18 +64,21 @@ def record(seed=0, segments=(400, 150)):
 
 RECORD = record()
 
+#: No equalities and no signs.
+PLAIN = np.empty((len(TERMS) + 1, 0)), np.empty(0), np.empty(0)
+
 
 def make_groups(terms, constrained):
     """Return the clusters of the target and the terms as groups; the cluster of y is the first."""
     group, weight = np.full(len(terms) + 1, -1), np.zeros(len(terms) + 1)
     if not constrained:
-        return Groups(group, weight, np.empty(0), 0)
+        return Groups(group, weight, np.empty(0), 0, *PLAIN)
     names = {OUTPUT_AT_REST: 0}
     for number, item in enumerate(terms, 1):
         size, state = steady_state(item)
         if size:
             group[number], weight[number] = names.setdefault(state, len(names)), size
-    return Groups(group, weight, np.array([1.0, *[0.0] * (len(names) - 1)]), 1)
+    return Groups(group, weight, np.array([1.0, *[0.0] * (len(names) - 1)]), 1, *PLAIN)
 
 
 def table(places=1 << 12):

@@ -40,6 +40,13 @@ def test_every_setting_of_a_preset_can_be_given(preset):
     assert resolve_job_settings(order(preset=preset, settings=given), 256, 10**10) == PRESETS[preset]
 
 
+def test_constraints_of_a_job_are_statements_about_its_inputs():
+    text = "odd; gain = 2.5; [u(k-1)] >= 0"
+    assert resolve_job_settings(order(settings={"constraints": text}), 256, 10**10).constraints == text
+    assert "unknown constraints 'gain = x'" in refused({"constraints": "gain = x"})
+    assert "the record has 1: correct one of them" in refused({"constraints": "[u2(k-1)] = 0"})
+
+
 def test_every_setting_has_a_description():
     described = SettingsChanges.model_json_schema()["properties"]
     assert list(described) == [each.name for each in fields(Settings)]
