@@ -19,7 +19,7 @@ from islands.data.split import split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics
-from islands.figures.registry import FIGURES, SEARCH_FIGURES, search_figures
+from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.models import model_from_json
@@ -136,14 +136,14 @@ def render_figures(job: Job, found: SearchResult) -> dict[str, bytes]:
     """Render the figures and the report of a search; return them by artefact name."""
     made = {f"{name}.svg": _svg(SEARCH_FIGURES[name](found)) for name in search_figures(found)}
     entry = found.recommended
-    model = {f"{name}.svg": _svg(draw(entry, found.split)) for name, draw in FIGURES.items()}
+    model = {f"{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
     return {**made, REPORT: identification_report(job.name or job.id, found, {**model, **made})}
 
 
 def render_model_figures(found: SearchResult, rank: int) -> dict[str, bytes]:
     """Render the figures and the free run of a model; return them by artefact name."""
     entry = found.models[0]
-    made = {f"{rank}/{name}.svg": _svg(draw(entry, found.split)) for name, draw in FIGURES.items()}
+    made = {f"{rank}/{name}.svg": _svg(FIGURES[name](entry, found.split)) for name in model_figures(found)}
     made[f"{rank}/free-run.json"] = _free_run_document(entry, found)
     return made
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from islands.data.dataset import Dataset
+from islands.data.loops import has_loops
 from islands.data.split import Split
 from islands.evolution.history import HistoryPoint
 from islands.model.equations import equation
@@ -120,6 +121,11 @@ class SearchResult:
     def claims_hysteresis(self) -> bool:
         """Whether the search is for models of hysteresis, or found a model with Property 1."""
         return self.requires_property_1 or any(entry.assessment.physics.property_1 for entry in self.models)
+
+    @property
+    def has_loop(self) -> bool:
+        """Whether the output over the input is a loop, or models of hysteresis were searched for."""
+        return self.requires_property_1 or has_loops(self.split.validation)
 
     @property
     def recommendation(self) -> Recommendation:

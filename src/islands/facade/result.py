@@ -20,6 +20,7 @@ from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
+from islands.validation.predictable_residual import ResidualStructure
 from islands.validation.prediction_bands import LEVEL, PredictionBand, predict_band
 from islands.validation.recommendation import Recommendation
 from islands.validation.residual_tests import ResidualTests
@@ -85,6 +86,11 @@ class FittedModel:
     def residual_tests(self) -> ResidualTests:
         """Correlation tests of the one-step-ahead residual."""
         return self.ranked_model.assessment.residual_tests
+
+    @property
+    def residual_structure(self) -> ResidualStructure:
+        """Predictable part of the residuals, and a verdict: adequate, minor or inadequate."""
+        return self.ranked_model.assessment.residual_structure
 
     def simulate(self, record: Dataset, mode: str = "free-run", warm_up: int | None = None) -> Simulation:
         """Simulate the model on a record.
@@ -197,13 +203,15 @@ class Result:
 
     def save(self, folder: str | Path) -> Path:
         """Write ``result.json``, ``models/``, ``figures/`` (of the recommended model) and ``summary.txt``."""
-        from islands.figures.registry import FIGURES, SEARCH_FIGURES, search_figures  # noqa: PLC0415
+        from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
         from islands.figures.style import save  # noqa: PLC0415
 
         folder = Path(folder)
         figures = folder / "figures"
         figures.mkdir(parents=True, exist_ok=True)
-        for kind in FIGURES:
+        # An earlier result in the folder may have had a loop.
+        (figures / "loop.svg").unlink(missing_ok=True)
+        for kind in model_figures(self.search_result):
             save(self.best.plot(kind), figures / f"{kind}.svg")
         for name in search_figures(self.search_result):
             save(SEARCH_FIGURES[name](self.search_result), figures / f"{name}.svg")

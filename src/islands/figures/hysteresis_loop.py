@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.loops import loop_starts
 from islands.figures.diverging_lines import break_line, divergence, finite_part, limits, within_reach
 from islands.figures.downsampling import downsample
 from islands.figures.style import (
@@ -18,7 +19,7 @@ from islands.figures.style import (
     house_style,
     label,
 )
-from islands.figures.windows import LOOPS, last_loops, loop_starts
+from islands.figures.windows import LOOPS, last_loops
 
 #: Largest number of panels in a row.
 _COLUMNS = 3

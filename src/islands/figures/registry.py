@@ -49,6 +49,14 @@ FIGURES: Mapping[str, ModelFigure] = MappingProxyType(
     {"free-run": _free_run, "loop": _loop, "hold": _hold, "residuals": _residuals}
 )
 
+#: The figure that needs a loop.
+_LOOP = "loop"
+
+
+def model_figures(result: SearchResult) -> tuple[str, ...]:
+    """Return the names of the figures of a model that can be drawn for a result."""
+    return tuple(name for name in FIGURES if name != _LOOP or result.has_loop)
+
 
 def _record(result: SearchResult) -> Figure:
     """Draw every input and the output of the estimation data."""

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.data.loops import loop_starts
 
 #: Loops that are distinguishable in one panel.
 LOOPS = 5
@@ -13,19 +14,6 @@ MANY_LOOPS = 20
 
 #: Smallest number of samples of a section; shorter sections are readable in the complete record.
 _MIN_SAMPLES = 60
-
-
-def loop_starts(record: Dataset) -> NDArray[np.int64]:
-    """Return the samples at which loops start: the first varying input rises through its mean.
-
-    A rise must lead from a quarter of the standard deviation below the mean to a quarter above it, so that
-    noise on a slow input does not create loops.
-    """
-    u = record.u[:, int(np.argmax(np.ptp(record.u, axis=0) > 0))]
-    u = u - u.mean()
-    away = np.flatnonzero(np.abs(u) > 0.25 * u.std())
-    rises = np.flatnonzero(np.diff(np.sign(u[away])) > 0)
-    return away[rises + 1]
 
 
 def last_loops(record: Dataset) -> slice:

@@ -55,7 +55,7 @@ def _row(rank: str, entry: RankedModel, hysteresis: bool) -> tuple[str, ...]:
         number(validation.mape, "{:.4f}", validated),
         number(validation.r2, "{:.5f}", validated),
         *(claims if hysteresis else ()),
-        "pass" if entry.assessment.residual_tests.passed else "fail",
+        entry.assessment.residual_structure.verdict,
     )
 
 

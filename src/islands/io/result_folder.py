@@ -19,6 +19,7 @@ from islands.model.equations import equation, latex_equation
 from islands.validation.assessment import PARTS
 from islands.validation.ensemble import Ensemble
 from islands.validation.physics import PhysicsChecks
+from islands.validation.predictable_residual import ResidualStructure
 from islands.validation.residual_tests import ResidualTests
 
 SCHEMA = "islands.result/1"
@@ -51,6 +52,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },
         },
+        "loop": found.has_loop,
         "recommended": asdict(recommendation),
         "models": [
             _model_document(rank, entry, rank == recommendation.rank, found.ensemble)
@@ -109,7 +111,8 @@ def _model_document(
         "information": asdict(assessment.information),
         "constraints": [asdict(entry) for entry in assessment.constraints],
         "physics": physics_document(assessment.physics),
-        "residual_tests": residual_tests_document(assessment.residual_tests),
+        "residual_tests": residual_tests_document(assessment.residual_tests)
+        | residual_structure_document(assessment.residual_structure),
     }
 
 
@@ -144,6 +147,18 @@ def residual_tests_document(tests: ResidualTests) -> dict[str, Any]:
             }
             for test in tests.tests
         ],
+    }
+
+
+def residual_structure_document(structure: ResidualStructure) -> dict[str, Any]:
+    """Return the predictable shares of the residuals and the verdict as JSON values."""
+    return {
+        "verdict": structure.verdict,
+        "predictable_share": {
+            "one_step_ahead": structure.one_step_share,
+            "free_run": structure.free_run_share,
+        },
+        "predictable_percent": structure.percent,
     }
 
 

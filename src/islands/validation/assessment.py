@@ -16,6 +16,7 @@ from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
 from islands.validation.metrics import InformationCriteria, Metrics, information_criteria, metrics
 from islands.validation.physics import PhysicsChecks, check_physics
+from islands.validation.predictable_residual import ResidualStructure, measure_structure
 from islands.validation.residual_tests import ResidualTests, residual_tests
 
 #: Parts of a split, as named in a result.
@@ -50,6 +51,8 @@ class Assessment:
     residual_tests : ResidualTests
         Tests of the one-step-ahead residual on the longest recording of the validation data. If the
         prediction diverged, all tests failed and their notes give the reason.
+    residual_structure : ResidualStructure
+        Predictable part of the residuals on the same recording, and a verdict.
     physics : PhysicsChecks
     warm_up : int
         Number of samples before the first prediction of these simulations. The errors depend on it.
@@ -64,6 +67,7 @@ class Assessment:
     outcomes: Mapping[str, Mapping[str, EvaluationOutcome]]
     information: InformationCriteria
     residual_tests: ResidualTests
+    residual_structure: ResidualStructure
     physics: PhysicsChecks
     warm_up: int
     block_errors: tuple[float, ...]
@@ -111,7 +115,7 @@ def assess(
         errors,
         outcomes,
         _compute_information(model, split.estimation, warm_up, constraints),
-        _test_residual(model, split.validation, warm_up),
+        *_assess_residual(model, split.validation, warm_up),
         check_physics(model, split.estimation),
         model.maximum_lag if warm_up is None else warm_up,
         # The loop ends with the validation data.
@@ -142,7 +146,9 @@ def _compute_information(
     return information_criteria(float(np.add.reduce(residual**2)), len(residual), free)
 
 
-def _test_residual(model: Model, record: Dataset, warm_up: int | None) -> ResidualTests:
+def _assess_residual(
+    model: Model, record: Dataset, warm_up: int | None
+) -> tuple[ResidualTests, ResidualStructure]:
     begin, end = max(record.bounds, key=lambda bounds: bounds[1] - bounds[0])
     recording = record[begin:end]
     first = model.maximum_lag if warm_up is None else warm_up
@@ -153,11 +159,15 @@ def _test_residual(model: Model, record: Dataset, warm_up: int | None) -> Residu
             f"warm-up takes {first}: testing the residual takes {_MIN_RESIDUALS} more; "
             "give a longer recording"
         )
-    run = multiple_shooting(model, recording, 1, warm_up)
+    runs = [multiple_shooting(model, recording, interval, warm_up) for interval in (1, None)]
+    one_step, simulated = ((recording.y - run.y)[first:] if run.outcome else None for run in runs)
+    structure = measure_structure(one_step, simulated, recording.u[first:], record.output_range)
     # After a divergence the tests run on zeros for their structure, and are then marked as failed.
-    residual = recording.y - run.y if run.outcome else np.zeros(recording.samples)
-    tests = residual_tests(residual, recording.u, max_lag=min(25, (samples - 2) // 2) or 1)
-    return tests if run.outcome else _mark_failed(tests, f"diverged: {run.outcome.reason}")
+    residual = np.zeros(samples) if one_step is None else one_step
+    tests = residual_tests(residual, recording.u[first:], max_lag=min(25, (samples - 2) // 2) or 1)
+    if one_step is None:
+        tests = _mark_failed(tests, f"diverged: {runs[0].outcome.reason}")
+    return tests, structure
 
 
 def _mark_failed(tests: ResidualTests, reason: str) -> ResidualTests:

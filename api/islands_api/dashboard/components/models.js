@@ -46,6 +46,12 @@ const HYSTERESIS_HEADINGS = ["Hold drift %", "Property 1"];
 const makeVerdict = (passed, positive, negative) =>
   el("span", { class: passed ? "yes" : "no" }, passed ? positive : negative);
 
+/** Make the verdict on the residual; results of earlier versions have the tests only. */
+function makeResidualVerdict({ verdict, passed }) {
+  const kind = { adequate: "yes", inadequate: "no" }[verdict] ?? "";
+  return verdict ? el("span", { class: kind }, verdict) : makeVerdict(passed, "pass", "fail");
+}
+
 function makeHysteresisCells(physics) {
   const drift = physics.hold_drift_percent;
   return [
@@ -61,7 +67,6 @@ function makeRank(job, { rank, recommended }) {
 
 function makeRow(job, model, hysteresis) {
   const { physics, recommended, residual_tests: residuals } = model;
-  const passed = residuals.tests.filter((test) => test.passed).length;
   const mark = recommended ? el("span", { class: "recommended" }, " recommended") : "";
   return [
     el("span", {}, makeRank(job, model), mark),
@@ -71,7 +76,7 @@ function makeRow(job, model, hysteresis) {
       makeMetric(model, part, "r2", formatR2),
     ]),
     ...(hysteresis ? makeHysteresisCells(physics) : []),
-    makeVerdict(residuals.passed, "pass", `${passed} of ${residuals.tests.length}`),
+    makeResidualVerdict(residuals),
   ];
 }
 
@@ -116,6 +121,17 @@ function makeResidualTable({ residual_tests: { tests } }) {
 }
 
 const formatTarget = (target) => (typeof target === "number" ? `, target ${formatShort(target)}` : "");
+
+const formatShare = (share) => (typeof share === "number" ? formatPercent(100 * share) : "diverged");
+
+const listPredictable = ({ predictable_share: shares, predictable_percent: percent }) =>
+  shares
+    ? [
+      ["Predictable residual, one step ahead", formatShare(shares.one_step_ahead)],
+      ["Predictable residual, free run", formatShare(shares.free_run)],
+      ["Its RMS in the output range", formatShare(percent === null ? null : percent / 100)],
+    ]
+    : [];
 
 const listClusterSum = ({ cluster, sum: value, target }) => [
   `Sum of cluster ${cluster}`,
@@ -180,6 +196,7 @@ function makeDetail(job, model, signal) {
       ),
     ),
     makeFacts([
+      ...listPredictable(model.residual_tests),
       ...physics.clusters.map(listClusterSum),
       ...physics.excursions.map(listExcursion),
       ["AIC", formatNumber(information.aic, 6)],

@@ -37,6 +37,9 @@ SEARCH_FIGURES = ("record", "front", "convergence", "islands")
 #: The figure that exists only for searches with several islands.
 _MULTI_ISLAND_FIGURE = "islands"
 
+#: The figure that exists only if the output over the input is a loop.
+_LOOP_FIGURE = "loop"
+
 #: Timeout in seconds of a figure process, which blocks the figures of all other jobs.
 _DRAWING_TIMEOUT = 120.0
 
@@ -128,7 +131,7 @@ async def search_figure(job: Id, figure: SearchFigure, caller: Reader, state: Ap
 async def model_figures(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Any:
     """List the names of the figures of a model."""
     await get_model(state, caller, job, rank)
-    return {"items": MODEL_FIGURES}
+    return {"items": await _list_model_figures(state, job)}
 
 
 @router.get("/{job}/models/{rank}/figures/{figure}.svg", response_class=Response, responses=_SVG_RESPONSES)
@@ -137,7 +140,7 @@ async def model_figure(
 ) -> Response:
     """Return a figure of a model: free run, hysteresis loop, holds, or residual correlations."""
     await get_model(state, caller, job, rank)
-    _check_figure(figure, MODEL_FIGURES)
+    _check_figure(figure, await _list_model_figures(state, job))
     return await _figure_response(state, caller, job, f"{rank}/{figure}.svg", rank)
 
 
@@ -163,6 +166,13 @@ async def _list_search_figures(state: AppState, caller: Principal, job: str) -> 
     document = await get_result(state, await get_job_of_kind(state, caller, job, IDENTIFICATION))
     several = document["settings"]["islands"] > 1
     return tuple(name for name in SEARCH_FIGURES if several or name != _MULTI_ISLAND_FIGURE)
+
+
+async def _list_model_figures(state: AppState, job: str) -> tuple[str, ...]:
+    # Results of earlier versions do not say whether there is a loop, and have the figure.
+    document = await state.run_blocking(state.store.results.document, job) or {}
+    loop = document.get("loop", True)
+    return tuple(name for name in MODEL_FIGURES if loop or name != _LOOP_FIGURE)
 
 
 def _check_figure(figure: str, figures: tuple[str, ...]) -> None:

@@ -1,43 +1,16 @@
 """Parts of a record that figures show: last loops and representative section."""
 
 import numpy as np
-import pytest
 
 from islands.data.dataset import Dataset
-from islands.figures.windows import LOOPS, last_loops, loop_starts, representative_window
+from islands.data.loops import loop_starts
+from islands.figures.windows import LOOPS, last_loops, representative_window
 
 
 def sine(periods: int, length: int = 100, **changes: object) -> Dataset:
     k = np.arange(periods * length)
     u = np.sin(2 * np.pi * k / length - 0.5)
     return Dataset(u, 2 * u, 0.01, **changes)
-
-
-@pytest.mark.parametrize("periods", [1, 7, 40])
-def test_sine_has_one_loop_per_period(periods):
-    assert len(loop_starts(sine(periods))) == periods
-
-
-def test_offset_of_the_input_does_not_affect_loops():
-    here = sine(9)
-    there = Dataset(here.u + 100.0, here.y, here.dt)
-    np.testing.assert_array_equal(loop_starts(here), loop_starts(there))
-
-
-def test_noise_on_a_slow_input_creates_no_loops():
-    record = sine(9)
-    noisy = record.u[:, 0] + 0.05 * np.random.default_rng(0).standard_normal(record.samples)
-    assert len(loop_starts(Dataset(noisy, record.y, record.dt))) == 9
-
-
-def test_constant_input_has_no_loops():
-    assert len(loop_starts(Dataset(np.ones(50), np.arange(50.0), 1.0))) == 0
-
-
-def test_loops_are_counted_by_the_first_varying_input():
-    record = sine(9)
-    both = Dataset(np.column_stack([np.ones(record.samples), record.u]), record.y, record.dt)
-    np.testing.assert_array_equal(loop_starts(both), loop_starts(record))
 
 
 def test_last_loops_are_complete_periods_at_the_end():

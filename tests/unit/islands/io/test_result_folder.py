@@ -55,7 +55,7 @@ def with_best(findings, **changes):
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
     assert list(result) == [
-        *("schema", "record", "seed", "settings", "search", "recommended", "models", "ensemble")
+        *("schema", "record", "seed", "settings", "search", "loop", "recommended", "models", "ensemble")
     ]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]
@@ -102,7 +102,12 @@ def test_a_result_lists_physics_checks_and_residual_tests(findings):
         assert len(physics["holds"]) == 10
         assert set(physics["holds"][0]) == {"level", "loading", "bounded", "constant", "drift_percent"}
         assert len(physics["excursions"]) == 4
-        assert set(tests) == {"passed", "whiteness_p", "ljung_box", "tests"}
+        assert set(tests) == {
+            *("passed", "whiteness_p", "ljung_box", "tests"),
+            *("verdict", "predictable_share", "predictable_percent"),
+        }
+        assert tests["verdict"] in ("adequate", "minor", "inadequate")
+        assert all(0.0 <= share <= 1.0 for share in tests["predictable_share"].values())
         assert [test["name"] for test in tests["tests"]] == ["xi_xi", "u_xi", "xi_xiu", "u2_xi", "u2_xi2"]
         for test in tests["tests"]:
             assert set(test) == {"name", "input", "passed", "inside_percent", "limit", "largest", "note"}

@@ -38,6 +38,7 @@ class Candidate:
             {"validation": {"free_run": OK if known else LOST}},
             None,
             None,
+            None,
             physics,
             0,
             tuple(map(float, self.blocks)),
