@@ -34,7 +34,7 @@ class Reference(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ColumnReference:
-    """ColumnReference of a simulation that is neither a model nor a record."""
+    """Columns of a simulation that is neither a model nor a record."""
 
     input_names: tuple[str, ...]
     output_name: str
