@@ -178,12 +178,10 @@ def _check_units(one: _Channel, other: _Channel, titles: tuple[str, str]) -> Non
     if not (expected and unit and stated) or expected == unit:
         return
     factor = conversion_factor(unit, expected)
-    advice = (
-        f"convert {other.name} to {one.unit}" if factor is None else f"multiply {other.name} by {factor:g}"
-    )
+    advice = f"convert {other.name}" if factor is None else f"multiply {other.name} by {factor:g}"
     raise RecordError(
         f"{titles[0]} has {one.name} in {one.unit}, {titles[1]} {other.name} in {other.unit}: {advice} and "
-        "state the unit"
+        f"give it the unit {one.unit}"
     )
 
 

@@ -54,7 +54,11 @@ def test_units_follow_their_inputs():
         (("a_V", "b_V"), ("a", "c"), "some names occur in both"),
         (("a", "b"), ("a",), r"has 2 inputs \(a, b\), the record 1 \(a\)"),
         (("u_V",), ("u_mV",), "u_V in V, the record u_mV in mV: multiply u_mV by 0.001"),
-        (("u_est_V",), ("u_val_um",), "in V, the record u_val_um in um: convert u_val_um to V"),
+        (
+            ("u_est_V",),
+            ("u_val_um",),
+            "in V, the record u_val_um in um: convert u_val_um and give it the unit V",
+        ),
         (("u_V",), ("u_V+1",), r"\+1 is a column that is read one sample early: read the input u_V$"),
         (("u_V+1",), ("u_V",), r"read the input u_V\+1$"),
         (("a_V+1", "b"), ("b", "a_V"), r"read the input a_V\+1$"),
