@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import replace
+from itertools import pairwise
 from math import inf, isfinite, nan
 from pathlib import Path
 
@@ -15,8 +16,9 @@ from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.individual import Individual, make_regressor
+from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
-from islands.evolution.island import first_generation, select_elite, step
+from islands.evolution.island import _breed_pair, first_generation, select_elite, step
 from islands.evolution.problem import make_problem
 from islands.io.checkpoints import write_checkpoint
 from islands.model.expression import Lagged
@@ -283,3 +285,21 @@ def test_failures_never_enter_the_hall_of_fame():
     assert {each.outcome.verdict.name for each in island.population} >= {"OK", "DIVERGED"}
     assert all(isfinite(entry.fitness) for entry in island.hall_of_fame.entries)
     assert isfinite(island.elite[0].fitness)
+
+
+@pytest.mark.parametrize("crossover", [0.0, 1.0])
+def test_bred_children_differ_from_their_parents(crossover):
+    """A single attempt gives a quarter of children with the structure of a parent, several nearly none."""
+    setting = replace(SMALL, crossover=crossover, mutation=1.0, prune=0.0, max_terms=5)
+    evaluator = Evaluator(record(), setting)
+    same = bred = 0
+    for seed in range(6):
+        island = islands_of(evaluator, 3, seed)[-1]
+        rng = Stream(seed, 0, 4, Purpose.VARIATION)
+        for one, other in pairwise(island.population):
+            parents = [one.genes, other.genes]
+            known = {evaluator.gene_indices(Individual(genes)) for genes in parents}
+            for genes in _breed_pair(parents, evaluator, setting, rng, ()):
+                bred += 1
+                same += evaluator.gene_indices(Individual(genes)) in known
+    assert same < 0.05 * bred

@@ -22,6 +22,7 @@ BUDGET = {
     "library": "phi-polynomial",
     "library_degree": 5,
     "library_lags": 3,
+    "swap_search": False,
     "from_library": 0.6,
     "migrate_every": 1,
 }

@@ -81,7 +81,7 @@ def sandwich_of_jacobian(
 
     A coefficient whose sensitivity is zero or a combination of those before it has variance zero.
     """
-    count, rows = jacobian.shape
+    count = len(jacobian)
     kept = list(range(count))
     while kept:
         q, ignored = np.ascontiguousarray(jacobian[kept]), np.array(residual)

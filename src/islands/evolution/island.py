@@ -1,8 +1,9 @@
 """State of one island, and the step from one generation to the next."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, isfinite
 
 from islands.evolution.generation.evaluation import Evaluator
@@ -25,6 +26,12 @@ from islands.model.expression import Expression
 
 #: Quantile of the parents' fitness that defines the abandon threshold.
 _THRESHOLD_QUANTILE = 0.8
+
+#: Attempts to breed children that differ from their parents. About a quarter of single attempts fail.
+_ATTEMPTS = 5
+
+#: Part of the first population that seeds may take, if there are more seeds than sizes.
+_SEEDED = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +105,17 @@ def first_generation(
     """
     settings = settings or evaluator.settings
     rng = Stream(seed, index, 0, Purpose.INITIAL)
-    given = [repair_genes(genes[: settings.max_terms], settings) for genes in seeds[: settings.population]]
+    given = [repair_genes(genes[: settings.max_terms], settings) for genes in seeds[: _count_seeds(settings)]]
     drawn = [
         random_genes(settings, evaluator.record.inputs, rng) for _ in range(settings.population - len(given))
     ]
     empty = Island(index, seed, 0, (), (), HallOfFame())
     return _evaluate_generation(empty, [*given, *drawn], evaluator, settings)
+
+
+def _count_seeds(settings: Settings) -> int:
+    """Return the number of seeds in the first population: one of every size, or a part of the population."""
+    return min(settings.population, max(settings.max_terms, int(_SEEDED * settings.population)))
 
 
 def step(
@@ -118,7 +130,7 @@ def step(
     settings : Settings, optional
         See `first_generation`.
     """
-    settings, inputs = settings or evaluator.settings, evaluator.record.inputs
+    settings = settings or evaluator.settings
     following = replace(island, generation=island.generation + 1)
     select = Stream(island.seed, island.index, following.generation, Purpose.SELECTION)
     rng = Stream(island.seed, island.index, following.generation, Purpose.VARIATION)
@@ -134,19 +146,52 @@ def step(
     offspring: list[Genes] = []
     for couple in range(pairs):
         pair = [parent.genes for parent in parents[2 * couple : 2 * couple + 2]]
-        if rng.chance(settings.crossover):
-            cross = high_level_crossover if rng.chance(settings.high_level) else low_level_crossover
-            pair = list(cross(pair[0], pair[1], settings, rng))
-        else:
-            for position, genes in enumerate(pair):
-                if rng.chance(settings.mutation):
-                    pair[position] = (
-                        outer_mutation(genes, settings, inputs, rng, pool)
-                        if rng.chance(settings.outer)
-                        else inner_mutation(genes, settings, inputs, rng)
-                    )
-        offspring += [with_required_genes(genes, settings) for genes in pair]
+        offspring += _breed_pair(pair, evaluator, settings, rng, pool)
     return _evaluate_generation(following, offspring[: settings.population], evaluator, settings)
+
+
+def _breed_pair(
+    parents: Sequence[Genes],
+    evaluator: Evaluator,
+    settings: Settings,
+    rng: Stream,
+    pool: Sequence[Expression],
+) -> list[Genes]:
+    """Recombine two parents, or mutate each with the given probability."""
+    if rng.chance(settings.crossover):
+        one, other = parents
+        cross = high_level_crossover if rng.chance(settings.high_level) else low_level_crossover
+        return _breed_new(partial(cross, one, other, settings, rng), parents, evaluator, settings)
+    inputs, children = evaluator.record.inputs, []
+    for genes in parents:
+        if not rng.chance(settings.mutation):
+            children.append(with_required_genes(genes, settings))
+            continue
+        mutate = (
+            partial(outer_mutation, genes, settings, inputs, rng, pool)
+            if rng.chance(settings.outer)
+            else partial(inner_mutation, genes, settings, inputs, rng)
+        )
+        children += _breed_new(partial(_as_family, mutate), [genes], evaluator, settings)
+    return children
+
+
+def _as_family(mutate: Callable[[], Genes]) -> tuple[Genes]:
+    return (mutate(),)
+
+
+def _breed_new(
+    breed: Callable[[], Sequence[Genes]], parents: Sequence[Genes], evaluator: Evaluator, settings: Settings
+) -> list[Genes]:
+    """Breed until there are children with new structures, at most `_ATTEMPTS` times."""
+    known = {evaluator.gene_indices(Individual(genes)) for genes in parents}
+    new: list[Genes] = []
+    for _ in range(_ATTEMPTS):
+        children = [with_required_genes(genes, settings) for genes in breed()]
+        new += [genes for genes in children if evaluator.gene_indices(Individual(genes)) not in known]
+        if len(new) >= len(children):
+            break
+    return [*new, *children][: len(children)]
 
 
 def _evaluate_generation(

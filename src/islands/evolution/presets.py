@@ -30,12 +30,14 @@ _SEEDED = Settings(
     crossover=0.4,
     mutation=1.0,
     prune=0.1,
-    tolerance=1e-9,
+    tolerance=1e-5,
+    err_target="increment",
     outer=0.7,
     from_library=0.6,
     distinct=True,
     refine=True,
     library="phi-polynomial",
+    swap_search=True,
     topology="ring",
     migrate_every=5,
 )
@@ -54,6 +56,7 @@ PRESETS: Mapping[str, Settings] = MappingProxyType(
             max_terms=9,
             initial_terms=(2, 9),
             structure="increment",
+            library_lags=4,
         ),
         "narx": replace(
             _SEEDED,

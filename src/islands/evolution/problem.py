@@ -1,17 +1,23 @@
 """Search problem: the record, the settings, the seeds and the gene pool."""
 
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.input_ranking import screen_candidates
 from islands.estimation.parameter_constraints import constraint
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.generation.variation import Genes
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.settings import Settings
 from islands.model.expression import Expression, height
 from islands.simulation.outcome import EvaluationOutcome
+
+#: Largest pool of a swap search: of a larger library, the candidates that forward selection finds first.
+MAX_POOL = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +30,8 @@ class Problem:
         Estimation data without missing values.
     settings : Settings
     seeds : tuple of genes
-        Individuals in every first population, from forward selection over the library of the settings.
+        Structures over the library of the settings, from forward selection or, if the settings ask for it,
+        from a swap search; the best of every size first. They start the first population of every island.
     pool : tuple of Expression
         Genes of that library, which an outer mutation may insert.
     """
@@ -63,11 +70,21 @@ def make_problem(record: Dataset, settings: Settings) -> Problem:
     genes = {item: with_phi(item.expression) for item in regressors}
     admits = constraint(settings.constraints).admits
     library = [item for item in regressors if height(genes[item]) <= settings.max_height and admits(item)]
-    selected = forward_selection(library, record, settings.constraints, settings.max_terms)
+    selected = forward_selection(library, record, settings.constraints, max(settings.max_terms, MAX_POOL))
     structures = () if isinstance(selected, EvaluationOutcome) else selected
-    return Problem(
-        record,
-        settings,
-        tuple(tuple(genes[item] for item in structure) for structure in structures),
-        tuple(genes[item] for item in library),
+    seeds = tuple(
+        tuple(genes[item] for item in structure)
+        for structure in structures
+        if len(structure) <= settings.max_terms
     )
+    if settings.swap_search:
+        exchanged = library if len(library) <= MAX_POOL or not structures else structures[-1]
+        seeds = _search_seeds(record, settings, [genes[item] for item in exchanged], seeds)
+    return Problem(record, settings, seeds, tuple(genes[item] for item in library))
+
+
+def _search_seeds(
+    record: Dataset, settings: Settings, pool: list[Expression], starts: tuple[Genes, ...]
+) -> tuple[Genes, ...]:
+    by_size = swap_search(Evaluator(record, settings), pool, starts)
+    return tuple(each.genes for rank in zip_longest(*by_size) for each in rank if each is not None)

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from islands.errors import SettingsError, lookup
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
+from islands.evolution.gp.err_targets import ERR_TARGETS
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_structure import STRUCTURES
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
@@ -68,6 +69,9 @@ class Settings:
         PRPB, probability that an evaluated individual is pruned by FROE.
     tolerance : float
         Smallest error reduction ratio of a term that pruning keeps.
+    err_target : str
+        An entry of ``ERR_TARGETS``: what the error reduction ratio refers to, ``output`` as in the paper or
+        ``increment``.
     max_terms, max_height : int
         Largest number of genes of an individual; largest number of edges from the root of a gene to a leaf,
         including back-shifts.
@@ -100,6 +104,8 @@ class Settings:
         may insert its regressors. Empty for no library.
     library_degree, library_lags : int
         Degree and lags of the library.
+    swap_search : bool
+        Whether a swap search over the library takes the place of the seeds of forward selection.
     from_library : float
         Probability that an outer mutation uses the library; no effect without a library.
     distinct : bool
@@ -135,6 +141,7 @@ class Settings:
     mutation: float = 0.2
     prune: float = 0.5
     tolerance: float = 1e-5
+    err_target: str = "output"
     max_terms: int = _option(10)
     max_height: int = _option(5)
     shifts: tuple[int, ...] = (1, 2, 3, 4, 5)
@@ -156,6 +163,7 @@ class Settings:
     library: str = ""
     library_degree: int = 5
     library_lags: int = 3
+    swap_search: bool = False
     from_library: float = 0.0
     distinct: bool = False
     refine: bool = False
@@ -204,6 +212,7 @@ class Settings:
         lookup(STRUCTURES, self.structure, "structure")
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")
+        lookup(ERR_TARGETS, self.err_target, "err_target")
         primitive_table(self.primitives)
         if any(shift < 1 for shift in self.shifts):
             raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")

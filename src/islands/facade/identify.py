@@ -1,54 +1,38 @@
 """Identification by evolution (MGGP/FROE), refinement and validation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import fields
-from math import isfinite
 from typing import Any
 
 from islands.data.dataset import Dataset
-from islands.data.split import Split, split_data
+from islands.data.split import split_data
 from islands.errors import RecordError, SettingsError
 from islands.estimation.deviations import (
     LARGE_OFFSET,
     SHIFTABLE,
     Offsets,
-    estimate_deviations,
     find_offsets,
     no_offsets,
     subtract_offsets,
 )
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.refinement import refine
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine, SerialEngine, Stop
-from islands.evolution.gp.fitness import FITNESSES
-from islands.evolution.gp.individual import make_regressor
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.search_result import (
-    RankedModel,
-    SearchResult,
-    SearchStatistics,
-    rank_models,
-    with_bands,
-)
+from islands.evolution.search_result import SearchResult, SearchStatistics, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
+from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set
 from islands.model.expression import Primitive
-from islands.model.model import Model, canonical_order
 from islands.model.primitives import PRIMITIVES
-from islands.model.regressor import Regressor
 from islands.model.user_primitive import get_source
 from islands.program.primitive_functions import row_address
-from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run
-from islands.validation.assessment import Assessment, assess
-from islands.validation.ensemble import ValidatedModel
 
 #: Outcomes of individuals with estimated parameters.
 FEASIBLE_OUTCOMES = ("ok", "abandoned")
@@ -180,68 +164,6 @@ def _find_search_offsets(record: Dataset, settings: Settings) -> Offsets:
     # A function such as a square root of a deviation differs from that of the signal.
     shiftable = SHIFTABLE.issuperset(settings.primitives) and constraint(settings.constraints).allows_offsets
     return find_offsets(record, LARGE_OFFSET) if shiftable else no_offsets(record)
-
-
-def select_final_models(
-    candidates: Sequence[ValidatedModel], problem: Problem, split: Split
-) -> tuple[RankedModel, ...]:
-    """Assess the candidates and return the best model of every size, best first.
-
-    If the parameters are constrained, a model must have Property 1; a size without such a model is left out.
-    """
-    settings = problem.settings
-    found: dict[int, list[ValidatedModel]] = {}
-    for candidate in candidates:
-        if isfinite(candidate.error):
-            found.setdefault(candidate.model.size, []).append(candidate)
-    kept = []
-    for entries in found.values():
-        for candidate in sorted(entries, key=lambda entry: entry.order):
-            model = candidate.model
-            assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
-            if _is_valid(assessment, settings):
-                kept.append(RankedModel(model, assessment))
-                break
-    return rank_models(kept)
-
-
-def _is_valid(assessment: Assessment, settings: Settings) -> bool:
-    """Return whether a model meets the constraints; hysteresis also requires stable equilibria."""
-    property_1 = assessment.physics.property_1 or not constraint(settings.constraints).sums
-    return property_1 and all(check.met for check in assessment.constraints)
-
-
-def estimate_candidates(
-    hall_of_fame: HallOfFame, problem: Problem, split: Split, offsets: Offsets
-) -> list[ValidatedModel]:
-    """Estimate and refine the models of the hall of fame, and validate them.
-
-    The structures that seeded the search are added, so that the result is never worse than the seeds.
-    """
-    record, settings = split.estimation, problem.settings
-    interval = FITNESSES[settings.fitness](settings.shooting)
-    structures: dict[tuple[Regressor, ...], None] = {entry.regressors: None for entry in hall_of_fame.entries}
-    for genes in problem.seeds:
-        regressors = (item for gene in genes if (item := make_regressor(gene)))
-        structures.setdefault(tuple(canonical_order(regressors)))
-    found = []
-
-    def validate(model: Model, interval: int | None) -> None:
-        simulated = free_run(model, split.validation, settings.maximum_lag)
-        found.append(ValidatedModel(model, interval, simulated.mean_squared_error))
-
-    for structure in structures:
-        estimated = estimate_deviations(
-            structure, offsets, record, settings.constraints, settings.maximum_lag
-        )
-        if isinstance(estimated, EvaluationOutcome) or estimated.model.size > settings.max_terms:
-            continue
-        validate(estimated.model, 1)
-        if settings.refine:
-            refined = refine(estimated.model, record, interval, settings.constraints, settings.maximum_lag)
-            if not isinstance(refined, EvaluationOutcome):
-                validate(refined.model, interval)
-    return found
 
 
 def _make_statistics(state: SearchState, problem: Problem) -> SearchStatistics:

@@ -58,8 +58,8 @@ def from_gram(gram, terms, reduction, factor, eta):
     for a in range(count):
         norms[a] = gram[free[a], free[a]]
         for b in range(a + 1):
-            reduced[a, b] = _product(gram, reduction, free[a], free[b])
-        right[a] = _target_product(gram, reduction, free[a], terms)
+            reduced[a, b] = reduced_product(gram, reduction, free[a], free[b])
+        right[a] = reduced_target_product(gram, reduction, free[a], terms)
     if reduction.row_pivot.size > 0:
         _reduce_products(gram, terms, reduction, reduced, right)
     least = _factorise(reduced, norms, factor)
@@ -123,40 +123,44 @@ def _reduce_products(gram, terms, reduction, reduced, right):
     for a in range(free.size):
         i = free[a]
         for q in range(pivots.size):
-            right[a] -= reduction.row_fixed[q] * _product(gram, reduction, i, pivots[q])
-            product = _target_product(gram, reduction, pivots[q], terms)
+            right[a] -= reduction.row_fixed[q] * reduced_product(gram, reduction, i, pivots[q])
+            product = reduced_target_product(gram, reduction, pivots[q], terms)
             for other in range(pivots.size):
-                product -= reduction.row_fixed[other] * _product(gram, reduction, pivots[q], pivots[other])
+                product -= reduction.row_fixed[other] * reduced_product(
+                    gram, reduction, pivots[q], pivots[other]
+                )
             right[a] -= share[q, i] * product
             for b in range(a + 1):
                 j = free[b]
-                product = _product(gram, reduction, i, pivots[q])
+                product = reduced_product(gram, reduction, i, pivots[q])
                 for other in range(pivots.size):
-                    product -= share[other, i] * _product(gram, reduction, pivots[other], pivots[q])
-                reduced[a, b] -= share[q, i] * _product(gram, reduction, pivots[q], j) + share[q, j] * product
+                    product -= share[other, i] * reduced_product(gram, reduction, pivots[other], pivots[q])
+                reduced[a, b] -= (
+                    share[q, i] * reduced_product(gram, reduction, pivots[q], j) + share[q, j] * product
+                )
 
 
 @kernel
-def _target_product(gram, reduction, i, terms):
+def reduced_target_product(gram, reduction, i, terms):
     """Return the inner product of a column and the target, both without the pivots of the groups."""
-    total = _left(gram, reduction, i, terms)
+    total = reduced_times_column(gram, reduction, i, terms)
     for p in range(terms):
         if reduction.fixed[p] != 0.0:
-            total -= reduction.fixed[p] * _left(gram, reduction, i, p)
+            total -= reduction.fixed[p] * reduced_times_column(gram, reduction, i, p)
     return total
 
 
 @kernel
-def _product(gram, reduction, i, j):
+def reduced_product(gram, reduction, i, j):
     """Return the inner product of two reduced columns."""
-    total = _left(gram, reduction, i, j)
+    total = reduced_times_column(gram, reduction, i, j)
     if reduction.pivot[j] >= 0:
-        total -= reduction.share[j] * _left(gram, reduction, i, reduction.pivot[j])
+        total -= reduction.share[j] * reduced_times_column(gram, reduction, i, reduction.pivot[j])
     return total
 
 
 @kernel
-def _left(gram, reduction, i, column):
+def reduced_times_column(gram, reduction, i, column):
     """Return the inner product of a reduced column and one of the Gram matrix."""
     if reduction.pivot[i] < 0:
         return gram[i, column]

@@ -6,6 +6,7 @@ Cholesky factorisation of the Gram matrix, pivoted by that ratio. The rows of th
 
 import numpy as np
 
+from islands.kernels.constrained_lstsq import reduced_product, reduced_target_product
 from islands.kernels.jit_cache import kernel
 
 #: A candidate whose squared norm has shrunk to this fraction counts as dependent on the selected ones: in
@@ -84,5 +85,52 @@ def prune(gram, terms, tolerance, kept):
     for rank in range(selected):
         kept_terms[order[rank]] = err[rank] > tolerance
     found = np.flatnonzero(kept_terms)
+    kept[: found.size] = found
+    return found.size
+
+
+@kernel
+def prune_increments(
+    gram,  # float64 [term + 1, term + 1]: inner products of the terms and, last, of y(k)
+    terms,
+    reduction,  # null space of the constraints on the terms
+    previous,  # position of y(k-1) among the terms, -1 if it is missing
+    tolerance,
+    kept,  # out, int64 [term]: positions of the terms that stay, ascending
+):
+    """Find the terms that explain increments of the output; return their number.
+
+    The error reduction ratio is that of the columns of the null space, and its target is y(k) without the
+    part that the constraints fix; without constraints the target is y(k) - y(k-1). On an oversampled record
+    y(k-1) explains nearly all of y(k), so that the ratio of every other term on y(k) itself is tiny. y(k-1)
+    stays, and the pivot of a group stays with any other member.
+    """
+    free, fixed = reduction.free, reduction.fixed
+    if free.size == terms and previous >= 0:
+        fixed[previous] = 1.0
+    count = free.size
+    reduced = np.empty((count + 1, count + 1))
+    energy = gram[terms, terms]
+    for p in range(terms):
+        if fixed[p] != 0.0:
+            energy -= 2.0 * fixed[p] * gram[p, terms]
+            for q in range(terms):
+                energy += fixed[p] * fixed[q] * gram[p, q]
+    reduced[count, count] = energy
+    for a in range(count):
+        for b in range(a + 1):
+            reduced[a, b] = reduced[b, a] = reduced_product(gram, reduction, free[a], free[b])
+        along = reduced_target_product(gram, reduction, free[a], terms)
+        reduced[a, count] = reduced[count, a] = along
+    order, err = np.empty(count, np.int64), np.empty(count)
+    selected = select(reduced, count, 0.0, count, order, err)
+    stays = fixed != 0.0
+    for rank in range(selected):
+        if err[rank] > tolerance:
+            term = free[order[rank]]
+            stays[term] = True
+            if reduction.pivot[term] >= 0:
+                stays[reduction.pivot[term]] = True
+    found = np.flatnonzero(stays)
     kept[: found.size] = found
     return found.size

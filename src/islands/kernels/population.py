@@ -19,7 +19,7 @@ from islands.kernels.constrained_lstsq import (
     from_columns,
     from_gram,
 )
-from islands.kernels.err_selection import prune
+from islands.kernels.err_selection import prune, prune_increments
 from islands.kernels.jit_cache import kernel
 from islands.kernels.pair_table import Pairs, complete_pairs, read_gram
 from islands.kernels.parameter_reduction import (
@@ -73,6 +73,8 @@ class PopulationContext(NamedTuple):
     ----------
     target : int
         The term that is y(k).
+    previous : int
+        The term that is y(k-1), if pruning applies to the increments of the output; -1 if to the output.
     tolerance : float
         Smallest error reduction ratio that survives pruning.
     nodes : NodeArrays
@@ -89,6 +91,7 @@ class PopulationContext(NamedTuple):
     """
 
     target: int
+    previous: int
     tolerance: float
     nodes: NodeArrays
     groups: Groups
@@ -177,13 +180,33 @@ def _select_terms(terms, size, pruned, context, matrix, positions):
     positions[:size] = np.arange(size)
     if not read_gram(terms[:size], context.target, context.pairs, matrix):
         return size, OVERFLOW
-    if pruned:
+    if pruned and context.previous < 0:
         size = prune(matrix, size, context.tolerance, positions)
+    elif pruned:
+        size = _prune_increments(terms[:size], context, matrix, positions)
     if context.groups.sums.size > 0:
         size = drop_single_members(terms, positions, size, context.groups)
     if context.groups.targets.size > 0:
         size = drop_zero_parameters(terms, positions, size, context.groups)
     return size, OK if size > 0 else NO_TERMS
+
+
+@kernel
+def _prune_increments(terms, context, matrix, positions):
+    """Prune the terms that do not explain increments of the output; return how many are left.
+
+    Columns that are zero on the record are left to the estimation, which rejects them.
+    """
+    size = terms.size
+    if not np.diag(matrix)[:size].all():
+        return size
+    group, weight, sums, _ = get_constraint(terms, context.groups)
+    reduction = reduce(matrix, size, group, weight, sums)
+    previous = -1
+    for position in range(size):
+        if terms[position] == context.previous:
+            previous = position
+    return prune_increments(matrix, size, reduction, previous, context.tolerance, positions)
 
 
 @kernel(forceinline=True)

@@ -61,6 +61,11 @@ class ValidatedModel:
     error: float
 
     @property
+    def size(self) -> int:
+        """Number of terms."""
+        return self.model.size
+
+    @property
     def order(self) -> tuple[float, tuple[str, ...], tuple[float, ...]]:
         """Sort key: the error; ties are broken by the text of the terms and by the parameters."""
         texts = tuple(item.text for item in self.model.regressors)

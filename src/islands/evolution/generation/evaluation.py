@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 from islands.estimation.parameter_constraints import constraint
+from islands.evolution.gp.err_targets import ERR_TARGETS
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.gene_index import ZERO, GeneIndex
 from islands.evolution.gp.individual import Individual
@@ -29,6 +30,9 @@ from islands.simulation.predictors import divergence_bound
 
 #: Index of y(k), the first term of every gene index.
 _TARGET = 0
+
+#: Index of y(k-1), the second term of every gene index.
+_PREVIOUS = 1
 
 _ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error exceeds the abandon threshold of the island")
 _DIVERGED = EvaluationOutcome(Status.DIVERGED, "the simulation left the divergence bound in an interval")
@@ -134,7 +138,7 @@ class Evaluator:
         self._gene_index = self._make_gene_index()
 
     def _make_gene_index(self) -> GeneIndex:
-        return GeneIndex(self._constraint, [Lagged(0, 0)])
+        return GeneIndex(self._constraint, [Lagged(0, 0), Lagged(0, 1)])
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
@@ -253,6 +257,7 @@ class Evaluator:
             row[: len(structure)] = structure
         context = kernel.PopulationContext(
             _TARGET,
+            _PREVIOUS if ERR_TARGETS[self.settings.err_target] else -1,
             self.settings.tolerance,
             self._gene_index.nodes,
             self._gene_index.groups,

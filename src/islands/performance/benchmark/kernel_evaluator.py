@@ -117,7 +117,9 @@ def _evaluation(state: Prepared, candidate: WorkloadModel, pruned: bool, cached:
     terms = np.array([[index.index_of(item.expression) for item in candidate.regressors]], np.int64)
     sizes, decided, allowed = np.array([size]), np.array([pruned]), np.full(size + 1, inf)
     pairs, program, theta = pair_table(_TABLE_BYTES), link(candidate.regressors), np.array(candidate.theta)
-    context = PopulationContext(0, 0.0, index.nodes, index.groups, pairs, state.rows, state.step, state.bound)
+    context = PopulationContext(
+        0, -1, 0.0, index.nodes, index.groups, pairs, state.rows, state.step, state.bound
+    )
     results = empty_results(1, size)
 
     def call() -> None:

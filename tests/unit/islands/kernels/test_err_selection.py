@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.kernels.err_selection import DEPENDENT, prune, select
+from islands.kernels.err_selection import DEPENDENT, prune, prune_increments, select
+from islands.kernels.parameter_reduction import reduce
 
 
 def problem(seed, terms=6, rows=150):
@@ -133,3 +134,40 @@ def test_selection_is_empty_without_candidates_or_limit():
 
 def test_pruning_with_tolerance_one_leaves_nothing():
     assert pruned(gram_of(*problem(4)), 6, 1.0) == []
+
+
+def null_space_columns(psi, y, group, sums, previous):
+    """Return free positions, their columns and the target without the part that the constraints fix."""
+    terms = len(psi)
+    pivots = {}
+    for position in range(terms):
+        if group[position] >= 0:
+            members = [other for other in range(terms) if group[other] == group[position]]
+            pivots[position] = min(members, key=lambda each: np.linalg.norm(psi[each]))
+    target = y.copy()
+    for pivot in set(pivots.values()):
+        target -= sums[pivot] * psi[pivot]
+    if not pivots and previous >= 0:
+        target -= psi[previous]
+    free = [position for position in range(terms) if pivots.get(position) != position]
+    columns = [psi[each] - (psi[pivots[each]] if each in pivots else 0.0) for each in free]
+    return free, np.array(columns), target, pivots
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("constrained", [False, True])
+def test_pruning_of_increments_equals_gram_schmidt_in_the_null_space(seed, constrained):
+    psi, y = problem(seed)
+    group = np.array([0, 0, -1, 1, 1, -1]) if constrained else np.full(6, -1)
+    sums = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    gram = gram_of(psi, y)
+    reduction = reduce(gram, 6, group, np.ones(6), sums)
+    free, columns, target, pivots = null_space_columns(psi, y, group, sums, 2)
+    err = {free[position]: ratio for position, ratio in gram_schmidt(columns, target)}
+    tolerance = float(np.median(list(err.values())))
+    expected = {position for position, ratio in err.items() if ratio > tolerance}
+    expected |= {pivots[position] for position in expected if position in pivots}
+    expected |= {pivots[0]} if constrained else {2}
+    kept = np.full(6, -7)
+    count = prune_increments(gram, 6, reduction, 2, tolerance, kept)
+    assert kept[:count].tolist() == sorted(expected)

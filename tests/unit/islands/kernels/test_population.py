@@ -101,6 +101,7 @@ def evaluated(
         array.fill(-7)
     context = PopulationContext(
         0,
+        -1,
         TOLERANCE,
         store.nodes,
         make_groups(terms, constrained),

@@ -68,7 +68,7 @@ for name, groups in (("clusters", clusters), ("free", free)):
         results = empty_results(4, count)
         for array in results:
             array.fill(0)
-        context = PopulationContext(0, 1e-4, store.nodes, groups, pair_table(1 << 16),
+        context = PopulationContext(0, -1, 1e-4, store.nodes, groups, pair_table(1 << 16),
                                     select_rows(record, 4), cut, divergence_bound(record))
         pruned = np.array([True, False, False, False])
         evaluate(structures, sizes, pruned, np.full(count + 1, np.inf), context, results)

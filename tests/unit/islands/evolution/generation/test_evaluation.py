@@ -283,3 +283,19 @@ def test_model_13_as_genes_has_the_fitness_of_constrained_least_squares():
     assert found.fitness == pytest.approx(simulated.mean_squared_error, rel=1e-7)
     # The error of its free run is 0.3 % of the range (Table 1); intervals of 0.5 s have no larger error.
     assert 100 * found.fitness**0.5 / data.output_range < 0.4
+
+
+@pytest.mark.parametrize(("number", "shrinks_to"), [("12", 6), ("13", 7)])
+def test_pruning_of_increments_keeps_the_models_of_the_paper(number, shrinks_to):
+    """The rule of the paper cuts them to two terms, since y(k-1) explains nearly all of y(k)."""
+    data = make_record("bouc-wen-piezo", "authors", "estimation")[:5000]
+    genes = tuple(item.expression for item in PUBLISHED[number].model.regressors)
+    found = {}
+    for target in ("output", "increment"):
+        evaluator = Evaluator(data, Settings(err_target=target, tolerance=1e-5, shooting=500))
+        whole, pruned = evaluator.evaluate([(Individual(genes), False), (Individual(genes), True)])[0]
+        found[target] = pruned.size, (pruned.fitness / whole.fitness) ** 0.5
+    assert found["output"][0] == 2
+    assert found["output"][1] > 3.0
+    assert found["increment"][0] >= shrinks_to
+    assert found["increment"][1] < 1.01

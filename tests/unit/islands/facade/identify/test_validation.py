@@ -161,6 +161,7 @@ def test_error_without_models_lists_the_outcomes():
             max_terms=3,
             library_degree=1,
             library_lags=1,
+            swap_search=False,
         )
 
 

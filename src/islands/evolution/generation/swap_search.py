@@ -1,0 +1,118 @@
+"""Swap search: forward steps and exchanges of single genes by the shooting error.
+
+Forward selection ranks candidates by the one-step-ahead error and never revises a choice. The swap search
+adds the gene that reduces the shooting error most, exchanges single genes as long as the error falls, and
+continues with the next size. Its structures seed the evolution, which is not bound to the pool.
+"""
+
+from collections.abc import Iterable, Sequence
+from math import inf, isfinite
+
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.variation import Genes, with_required_genes
+from islands.evolution.gp.individual import Individual, Population
+from islands.model.expression import Expression
+
+#: Smallest relative reduction of the squared error for which an exchange continues.
+_MIN_GAIN = 1e-3
+
+#: A structure whose squared error exceeds that of the current one by this factor is abandoned.
+_ABANDON_FACTOR = 4.0
+
+#: Maximum number of evaluations; the search then ends with the structures found so far.
+MAX_EVALUATIONS = 60_000
+
+
+def swap_search(
+    evaluator: Evaluator, pool: Sequence[Expression], starts: Iterable[Genes] = (), depth: int = 40
+) -> tuple[Population, ...]:
+    """Search structures over a pool of genes.
+
+    Parameters
+    ----------
+    evaluator : Evaluator
+        Evaluates structures; its settings limit their number of genes.
+    pool : sequence of Expression
+        Genes to choose from.
+    starts : iterable of genes
+        Further structures; the exchanges start from one of them if it is better than the forward step.
+    depth : int
+        Number of structures that are returned for every size.
+
+    Returns
+    -------
+    tuple of populations
+        Evaluated individuals of every size found, smallest size first and best first.
+    """
+    search = _SwapSearch(evaluator, pool)
+    search.evaluate(starts, inf)
+    best = with_required_genes((), evaluator.settings)
+    if best:
+        search.evaluate([best], inf)
+    while len(best) < evaluator.settings.max_terms and not search.is_exhausted:
+        found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
+        start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
+        if start is None or start.size <= len(best):
+            break
+        best = search.exchange(start).genes
+    return search.ranked(depth)
+
+
+class _SwapSearch:
+    """Structures that were evaluated, by size and structure."""
+
+    def __init__(self, evaluator: Evaluator, pool: Sequence[Expression]) -> None:
+        self._evaluator, self._pool = evaluator, pool
+        self._seen: dict[int, dict[tuple[str, ...], Individual]] = {}
+        self._evaluations = 0
+
+    @property
+    def is_exhausted(self) -> bool:
+        """Whether the budget of evaluations is used up."""
+        return self._evaluations >= MAX_EVALUATIONS
+
+    def evaluate(self, structures: Iterable[Genes], threshold: float) -> Individual | None:
+        """Evaluate structures and return the best one; None if all fail or exceed the threshold."""
+        individuals = [(Individual(genes), False) for genes in structures]
+        thresholds = [threshold] * (self._evaluator.settings.max_terms + 1)
+        evaluated, _ = self._evaluator.evaluate(individuals, thresholds)
+        self._evaluations += len(individuals)
+        found = [each for each in evaluated if isfinite(each.fitness)]
+        for each in found:
+            self._seen.setdefault(each.size, {}).setdefault(each.key, each)
+        return min(found, key=_order, default=None)
+
+    def exchange(self, start: Individual) -> Individual:
+        """Exchange single genes, each time the best exchange of all, as long as the error falls."""
+        best = start
+        while not self.is_exhausted:
+            genes = best.genes
+            required = with_required_genes((), self._evaluator.settings)
+            free = [place for place, gene in enumerate(genes) if gene not in required]
+            exchanged = self.evaluate(
+                (
+                    (*genes[:place], gene, *genes[place + 1 :])
+                    for place in free
+                    for gene in self._pool
+                    if gene not in genes
+                ),
+                _ABANDON_FACTOR * best.fitness,
+            )
+            if exchanged is None or not exchanged.fitness < (1.0 - _MIN_GAIN) * best.fitness:
+                break
+            best = exchanged
+        return best
+
+    def best(self, size: int) -> Individual | None:
+        """Return the best structure of a size."""
+        return min(self._seen.get(size, {}).values(), key=_order, default=None)
+
+    def ranked(self, depth: int) -> tuple[Population, ...]:
+        """Return the best structures of every size."""
+        return tuple(
+            tuple(sorted(found.values(), key=_order)[:depth]) for _, found in sorted(self._seen.items())
+        )
+
+
+def _order(individual: Individual) -> tuple[int, float, tuple[str, ...]]:
+    return -individual.size, individual.fitness, individual.key

@@ -1,0 +1,174 @@
+"""Final models of a search: structures are screened on the validation data, then refined and assessed."""
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from math import isfinite
+from typing import Protocol, TypeVar
+
+from islands.data.dataset import Dataset
+from islands.data.split import Split
+from islands.estimation.deviations import Offsets, estimate_deviations, subtract_offsets
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.refinement import refine
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.gp.fitness import FITNESSES
+from islands.evolution.gp.individual import Individual, unique_structures
+from islands.evolution.hall_of_fame import HallOfFame
+from islands.evolution.problem import Problem
+from islands.evolution.search_result import RankedModel, rank_models
+from islands.evolution.settings import Settings
+from islands.model.model import Model
+from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import free_run
+from islands.validation.assessment import Assessment, assess
+from islands.validation.ensemble import ValidatedModel
+
+#: Structures of every size whose parameters are refined: the best by validation error and by fitness.
+_REFINED = (8, 8)
+
+#: Lengths of the intervals of further refinements, relative to the setting ``shooting``. Short intervals
+#: weigh fast transients, long ones slow drift; the validation data decide.
+_INTERVALS = (0.3, 3.0)
+
+#: Structures of every size that are refined over all intervals.
+_MOST_PROMISING = 3
+
+
+class _HasSize(Protocol):
+    @property
+    def size(self) -> int: ...
+
+
+_Sized = TypeVar("_Sized", bound=_HasSize)
+
+
+def select_final_models(
+    candidates: Iterable[ValidatedModel], problem: Problem, split: Split
+) -> tuple[RankedModel, ...]:
+    """Assess the candidates and return the best model of every size, best first.
+
+    If the parameters are constrained, a model must have Property 1; a size without such a model is left out.
+    """
+    settings = problem.settings
+    kept = []
+    for entries in _group_by_size(each for each in candidates if isfinite(each.error)):
+        for candidate in sorted(entries, key=lambda entry: entry.order):
+            model = candidate.model
+            assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
+            if _is_valid(assessment, settings):
+                kept.append(RankedModel(model, assessment))
+                break
+    return rank_models(kept)
+
+
+def _is_valid(assessment: Assessment, settings: Settings) -> bool:
+    """Return whether a model meets the constraints; hysteresis also requires stable equilibria."""
+    property_1 = assessment.physics.property_1 or not constraint(settings.constraints).sums
+    return property_1 and all(check.met for check in assessment.constraints)
+
+
+def estimate_candidates(
+    hall_of_fame: HallOfFame, problem: Problem, split: Split, offsets: Offsets
+) -> list[ValidatedModel]:
+    """Estimate and refine the best structures of every size, and validate them.
+
+    Structures are those of the hall of fame and those that seeded the search, so that the result is never
+    worse than the seeds. All of them are simulated on the validation data with the parameters of the search.
+    The best of every size are estimated again in the units of the record and, if the settings ask for it,
+    refined over several shooting intervals.
+    """
+    validation = subtract_offsets(split.validation, offsets)
+    found = []
+    for individuals in _group_by_size(_evaluate_structures(hall_of_fame, problem)):
+        found += _estimate_models(_screen(individuals, problem, validation), problem, split, offsets)
+    return found
+
+
+def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[Individual, ...]:
+    structures = [*(entry.genes for entry in hall_of_fame.entries), *problem.seeds]
+    evaluated, _ = Evaluator(problem.record, problem.settings).evaluate(
+        [(Individual(genes), False) for genes in structures]
+    )
+    return tuple(each for each in unique_structures(evaluated) if each.outcome)
+
+
+def _group_by_size(items: Iterable[_Sized]) -> Iterable[list[_Sized]]:
+    groups: dict[int, list[_Sized]] = {}
+    for item in items:
+        groups.setdefault(item.size, []).append(item)
+    return groups.values()
+
+
+def _screen(individuals: list[Individual], problem: Problem, validation: Dataset) -> list[Individual]:
+    """Return the structures of one size that are estimated again.
+
+    Parameters
+    ----------
+    validation : Dataset
+        Validation data in the units of the search.
+    """
+    record = problem.record
+    by_fitness = sorted(individuals, key=lambda each: (each.fitness, each.key))
+    models = {
+        Model(each.regressors, each.theta, record.input_names, record.output_name, record.dt): each
+        for each in by_fitness
+    }
+    by_error = [models[each.model] for each in _validate(models, 1, validation, problem)]
+    most_valid, fittest = _REFINED
+    return list(unique_structures((*by_error[:most_valid], *by_fitness[:fittest])))
+
+
+def _estimate_models(
+    individuals: list[Individual], problem: Problem, split: Split, offsets: Offsets
+) -> list[ValidatedModel]:
+    """Return models with estimated and with refined parameters in the units of the record."""
+    settings = problem.settings
+    found = (
+        estimate_deviations(
+            each.regressors, offsets, split.estimation, settings.constraints, settings.maximum_lag
+        )
+        for each in individuals
+    )
+    estimated = [
+        each.model
+        for each in found
+        if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
+    ]
+    validated = _validate(estimated, 1, split.validation, problem)
+    if settings.refine:
+        interval = FITNESSES[settings.fitness](settings.shooting)
+        refined = _refine(estimated, interval, problem, split)
+        validated += refined
+        best = [each.model for each in refined[:_MOST_PROMISING]]
+        lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
+        for length in lengths:
+            validated += _refine(best, length, problem, split)
+    return validated
+
+
+def _refine(
+    models: list[Model], interval: int | None, problem: Problem, split: Split
+) -> list[ValidatedModel]:
+    """Refine models over shooting intervals and validate them; the kernels run in parallel threads."""
+    settings = problem.settings
+    with ThreadPoolExecutor() as threads:
+        refined = threads.map(
+            lambda model: refine(
+                model, split.estimation, interval, settings.constraints, settings.maximum_lag
+            ),
+            models,
+        )
+        found = [each.model for each in refined if not isinstance(each, EvaluationOutcome)]
+    return _validate(found, interval, split.validation, problem)
+
+
+def _validate(
+    models: Iterable[Model], interval: int | None, validation: Dataset, problem: Problem
+) -> list[ValidatedModel]:
+    """Simulate models on the validation data and return them, least error first."""
+    warm_up = problem.settings.maximum_lag
+    validated = (
+        ValidatedModel(model, interval, free_run(model, validation, warm_up).mean_squared_error)
+        for model in models
+    )
+    return sorted((each for each in validated if isfinite(each.error)), key=lambda entry: entry.order)
