@@ -28,11 +28,10 @@ from islands.simulation.layout import layout
 from islands.simulation.outcome import OK, EvaluationOutcome, Status
 from islands.simulation.predictors import divergence_bound
 
-#: Index of y(k), the first term of every gene index.
+#: Indices of y(k) and y(k-1), the first terms of every gene index.
 _TARGET = 0
-
-#: Index of y(k-1), the second term of every gene index.
 _PREVIOUS = 1
+_TARGETS = (Lagged(0, 0), Lagged(0, 1))
 
 _ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error exceeds the abandon threshold of the island")
 _DIVERGED = EvaluationOutcome(Status.DIVERGED, "the simulation left the divergence bound in an interval")
@@ -135,10 +134,7 @@ class Evaluator:
         }
         self._pairs = pair_table(self.limits.pairs)
         self._evaluations: dict[_Key, Evaluation] = {}
-        self._gene_index = self._make_gene_index()
-
-    def _make_gene_index(self) -> GeneIndex:
-        return GeneIndex(self._constraint, [Lagged(0, 0), Lagged(0, 1)])
+        self._gene_index = GeneIndex(self._constraint, _TARGETS)
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
@@ -160,7 +156,7 @@ class Evaluator:
         """Empty all caches."""
         clear(self._pairs)
         self._evaluations.clear()
-        self._gene_index = self._make_gene_index()
+        self._gene_index = GeneIndex(self._constraint, _TARGETS)
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None

@@ -41,7 +41,7 @@ def pool(settings):
 
 
 @pytest.mark.parametrize(("data", "settings"), [(record(), HYSTERESIS), (smooth(), SMOOTH)])
-def test_no_exchange_of_one_gene_improves_the_best_structure_of_the_largest_size(data, settings):
+def test_exchange_of_one_gene_cannot_improve_the_best_structure(data, settings):
     evaluator = Evaluator(data, settings)
     best = swap_search(evaluator, pool(settings))[-1][0]
     assert best.size == settings.max_terms

@@ -52,7 +52,7 @@ def test_duplicates_are_offspring_with_a_known_structure(piezo):
             return found, known
 
     # In tournaments of size one abandoned individuals win as well, some of them repeatedly.
-    setting = replace(SMALL, population=20, generations=12, tournament=1)
+    setting = replace(SMALL, population=60, generations=12, tournament=1)
     evaluator = Counting(piezo, setting)
     island, info = first_generation(0, 0, evaluator)
     reported = info.duplicates
@@ -62,7 +62,7 @@ def test_duplicates_are_offspring_with_a_known_structure(piezo):
     assert evaluator.others > 0
     found = run_island(piezo, setting, 0)
     assert found.duplicates == evaluator.offspring != reported
-    assert found.evaluations == 13 * 20
+    assert found.evaluations == 13 * 60
 
 
 def test_rates_are_counts_over_times():
