@@ -31,7 +31,6 @@ from islands.simulation.predictors import divergence_bound
 #: Indices of y(k) and y(k-1), the first terms of every gene index.
 _TARGET = 0
 _PREVIOUS = 1
-_TARGETS = (Lagged(0, 0), Lagged(0, 1))
 
 _ABANDONED = EvaluationOutcome(Status.ABANDONED, "the error exceeds the abandon threshold of the island")
 _DIVERGED = EvaluationOutcome(Status.DIVERGED, "the simulation left the divergence bound in an interval")
@@ -134,7 +133,7 @@ class Evaluator:
         }
         self._pairs = pair_table(self.limits.pairs)
         self._evaluations: dict[_Key, Evaluation] = {}
-        self._gene_index = GeneIndex(self._constraint, _TARGETS)
+        self._gene_index = GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)))
 
     @property
     def memory(self) -> dict[str, tuple[int, int]]:
@@ -156,7 +155,7 @@ class Evaluator:
         """Empty all caches."""
         clear(self._pairs)
         self._evaluations.clear()
-        self._gene_index = GeneIndex(self._constraint, _TARGETS)
+        self._gene_index = GeneIndex(self._constraint, (Lagged(0, 0), Lagged(0, 1)))
 
     def evaluate(
         self, population: Sequence[tuple[Individual, bool]], thresholds: Sequence[float] | None = None
