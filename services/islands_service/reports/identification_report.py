@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from islands.evolution.search_result import SearchResult
 from islands.io.model_table import LEGEND, columns, rows
+from islands.io.summary_text import describe
 from islands.model.equations import mathml_equation
 
 #: Environment of the HTML templates.
@@ -54,6 +55,7 @@ def identification_report(name: str, found: SearchResult, figures: Mapping[str, 
         record=found.record,
         findings=found,
         recommendation=found.recommendation,
+        sentences=describe(found),
         settings=_settings(found),
         columns=columns(found),
         legend=LEGEND,

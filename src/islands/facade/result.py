@@ -12,7 +12,8 @@ from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.constraint_checks import ConstraintCheck
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.export import export
-from islands.io.result_folder import summary, write_result
+from islands.io.result_folder import write_result
+from islands.io.summary_text import summary
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome

@@ -13,8 +13,8 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.ensembles import bands_document, ensemble_document
-from islands.io.model_table import table
 from islands.io.models import terms_document, write_model
+from islands.io.summary_text import summary
 from islands.model.equations import equation, latex_equation
 from islands.validation.assessment import PARTS
 from islands.validation.ensemble import Ensemble
@@ -175,25 +175,6 @@ def write_result(found: SearchResult, folder: Path) -> None:
         write_model(entry.model, models / f"{rank:02d}.json")
     (folder / "summary.txt").write_text(summary(found), encoding="utf-8")
     (folder / "result.json").write_text(result_json(found), encoding="utf-8")
-
-
-def summary(found: SearchResult) -> str:
-    """Return the result as plain text."""
-    record, search = found.record, found.search
-    outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
-    full = search.full_set
-    lines = [
-        f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
-        ", ".join(f"{name} {value}" for name, value in found.settings.items() if name != "own_primitives")
-        + f", seed {found.seed}",
-        f"{search.evaluations} models estimated: {outcomes}",
-        f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
-        "",
-        *table(found),
-        "",
-        *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
-    ]
-    return "\n".join(lines) + "\n"
 
 
 def _finite(value: Any) -> Any:

@@ -34,6 +34,31 @@ def equation(model: Model, digits: int = 6) -> str:
     return f"y(k) = {_join_terms(parts)}"
 
 
+def named_equation(model: Model, digits: int = 6) -> str:
+    """Write a model as one line with the column names of its record: ``y_um(k) = 0.9*y_um(k-1) + u_V(k-1)``.
+
+    A name that is not an identifier is written in brackets, ``[flow (l/s)](k-1)``. The text is for readers;
+    `parse` needs that of `equation`.
+    """
+    return _name_signals(equation(model, digits), model)
+
+
+def named_term(model: Model, position: int) -> str:
+    """Write one regressor of a model with the column names of its record."""
+    return _name_signals(plain_factor(model.regressors[position].expression, model.inputs), model)
+
+
+def _name_signals(text: str, model: Model) -> str:
+    names = {"y": model.output_name, "u": model.input_names[0]}
+    names |= {f"u{index}": name for index, name in enumerate(model.input_names, start=1)}
+
+    def substitute(leaf: re.Match[str]) -> str:
+        name = names[leaf[1]]
+        return f"{name if name.isidentifier() else f'[{name}]'}(k"
+
+    return re.sub(r"\b(y|u\d*)\(k(?=[-)])", substitute, text)
+
+
 def latex_equation(model: Model, digits: int = 6) -> str:
     """Write a model as one line of LaTeX without dollar signs."""
     parts = []

@@ -161,7 +161,9 @@ def _assess_residual(
         )
     runs = [multiple_shooting(model, recording, interval, warm_up) for interval in (1, None)]
     one_step, simulated = ((recording.y - run.y)[first:] if run.outcome else None for run in runs)
-    structure = measure_structure(one_step, simulated, recording.u[first:], record.output_range)
+    structure = measure_structure(
+        one_step, simulated, recording.u[first:], recording.y[first:], record.output_range
+    )
     # After a divergence the tests run on zeros for their structure, and are then marked as failed.
     residual = np.zeros(samples) if one_step is None else one_step
     tests = residual_tests(residual, recording.u[first:], max_lag=min(25, (samples - 2) // 2) or 1)

@@ -57,6 +57,7 @@ def measure_structure(
     one_step: NDArray[np.float64] | None,
     free_run: NDArray[np.float64] | None,
     u: NDArray[np.float64],
+    y: NDArray[np.float64],
     output_range: float,
 ) -> ResidualStructure:
     """Measure the predictable shares of two residuals of a model.
@@ -78,12 +79,14 @@ def measure_structure(
     one_step, free_run : ndarray, shape (samples,), or None
         Residuals without warm-up. None after a divergence.
     u : ndarray, shape (samples, inputs)
-        Inputs at the same samples.
+    y : ndarray, shape (samples,)
+        Inputs and output at the same samples.
     output_range : float
-        Range of the output.
+        Range of the output of the whole record.
     """
     shares = [
-        math.nan if residual is None else predictable_share(residual, u) for residual in (one_step, free_run)
+        math.nan if residual is None else predictable_share(residual, u, y)
+        for residual in (one_step, free_run)
     ]
     percent = rms_percent = math.nan
     if free_run is not None:
@@ -98,23 +101,24 @@ def measure_structure(
     return ResidualStructure(shares[0], shares[1], percent, verdict)
 
 
-def predictable_share(residual: NDArray[np.float64], u: NDArray[np.float64]) -> float:
-    """Return the share of the mean square of a residual that is predictable from its past and the inputs.
+def predictable_share(residual: NDArray[np.float64], u: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Return the predictable share of the mean square of a residual.
 
     The predictor is linear in past residuals, present and past inputs and their squares, and products of past
-    residuals and inputs, as in the tests of `residual_tests`. Each half of the residual is predicted with the
+    residuals and inputs, as in the tests of `residual_tests`, and in three powers of the last output. Each half of the residual is predicted with the
     coefficients of the other half, so that chance does not count; a negative share is 0.
 
     Parameters
     ----------
     residual : ndarray, shape (samples,)
     u : ndarray, shape (samples, inputs)
+    y : ndarray, shape (samples,)
     """
     peak = float(np.abs(residual).max())
     if peak == 0.0:
         return 0.0
     # The residual keeps its mean, which is a predictable part of it.
-    rows = _make_columns(residual / peak, np.column_stack([_scale(column) for column in u.T]))
+    rows = _make_columns(residual / peak, np.column_stack([_scale(column) for column in u.T]), _scale(y))
     target, columns = rows[0], rows[1:]
     half = len(target) // 2
     unexplained = 0.0
@@ -135,7 +139,9 @@ def _scale(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return centred / (np.abs(centred).max() or 1.0)
 
 
-def _make_columns(xi: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+def _make_columns(
+    xi: NDArray[np.float64], u: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the residual and, in further rows, the constant and the regressors of its prediction."""
     signals = [xi, *(_scale(xi * column) for column in u.T)]
     direct = [*u.T, *(_scale(column**2) for column in u.T)]
@@ -143,6 +149,7 @@ def _make_columns(xi: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np
     last = len(xi)
     past = [signal[lags - lag : last - lag] for signal in signals for lag in range(1, lags + 1)]
     past += [signal[lags - lag : last - lag] for signal in direct for lag in range(lags + 1)]
+    past += [y[lags - 1 : last - 1] ** power for power in (1, 2, 3)]
     return np.array([xi[lags:], np.ones(last - lags), *past])
 
 

@@ -9,7 +9,8 @@ import pytest
 import islands
 from islands.data.dataset import Dataset, join
 from islands.errors import RecordError, SettingsError
-from islands.io.result_folder import record_document, result_json, summary
+from islands.io.result_folder import record_document, result_json
+from islands.io.summary_text import summary
 from islands.model.equations import equation, latex_equation
 from islands.model.rendering import plain
 from islands.simulation.predictors import free_run, multiple_shooting, one_step_ahead

@@ -11,9 +11,9 @@ import pytest
 import islands
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel
-from islands.io.model_table import table
 from islands.io.models import read_model, terms_document
-from islands.io.result_folder import content_sha256, result_json, summary, write_result
+from islands.io.result_folder import content_sha256, result_json, write_result
+from islands.io.summary_text import summary
 from islands.simulation.outcome import EvaluationOutcome, Status
 
 LOST = EvaluationOutcome(Status.DIVERGED, "|y| left 1e+06 at sample 17")
@@ -232,17 +232,3 @@ def test_model_files_do_not_depend_on_the_folder_or_the_clock(findings, tmp_path
     for name in names:
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
     assert str(tmp_path) not in "".join((tmp_path / "here" / name).read_text() for name in names)
-
-
-# Text summary.
-
-
-def test_the_summary_shows_record_settings_table_and_equations(findings):
-    lines = summary(findings).splitlines()
-    assert lines[0] == "300 samples, 0.1 s: u_V to y_um"
-    assert "library phi-polynomial" in lines[1]
-    assert lines[1].endswith("seed 7")
-    assert lines[2] == "4 models estimated: 4 ok"
-    assert lines[3].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
-    assert lines[5:10] == table(findings)
-    assert lines[-4].startswith(" 1  y(k) = 1*y(k-1) ")

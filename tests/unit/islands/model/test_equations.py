@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import given
 
-from islands.model.equations import equation, latex_equation, mathml_equation
+from islands.model.equations import equation, latex_equation, mathml_equation, named_equation, named_term
 from islands.model.expression import Apply, Lagged, Primitive
 from islands.model.model import make_model
 from islands.model.parsing import parse
@@ -58,6 +58,20 @@ def test_equation_shows_very_small_and_negative_parameters():
     model = make_model([(parse("y(k-1)"), -1.5e-7), (parse("u(k-1)"), -2.0), (parse("1"), -0.25)])
     assert equation(model) == "y(k) = -1.5e-07*y(k-1) - 2*u(k-1) - 0.25"
     assert latex_equation(model) == r"y_{k} = -1.5 \times 10^{-7} \, y_{k-1} - 2 \, u_{k-1} - 0.25"
+
+
+def test_named_equation_has_the_column_names_of_the_record():
+    terms = [("y(k-1)", 0.5), ("u1(k-2)*u2(k-1)", 2.0), ("max(u10(k-3), y(k-4))", 1.0)]
+    names = ("u2", "flow (l/s)", *(f"a{index}" for index in range(3, 10)), "heat")
+    model = make_model([(parse(text), value) for text, value in terms], names, "T_out")
+    assert sorted(named_equation(model).removeprefix("T_out(k) = ").split(" + ")) == [
+        "0.5*T_out(k-1)",
+        "1*max(T_out(k-4), heat(k-3))",
+        "2*u2(k-2)*[flow (l/s)](k-1)",
+    ]
+    assert {named_term(model, position) for position in range(3)} >= {"T_out(k-1)"}
+    single = make_model([(parse("u(k-1)"), 2.0), (parse("sqrt(u(k-2))"), 1.0)], ("u_V",), "y_um")
+    assert named_equation(single) == "y_um(k) = 2*u_V(k-1) + 1*sqrt(u_V(k-2))"
 
 
 def test_quotient_keeps_its_brackets_after_its_parameter():

@@ -8,6 +8,7 @@ from islands.validation.predictable_residual import measure_structure, predictab
 RNG = np.random.default_rng(3)
 U = RNG.uniform(-1, 1, (2000, 1))
 WHITE = RNG.standard_normal(2000)
+Y = RNG.standard_normal(2000)
 
 
 def moving_average(noise, coefficient=-0.9):
@@ -16,7 +17,7 @@ def moving_average(noise, coefficient=-0.9):
 
 @pytest.mark.parametrize("samples", [3, 10, 40, 200, 2000])
 def test_white_noise_is_hardly_predictable(samples):
-    assert predictable_share(WHITE[:samples], U[:samples]) < 0.05
+    assert predictable_share(WHITE[:samples], U[:samples], Y[:samples]) < 0.05
 
 
 @pytest.mark.parametrize(
@@ -27,39 +28,44 @@ def test_white_noise_is_hardly_predictable(samples):
 def test_the_share_is_the_fraction_of_the_mean_square(missing):
     for noise in (0.3, 3.0):
         residual = missing / missing.std() + noise * WHITE
-        assert predictable_share(residual, U) == pytest.approx(1 / (1 + noise**2), abs=0.06)
+        assert predictable_share(residual, U, Y) == pytest.approx(1 / (1 + noise**2), abs=0.06)
+
+
+def test_an_odd_function_of_the_last_output_is_predictable():
+    missing = np.concatenate([[0.0], np.sign(Y[:-1])])
+    assert predictable_share(missing + WHITE, U, Y) > 0.25
 
 
 def test_a_product_of_residual_and_input_is_predictable():
     residual = WHITE.copy()
     for k in range(1, len(residual)):
         residual[k] += 0.9 * residual[k - 1] * U[k - 1, 0]
-    assert predictable_share(residual, U) > 0.15
+    assert predictable_share(residual, U, Y) > 0.15
 
 
 def test_the_share_of_a_moving_average_is_that_of_its_whitening():
     # The one-step-ahead variance of y(k) = e(k) + c e(k-1) is 1 of 1 + c^2.
-    assert predictable_share(moving_average(WHITE, -0.5), U) == pytest.approx(0.2, abs=0.04)
+    assert predictable_share(moving_average(WHITE, -0.5), U, Y) == pytest.approx(0.2, abs=0.06)
 
 
 def test_the_share_does_not_depend_on_units_or_on_the_number_of_threads():
     residual = moving_average(WHITE) + U[:, 0]
-    share = predictable_share(residual, U)
-    assert predictable_share(1e200 * residual, 1e-200 * U) == pytest.approx(share)
-    assert predictable_share(1e-300 * residual, U + 1e3) == pytest.approx(share, abs=1e-3)
+    share = predictable_share(residual, U, Y)
+    assert predictable_share(1e200 * residual, 1e-200 * U, Y) == pytest.approx(share)
+    assert predictable_share(1e-300 * residual, U + 1e3, Y) == pytest.approx(share, abs=1e-3)
 
 
 def test_inputs_with_dependent_lags_are_no_exception():
     sine = np.sin(np.arange(2000) / 7)[:, None]
-    assert predictable_share(WHITE, sine) < 0.02
-    assert predictable_share(sine[:, 0] + 0.01 * WHITE, sine) > 0.99
-    assert predictable_share(WHITE, np.ones((2000, 20))) < 0.02
+    assert predictable_share(WHITE, sine, Y) < 0.02
+    assert predictable_share(sine[:, 0] + 0.01 * WHITE, sine, Y) > 0.99
+    assert predictable_share(WHITE, np.ones((2000, 20)), Y) < 0.02
 
 
 def test_a_bias_is_predictable_and_a_zero_residual_is_not():
-    assert predictable_share(np.zeros(50), U[:50]) == 0.0
-    assert predictable_share(np.full(50, 3.0), U[:50]) > 0.999
-    assert predictable_share(WHITE + 1.0, U) == pytest.approx(0.5, abs=0.05)
+    assert predictable_share(np.zeros(50), U[:50], Y[:50]) == 0.0
+    assert predictable_share(np.full(50, 3.0), U[:50], Y[:50]) > 0.999
+    assert predictable_share(WHITE + 1.0, U, Y) == pytest.approx(0.5, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -75,12 +81,12 @@ def test_a_bias_is_predictable_and_a_zero_residual_is_not():
     ],
 )
 def test_the_verdict_has_three_levels(one_step, free_run, verdict):
-    found = measure_structure(one_step, free_run, U, output_range=2.0)
+    found = measure_structure(one_step, free_run, U, Y, output_range=2.0)
     assert found.verdict == verdict
 
 
 def test_the_predictable_part_is_given_in_per_cent_of_the_output_range():
-    found = measure_structure(WHITE, 0.02 * U[:, 0] + 0.02, U, output_range=2.0)
+    found = measure_structure(WHITE, 0.02 * U[:, 0] + 0.02, U, Y, output_range=2.0)
     assert found.percent == pytest.approx(100 * 0.02 * np.sqrt(1 / 3 + 1) / 2, rel=0.03)
     assert found.free_run_share == pytest.approx(1.0, abs=1e-6)
-    assert np.isnan(measure_structure(WHITE, None, U, 2.0).percent)
+    assert np.isnan(measure_structure(WHITE, None, U, Y, 2.0).percent)

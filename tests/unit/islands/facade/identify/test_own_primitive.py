@@ -9,7 +9,8 @@ import pytest
 import islands
 from islands.errors import ModelError, SettingsError
 from islands.io.checkpoints import read_checkpoint, state_document, state_from_document, write_checkpoint
-from islands.io.result_folder import result_json, summary
+from islands.io.result_folder import result_json
+from islands.io.summary_text import summary
 from islands.model.primitives import PRIMITIVES
 from islands.model.rendering import plain
 from support.own_primitive import DEAD_ZONE, LAW, SEARCH, record

@@ -1,0 +1,185 @@
+"""Text summary of a result: the recommended model in sentences, the search, and the table of models."""
+
+from collections.abc import Iterator
+from math import isfinite
+
+import numpy as np
+
+from islands.evolution.search_result import RankedModel, SearchResult
+from islands.io.model_table import LEGEND, table
+from islands.model.equations import equation, named_equation, named_term
+from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
+
+#: Smallest R2 of a simulation that counts as good.
+_GOOD_R2 = 0.9
+
+#: Ratio of the errors on validation data and estimation data above which a model does not generalise.
+_LARGE_RATIO = 2.0
+
+#: Standard errors below which a parameter is not significant.
+_SIGNIFICANT = 2.0
+
+#: Closure of a loop, in per cent of the output range, above which the loop is open.
+_OPEN_PERCENT = 5.0
+
+#: Where to look for missing terms, by correlation test.
+_HINTS = {
+    "xi_xi": "terms in past outputs (larger lags, other powers), or a model of coloured noise",
+    "u_xi": "linear or odd terms in {input}, also at other lags",
+    "xi_xiu": "products of past outputs and {input}",
+    "u2_xi": "even terms in {input}, such as squares or absolute values",
+    "u2_xi2": "terms that grow with {input}; the size of the residual depends on it",
+}
+
+
+def summary(found: SearchResult) -> str:
+    """Return the result as plain text."""
+    record, search = found.record, found.search
+    outcomes = ", ".join(f"{count} {name}" for name, count in search.outcomes.items())
+    full = search.full_set
+    lines = [
+        *describe(found),
+        "",
+        f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
+        ", ".join(f"{name} {value}" for name, value in found.settings.items() if name != "own_primitives")
+        + f", seed {found.seed}",
+        f"{search.evaluations} models estimated: {outcomes}",
+        f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
+        "",
+        *table(found),
+        LEGEND,
+        "",
+        *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def describe(found: SearchResult) -> list[str]:
+    """Describe the recommended model in sentences: equation, error, uses, failures and next steps.
+
+    Every statement is about a quantity of the assessment.
+    """
+    entry, recommendation = found.recommended, found.recommendation
+    choice, physics = (*recommendation.reasons, "")[:2]
+    rank, count = recommendation.rank, len(found.models)
+    lines = [
+        f"Recommended: model {rank} of {count}, size {entry.model.size}: {choice}.",
+        f"    {named_equation(entry.model)}",
+        _describe_units(found),
+        _describe_error(found, entry),
+    ]
+    good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
+    bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
+    return [
+        *lines,
+        f"Good for: {'; '.join(good) or 'no use: every check failed'}.",
+        f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
+        f"Next: {'; '.join(_list_next_steps(found, entry))}.",
+    ]
+
+
+def _describe_units(found: SearchResult) -> str:
+    record = found.record
+    columns = zip(
+        (record.output_name, *record.input_names), (record.output_unit, *record.input_units), strict=True
+    )
+    units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
+    return f"    {f'{units}; ' if units else ''}k counts samples of {record.dt:g} s."
+
+
+def _describe_error(found: SearchResult, entry: RankedModel) -> str:
+    free, one = (entry.assessment.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
+    if not isfinite(free.rmse):
+        error = "the free run on the validation data diverges"
+    else:
+        error = (
+            f"free run on the validation data, from the inputs alone, RMSE {_unit(found, free.rmse)}, "
+            f"mean absolute error {free.mape:.3g} % of the output range, R2 {free.r2:.5f}"
+        )
+    return f"Error: {error}; one step ahead RMSE {_unit(found, one.rmse)}."
+
+
+def _unit(found: SearchResult, value: float) -> str:
+    return f"{value:.4g} {found.record.output_unit}".rstrip()
+
+
+def _list_uses(entry: RankedModel) -> Iterator[str]:
+    free, one = (entry.assessment.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
+    if free.r2 >= _GOOD_R2:
+        yield "simulation from the inputs alone"
+    elif one.r2 >= _GOOD_R2:
+        yield "prediction one step ahead"
+    if entry.assessment.residual_structure.verdict == ADEQUATE:
+        yield f"no structure is left in the residual (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
+
+
+def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
+    assessment = entry.assessment
+    errors = {part: assessment.metrics[part]["free_run"] for part in ("estimation", "validation")}
+    if errors["validation"].r2 < _GOOD_R2:
+        yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
+    physics = assessment.physics
+    diverging = [f"{test.name}" for test in physics.excursions if not test.bounded]
+    if diverging:
+        yield f"diverges at {', '.join(diverging)}"
+    held = sum(not hold.bounded for hold in physics.holds)
+    if held:
+        yield f"diverges in {held} of {len(physics.holds)} holds of the inputs"
+    if found.requires_property_1 and not physics.property_1 and isfinite(physics.hold_drift_percent):
+        yield f"the output drifts by {physics.hold_drift_percent:.3g} % of its range at constant input"
+    opened = [test for test in physics.excursions if test.bounded and test.closure_percent > _OPEN_PERCENT]
+    if found.claims_hysteresis and opened:
+        worst = max(opened, key=lambda test: test.closure_percent)
+        yield f"loops do not close at {worst.name}: {worst.closure_percent:.3g} % of the output range"
+    structure = assessment.residual_structure
+    if structure.verdict != ADEQUATE and isfinite(structure.percent):
+        yield (
+            f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable, "
+            f"{structure.percent:.2g} % of the output range"
+        )
+    ratio = errors["validation"].rmse / errors["estimation"].rmse if errors["estimation"].rmse > 0 else 0.0
+    if ratio > _LARGE_RATIO:
+        yield f"the free-run error on the validation data is {ratio:.2g} times that on the estimation data"
+
+
+def _list_insignificant(entry: RankedModel) -> list[str]:
+    model = entry.model
+    if model.standard_errors is None:
+        return []
+    values = zip(model.parameters, model.standard_errors, strict=True)
+    return [
+        named_term(model, position)
+        for position, (theta, error) in enumerate(values)
+        if abs(theta) < _SIGNIFICANT * error
+    ]
+
+
+def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
+    steps = []
+    structure = entry.assessment.residual_structure
+    if structure.verdict != ADEQUATE:
+        largest = max(found.models, key=lambda other: other.model.size).model.size
+        if entry.model.size == largest and "max_terms" in found.settings:
+            steps.append(f"allow more than {largest} terms")
+        steps.append(f"try {_suggest_terms(found, entry)}")
+    errors = [entry.assessment.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
+    if errors[1] > _LARGE_RATIO * errors[0] > 0:
+        steps.append("estimate from a record that covers the amplitudes and rates of the validation data")
+    weak = _list_insignificant(entry)
+    if weak:
+        more = f" and {len(weak) - 1} more" if len(weak) > 1 else ""
+        steps.append(
+            f"try a longer record or a smaller model, since {weak[0]}{more} has less than two standard errors"
+        )
+    steps.append("check the model on a record that was not used (islands simulate)")
+    return steps
+
+
+def _suggest_terms(found: SearchResult, entry: RankedModel) -> str:
+    """Return the hint of the test with an input that exceeds its limit by most, or of the one without."""
+    past, *tests = entry.assessment.residual_tests.tests
+    # The residual of a slow record is correlated in time whatever term is missing.
+    excess = [float(np.abs(test.values).max()) / test.limit for test in tests]
+    worst = tests[int(np.argmax(excess))] if max(excess) > 1.0 else past
+    name = "" if worst.input is None else found.record.input_names[worst.input]
+    return _HINTS[worst.name].format(input=name)

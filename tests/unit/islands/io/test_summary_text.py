@@ -1,0 +1,133 @@
+"""Text summary: sentences about the recommended model, each about a measured quantity, and the table."""
+
+from dataclasses import replace
+from math import nan
+
+import pytest
+
+import islands
+from islands.data.dataset import Dataset
+from islands.io.model_table import table
+from islands.io.summary_text import describe, summary
+from islands.simulation.outcome import EvaluationOutcome, Status
+from islands.validation.metrics import Metrics
+from islands.validation.predictable_residual import ResidualStructure
+from support.searches import record
+
+LOST = EvaluationOutcome(Status.DIVERGED, "at sample 17")
+
+
+@pytest.fixture(scope="module")
+def findings():
+    data = record(300)
+    named = Dataset(data.u, data.y, 0.1, ("u_V",), "y_um", ("V",), "um")
+    return islands.fit(named, max_terms=4, seed=7).with_wall_time(0.5).search_result
+
+
+def said(findings, **changes):
+    """Return the sentences by first word, for a result with one model whose assessment is changed."""
+    entry = findings.recommended
+    changed = replace(entry, assessment=replace(entry.assessment, **changes))
+    lines = describe(replace(findings, models=(changed,)))
+    return {line.partition(":")[0]: line for line in lines if not line.startswith(" ")}
+
+
+def errors(findings, validation, **others):
+    metrics = findings.recommended.assessment.metrics
+    return {
+        "estimation": metrics["estimation"] | others,
+        "validation": metrics["validation"] | {"free_run": validation},
+    }
+
+
+def test_the_summary_begins_with_sentences_and_contains_the_table(findings):
+    lines = summary(findings).splitlines()
+    sentences = describe(findings)
+    assert lines[: len(sentences)] == sentences
+    rest = lines[len(sentences) + 1 :]
+    assert rest[0] == "300 samples, 0.1 s: u_V to y_um"
+    assert "library phi-polynomial" in rest[1]
+    assert rest[1].endswith("seed 7")
+    assert rest[2] == "4 models estimated: 4 ok"
+    assert rest[3].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
+    assert rest[5:10] == table(findings)
+    assert rest[10] == "* recommended"
+    assert rest[-4].startswith(" 1  y(k) = 1*y(k-1) ")
+
+
+def test_the_equation_has_the_names_and_units_of_the_record(findings):
+    first, text, units, error, *_ = describe(findings)
+    rank, size = findings.recommendation.rank, findings.recommended.model.size
+    assert first.startswith(f"Recommended: model {rank} of 4, size {size}: ")
+    assert text.strip().startswith("y_um(k) = 1*y_um(k-1) ")
+    assert "(u_V(k-1) - u_V(k-2))" in text
+    assert units.strip() == "y_um in um, u_V in V; k counts samples of 0.1 s."
+    rmse = findings.recommended.assessment.metrics["validation"]["free_run"].rmse
+    assert f"RMSE {rmse:.4g} um" in error
+
+
+def test_uses_and_failures_follow_the_free_run(findings):
+    good, bad = Metrics(1.0, 0.99, 0.1, 90.0), Metrics(20.0, 0.3, 2.0, 10.0)
+    assert "simulation from the inputs alone" in said(findings, metrics=errors(findings, good))["Good for"]
+    poor = said(findings, metrics=errors(findings, bad))
+    assert "simulation" not in poor["Good for"]
+    assert "prediction one step ahead" in poor["Good for"]
+    assert "simulation from the inputs alone: R2 0.300" in poor["Fails at"]
+    lost = Metrics(nan, nan, nan, nan)
+    diverged = said(
+        findings, metrics=errors(findings, lost), outcomes={"validation": {"free_run": LOST}} | {}
+    )
+    assert "the free run on the validation data diverges" in diverged["Error"]
+
+
+def test_an_error_that_grows_on_validation_data_is_a_failure(findings):
+    small, large = Metrics(1.0, 0.99, 0.1, 90.0), Metrics(3.0, 0.95, 0.31, 70.0)
+    found = said(findings, metrics=errors(findings, large, free_run=small))
+    assert "3.1 times that on the estimation data" in found["Fails at"]
+    assert "estimate from a record that covers" in found["Next"]
+    assert "times that" not in said(findings, metrics=errors(findings, small, free_run=small))["Fails at"]
+
+
+def test_excursions_and_holds_that_diverge_are_failures(findings):
+    physics = findings.recommended.assessment.physics
+    fast = (*physics.excursions[:-1], replace(physics.excursions[-1], bounded=False))
+    found = said(findings, physics=replace(physics, excursions=fast))
+    assert "diverges at rate x 5" in found["Fails at"]
+    assert "no model passes the physics checks" in found["Fails at"]
+    holds = (replace(physics.holds[0], bounded=False), *physics.holds[1:])
+    assert "diverges in 1 of 10 holds" in said(findings, physics=replace(physics, holds=holds))["Fails at"]
+    drifting = tuple(replace(hold, constant=False, drift_percent=7.5) for hold in physics.holds)
+    found = said(findings, physics=replace(physics, holds=drifting))
+    assert "drifts by 7.5 % of its range at constant input" in found["Fails at"]
+    opened = tuple(replace(test, closure_percent=6.0) for test in physics.excursions)
+    found = said(findings, physics=replace(physics, excursions=opened))
+    assert "loops do not close at minor-loops: 6 %" in found["Fails at"]
+
+
+def test_structure_in_the_residual_is_a_failure_with_a_hint(findings):
+    tests = findings.recommended.assessment.residual_tests
+    worst = tests.tests[3]
+    assert worst.name == "u2_xi"
+    values = worst.values.copy()
+    values[3] = 0.9
+    changed = replace(tests, tests=(*tests.tests[:3], replace(worst, values=values), tests.tests[4]))
+    structure = ResidualStructure(0.4, 0.5, 0.7, "minor")
+    found = said(findings, residual_tests=changed, residual_structure=structure)
+    assert "50 % of the free-run residual is predictable, 0.7 % of the output range" in found["Fails at"]
+    assert "even terms in u_V" in found["Next"]
+    assert "no structure" not in found["Good for"]
+    clean = ResidualStructure(0.02, 0.5, 0.7, "adequate")
+    found = said(findings, residual_structure=clean)
+    assert "no structure is left in the residual" in found["Good for"]
+    assert "terms in" not in found["Next"]
+
+
+def test_a_parameter_below_two_standard_errors_is_named(findings):
+    entry = findings.recommended
+    theta = entry.model.parameters
+    model = entry.model.with_parameters(theta, [abs(value) / 3 for value in theta])
+    certain = describe(replace(findings, models=(replace(entry, model=model),)))[-1]
+    assert "standard errors" not in certain
+    model = entry.model.with_parameters(theta, [abs(theta[0]), *(abs(value) / 3 for value in theta[1:])])
+    weak = describe(replace(findings, models=(replace(entry, model=model),)))[-1]
+    assert "y_um(k-1) has less than two standard errors" in weak
