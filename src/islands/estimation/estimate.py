@@ -87,6 +87,6 @@ def _estimate_constrained(
     if not found.outcome:
         return found.outcome
     return FittedStructure(
-        structure.with_parameters(found.theta.tolist(), found.standard_errors.tolist()),
+        structure.with_parameters(constrained.enforce(found.theta).tolist(), found.standard_errors.tolist()),
         found.residual_variance,
     )

@@ -49,6 +49,20 @@ class Constrained:
     c: NDArray[np.float64]
     signs: NDArray[np.float64]
 
+    def enforce(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return parameters that meet the constraint up to the rounding of the terms in it.
+
+        Least squares scales the parameters by the norms of their columns. The rounding errors are relative to
+        the largest contribution to the output, which may be far larger than the terms of a constraint.
+        """
+        found = eliminate(self.S, self.c)
+        assert not isinstance(found, int), "the rows are consistent"
+        pivots = list(found.pivots)
+        corrected = theta.copy()
+        corrected[pivots] = 0.0
+        corrected[pivots] = found.fixed - found.share @ corrected
+        return corrected
+
     def has_signs(self, theta: NDArray[np.float64]) -> bool:
         """Return whether every parameter has its sign."""
         return bool(np.all(self.signs * theta >= 0.0))

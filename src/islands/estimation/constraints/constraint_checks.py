@@ -77,10 +77,8 @@ def _check(part: Part, model: Model) -> ConstraintCheck:
 def _check_sums(part: ClusterSums, model: Model) -> ConstraintCheck:
     groups = clusters(model.regressors, part.group)
     complete = part.sums.keys() <= {group.steady_state for group in groups}
-    largest = max(
-        (abs(group.total(model.parameters) - part.sums.get(group.steady_state, 0.0)) for group in groups),
-        default=0.0,
-    )
+    deviations = [group.total(model.parameters) - part.sums.get(group.steady_state, 0.0) for group in groups]
+    largest = max(map(abs, deviations), default=0.0)
     return ConstraintCheck(part.text, 0.0, largest if complete else nan, complete and largest <= TOLERANCE)
 
 
