@@ -19,10 +19,25 @@ from islands.simulation.outcome import EvaluationOutcome, Status
 
 @dataclass(frozen=True, slots=True)
 class FittedStructure:
-    """A model with parameters, and the variance of its equation error (the one-step-ahead residual)."""
+    """A model with estimated parameters.
+
+    Attributes
+    ----------
+    model : Model
+    residual_variance : float
+        Variance of the equation error (the one-step-ahead residual), or of the residual that another
+        estimator minimises.
+    noise : tuple of float
+        Coefficients of the noise terms e(k-1), e(k-2), ... of extended least squares.
+    least_squares_bias : float or None
+        Largest difference of a parameter from least squares in standard errors; see `least_squares_bias` in
+        `islands.estimation.estimators`. None for least squares itself.
+    """
 
     model: Model
     residual_variance: float
+    noise: tuple[float, ...] = ()
+    least_squares_bias: float | None = None
 
 
 def estimate(
