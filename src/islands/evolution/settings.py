@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 from islands.errors import SettingsError, lookup
 from islands.estimation.constraints.constraint_parser import FORMS
+from islands.estimation.estimators import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.evolution.gp.err_targets import ERR_TARGETS
 from islands.evolution.gp.fitness import FITNESSES
@@ -112,6 +113,9 @@ class Settings:
         Whether the elite contains each structure only once.
     refine : bool
         Whether to refine the parameters of the hall of fame by minimising the shooting error.
+    estimator : str
+        An entry of ``ESTIMATORS``, which estimates the parameters of the final models. Empty: least squares
+        and, with ``refine``, refinement; the validation data select between the two.
     islands : int
         Number of islands, each with a separate population.
     topology : str
@@ -167,6 +171,9 @@ class Settings:
     from_library: float = 0.0
     distinct: bool = False
     refine: bool = False
+    estimator: str = _option(
+        "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"
+    )
     islands: int = _option(1, "Number of islands that evolve in parallel.")
     topology: str = _option("isolated", f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
     migrate_every: int | str = _option(
@@ -213,6 +220,8 @@ class Settings:
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")
         lookup(ERR_TARGETS, self.err_target, "err_target")
+        if self.estimator:
+            lookup(ESTIMATORS, self.estimator, "estimator")
         primitive_table(self.primitives)
         if any(shift < 1 for shift in self.shifts):
             raise SettingsError(f"back-shifts are at least 1, got {self.shifts}")

@@ -8,6 +8,8 @@ from typing import Protocol, TypeVar
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.deviations import Offsets, estimate_deviations, subtract_offsets
+from islands.estimation.estimate import FittedStructure
+from islands.estimation.estimators import ESTIMATORS, estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.evolution.generation.evaluation import Evaluator
@@ -75,7 +77,7 @@ def estimate_candidates(
     Structures are those of the hall of fame and those that seeded the search, so that the result is never
     worse than the seeds. All of them are simulated on the validation data with the parameters of the search.
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
-    refined over several shooting intervals.
+    refined over several shooting intervals. An estimator in the settings replaces both.
     """
     validation = subtract_offsets(split.validation, offsets)
     found = []
@@ -129,11 +131,14 @@ def _estimate_models(
         )
         for each in individuals
     )
-    estimated = [
-        each.model
+    fitted = [
+        each
         for each in found
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
+    if settings.estimator:
+        return _estimate_with_choice(fitted, problem, split)
+    estimated = [each.model for each in fitted]
     validated = _validate(estimated, 1, split.validation, problem)
     if settings.refine:
         interval = FITNESSES[settings.fitness](settings.shooting)
@@ -144,6 +149,27 @@ def _estimate_models(
         for length in lengths:
             validated += _refine(best, length, problem, split)
     return validated
+
+
+def _estimate_with_choice(
+    fitted: list[FittedStructure], problem: Problem, split: Split
+) -> list[ValidatedModel]:
+    """Return models with the parameters of the estimator that the settings choose."""
+    settings = problem.settings
+    found = (
+        estimate_with(
+            settings.estimator,
+            start,
+            split.estimation,
+            settings.constraints,
+            settings.maximum_lag,
+            settings.shooting,
+        )
+        for start in fitted
+    )
+    models = [each.model for each in found if not isinstance(each, EvaluationOutcome)]
+    interval = ESTIMATORS[settings.estimator].interval(settings.shooting)
+    return _validate(models, interval, split.validation, problem)
 
 
 def _refine(

@@ -4,7 +4,7 @@ from collections import Counter
 
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
-from islands.errors import SettingsError
+from islands.errors import SettingsError, lookup
 from islands.estimation.deviations import (
     OPERATING_POINT,
     estimate_deviations,
@@ -12,6 +12,7 @@ from islands.estimation.deviations import (
     no_offsets,
     subtract_offsets,
 )
+from islands.estimation.estimators import ESTIMATORS, estimate_with
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.input_ranking import screen_candidates
 from islands.estimation.parameter_constraints import constraint
@@ -43,6 +44,7 @@ def fit(
     lags: int | None = None,
     max_terms: int = 10,
     constraints: str | None = None,
+    estimator: str = "least-squares",
     shooting: int | None = None,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
@@ -64,6 +66,8 @@ def fit(
     constraints : str, optional
         ``hysteresis``, ``none`` or statements such as ``odd; gain = 2.5``; None takes the default of the
         library.
+    estimator : str
+        An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures.
     shooting : int, optional
         Samples of each interval of multiple shooting.
     seed : int
@@ -88,6 +92,7 @@ def fit(
     lags = entry.lags if lags is None else lags
     constraints = entry.constraints if constraints is None else constraints
     constraint(constraints).check_inputs(record.inputs)
+    lookup(ESTIMATORS, estimator, "estimator")
     if max_terms < 1:
         raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
     parts = split_data(record, validation)
@@ -114,6 +119,8 @@ def fit(
     models = []
     for done, (structure, offsets) in enumerate(structures, start=1):
         estimated = estimate_deviations(structure, offsets, parts.estimation, constraints, warm_up)
+        if not isinstance(estimated, EvaluationOutcome):
+            estimated = estimate_with(estimator, estimated, parts.estimation, constraints, warm_up, shooting)
         if isinstance(estimated, EvaluationOutcome):
             outcomes[estimated.verdict.name.lower()] += 1
             continue
@@ -142,12 +149,14 @@ def fit(
         "lags": lags,
         "max_terms": max_terms,
         "constraints": constraints,
+        "estimator": estimator,
         "shooting": shooting,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
     found = SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values()))
+    interval = ESTIMATORS[estimator].interval(shooting)
     estimates = [
-        ValidatedModel(entry.model, 1, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
+        ValidatedModel(entry.model, interval, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
     return Result(with_bands(found, estimates, constraints, warm_up))

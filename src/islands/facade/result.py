@@ -10,6 +10,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.constraint_checks import ConstraintCheck
+from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.export import export
 from islands.io.result_folder import write_result
@@ -155,6 +156,17 @@ class FittedModel:
         if ensemble is None:
             raise ModelError("the result has no ensemble: the free run of every model diverged")
         return ensemble
+
+    @property
+    def least_squares_bias(self) -> float | None:
+        """Largest bias of least squares for this structure, in standard errors; None if it is unknown.
+
+        Above 2 to 3 the noise is coloured or a term is missing: take another entry of ``ESTIMATORS``. The
+        estimation runs at each access.
+        """
+        result = self.search_result
+        found = least_squares_bias(self.model, result.split.estimation, str(result.settings["constraints"]))
+        return None if isinstance(found, EvaluationOutcome) else found
 
     def plot(self, kind: str = "free-run") -> "Figure":
         """Draw a figure of the model; ``kind`` is a key of ``islands.figures.registry.FIGURES``."""

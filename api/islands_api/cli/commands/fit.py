@@ -8,6 +8,7 @@ import typer
 
 import islands
 from islands.estimation.constraints.constraint_parser import FORMS
+from islands.estimation.estimators import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.io.records import read_record
 from islands.io.records.row_range import parse_rows
@@ -44,6 +45,7 @@ def fit(
             "By default those of the library.",
         ),
     ] = None,
+    estimator: Annotated[str, typer.Option("--estimator", help=", ".join(ESTIMATORS))] = "least-squares",
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
     ] = None,
@@ -67,6 +69,7 @@ def fit(
             lags=lags,
             max_terms=max_terms,
             constraints=constraints,
+            estimator=estimator,
             shooting=shooting,
             seed=seed,
             progress=show,

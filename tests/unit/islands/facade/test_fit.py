@@ -172,6 +172,7 @@ def test_result_has_the_values_of_default_settings():
         "lags": 3,
         "max_terms": 2,
         "constraints": "none",
+        "estimator": "least-squares",
         "shooting": 30,
         "validation": 0.25,
     }
@@ -331,6 +332,7 @@ def test_progress_fractions_are_monotonic(samples):
     ("settings", "message"),
     [
         ({"library": "wavelets"}, "unknown library 'wavelets': take one of phi-polynomial, polynomial"),
+        ({"estimator": "kalman"}, "unknown estimator 'kalman': take one of least-squares, extended-"),
         ({"constraints": "passive"}, "unknown constraints 'passive': take one of none, hysteresis"),
         ({"max_terms": 0}, "a model has at least one term, got max_terms = 0"),
         ({"degree": 0}, "degree and lags are at least 1, got 0 and 3"),

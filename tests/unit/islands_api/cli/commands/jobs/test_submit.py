@@ -29,6 +29,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "shooting": (("50",), 50),
     "primitives": (("mul", "phi1"), ["mul", "phi1"]),
     "constraints": (("none",), "none"),
+    "estimator": (("free-run",), "free-run"),
     "islands": (("3",), 3),
     "topology": (("ring",), "ring"),
     "migrate_every": (("2,5:3",), "2,5:3"),
