@@ -92,10 +92,10 @@ def _describe_error(found: SearchResult, entry: RankedModel) -> str:
     if not isfinite(free.rmse):
         error = "the free run on the validation data diverges"
     else:
-        error = (
-            f"free run on the validation data, from the inputs alone, RMSE {_unit(found, free.rmse)}, "
-            f"mean absolute error {free.mape:.3g} % of the output range, R2 {free.r2:.5f}"
-        )
+        error = f"free run on the validation data, from the inputs alone, RMSE {_unit(found, free.rmse)}"
+        # Both are undefined for a constant output.
+        error += f", mean absolute error {free.mape:.3g} % of the output range" if isfinite(free.mape) else ""
+        error += f", R2 {free.r2:.5f}" if isfinite(free.r2) else ""
     return f"Error: {error}; one step ahead RMSE {_unit(found, one.rmse)}."
 
 

@@ -105,8 +105,9 @@ def predictable_share(residual: NDArray[np.float64], u: NDArray[np.float64], y: 
     """Return the predictable share of the mean square of a residual.
 
     The predictor is linear in past residuals, present and past inputs and their squares, and products of past
-    residuals and inputs, as in the tests of `residual_tests`, and in three powers of the last output. Each half of the residual is predicted with the
-    coefficients of the other half, so that chance does not count; a negative share is 0.
+    residuals and inputs, as in the tests of `residual_tests`, and in three powers of the last output. Each
+    half of the residual is predicted with the coefficients of the other half, so that chance does not count;
+    a negative share is 0.
 
     Parameters
     ----------
