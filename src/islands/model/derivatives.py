@@ -11,7 +11,7 @@ _Partials = tuple[float, ...]
 
 
 def _differentiate_div(a: float, b: float) -> _Partials:
-    return (1.0 / b, -a / (b * b)) if b else (math.nan, math.nan)
+    return (1.0 / b, -(a / b) / b) if b else (math.nan, math.nan)
 
 
 def _differentiate_sqrt(a: float) -> _Partials:

@@ -5,6 +5,7 @@ An equality is one row of ``S theta = c`` whose coefficient for a regressor depe
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import nan
 
 from islands.model.clusters import steady_state
 from islands.model.derivatives import differentiate
@@ -60,9 +61,15 @@ class FixedPoint:
         return len(self.point) - 1
 
     def weigh(self, regressor: Regressor) -> float:
-        """Return the coefficient of the regressor's parameter: its steady state at the point."""
+        """Return the coefficient of the regressor's parameter: its steady state at the point.
+
+        NaN if the regressor overflows there.
+        """
         weight, state = steady_state(regressor)
-        return weight * value(state, lambda channel, _: self.point[channel]) if weight else 0.0
+        try:
+            return weight * value(state, lambda channel, _: self.point[channel]) if weight else 0.0
+        except (ArithmeticError, ValueError):
+            return nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,18 +110,22 @@ class StaticGain:
         return self.slope(regressor, self.channel) + self.gain * self.slope(regressor, 0)
 
     def slope(self, regressor: Regressor, channel: int) -> float:
-        """Return the derivative of the regressor's steady state with respect to a channel."""
+        """Return the derivative of the regressor's steady state with respect to a channel.
+
+        NaN if it is not defined or the regressor overflows at the operating point.
+        """
         weight, state = steady_state(regressor)
         if not weight:
             return 0.0
-        return (
-            weight
-            * differentiate(
+        try:
+            _, slope = differentiate(
                 state,
                 lambda each: self.point[each] if self.point else 0.0,
                 lambda each: float(each == channel),
-            )[1]
-        )
+            )
+        except (ArithmeticError, ValueError):
+            return nan
+        return weight * slope
 
 
 @dataclass(frozen=True, slots=True)

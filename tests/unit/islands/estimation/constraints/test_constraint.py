@@ -88,6 +88,12 @@ def test_term_without_a_slope_at_the_operating_point_is_removed():
     assert constraint("gain = 1 at 1, 0").constrain(items).regressors == tuple(items)
 
 
+@pytest.mark.parametrize("text", ["fixed-point = 1e200, 1e200", "gain = 1 at 1e200, 0"])
+def test_term_that_overflows_at_the_point_is_removed(text):
+    items = make_regressors("y(k-1)", "u(k-1)", "sin(u(k-1)^2)")
+    assert texts(constraint(text).constrain(items).regressors) == ["y(k-1)", "u(k-1)"]
+
+
 def test_rows_that_follow_from_others_do_not_count():
     items = make_regressors(*TERMS)
     # The mirrored point makes the constraints on the odd and on the even terms separate.

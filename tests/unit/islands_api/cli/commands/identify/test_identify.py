@@ -206,11 +206,12 @@ def test_missing_arguments_are_named(run):
 
 
 def test_options_reach_the_settings(run, tmp_path):
-    own = ("--primitive", "mul", "--primitive", "phi1", "--constraints", "none", "--preset", "hysteresis")
+    text = "odd; [u(k-1)] >= 0"
+    own = ("--primitive", "mul", "--primitive", "phi1", "--constraints", text, "--preset", "hysteresis")
     assert run("r.csv", *COLUMNS, *SMALL, *own, "--out", "out")[0] == 0
     settings = json.loads((tmp_path / "out/result.json").read_text())["settings"]
     assert settings["primitives"] == ["mul", "phi1"]
-    assert (settings["constraints"], settings["preset"]) == ("none", "hysteresis")
+    assert (settings["constraints"], settings["preset"]) == (text, "hysteresis")
     assert (settings["population"], settings["generations"], settings["shooting"]) == (10, 3, 50)
     assert (settings["max_terms"], settings["max_height"]) == (3, 3)
 
