@@ -151,13 +151,15 @@ def _extend(
     found = extended_least_squares(np.array(psi), y, constrained.S, constrained.c, rows)
     if isinstance(found, EvaluationOutcome):
         return found
-    if not constrained.has_signs(found.estimate.theta):
+    theta = constrained.enforce(found.estimate.theta)
+    if not constrained.has_signs(theta):
         return EvaluationOutcome(
             Status.INFEASIBLE, "a parameter has the wrong sign under coloured noise: remove its term"
         )
-    theta, errors = found.estimate.theta.tolist(), found.estimate.standard_errors.tolist()
     return FittedStructure(
-        model.with_parameters(theta, errors), found.estimate.residual_variance, found.noise
+        model.with_parameters(theta.tolist(), found.estimate.standard_errors.tolist()),
+        found.estimate.residual_variance,
+        found.noise,
     )
 
 
