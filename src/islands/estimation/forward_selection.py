@@ -7,8 +7,13 @@ the constraint then forbids.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
+from islands.estimation.constraints.constraint import Direction
 from islands.estimation.froe import froe
 from islands.estimation.parameter_constraints import constraint
 from islands.model.model import canonical_order
@@ -17,6 +22,51 @@ from islands.program.regressor_matrix import gram_matrix
 from islands.simulation.outcome import EvaluationOutcome
 
 Structure = tuple[Regressor, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SelectionProblem:
+    """Candidates of a selection and their inner products.
+
+    Attributes
+    ----------
+    fixed : tuple of Regressor
+        Regressors of every model.
+    free : tuple of Direction
+        Candidates. Ties go to the first.
+    gram : ndarray, shape (candidates + 1, candidates + 1)
+        Inner products of the candidates and, last, the target.
+    rows : int
+        Number of rows of the record in the inner products.
+    """
+
+    fixed: Structure
+    free: tuple[Direction, ...]
+    gram: NDArray[np.float64]
+    rows: int
+
+    def compose(self, positions: Sequence[int]) -> Structure:
+        """Return the structure of the fixed regressors and some candidates, in canonical order."""
+        chosen = [item for position in positions for item in self.free[position].regressors]
+        return tuple(canonical_order([*self.fixed, *chosen]))
+
+
+def make_selection_problem(
+    library: Sequence[Regressor], record: Dataset, constraints: str = "none"
+) -> SelectionProblem | EvaluationOutcome:
+    """Compute the inner products of the candidates of a library under a constraint.
+
+    Return INFEASIBLE if the library cannot meet the constraint.
+    """
+    found = constraint(constraints).directions(library)
+    if isinstance(found, EvaluationOutcome):
+        return found
+    warm_up = max(item.maximum_lag for item in library)
+    # Ties go to the first candidate: take the one of the lowest degree.
+    free = sorted(found.free, key=lambda direction: max(item.degree for item in direction.regressors))
+    gram = gram_matrix([*(direction.expression for direction in free), found.target], record, warm_up)
+    rows = sum(max(0, length - warm_up) for length in record.segments)
+    return SelectionProblem(found.fixed, tuple(free), gram, rows)
 
 
 def forward_selection(
@@ -47,23 +97,24 @@ def forward_selection(
     tuple of structures, or EvaluationOutcome
         Regressors in canonical order. INFEASIBLE if the library cannot meet the constraint.
     """
-    found = constraint(constraints).directions(library)
-    if isinstance(found, EvaluationOutcome):
-        return found
-    warm_up = max(item.maximum_lag for item in library)
-    # Ties go to the first candidate: take the one of the lowest degree.
-    free = sorted(found.free, key=lambda direction: max(item.degree for item in direction.regressors))
-    gram = gram_matrix([*(direction.expression for direction in free), found.target], record, warm_up)
-    structures = [tuple(found.fixed)] if found.fixed else []
-    selected: list[Regressor] = list(found.fixed)
-    selection = froe(gram, max_terms=max_terms)
+    problem = make_selection_problem(library, record, constraints)
+    if isinstance(problem, EvaluationOutcome):
+        return problem
+    return select_forward(problem, max_terms, least_gain)
+
+
+def select_forward(
+    problem: SelectionProblem, max_terms: int = 10, least_gain: float = 0.0
+) -> tuple[Structure, ...]:
+    """Return nested structures, as `forward_selection`."""
+    structures = [problem.fixed] if problem.fixed else []
+    selection = froe(problem.gram, max_terms=max_terms)
     remaining = 1.0
-    for position, ratio in zip(selection.order, selection.err, strict=True):
+    for count, ratio in enumerate(selection.err, start=1):
         if ratio < least_gain * remaining:
             break
         remaining -= ratio
-        selected += free[position].regressors
-        structure = tuple(canonical_order(selected))
+        structure = problem.compose(selection.order[:count])
         if len(structure) > max_terms:
             break
         structures.append(structure)

@@ -10,6 +10,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
 from islands.data.split import Split
+from islands.estimation.certificate import Certificate
 from islands.evolution.history import HistoryPoint
 from islands.model.equations import equation
 from islands.model.model import Model
@@ -64,6 +65,8 @@ class SearchStatistics:
         Bytes in use at the end of an evolution and byte limit of each cache, by name.
     ended_by : str or None
         Budget that an evolution used up, or ``stopped``; None if the search is not an evolution.
+    certificates : mapping
+        Certificate of the candidate library by number of terms; empty if none was computed.
     """
 
     evaluations: int
@@ -76,6 +79,7 @@ class SearchStatistics:
     history: tuple[HistoryPoint, ...] = ()
     caches: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     ended_by: str | None = None
+    certificates: Mapping[int, Certificate] = field(default_factory=dict)
 
     @property
     def evaluations_per_second(self) -> float | None:

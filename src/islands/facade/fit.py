@@ -1,19 +1,26 @@
-"""Forward selection over a candidate library, (constrained) least squares, assessment."""
+"""Subset selection over a candidate library, (constrained) least squares, assessment."""
 
 from collections import Counter
 
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import SettingsError, lookup
+from islands.estimation.certificate import Certificate, certify, combine_certificates
 from islands.estimation.deviations import (
+    LARGE_OFFSET,
     OPERATING_POINT,
+    Offsets,
     estimate_deviations,
     find_offsets,
     no_offsets,
     subtract_offsets,
 )
 from islands.estimation.estimators import ESTIMATORS, estimate_with
-from islands.estimation.forward_selection import forward_selection
+from islands.estimation.forward_selection import (
+    Structure,
+    make_selection_problem,
+    select_forward,
+)
 from islands.estimation.input_ranking import screen_candidates
 from islands.estimation.parameter_constraints import constraint
 from islands.evolution.progress import ProgressCallback, ignore_progress
@@ -46,10 +53,11 @@ def fit(
     constraints: str | None = None,
     estimator: str = "least-squares",
     shooting: int | None = None,
+    certificate: int = 10_000,
     seed: int = 0,
     progress: ProgressCallback = ignore_progress,
 ) -> Result:
-    """Fit nested models to a record by forward selection and rank them on validation data.
+    """Fit models of increasing size to a record by subset selection and rank them on validation data.
 
     Parameters
     ----------
@@ -70,6 +78,9 @@ def fit(
         An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures.
     shooting : int, optional
         Samples of each interval of multiple shooting.
+    certificate : int
+        Nodes of the search for the best structure of each size, and for the bound on the one-step-ahead error
+        of all others; 0 for forward selection only.
     seed : int
         Stored in the result; forward selection is deterministic.
     progress : callable, optional
@@ -95,26 +106,16 @@ def fit(
     lookup(ESTIMATORS, estimator, "estimator")
     if max_terms < 1:
         raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
+    if certificate < 0:
+        raise SettingsError(f"a search has at least 0 nodes, got certificate = {certificate}")
     parts = split_data(record, validation)
     shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
 
-    structures = []
-    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
-    # in deviations from it. The validation data tell which one holds.
-    tried = [no_offsets(record)]
-    if constraint(constraints).allows_offsets:
-        tried.append(find_offsets(parts.estimation, OPERATING_POINT))
-    for offsets in dict.fromkeys(tried):
-        deviations = subtract_offsets(parts.estimation, offsets)
-        pool = screen_candidates(library, degree, lags, deviations, constraints)
-        progress(f"inner products of {len(pool)} candidates", 0.0)
-        selected = forward_selection(pool, deviations, constraints, max_terms)
-        if isinstance(selected, EvaluationOutcome):
-            raise SettingsError(f"nothing can be fitted with these settings: {selected}")
-        structures += [(structure, offsets) for structure in selected]
-    warm_up = max(item.maximum_lag for item in pool)
+    structures, certificates, warm_up = _select(
+        parts.estimation, (library, degree, lags), constraints, max_terms, certificate, progress
+    )
     outcomes: Counter[str] = Counter()
     models = []
     for done, (structure, offsets) in enumerate(structures, start=1):
@@ -140,7 +141,10 @@ def fit(
     rows = sum(max(0, length - warm_up) for length in parts.estimation.segments)
     count = full_set(degree, lags, lags, record.inputs)
     search = SearchStatistics(
-        sum(outcomes.values()), dict(outcomes), {"candidates": count, "bytes": 8 * count * rows}
+        sum(outcomes.values()),
+        dict(outcomes),
+        {"candidates": count, "bytes": 8 * count * rows},
+        certificates={found.terms: found for found in certificates},
     )
     settings = {
         "method": "fit",
@@ -151,12 +155,46 @@ def fit(
         "constraints": constraints,
         "estimator": estimator,
         "shooting": shooting,
+        "certificate": certificate,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
-    found = SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values()))
+    result = SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values()))
     interval = ESTIMATORS[estimator].interval(shooting)
     estimates = [
         ValidatedModel(entry.model, interval, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
-    return Result(with_bands(found, estimates, constraints, warm_up))
+    return Result(with_bands(result, estimates, constraints, warm_up))
+
+
+def _select(
+    record: Dataset,
+    library: tuple[str, int, int],
+    constraints: str,
+    max_terms: int,
+    nodes: int,
+    progress: ProgressCallback,
+) -> tuple[list[tuple[Structure, Offsets]], tuple[Certificate, ...], int]:
+    """Return structures, each with the offsets of its signals, the certificates, and the largest lag."""
+    # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
+    # in deviations from it. The validation data tell which one holds.
+    tried = [no_offsets(record)]
+    if constraint(constraints).allows_offsets:
+        tried = [find_offsets(record, limit) for limit in (LARGE_OFFSET, OPERATING_POINT)]
+    structures: list[tuple[Structure, Offsets]] = []
+    certificates: tuple[Certificate, ...] | None = None
+    warm_up = 0
+    for offsets in dict.fromkeys(tried):
+        deviations = subtract_offsets(record, offsets)
+        pool = screen_candidates(*library, deviations, constraints)
+        warm_up = max(item.maximum_lag for item in pool)
+        progress(f"inner products of {len(pool)} candidates", 0.0)
+        problem = make_selection_problem(pool, deviations, constraints)
+        if isinstance(problem, EvaluationOutcome):
+            raise SettingsError(f"nothing can be fitted with these settings: {problem}")
+        progress(f"best subsets of {len(pool)} candidates", 0.0)
+        found = certify(problem, max_terms, nodes)
+        certificates = combine_certificates(certificates, found)
+        chosen = [*select_forward(problem, max_terms), *(entry.structure for entry in found)]
+        structures += [(structure, offsets) for structure in chosen]
+    return list(dict.fromkeys(structures)), certificates or (), warm_up

@@ -12,6 +12,7 @@ import numpy as np
 
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel, SearchResult
+from islands.io.certificates import certificates_document
 from islands.io.ensembles import bands_document, ensemble_document
 from islands.io.models import terms_document, write_model
 from islands.io.summary_text import summary
@@ -48,6 +49,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             "ended_by": search.ended_by,
             "duplicates": search.duplicates,
             "feasible_share": search.feasible_share,
+            "certificates": certificates_document(found),
             "caches": {
                 name: {"bytes": size, "limit": limit} for name, (size, limit) in search.caches.items()
             },

@@ -6,6 +6,7 @@ from math import isfinite
 import numpy as np
 
 from islands.evolution.search_result import RankedModel, SearchResult
+from islands.io.certificates import summarise_certificates
 from islands.io.model_table import LEGEND, table
 from islands.model.equations import equation, named_equation, named_term
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
@@ -48,6 +49,7 @@ def summary(found: SearchResult) -> str:
         "",
         *table(found),
         LEGEND,
+        *summarise_certificates(found),
         "",
         *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
     ]

@@ -49,10 +49,16 @@ def fit(
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
     ] = None,
+    certificate: Annotated[
+        int,
+        typer.Option(
+            "--certificate", min=0, help="Nodes of the search for the best model of each size; 0 for none."
+        ),
+    ] = 10_000,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random generator.")] = 0,
     force: Annotated[bool, typer.Option("--force", help="Replace a result that is in the folder.")] = False,
 ) -> None:
-    """Fit small models to a record by forward selection and least squares, and assess them."""
+    """Fit small models to a record by subset selection and least squares, and assess them."""
     check_folder(out, force)
     names = options.columns(inputs)
     compile_kernels()
@@ -71,6 +77,7 @@ def fit(
             constraints=constraints,
             estimator=estimator,
             shooting=shooting,
+            certificate=certificate,
             seed=seed,
             progress=show,
         ).with_wall_time(perf_counter() - began)

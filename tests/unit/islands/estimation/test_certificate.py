@@ -1,0 +1,154 @@
+"""Certificates of a model size: bounds that no model of the library undercuts, and the best subsets.
+
+Oracle: least squares on every subset.
+"""
+
+from itertools import combinations
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import islands
+from islands.data.dataset import Dataset
+from islands.estimation.certificate import certify, combine_certificates
+from islands.estimation.estimate import FittedStructure, estimate
+from islands.estimation.forward_selection import make_selection_problem, select_forward
+from islands.io.result_folder import result_document
+from islands.io.summary_text import summary
+from islands.model.candidate_library import candidates
+from islands.model.expression import Lagged
+from islands.program.regressor_matrix import regressor_matrix
+from islands.simulation.predictors import multiple_shooting
+
+LAGS = 2
+
+
+def measured(seed=0, samples=200):
+    """Return a record with correlated lags that no structure of a library explains exactly."""
+    generator = np.random.default_rng(seed)
+    u = np.convolve(generator.normal(size=samples), np.ones(5) / 2.0, mode="same")
+    y = np.zeros(samples)
+    for k in range(LAGS, samples):
+        y[k] = (
+            0.6 * y[k - 1] + 0.3 * np.tanh(u[k - 1]) - 0.2 * y[k - 1] * u[k - 2] + 0.05 * generator.normal()
+        )
+    return Dataset(u, y, 0.1)
+
+
+def root_mean_square(structure, record, constraints):
+    """Return the one-step-ahead error of a structure; infinite if it cannot be estimated."""
+    if constraints == "none":
+        *psi, y = regressor_matrix([*structure, Lagged(0, 0)], record, LAGS)
+        theta = np.linalg.lstsq(np.array(psi).T, y, rcond=None)[0]
+        return float(np.sqrt(np.mean((y - theta @ np.array(psi)) ** 2)))
+    found = estimate(structure, record, constraints, LAGS)
+    if not isinstance(found, FittedStructure):
+        return inf
+    predicted = multiple_shooting(found.model, record, 1, LAGS).y[LAGS:]
+    return float(np.sqrt(np.mean((record.y[LAGS:] - predicted) ** 2)))
+
+
+def least_error(library, record, constraints, terms):
+    return min(root_mean_square(subset, record, constraints) for subset in combinations(library, terms))
+
+
+SETTINGS = [
+    ("polynomial", 2, "none", 3),
+    ("polynomial", 1, "hysteresis", 3),
+    ("phi-polynomial", 3, "hysteresis", 3),
+]
+
+
+@pytest.mark.parametrize(("name", "degree", "constraints", "terms"), SETTINGS)
+def test_bound_is_the_least_error_of_all_subsets(name, degree, constraints, terms):
+    record, library = measured(), candidates(name, degree, LAGS, 1)
+    problem = make_selection_problem(library, record, constraints)
+    for certificate in certify(problem, terms, 10_000)[1:]:
+        expected = least_error(library, record, constraints, certificate.terms)
+        assert certificate.bound <= expected * (1.0 + 1e-9)
+        if name != "polynomial" or constraints == "none":
+            assert certificate.bound == pytest.approx(expected, rel=1e-9)
+            assert root_mean_square(certificate.structure, record, constraints) == pytest.approx(expected)
+            assert certificate.proves(expected)
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 1000), st.integers(1, 6), st.integers(1, 200))
+def test_bound_with_few_nodes_is_below_that_with_many(seed, terms, nodes):
+    problem = make_selection_problem(candidates("polynomial", 2, LAGS, 1), measured(seed, 100))
+    few, many = (certify(problem, terms, limit)[-1] for limit in (nodes, 10_000))
+    assert few.bound <= many.bound * (1.0 + 1e-9)
+    assert few.nodes <= nodes
+    assert certify(problem, terms, nodes)[-1] == few
+
+
+def test_best_subsets_are_never_worse_than_forward_selection():
+    record = measured(3)
+    problem = make_selection_problem(candidates("polynomial", 3, LAGS, 1), record)
+    for certificate in certify(problem, 6, 50):
+        greedy = select_forward(problem, certificate.terms)[-1]
+        errors = [root_mean_square(each, record, "none") for each in (certificate.structure, greedy)]
+        assert errors[0] <= errors[1] * (1.0 + 1e-9)
+        assert certificate.bound <= errors[0] * (1.0 + 1e-9)
+
+
+def test_best_subset_is_found_where_forward_selection_fails():
+    # The sum of both terms is the first choice of forward selection, and is not in the law.
+    generator = np.random.default_rng(1)
+    u = generator.normal(size=(300, 3))
+    u[:, 2] = u[:, 0] + u[:, 1] + 0.3 * generator.normal(size=300)
+    y = np.append(0.0, u[:-1, 0] + u[:-1, 1])
+    problem = make_selection_problem(candidates("polynomial", 1, 1, 3), Dataset(u, y, 0.1))
+    assert [item.text for item in select_forward(problem, 1)[-1]] == ["u3(k-1)"]
+    certificate = certify(problem, 2, 100)[-1]
+    assert [item.text for item in certificate.structure] == ["u1(k-1)", "u2(k-1)"]
+
+
+def test_duplicate_and_zero_candidates_do_not_matter():
+    record = measured(4)
+    u = np.column_stack([record.u, record.u, np.zeros(record.samples)])
+    one = make_selection_problem(candidates("polynomial", 1, LAGS, 1), record)
+    three = make_selection_problem(candidates("polynomial", 1, LAGS, 3), Dataset(u, record.y, 0.1))
+    bounds = [[each.bound for each in certify(problem, 3, 1000)] for problem in (one, three)]
+    assert bounds[0] == pytest.approx(bounds[1], rel=1e-9)
+
+
+def test_gap_is_the_possible_reduction_of_the_error():
+    problem = make_selection_problem(candidates("polynomial", 2, LAGS, 1), measured())
+    certificate = certify(problem, 2, 100)[-1]
+    assert certificate.gap(2.0 * certificate.bound) == pytest.approx(0.5)
+    assert certificate.gap(0.5 * certificate.bound) == 0.0
+    assert not certificate.proves(1.001 * certificate.bound)
+    assert certify(problem, 2, 0) == ()
+
+
+def test_combined_certificates_hold_for_both_libraries():
+    record = measured()
+    small, large = (
+        certify(make_selection_problem(candidates("polynomial", degree, LAGS, 1), record), 3, 500)
+        for degree in (1, 2)
+    )
+    for both, one, other in zip(combine_certificates(small, large), small, large, strict=True):
+        assert both.bound == min(one.bound, other.bound)
+        assert both.nodes == one.nodes + other.nodes
+
+
+def test_fit_reports_the_gap_of_every_model():
+    found = islands.fit(measured(), library="polynomial", degree=2, lags=LAGS, max_terms=3)
+    document = result_document(found.search_result)["search"]["certificates"]
+    assert [entry["terms"] for entry in document] == [1, 2, 3]
+    errors = {entry.model.size: entry.metrics["estimation"]["one_step_ahead"].rmse for entry in found.models}
+    for entry in document:
+        expected = 100.0 * max(0.0, 1.0 - entry["bound"] / errors[entry["terms"]])
+        assert entry["gap_percent"] == pytest.approx(expected)
+        assert entry["proved"] == (entry["gap_percent"] < 1e-4)
+    assert "possible reduction of the one-step error" in summary(found.search_result)
+
+
+def test_fit_without_nodes_has_no_certificate():
+    found = islands.fit(measured(), library="polynomial", degree=1, max_terms=2, certificate=0)
+    assert result_document(found.search_result)["search"]["certificates"] == []
+    assert "possible reduction" not in summary(found.search_result)
