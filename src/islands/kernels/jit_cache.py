@@ -176,6 +176,6 @@ def _hash(processor: str) -> str:
     features = get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
     hashed = sha256(repr((sys.implementation.cache_tag, processor, features)).encode())
     package = Path(__file__).parents[1]
-    for source in sorted(source for folder in COMPILED for source in (package / folder).glob("*.py")):
+    for source in sorted(source for folder in COMPILED for source in (package / folder).rglob("*.py")):
         hashed.update(repr((str(source), source.read_bytes())).encode())
     return hashed.hexdigest()[:12]

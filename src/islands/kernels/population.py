@@ -19,7 +19,6 @@ from islands.kernels.constrained_lstsq import (
     from_columns,
     from_gram,
 )
-from islands.kernels.err_selection import prune, prune_increments
 from islands.kernels.jit_cache import kernel
 from islands.kernels.pair_table import Pairs, complete_pairs, read_gram
 from islands.kernels.parameter_reduction import (
@@ -33,6 +32,7 @@ from islands.kernels.parameter_reduction import (
     reduce,
 )
 from islands.kernels.regressor_columns import Rows
+from islands.kernels.selection.err_selection import prune, prune_increments
 from islands.kernels.simulate import Layout, simulate
 from islands.kernels.summation import total
 

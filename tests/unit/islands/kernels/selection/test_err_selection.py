@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from islands.kernels.err_selection import DEPENDENT, prune, prune_increments, select
 from islands.kernels.parameter_reduction import reduce
+from islands.kernels.selection.err_selection import DEPENDENT, prune, prune_increments, select
 
 
 def problem(seed, terms=6, rows=150):

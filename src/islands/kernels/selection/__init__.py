@@ -1,0 +1,1 @@
+"""Selection of columns from inner products: one after the other, and of the best subset."""
