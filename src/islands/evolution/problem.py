@@ -5,8 +5,8 @@ from itertools import zip_longest
 
 from islands.data.dataset import Dataset
 from islands.estimation.forward_selection import forward_selection
-from islands.estimation.input_ranking import screen_candidates
 from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.generation.variation import Genes

@@ -10,7 +10,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
 from islands.data.split import Split
-from islands.estimation.certificate import Certificate
+from islands.estimation.structure_selection.certificate import Certificate
 from islands.evolution.history import HistoryPoint
 from islands.model.equations import equation
 from islands.model.model import Model

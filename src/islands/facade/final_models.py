@@ -7,11 +7,11 @@ from typing import Protocol, TypeVar
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.estimation.deviations import Offsets, estimate_deviations, subtract_offsets
 from islands.estimation.estimate import FittedStructure
 from islands.estimation.estimators import ESTIMATORS, estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
+from islands.estimation.structure_selection.deviations import Offsets, estimate_deviations, subtract_offsets
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.individual import Individual, unique_structures

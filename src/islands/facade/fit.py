@@ -5,8 +5,15 @@ from collections import Counter
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import SettingsError, lookup
-from islands.estimation.certificate import Certificate, certify, combine_certificates
-from islands.estimation.deviations import (
+from islands.estimation.estimators import ESTIMATORS, estimate_with
+from islands.estimation.forward_selection import (
+    Structure,
+    make_selection_problem,
+    select_forward,
+)
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.certificate import Certificate, certify, combine_certificates
+from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
     OPERATING_POINT,
     Offsets,
@@ -15,14 +22,7 @@ from islands.estimation.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.estimation.estimators import ESTIMATORS, estimate_with
-from islands.estimation.forward_selection import (
-    Structure,
-    make_selection_problem,
-    select_forward,
-)
-from islands.estimation.input_ranking import screen_candidates
-from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import (
     RankedModel,

@@ -8,7 +8,8 @@ from typing import Any
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import RecordError, SettingsError
-from islands.estimation.deviations import (
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
     SHIFTABLE,
     Offsets,
@@ -16,7 +17,6 @@ from islands.estimation.deviations import (
     no_offsets,
     subtract_offsets,
 )
-from islands.estimation.parameter_constraints import constraint
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import Engine, SerialEngine, Stop
 from islands.evolution.hall_of_fame import HallOfFame

@@ -7,7 +7,7 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.estimation.forward_selection import forward_selection
-from islands.estimation.input_ranking import rank_inputs, screen_candidates
+from islands.estimation.structure_selection.input_ranking import rank_inputs, screen_candidates
 from islands.model import candidate_library
 from islands.model.candidate_library import candidates
 from islands.model.rendering import plain

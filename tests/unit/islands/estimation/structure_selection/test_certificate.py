@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import islands
 from islands.data.dataset import Dataset
-from islands.estimation.certificate import certify, combine_certificates
 from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import make_selection_problem, select_forward
+from islands.estimation.structure_selection.certificate import certify, combine_certificates
 from islands.io.result_folder import result_document
 from islands.io.summary_text import summary
 from islands.model.candidate_library import candidates

@@ -5,14 +5,14 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
-from islands.estimation.deviations import (
+from islands.estimation.estimate import estimate
+from islands.estimation.structure_selection.deviations import (
     LARGE_OFFSET,
     add_offsets,
     estimate_deviations,
     find_offsets,
     subtract_offsets,
 )
-from islands.estimation.estimate import estimate
 from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.model.rendering import plain
