@@ -215,7 +215,10 @@ class ModelView(ResponseModel):
     size: int = Field(description="Number of terms.")
     equation: str
     latex: str
-    terms: list[dict[str, Any]]
+    terms: list[dict[str, Any]] = Field(
+        description="Regressor, parameter, standard error and inclusion probability of each term."
+    )
+    bands: dict[str, Any] | None = Field(default=None, description="Width of the prediction bands.")
     metrics: dict[str, Any] = Field(description="For example metrics.validation.free_run.mape.")
     outcomes: dict[str, Any]
     warm_up: int | None = Field(

@@ -245,8 +245,13 @@ def test_every_figure_is_drawn_once_and_stored(service, document, finished):
     ).json()
     assert len(simulation["measured"]) == len(simulation["free_run"]) == len(simulation["time_s"]) == 100
     assert simulation["inputs"]["u_V"] == pytest.approx(columns(400)["u_V"][300:], abs=1e-6)
+    band = simulation["band"]
+    assert band["level"] == 0.9
+    limits = zip(band["lower"], simulation["free_run"], band["upper"], strict=True)
+    assert all(low <= run <= high for low, run, high in limits if run is not None)
     report = check_response(document, service.client.get(f"/v1/jobs/{finished}/report"))
     assert report.text.startswith("<!DOCTYPE html>")
+    assert "inclusion" in report.text
     assert "script" not in report.headers["content-security-policy"]
 
 

@@ -14,6 +14,7 @@ from errno import EAGAIN, EINVAL, ENODATA, ENOSPC
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from islands.data.split import split_data
 from islands.errors import IslandsError, SettingsError
@@ -22,6 +23,7 @@ from islands.evolution.search_result import RankedModel, SearchResult, SearchSta
 from islands.figures.registry import FIGURES, SEARCH_FIGURES, model_figures, search_figures
 from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
+from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import model_from_json
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
@@ -106,15 +108,18 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     stored = store.results.models(job.id, rank)
     if document is None or not stored:
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
-    assessed = []
+    assessed, ensemble = [], None
     for entry in stored:
         model = model_from_json(entry.file, f"model {entry.rank}")
+        # Results of earlier versions have no ensemble.
+        ensemble = ensemble or ensemble_from_document(document.get("ensemble"), model)
         # Results of earlier versions do not state their warm-up.
         warm_up = entry.document.get("warm_up", settings.maximum_lag)
         assessment = assess(model, split, settings.shooting, warm_up, settings.constraints)
-        assessed.append(RankedModel(model, assessment))
+        bands = bands_from_document(entry.document.get("bands"), ensemble)
+        assessed.append(RankedModel(model, assessment, bands))
     search = _search(document["search"], store.results.history(job.id))
-    return SearchResult(record, split, spec.seed, document["settings"], search, tuple(assessed))
+    return SearchResult(record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble)
 
 
 def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:
@@ -167,9 +172,20 @@ def _free_run_document(entry: RankedModel, found: SearchResult) -> bytes:
         "time_s": time[kept].tolist(),
         "inputs": {name: data.u[kept, index].tolist() for index, name in enumerate(data.input_names)},
         "measured": data.y[kept].tolist(),
-        "free_run": [value if np.isfinite(value) else None for value in simulated.y[kept].tolist()],
+        "free_run": _finite_values(simulated.y[kept]),
     }
+    if entry.bands is not None:
+        band = entry.bands.predict(entry.model, data, warm_up=entry.assessment.warm_up)
+        document["band"] = {
+            "level": band.level,
+            "lower": _finite_values(band.lower[kept]),
+            "upper": _finite_values(band.upper[kept]),
+        }
     return json.dumps(document).encode()
+
+
+def _finite_values(values: NDArray[np.float64]) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
 if __name__ == "__main__":

@@ -2,15 +2,17 @@
 
 import base64
 from collections.abc import Mapping
+from math import nan
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
 from islands.evolution.search_result import SearchResult
-from islands.io.model_table import LEGEND, columns, rows
+from islands.io.model_table import LEGEND, columns, number, rows
 from islands.io.summary_text import describe
 from islands.model.equations import mathml_equation
+from islands.model.rendering import plain
 
 #: Environment of the HTML templates.
 TEMPLATES = Environment(
@@ -60,9 +62,25 @@ def identification_report(name: str, found: SearchResult, figures: Mapping[str, 
         columns=columns(found),
         legend=LEGEND,
         models=models,
+        terms=_terms(found),
         figures=shown,
     )
     return text.encode()
+
+
+def _terms(found: SearchResult) -> list[tuple[str, str, str, str]]:
+    """Return the term, parameter, standard error and inclusion probability of the recommended model."""
+    model = found.recommended.model
+    errors = model.standard_errors or (nan,) * model.size
+    return [
+        (
+            plain(item.expression, model.inputs),
+            f"{theta:.6g}",
+            number(error, "{:.2g}", bounded=True),
+            "-" if found.ensemble is None else f"{found.ensemble.inclusion(item):.2f}",
+        )
+        for item, theta, error in zip(model.regressors, model.parameters, errors, strict=True)
+    ]
 
 
 def _settings(found: SearchResult) -> list[tuple[str, Any]]:

@@ -16,7 +16,7 @@ from islands.model.equations import equation
 from islands.model.model import Model
 from islands.validation.assessment import Assessment
 from islands.validation.ensemble import Ensemble, ValidatedModel, make_ensemble
-from islands.validation.prediction_bands import BandCalibration, calibrate_bands
+from islands.validation.prediction_bands import PredictionBands, calibrate_bands
 from islands.validation.recommendation import Recommendation, recommend
 
 
@@ -28,13 +28,13 @@ class RankedModel:
     ----------
     model : Model
     assessment : Assessment
-    calibration : BandCalibration or None
-        Width of its prediction bands. None without an ensemble, or if its free runs diverge.
+    bands : PredictionBands or None
+        Prediction bands of its free run. None without an ensemble, or if its free runs diverge.
     """
 
     model: Model
     assessment: Assessment
-    calibration: BandCalibration | None = None
+    bands: PredictionBands | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,11 +154,8 @@ def with_bands(
     ensemble = make_ensemble(candidates, found.split, constraints, warm_up, found.seed)
     if ensemble is None:
         return found
-    calibrations = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
-    models = tuple(
-        replace(entry, calibration=calibration)
-        for entry, calibration in zip(found.models, calibrations, strict=True)
-    )
+    calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
+    models = tuple(replace(entry, bands=bands) for entry, bands in zip(found.models, calibrated, strict=True))
     return replace(found, models=models, ensemble=ensemble)
 
 

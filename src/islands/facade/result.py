@@ -19,11 +19,10 @@ from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, multiple_shooting
-from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.physics import PhysicsChecks
 from islands.validation.predictable_residual import ResidualStructure
-from islands.validation.prediction_bands import LEVEL, PredictionBand, predict_band
+from islands.validation.prediction_bands import LEVEL, PredictionBand
 from islands.validation.recommendation import Recommendation
 from islands.validation.residual_tests import ResidualTests
 
@@ -120,7 +119,9 @@ class FittedModel:
         ModelError
             The result has no ensemble.
         """
-        ensemble = self._ensemble
+        ensemble = self.search_result.ensemble
+        if ensemble is None:
+            raise ModelError("the result has no ensemble: the free run of every model diverged")
         return tuple(ensemble.inclusion(item) for item in self.model.regressors)
 
     def bands(self, record: Dataset, level: float = LEVEL, warm_up: int | None = None) -> PredictionBand:
@@ -142,20 +143,13 @@ class FittedModel:
         SettingsError
             The level is out of range.
         """
-        calibration = self.ranked_model.calibration
-        if calibration is None:
+        bands = self.ranked_model.bands
+        if bands is None:
             raise ModelError(
                 f"model {self.rank} has no prediction bands: its free run diverged, take another"
             )
         warm_up = self.ranked_model.assessment.warm_up if warm_up is None else warm_up
-        return predict_band(self.model, self._ensemble, calibration, record, level, warm_up)
-
-    @property
-    def _ensemble(self) -> Ensemble:
-        ensemble = self.search_result.ensemble
-        if ensemble is None:
-            raise ModelError("the result has no ensemble: the free run of every model diverged")
-        return ensemble
+        return bands.predict(self.model, record, level, warm_up)
 
     @property
     def least_squares_bias(self) -> float | None:

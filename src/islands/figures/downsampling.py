@@ -9,6 +9,36 @@ VERTICES = 2000
 Line = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
+def envelope(
+    x: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    vertices: int = VERTICES,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the envelope of a band: its lowest and highest value in each block of samples.
+
+    Parameters
+    ----------
+    x, lower, upper : ndarray, shape (samples,)
+        Abscissas and limits; NaN is a gap.
+    vertices : int
+        A band with at most half this number of samples is returned unchanged, of a longer one at most this
+        number of samples.
+
+    Returns
+    -------
+    x, lower, upper : ndarray, shape (kept,)
+        First and last abscissa of each block, with the limits of the block; NaN if it has no value.
+    """
+    size = -(-2 * len(x) // vertices)
+    if size <= 1:
+        return x, lower, upper
+    first = np.arange(0, len(x), size)
+    low, high = np.fmin.reduceat(lower, first), np.fmax.reduceat(upper, first)
+    at = np.column_stack([np.fmin.reduceat(x, first), np.fmax.reduceat(x, first)]).ravel()
+    return at, np.repeat(low, 2), np.repeat(high, 2)
+
+
 def downsample(x: NDArray[np.float64], y: NDArray[np.float64], vertices: int = VERTICES) -> Line:
     """Keep of each block the samples at which ``x`` or ``y`` is extreme or a gap begins or ends.
 

@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -15,8 +16,9 @@ from islands.figures.diverging_lines import (
     limits,
     within_reach,
 )
-from islands.figures.downsampling import downsample
+from islands.figures.downsampling import downsample, envelope
 from islands.figures.style import (
+    BAND,
     FRAME,
     MEASURED,
     MEASURED_WIDTH,
@@ -32,13 +34,16 @@ from islands.figures.style import (
 )
 from islands.figures.windows import representative_window
 from islands.validation.metrics import metrics
+from islands.validation.prediction_bands import PredictionBand
 
 #: Added to the title of a section without missing values.
 _MEDIAN_SECTION = "; its mean absolute residual is the median of all sections"
 
 
 @house_style()
-def draw_free_run(record: Dataset, simulated: NDArray[np.float64], title: str = "") -> Figure:
+def draw_free_run(
+    record: Dataset, simulated: NDArray[np.float64], title: str = "", band: PredictionBand | None = None
+) -> Figure:
     """Draw the measured output and the free run, and below them the residual on a separate scale.
 
     A record of more than 20 loops is shown completely and, below, in a section whose residual is the median
@@ -51,6 +56,8 @@ def draw_free_run(record: Dataset, simulated: NDArray[np.float64], title: str = 
     simulated : ndarray, shape (samples,)
         Simulated output, in the unit of the output; NaN if there is no prediction.
     title : str
+    band : PredictionBand, optional
+        Shaded about the free run, and about zero below it.
 
     Returns
     -------
@@ -63,28 +70,42 @@ def draw_free_run(record: Dataset, simulated: NDArray[np.float64], title: str = 
         The simulation does not have one value per sample.
     """
     yhat = finite_part(record, simulated)
+    half = None if band is None else 0.5 * (band.upper - band.lower)
     section = representative_window(record, record.y - yhat)
     if section is None:
         figure = blank(4.2, title)
         axes = figure.subplots(2, 1, height_ratios=(2, 1))
-        _draw_pair(axes[0], axes[1], record, yhat, 1.0)
+        _draw_pair(axes[0], axes[1], record, yhat, half, 1.0)
     else:
         figure = blank(7.2, title)
         axes = figure.subplots(4, 1, height_ratios=(2, 1, 2.4, 1.2))
-        _draw_pair(axes[0], axes[1], record, yhat, 0.6)
-        _draw_pair(axes[2], axes[3], record[section], yhat[section], 1.0)
+        _draw_pair(axes[0], axes[1], record, yhat, half, 0.6)
+        _draw_pair(
+            axes[2], axes[3], record[section], yhat[section], None if half is None else half[section], 1.0
+        )
         _mark_section(axes[:2], record[section])
         complete = not np.isnan((record.y - yhat)[section]).any()
         axes[2].set_title("shaded section" + (_MEDIAN_SECTION if complete else ""), fontsize=8.0)
     if np.isnan(yhat).all():
         axes[0].set_title("no simulated value", color=SIMULATED)
-    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    handles, labels = axes[0].get_legend_handles_labels()
+    if band is not None:
+        handles.append(Patch(color=BAND))
+        labels.append(f"{100 * band.level:g} % band")
+    axes[0].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2)
     axes[1].set_title(_format_errors(record, yhat), loc="right", fontsize=8.0)
     figure.align_ylabels()
     return finish(figure)
 
 
-def _draw_pair(above: Axes, below: Axes, record: Dataset, yhat: NDArray[np.float64], weight: float) -> None:
+def _draw_pair(
+    above: Axes,
+    below: Axes,
+    record: Dataset,
+    yhat: NDArray[np.float64],
+    half: NDArray[np.float64] | None,
+    weight: float,
+) -> None:
     time = break_line(record, record.time)
     measured, simulated = break_line(record, record.y), break_line(record, yhat)
     residual = measured - simulated
@@ -95,6 +116,9 @@ def _draw_pair(above: Axes, below: Axes, record: Dataset, yhat: NDArray[np.float
     below.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
     below.plot(*downsample(time, residual), color=RESIDUAL, lw=weight * SIMULATED_WIDTH, label="residual")
     below.set_ylim(limits(measured - followed, np.zeros(1)))
+    if half is not None:
+        _draw_band(above, record, yhat, half)
+        _draw_band(below, record, np.zeros(record.samples), half)
     below.yaxis.set_major_locator(MaxNLocator(4, steps=STEPS))
     for axes in (above, below):
         axes.set_xlim(record.time[0], record.time[-1] + (record.dt if record.samples == 1 else 0.0))
@@ -104,6 +128,19 @@ def _draw_pair(above: Axes, below: Axes, record: Dataset, yhat: NDArray[np.float
     above.set_ylabel(label(record.output_name, record.output_unit))
     below.set(xlabel="time (s)", ylabel=label("residual", record.output_unit))
     _annotate_divergences(above, record, yhat)
+
+
+def _draw_band(axes: Axes, record: Dataset, centre: NDArray[np.float64], half: NDArray[np.float64]) -> None:
+    """Shade a band within the limits of the axes, which it does not change."""
+    low, high = axes.get_ylim()
+    margin = high - low
+    # An infinite limit is drawn beyond the axes; NaN remains a gap.
+    inside = np.clip([centre - half, centre + half], low - margin, high + margin)
+    at, lower, upper = envelope(
+        break_line(record, record.time), break_line(record, inside[0]), break_line(record, inside[1])
+    )
+    axes.fill_between(at, lower, upper, color=BAND, lw=0.0, zorder=0.8)
+    axes.set_ylim(low, high)
 
 
 def _clip_diverged(record: Dataset, yhat: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,8 +21,11 @@ ModelFigure = Callable[[RankedModel, Split], Figure]
 
 
 def _free_run(entry: RankedModel, split: Split) -> Figure:
-    """Draw the measured output, the free run and the residual over time."""
-    return draw_free_run(split.validation, _simulate(entry, split))
+    """Draw the measured output, the free run with its prediction band, and the residual over time."""
+    band = None
+    if entry.bands is not None:
+        band = entry.bands.predict(entry.model, split.validation, warm_up=entry.assessment.warm_up)
+    return draw_free_run(split.validation, _simulate(entry, split), band=band)
 
 
 def _loop(entry: RankedModel, split: Split) -> Figure:

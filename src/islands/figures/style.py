@@ -23,6 +23,9 @@ MEASURED = "#3a3a3a"
 #: Colour of simulations.
 SIMULATED = "#d55e00"
 
+#: Colour of prediction bands, a light tint of that of simulations.
+BAND = "#f7d4b5"
+
 #: Colour of residuals.
 RESIDUAL = "#0072b2"
 

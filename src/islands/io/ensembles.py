@@ -17,7 +17,7 @@ from islands.model.primitives import PRIMITIVES
 from islands.model.regressor import Regressor, regressor
 from islands.model.rendering import plain
 from islands.validation.ensemble import Ensemble, EnsembleStructure
-from islands.validation.prediction_bands import BandCalibration
+from islands.validation.prediction_bands import PredictionBands
 
 #: File of a result folder that contains the ensemble.
 RESULT = "result.json"
@@ -103,36 +103,36 @@ def _regressor(text: str, primitives: Mapping[str, Primitive]) -> Regressor:
     return item
 
 
-def bands_document(calibration: BandCalibration | None) -> dict[str, Any] | None:
+def bands_document(bands: PredictionBands | None) -> dict[str, Any] | None:
     """Return the width of the bands of a model as JSON values, None for no bands."""
-    if calibration is None:
+    if bands is None:
         return None
     return {
-        "noise": calibration.noise,
-        "levels": list(calibration.factors),
-        "factors": list(calibration.factors.values()),
+        "noise": bands.noise,
+        "levels": list(bands.factors),
+        "factors": list(bands.factors.values()),
     }
 
 
-def bands_from_document(document: Any) -> BandCalibration | None:
-    """Return the width of the bands of a document.
+def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionBands | None:
+    """Return the bands of a document and an ensemble; None if one of them is None.
 
     Raises
     ------
     ModelError
         The document is damaged.
     """
-    if document is None:
+    if document is None or ensemble is None:
         return None
     try:
         found = BandsDocument.model_validate(document)
-        return BandCalibration(found.noise, dict(zip(found.levels, found.factors, strict=True)))
+        return PredictionBands(ensemble, found.noise, dict(zip(found.levels, found.factors, strict=True)))
     except ValueError as error:
         raise ModelError(f"the bands of the result are damaged: {error}") from error
 
 
-def read_bands(path: str | Path, model: Model) -> tuple[Ensemble, BandCalibration]:
-    """Read the ensemble and the width of the bands of a model of a result folder.
+def read_bands(path: str | Path, model: Model) -> PredictionBands:
+    """Read the prediction bands of a model of a result folder.
 
     Parameters
     ----------
@@ -149,22 +149,19 @@ def read_bands(path: str | Path, model: Model) -> tuple[Ensemble, BandCalibratio
     file = Path(path).resolve().parent.parent / RESULT
     try:
         document = json.loads(file.read_text(encoding="utf-8"))
-        entries = document["models"]
+        entries = {str(_terms(each["terms"])): each for each in document["models"]}
         ensemble = ensemble_from_document(document["ensemble"], model)
-        found = next(
-            (each for each in entries if _terms(each["terms"]) == _terms(terms_document(model))), None
-        )
+        entry = entries.get(str(_terms(terms_document(model))))
+        bands = entry and bands_from_document(entry["bands"], ensemble)
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise ModelError(
-            f"prediction bands need a model file of a result folder with a {RESULT} of this version: "
-            f"cannot read them from {file}: {error!r}"
+            f"prediction bands need a model of a result folder of this version: cannot read {file}: {error!r}"
         ) from error
-    if found is None:
+    if entry is None:
         raise ModelError(f"{path} is not a model of {file}: give a file of its folder models/")
-    calibration = bands_from_document(found.get("bands"))
-    if ensemble is None or calibration is None:
+    if bands is None:
         raise ModelError(f"{path} has no prediction bands, because its free run diverged: take another model")
-    return ensemble, calibration
+    return bands
 
 
 def _terms(terms: list[dict[str, Any]]) -> list[tuple[str, float]]:

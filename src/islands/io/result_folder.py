@@ -102,7 +102,7 @@ def _model_document(
         "equation": equation(model),
         "latex": latex_equation(model),
         "terms": terms,
-        "bands": bands_document(entry.calibration),
+        "bands": bands_document(entry.bands),
         "metrics": {
             part: {mode: asdict(value) for mode, value in assessment.metrics[part].items()} for part in PARTS
         },

@@ -36,35 +36,6 @@ _SAMPLES = 5000
 LEVEL = 0.9
 
 
-@dataclass(frozen=True, slots=True)
-class BandCalibration:
-    """Width of the bands of a model.
-
-    Attributes
-    ----------
-    noise : float
-        Root mean square of the residual of the free run that the spread of the ensemble does not explain, in
-        the unit of the output.
-    factors : mapping
-        Half-width of a band in units of ``sqrt(noise^2 + spread^2)``, by level.
-    """
-
-    noise: float
-    factors: Mapping[float, float]
-
-    def factor(self, level: float) -> float:
-        """Return the factor of a level, interpolated linearly.
-
-        Raises
-        ------
-        SettingsError
-            The level is outside the stored ones.
-        """
-        check_level(level)
-        levels = sorted(self.factors)
-        return float(np.interp(level, levels, [self.factors[each] for each in levels]))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictionBand:
     """Free run of a model with a band that contains a measured sample with a given probability.
@@ -84,15 +55,62 @@ class PredictionBand:
     upper: NDArray[np.float64]
 
 
-def check_level(level: float) -> None:
-    """Raise a `SettingsError` if no band has this level."""
-    if not LEVELS[0] <= level <= LEVELS[-1]:
-        raise SettingsError(f"the level of a band lies between {LEVELS[0]} and {LEVELS[-1]}, got {level}")
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictionBands:
+    """Prediction bands of a model, of every level.
+
+    Attributes
+    ----------
+    ensemble : Ensemble
+        Models that the data do not exclude.
+    noise : float
+        Root mean square of the residual of the free run that the spread of the ensemble does not explain, in
+        the unit of the output.
+    factors : mapping
+        Half-width of a band in units of ``sqrt(noise^2 + spread^2)``, by level.
+    """
+
+    ensemble: Ensemble
+    noise: float
+    factors: Mapping[float, float]
+
+    def predict(
+        self, model: Model, record: Dataset, level: float = LEVEL, warm_up: int | None = None
+    ) -> PredictionBand:
+        """Simulate a record with a band.
+
+        Parameters
+        ----------
+        model : Model
+            Model for which the bands were calibrated.
+        record : Dataset
+            Inputs, and the output of the warm-up.
+        level : float
+            Probability with which the band contains a measured sample, between 0.5 and 0.99.
+        warm_up : int or None
+            Number of samples before the first prediction. None is the model's largest lag.
+
+        Raises
+        ------
+        SettingsError
+            The level is out of range.
+        RecordError
+            The record does not match the model, or is too short for it or for a member of the ensemble.
+        """
+        if not LEVELS[0] <= level <= LEVELS[-1]:
+            raise SettingsError(f"the level of a band lies between {LEVELS[0]} and {LEVELS[-1]}, got {level}")
+        levels = sorted(self.factors)
+        factor = float(np.interp(level, levels, [self.factors[each] for each in levels]))
+        first = model.maximum_lag if warm_up is None else warm_up
+        run = free_run(model, record, first)
+        spread = self.ensemble.spread(self.ensemble.simulate(record, first), run.y)
+        half = factor * np.sqrt(self.noise**2 + spread**2)
+        return PredictionBand(level, run.y, run.y - half, run.y + half)
 
 
 def calibrate_bands(
     models: Sequence[Model], ensemble: Ensemble, split: Split, warm_up: int
-) -> tuple[BandCalibration | None, ...]:
+) -> tuple[PredictionBands | None, ...]:
     """Calibrate the bands of models.
 
     Parameters
@@ -107,7 +125,7 @@ def calibrate_bands(
 
     Returns
     -------
-    tuple of BandCalibration or None
+    tuple of PredictionBands or None
         None for a model that diverges on the estimation or the validation data.
     """
     parts = [(record, *_runs(record, ensemble, warm_up)) for record in (split.estimation, split.validation)]
@@ -125,7 +143,7 @@ def _calibrate(
     ensemble: Ensemble,
     parts: Sequence[tuple[Dataset, NDArray[np.int64], NDArray[np.float64]]],
     warm_up: int,
-) -> BandCalibration | None:
+) -> PredictionBands | None:
     residuals, spreads, count = [], [], 0.0
     for record, samples, runs in parts:
         run = free_run(model, record, warm_up)
@@ -147,38 +165,4 @@ def _calibrate(
     # The correction of a conformal prediction for a finite number of residuals.
     ranks = [int(len(scores) * level * (1.0 + 1.0 / count)) for level in LEVELS]
     factors = [float(scores[min(len(scores) - 1, rank)]) for rank in ranks]
-    return BandCalibration(noise, dict(zip(LEVELS, factors, strict=True)))
-
-
-def predict_band(
-    model: Model,
-    ensemble: Ensemble,
-    calibration: BandCalibration,
-    record: Dataset,
-    level: float = LEVEL,
-    warm_up: int | None = None,
-) -> PredictionBand:
-    """Simulate a record with a band of a level.
-
-    Parameters
-    ----------
-    record : Dataset
-        Inputs, and the output of the warm-up.
-    level : float
-        Probability with which the band contains a measured sample, between 0.5 and 0.99.
-    warm_up : int or None
-        Number of samples before the first prediction. None is the model's largest lag.
-
-    Raises
-    ------
-    SettingsError
-        The level is out of range.
-    RecordError
-        The record does not match the model, or is too short for it or for a member of the ensemble.
-    """
-    first = model.maximum_lag if warm_up is None else warm_up
-    factor = calibration.factor(level)
-    run = free_run(model, record, first)
-    spread = ensemble.spread(ensemble.simulate(record, first), run.y)
-    half = factor * np.sqrt(calibration.noise**2 + spread**2)
-    return PredictionBand(level, run.y, run.y - half, run.y + half)
+    return PredictionBands(ensemble, noise, dict(zip(LEVELS, factors, strict=True)))

@@ -11,12 +11,14 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.facade.fit import SHOOTING
 from islands.facade.result import simulate as run
+from islands.io.ensembles import read_bands
 from islands.io.records import read_record, write_simulation
 from islands.io.records.row_range import parse_rows
 from islands.io.result_models import ErrorMeasurement, find_model_file, read_error_measurement
 from islands.io.simulator_spec.factory import simulate_spec
 from islands.io.simulator_spec.specification import ColumnSpec, LocalExtendedSpec, innermost
 from islands.validation.metrics import metrics
+from islands.validation.prediction_bands import PredictionBand
 from islands_api.cli import options
 from islands_api.cli.console import compile_kernels, output
 
@@ -25,7 +27,10 @@ def simulate(
     model: options.ModelFile,
     record: options.Record,
     mode: Annotated[str, typer.Option("--mode", help="one-step, shooting or free-run.")] = "free-run",
-    out: Annotated[Path | None, typer.Option("--out", help="CSV file for time and y_sim.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="CSV file for time and y_sim, with --bands also for y_low and y_high."),
+    ] = None,
     inputs: Annotated[
         list[str] | None,
         typer.Option("--input", help="Input column; by default that of the model."),
@@ -49,12 +54,21 @@ def simulate(
             help="Samples before the first prediction; by default those of the result, or the largest lag.",
         ),
     ] = None,
+    bands: Annotated[
+        float | None,
+        typer.Option(
+            "--bands",
+            help="Probability, as 0.9, of the prediction band of a free run; for models of a result folder.",
+        ),
+    ] = None,
 ) -> None:
     """Simulate a model on a record. A free run needs only the first samples of the output.
 
     For a model of a result folder, the errors on the validation data are those of the result.
     """
     extended = options.extended(model)
+    if bands is not None and (mode != "free-run" or extended is not None):
+        raise SettingsError("--bands are for free runs of models of a result folder")
     if extended is not None:
         _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows)
         return
@@ -71,9 +85,12 @@ def simulate(
     reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
     interval = reported.shooting if shooting is None else shooting
     first = next(each for each in (warm_up, reported.warm_up, chosen.maximum_lag) if each is not None)
+    band = None
+    if bands is not None:
+        band = read_bands(find_model_file(model), chosen).predict(chosen, data, bands, first)
     simulation = run(chosen, data, mode, interval, warm_up=first)
     _print_metrics(
-        data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out
+        data, simulation.y, f"{mode} after a warm-up of {first} samples: {simulation.outcome}", out, band
     )
 
 
@@ -100,9 +117,15 @@ def _simulate_extended(
     _print_metrics(data, y, f"{mode}: with {', '.join(effect.name for effect in spec.effects)}", out)
 
 
-def _print_metrics(data: Dataset, y: NDArray[np.float64], line: str, out: Path | None) -> None:
+def _print_metrics(
+    data: Dataset,
+    y: NDArray[np.float64],
+    line: str,
+    out: Path | None,
+    band: PredictionBand | None = None,
+) -> None:
     if out is not None:
-        write_simulation(data, y, out)
+        write_simulation(data, y, out, None if band is None else (band.lower, band.upper))
         output.print(f"{out}: {data.samples} rows", markup=False)
     errors = metrics(data.y, y)
     output.print(line, markup=False)
@@ -111,3 +134,16 @@ def _print_metrics(data: Dataset, y: NDArray[np.float64], line: str, out: Path |
         f"fit {errors.fit_percent:.3f} %",
         markup=False,
     )
+    if band is not None:
+        _print_band(data, band)
+
+
+def _print_band(data: Dataset, band: PredictionBand) -> None:
+    predicted = ~np.isnan(band.y)
+    half = 0.5 * float(np.median((band.upper - band.lower)[predicted]))
+    text = f"{100 * band.level:g} % band: median half-width {half:.6g} {data.output_unit}".rstrip()
+    known = predicted & ~np.isnan(data.y)
+    if known.any():
+        inside = (band.lower <= data.y) & (data.y <= band.upper)
+        text += f", contains {100 * inside[known].mean():.1f} % of the measured samples"
+    output.print(text, markup=False)

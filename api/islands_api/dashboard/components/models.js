@@ -94,11 +94,12 @@ function makeModelTable(job, models) {
 function makeTermTable(model) {
   return makeTable(
     "Terms of the model",
-    ["Regressor", ["Parameter", "figure"], ["Standard error", "figure"]],
+    ["Regressor", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
     model.terms.map((term) => [
       el("code", {}, term.regressor),
       makeExactValue(term.parameter, (value) => formatNumber(value, 6)),
       makeExactValue(term.standard_error, formatNumber),
+      makeExactValue(term.inclusion ?? null, formatNumber),
     ]),
   );
 }

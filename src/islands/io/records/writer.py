@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
 
+#: Lower and upper limit of a prediction band.
+Band = tuple[NDArray[np.float64], NDArray[np.float64]]
+
 
 def write_record(record: Dataset, path: str | Path) -> None:
     """Write a record of one segment with the columns ``t_s``, the inputs and the output.
@@ -27,15 +30,23 @@ def write_record(record: Dataset, path: str | Path) -> None:
     _write(path, names, zip(_round_times(record), *record.u.T.tolist(), record.y.tolist(), strict=True))
 
 
-def write_simulation(record: Dataset, simulated: NDArray[np.float64], path: str | Path) -> None:
+def write_simulation(
+    record: Dataset, simulated: NDArray[np.float64], path: str | Path, band: Band | None = None
+) -> None:
     """Write the columns ``time`` (s) and ``y_sim``, one row for every sample of the record.
 
     Parameters
     ----------
     simulated : ndarray, shape (samples,)
         Simulated output. NaN, as in the warm-up, is written as ``nan``.
+    band : (ndarray, ndarray), optional
+        Limits of a prediction band, written as the columns ``y_low`` and ``y_high``; each has the shape of
+        ``simulated``.
     """
-    _write(path, ("time", "y_sim"), zip(_round_times(record), simulated.tolist(), strict=True))
+    columns = [simulated, *(band or ())]
+    names = ("time", "y_sim", "y_low", "y_high")[: 1 + len(columns)]
+    rows = zip(_round_times(record), *(column.tolist() for column in columns), strict=True)
+    _write(path, names, rows)
 
 
 def _round_times(record: Dataset) -> list[float]:

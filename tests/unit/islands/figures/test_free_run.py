@@ -9,6 +9,7 @@ from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.figures.free_run import draw_free_run
 from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, save
+from islands.validation.prediction_bands import PredictionBand
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -214,3 +215,49 @@ def test_record_of_one_sample_is_drawn(tmp_path):
 def test_simulation_of_another_length_raises_settings_error():
     with pytest.raises(SettingsError, match="one value for each of the record's 400 samples"):
         draw_free_run(sine(3), np.zeros(399))
+
+
+def band_of(record: Dataset, half: np.ndarray) -> PredictionBand:
+    return PredictionBand(0.9, record.y, record.y - half, record.y + half)
+
+
+def shaded(axes: "Axes") -> np.ndarray:
+    """Return the vertices of the only shaded band of the axes."""
+    (band,) = axes.collections
+    return band.get_paths()[0].vertices
+
+
+def test_a_band_is_shaded_about_the_free_run_and_about_zero():
+    record = sine(3)
+    half = np.linspace(0.02, 0.05, record.samples)
+    without = draw_free_run(record, record.y)
+    above, below = draw_free_run(record, record.y, band=band_of(record, half)).axes
+    for axes, centre in ((above, record.y), (below, np.zeros(record.samples))):
+        drawn = {tuple(vertex) for vertex in shaded(axes).round(9)}
+        for edge in (centre - half, centre + half):
+            points = zip(record.time.round(9), edge.round(9), strict=True)
+            assert sum(point in drawn for point in points) > 0.99 * record.samples
+    assert [text.get_text() for text in above.get_legend().get_texts()][-1] == "90 % band"
+    assert above.get_ylim() == without.axes[0].get_ylim()
+
+
+def test_a_band_without_limits_is_shaded_over_the_axes():
+    record = sine(3)
+    half = np.where(np.arange(record.samples) < 200, 0.1, np.inf)
+    half[:3] = np.nan
+    above = draw_free_run(record, record.y, band=band_of(record, half)).axes[0]
+    vertices = shaded(above)
+    low, high = above.get_ylim()
+    assert np.isfinite(vertices).all()
+    assert vertices[:, 0].min() == record.time[3]
+    assert vertices[:, 1].min() < low
+    assert vertices[:, 1].max() > high
+
+
+def test_the_band_of_a_long_record_is_its_envelope():
+    record = Dataset(noise(1), noise(2), 1e-3)
+    half = np.full(LONG, 0.5)
+    half[31_234] = 2.0
+    vertices = shaded(draw_free_run(record, record.y, band=band_of(record, half)).axes[1])
+    assert len(vertices) < 5000
+    assert vertices[:, 1].max() == pytest.approx(2.0)

@@ -38,10 +38,11 @@ def folder(tmp_path):
 def test_a_result_folder_reproduces_the_bands_bit_for_bit(folder):
     for model in result().models:
         file = folder / "models" / f"{model.rank:02d}.json"
-        ensemble, calibration = read_bands(file, islands.read_model(file))
+        bands = read_bands(file, islands.read_model(file))
         expected = result().search_result.ensemble
-        assert calibration == model.ranked_model.calibration
-        for found, each in zip(ensemble.structures, expected.structures, strict=True):
+        own = model.ranked_model.bands
+        assert (bands.noise, bands.factors) == (own.noise, own.factors)
+        for found, each in zip(bands.ensemble.structures, expected.structures, strict=True):
             assert (found.model, found.weight) == (each.model, each.weight)
             assert (found.parameters == each.parameters).all()
 
@@ -56,7 +57,7 @@ def test_no_ensemble_and_no_bands_are_null():
     assert ensemble_document(None) is None
     assert ensemble_from_document(None, result().best.model) is None
     assert bands_document(None) is None
-    assert bands_from_document(None) is None
+    assert bands_from_document(None, result().search_result.ensemble) is None
 
 
 def test_a_model_outside_a_result_folder_has_no_bands(tmp_path):
@@ -97,6 +98,6 @@ def test_a_damaged_ensemble_is_refused(damage):
 
 
 def test_damaged_bands_are_refused():
-    document = {**bands_document(result().best.ranked_model.calibration), "levels": [0.9]}
+    document = {**bands_document(result().best.ranked_model.bands), "levels": [0.9]}
     with pytest.raises(ModelError, match="damaged"):
-        bands_from_document(document)
+        bands_from_document(document, result().search_result.ensemble)

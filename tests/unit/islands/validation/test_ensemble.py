@@ -13,7 +13,7 @@ from islands.model.parsing import parse
 from islands.model.regressor import regressor
 from islands.simulation.predictors import free_run
 from islands.validation.ensemble import Ensemble, ValidatedModel, effective_samples, make_ensemble
-from islands.validation.prediction_bands import calibrate_bands, predict_band
+from islands.validation.prediction_bands import calibrate_bands
 
 TRUE = ("y(k-1)", "u(k-1)", "y(k-1)*u(k-1)")
 STRUCTURES = (TRUE, TRUE[:2], (*TRUE, "u(k-2)"), (*TRUE, "y(k-2)", "u(k-1)*u(k-1)"))
@@ -89,8 +89,7 @@ def test_there_is_no_ensemble_without_a_bounded_free_run():
 def test_the_band_of_an_exact_law_has_the_width_of_rounding():
     data, new = parts(), parts(seed=1)
     found, model = ensemble(data, [TRUE]), candidate(TRUE, data).model
-    calibration = calibrate_bands([model], found, data, 2)[0]
-    band = predict_band(model, found, calibration, new.validation)
+    band = calibrate_bands([model], found, data, 2)[0].predict(model, new.validation)
     assert np.nanmax(band.upper - band.lower) < 1e-13
     assert band.y[2:] == pytest.approx(new.validation.y[2:], abs=1e-13)
 

@@ -195,6 +195,26 @@ def test_simulate_reads_the_columns_of_the_model(run, fitted):
     assert run("simulate", "out/models/01.json", "other.csv", *columns)[0] == 0
 
 
+def test_simulate_writes_prediction_bands(run, fitted):
+    arguments = ("simulate", "out", "r.csv", "--out", "s.csv", "--bands")
+    code, out, _ = run(*arguments, "0.9")
+    assert code == 0
+    assert "90 % band: median half-width" in out
+    header, *rows = Path("s.csv").read_text().splitlines()
+    assert header == "time,y_sim,y_low,y_high"
+    numbers = [tuple(map(float, row.split(",")[1:])) for row in rows[3:]]
+    assert all(low <= simulated <= high for simulated, low, high in numbers)
+    for changes, reason in (
+        (("0.2",), "between 0.5 and 0.99"),
+        (("0.9", "--mode", "one-step"), "free runs of models of a result folder"),
+    ):
+        code, _, error = run(*arguments, *changes)
+        assert (code, reason in error) == (2, True)
+    shutil.copyfile("out/models/01.json", "model.json")
+    code, _, error = run("simulate", "model.json", "r.csv", "--bands", "0.9")
+    assert (code, "need a model of a result folder" in error) == (2, True)
+
+
 def test_simulate_prints_the_errors_that_the_result_reports(run, fitted):
     result = json.loads(Path("out/result.json").read_text())
     files = {f"out/models/{entry['rank']:02d}.json": entry for entry in result["models"]}
