@@ -3,6 +3,7 @@
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 
@@ -289,6 +290,17 @@ def test_figures_of_a_job_of_another_version_are_rejected(service):
     detail = problem_of(answer, 422, "invalid-settings")
     assert "this version of islands cannot read the job (colour: " in detail
     assert "submit it again" in detail
+
+
+@pytest.mark.parametrize("loop", [True, False])
+def test_only_a_result_with_a_loop_has_the_loop_figure(service, loop):
+    job = service.store.jobs.submit(Submission(LOCAL_OWNER, spec("0-csv")))[0].id
+    service.store.leases.finish(claimed(service.store), replace(FOUND, document={"loop": loop}))
+    path = f"/v1/jobs/{job}/models/1/figures"
+    names = service.client.get(path).json()["items"]
+    assert names == ["free-run", *(["loop"] if loop else []), "hold", "residuals"]
+    if not loop:
+        assert "no figure 'loop'" in problem_of(service.client.get(f"{path}/loop.svg"), 404, "not-found")
 
 
 def test_cached_figures_vary_with_the_key(service):

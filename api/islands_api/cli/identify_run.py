@@ -136,7 +136,7 @@ def run(
 
 
 def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: Path) -> None:
-    """Simulate the best model on the test data; print and write the metrics."""
+    """Simulate the recommended model on the test data; print and write the metrics."""
     simulated = result.best.simulate(test_data)
     errors_by_name = asdict(metrics(test_data.y, simulated.y)) if simulated.outcome else {}
     numbers = {name: value if isfinite(value) else None for name, value in errors_by_name.items()}

@@ -87,10 +87,11 @@ class AsyncClient(BaseClient[httpx.AsyncClient]):
             return job
 
     async def figures(self, which: JobRef) -> tuple[tuple[str, int | None], ...]:
-        """Return name and rank of each figure of the search and of the best model, for `figure`."""
+        """Return name and rank of each figure of the search and of the recommended model, for `figure`."""
         of_search = await self.call(calls.figure_names(which, None))
-        of_best = await self.call(calls.figure_names(which, 1))
-        return (*((name, None) for name in of_search), *((name, 1) for name in of_best))
+        rank = calls.get_recommended_rank(await self.call(calls.job(which)))
+        of_model = await self.call(calls.figure_names(which, rank))
+        return (*((name, None) for name in of_search), *((name, rank) for name in of_model))
 
     async def progress(self, which: JobRef, seconds: float = inf) -> AsyncIterator[JobView]:
         """Yield a job now and after each change, until it has ended.

@@ -188,7 +188,7 @@ def delete_dataset(which: DatasetRef) -> RequestSpec[None]:
 
 
 def models(which: JobRef) -> RequestSpec[tuple[ModelView, ...]]:
-    """Return the models of a job, best first."""
+    """Return the models of a job, least validation error first."""
     page = read_as(ModelPage)
     return RequestSpec("GET", f"/v1/jobs/{_quote_id(which)}/models", lambda response: page(response).items)
 
@@ -238,6 +238,11 @@ def figure_names(which: JobRef, rank: int | None) -> RequestSpec[tuple[str, ...]
     return RequestSpec(
         "GET", f"/v1/jobs/{_quote_id(which)}{of}/figures", lambda response: names(response).items
     )
+
+
+def get_recommended_rank(job: JobView) -> int:
+    """Return the rank of the recommended model of a job; 1 for results of earlier versions."""
+    return int((job.summary or {}).get("rank", 1))
 
 
 def events_path(which: JobRef) -> str:

@@ -53,7 +53,7 @@ class Results:
         return None if text is None else dict(json.loads(text))
 
     def models(self, job: str, rank: int | None = None) -> list[StoredModel]:
-        """Return the models of a job, best first, or only the one of a rank."""
+        """Return the models of a job in the order of their ranks, or only the one of a rank."""
         query = select(models).where(models.c.job_id == job).order_by(models.c.rank)
         if rank is not None:
             query = query.where(models.c.rank == rank)

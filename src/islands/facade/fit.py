@@ -89,7 +89,7 @@ def fit(
     Returns
     -------
     Result
-        Models of increasing size, best first: ``result.best.equation``, ``result.best.metrics``, ...
+        Models of every size, least validation error first. ``result.best`` is the recommended one.
 
     Raises
     ------

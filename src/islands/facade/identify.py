@@ -83,7 +83,7 @@ def identify(
     Returns
     -------
     Result
-        Best model of every size, best first.
+        Best model of every size, least validation error first.
 
     Raises
     ------

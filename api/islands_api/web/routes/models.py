@@ -19,7 +19,7 @@ from islands_service.store.results import StoredModel
 router = APIRouter(prefix="/v1/jobs", tags=["models"], responses=RESPONSES)
 
 #: Path parameter: the rank of a model in its result.
-Rank = Annotated[int, Path(ge=1, le=10_000, description="1 is the best model on the validation data.")]
+Rank = Annotated[int, Path(ge=1, le=10_000, description="1 has the least error on the validation data.")]
 
 #: Media types of the export formats that are not plain text.
 _MEDIA_TYPES = {"json": "application/json", "mathml": "application/mathml+xml"}
@@ -41,7 +41,7 @@ _EXPORT_RESPONSES: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{job}/models", response_model=ModelPage)
 async def models(job: Id, caller: Reader, state: AppStateDep) -> Any:
-    """Return the models of a job, best first. The list is empty until the job has succeeded."""
+    """Return the models of a job in the order of their ranks; none until the job has succeeded."""
     await get_job_of_kind(state, caller, job, IDENTIFICATION)
     return await state.run_blocking(
         lambda: JSONItems([model.document for model in state.store.results.models(job)])

@@ -106,9 +106,10 @@ def test_exported_model_file_can_be_read_back(reader: Any, job: str) -> None:
 def test_figures_are_listed_and_fetched(reader: Any, service: Service, job: str, tmp_path: Path) -> None:
     names = reader.figures(job)
     of_search = ("record", "front", "convergence", "islands")
+    rank = next(model.rank for model in reader.models(job) if model.recommended)
     assert names == (
         *((name, None) for name in of_search),
-        *((name, 1) for name in ("free-run", "loop", "hold", "residuals")),
+        *((name, rank) for name in ("free-run", "loop", "hold", "residuals")),
     )
     # Stored beforehand, so that the test does not wait for matplotlib; tests/acceptance draws them.
     blobs = Blobs(service.settings.blobs)
