@@ -332,7 +332,7 @@ DIGEST = """
 import hashlib
 import numpy as np
 from islands.data.dataset import Dataset
-from islands.estimation.least_squares import factorise
+from islands.estimation.least_squares import factorise, least_squares
 from islands.model.expression import Lagged
 from islands.model.regressor import regressor
 from islands.model.parsing import parse
@@ -344,7 +344,8 @@ u, y = np.random.default_rng(0).normal(size=(2, 60_000)).cumsum(axis=1) / 100
 record = Dataset(u, y, 0.1)
 psi = regressor_matrix(terms, record, 2)
 qr = factorise(psi[:-1], psi[-1])
-parts = [qr.triangle, qr.scale, qr.projection, np.array(qr.residual), gram_matrix(terms, record, 2)]
+errors = least_squares(psi[:-1], psi[-1]).standard_errors
+parts = [errors, qr.triangle, qr.scale, qr.projection, np.array(qr.residual), gram_matrix(terms, record, 2)]
 print(hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest(), qr.residual)
 """
 

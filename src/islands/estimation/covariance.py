@@ -40,6 +40,7 @@ def sandwich(
     sensitivities: NDArray[np.float64],
     residual: NDArray[np.float64],
     intervals: NDArray[np.int64] | None = None,
+    weights: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Return the covariance of the coefficients of orthonormal sensitivities.
 
@@ -55,19 +56,22 @@ def sandwich(
     intervals : ndarray of int64, shape (intervals,), optional
         Numbers of rows of the shooting intervals, in the order of time. The residuals of one interval share
         its initial values, so the scores are summed over each interval.
+    weights : ndarray, shape (coefficients, free), optional
+        Orthonormal combinations of the sensitivities whose coefficients are estimated; all by default.
 
     Returns
     -------
-    ndarray, shape (coefficients, coefficients)
+    ndarray, shape (free, free)
     """
-    count, rows = sensitivities.shape
+    weights = np.eye(len(sensitivities)) if weights is None else weights
+    rows, count = residual.size, weights.shape[1]
     if not count:
         return np.zeros((0, 0))
     scores = sensitivities * residual
     if intervals is not None and _MIN_INTERVALS <= len(intervals) < rows:
         ends = np.cumsum(intervals) - 1
         scores = np.diff(np.cumsum(scores, axis=1)[:, ends], axis=1, prepend=0.0)
-    covariance, freedom = long_run_variance(np.ascontiguousarray(scores))
+    covariance, freedom = long_run_variance(np.ascontiguousarray(scores), weights)
     freedom = max(1.0, min(freedom, rows - count))
     student = float(stdtrit(freedom, _PROBABILITY)) / _QUANTILE
     corrected: NDArray[np.float64] = covariance * (rows / max(1, rows - count) * student**2)
@@ -98,22 +102,26 @@ def sandwich_of_jacobian(
     return covariance
 
 
-def long_run_variance(scores: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def long_run_variance(
+    scores: NDArray[np.float64], weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
     """Return the sum of the autocovariances of series that sum to zero, times their length.
 
     Parameters
     ----------
     scores : ndarray, shape (series, rows)
+    weights : ndarray, shape (series, combinations)
+        The variance is that of ``weights.T @ scores``, which is never stored.
 
     Returns
     -------
-    variance : ndarray, shape (series, series)
+    variance : ndarray, shape (combinations, combinations)
         Variance of the sum over the rows.
     freedom : float
         Degrees of freedom of the estimate.
     """
     count, rows = scores.shape
-    length = _window(scores)
+    length = _window(scores, weights)
     smooth = np.ascontiguousarray(_moving_sum(_moving_sum(scores, length), length))
     triangle = np.convolve(np.ones(length), np.ones(length))
     kernel = np.convolve(triangle, triangle)
@@ -125,13 +133,14 @@ def long_run_variance(scores: NDArray[np.float64]) -> tuple[NDArray[np.float64],
             variance[i, j] = variance[j, i] = dot(flat, i * samples, flat, j * samples, samples)
     # The scores sum to zero, which takes the share of the weights from the expected value.
     share = 1.0 - float(kernel.sum()) / rows if length > 1 else 1.0
-    return variance / (triangle @ triangle) / share, rows / float(kernel @ kernel)
+    combined: NDArray[np.float64] = weights.T @ variance @ weights
+    return combined / (triangle @ triangle) / share, rows / float(kernel @ kernel)
 
 
-def _window(scores: NDArray[np.float64]) -> int:
+def _window(scores: NDArray[np.float64], weights: NDArray[np.float64]) -> int:
     """Return half the support of the Parzen kernel in rows; 1 uses no autocovariance."""
     numerator = denominator = 0.0
-    for value in _autocorrelations(scores):
+    for value in _autocorrelations(scores, weights):
         rho = min(max(value, -_MAX_AUTOCORRELATION), _MAX_AUTOCORRELATION)
         innovation = (1.0 - rho**2) ** 2
         numerator += 4.0 * rho**2 * innovation / (1.0 - rho) ** 8
@@ -143,8 +152,8 @@ def _window(scores: NDArray[np.float64]) -> int:
     return max(1, int(np.ceil(min(support, _MAX_SUPPORT * rows) / 2.0)))
 
 
-def _autocorrelations(scores: NDArray[np.float64]) -> list[float]:
-    """Return the autocorrelations at lag 1 of the principal combinations of the series.
+def _autocorrelations(scores: NDArray[np.float64], weights: NDArray[np.float64]) -> list[float]:
+    """Return the autocorrelations at lag 1 of the principal combinations of the weighted series.
 
     They do not depend on the basis of the series, hence not on units or on the basis of a null space.
     """
@@ -155,19 +164,21 @@ def _autocorrelations(scores: NDArray[np.float64]) -> list[float]:
     present, shifted = np.empty((count, count)), np.empty((count, count))
     for i in range(count):
         for j in range(count):
-            present[i, j] = dot(flat, i * rows, flat, j * rows, rows)
+            if j <= i:
+                present[i, j] = present[j, i] = dot(flat, i * rows, flat, j * rows, rows)
             shifted[i, j] = dot(flat, i * rows, flat, j * rows + 1, rows - 1)
+    present, shifted = (weights.T @ matrix @ weights for matrix in (present, shifted + shifted.T))
     energies, vectors = np.linalg.eigh(present)
     kept = energies > _DEPENDENT * max(energies[-1], 0.0)
     white = vectors[:, kept] / np.sqrt(energies[kept])
-    values: list[float] = np.linalg.eigvalsh(white.T @ (shifted + shifted.T) @ white / 2.0).tolist()
+    values: list[float] = np.linalg.eigvalsh(white.T @ shifted @ white / 2.0).tolist()
     return values
 
 
 def _moving_sum(series: NDArray[np.float64], length: int) -> NDArray[np.float64]:
     """Return the sums over all windows that overlap the series, which is zero outside."""
-    running = np.cumsum(series, axis=1)
-    return (
-        np.pad(running, ((0, 0), (0, length - 1)), mode="edge")
-        - np.pad(running, ((0, 0), (length, 0)))[:, : running.shape[1] + length - 1]
-    )
+    count, rows = series.shape
+    running = np.zeros((count, rows + 2 * length - 1))
+    np.cumsum(series, axis=1, out=running[:, length : length + rows])
+    running[:, length + rows :] = running[:, length + rows - 1, None]
+    return running[:, length:] - running[:, :-length]

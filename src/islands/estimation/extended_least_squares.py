@@ -39,8 +39,11 @@ _ROWS_PER_TERM = 20
 #: The iteration ends when it reduces the squared error by a smaller relative amount.
 _MIN_GAIN = 1e-9
 
-#: Maximum number of iterations, and of halvings of a step that increases the error.
-_MAX_ITERATIONS, _MAX_HALVINGS = 30, 12
+#: Maximum numbers of iterations for the selection of the order and for the final estimate.
+_SELECTING_ITERATIONS, _MAX_ITERATIONS = 5, 30
+
+#: Maximum number of halvings of a step that increases the error.
+_MAX_HALVINGS = 12
 
 #: A residual with a smaller norm relative to the output is rounding error.
 _ROUNDING = 1e-12
@@ -170,7 +173,7 @@ def _select_noise(
     for order in orders:
         if order:
             padded = np.append(fits[-1], np.zeros(eta.size + order - fits[-1].size))
-            fits.append(_minimise(regression, padded))
+            fits.append(_minimise(regression, padded, _SELECTING_ITERATIONS, 0.1 / rows))
         error = regression(fits[-1])[1]
         squares = dot(error, 0, error, 0, rows)
         if not squares > rounding:
@@ -181,15 +184,17 @@ def _select_noise(
             break
     if not criteria or best == 0:
         return None
-    return fits[min(best + _PATIENCE, len(fits) - 1)]
+    return _minimise(regression, fits[min(best + _PATIENCE, len(fits) - 1)], _MAX_ITERATIONS, _MIN_GAIN)
 
 
-def _minimise(regression: _NoiseRegression, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+def _minimise(
+    regression: _NoiseRegression, parameters: NDArray[np.float64], iterations: int, least_gain: float
+) -> NDArray[np.float64]:
     """Minimise the prediction error by Gauss-Newton steps from the given parameters."""
     sensitivities, error = regression(parameters)
     rows, count = error.size, parameters.size
     squares = dot(error, 0, error, 0, rows)
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(iterations):
         triangle, projection = np.empty((count, count)), np.empty(count)
         if orthogonalise(sensitivities, error.copy(), triangle, projection, DEPENDENT) >= 0:
             break
@@ -207,7 +212,7 @@ def _minimise(regression: _NoiseRegression, parameters: NDArray[np.float64]) -> 
             break
         gain = 1.0 - smaller / squares
         parameters, squares = candidate, smaller
-        if gain < _MIN_GAIN:
+        if gain < least_gain:
             break
     return parameters
 

@@ -141,7 +141,7 @@ def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.
     scaled = particular + basis @ solve_triangular(r, right)
     unexplained = remainder - q @ right
     residual = factors.orthogonal + combine(unexplained[:, None], factors.columns)[0]
-    covariance = sandwich(combine(q, factors.columns), residual)
+    covariance = sandwich(factors.columns, residual, weights=q)
     spread = solve_triangular(r, basis.T, trans="T")
     variances = np.einsum("it,ij,jt->t", spread, covariance, spread)
     return _make_estimate(factors, scaled, variances, float(unexplained @ unexplained), free)

@@ -26,16 +26,17 @@ def test_long_run_variance_of_an_autoregression(pole, tolerance):
     rows, found = 2000, []
     for seed in range(40):
         series = lfilter([1.0], [1.0, -pole], np.random.default_rng(seed).normal(size=(1, rows)), axis=1)
-        found.append(long_run_variance(series - series.mean())[0][0, 0])
+        found.append(long_run_variance(series - series.mean(), np.eye(1))[0][0, 0])
     assert np.mean(found) == pytest.approx(rows / (1.0 - pole) ** 2, rel=tolerance)
 
 
 def test_long_run_variance_is_positive_and_follows_a_change_of_basis():
     series = make_problem(count=4)[0]
-    variance, freedom = long_run_variance(series)
+    variance, freedom = long_run_variance(series, np.eye(4))
     assert np.linalg.eigvalsh(variance).min() > 0.0
     mix = np.random.default_rng(1).normal(size=(4, 4))
-    mixed, same = long_run_variance(mix @ series)
+    mixed, same = long_run_variance(mix @ series, np.eye(4))
+    np.testing.assert_allclose(long_run_variance(series, mix.T)[0], mixed, rtol=1e-8)
     np.testing.assert_allclose(mixed, mix @ variance @ mix.T, rtol=1e-8)
     assert freedom == pytest.approx(same)
 
