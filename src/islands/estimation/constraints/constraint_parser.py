@@ -27,13 +27,14 @@ FORMS = (
     "[u(k-1)] >= 0",
 )
 
-_UNSIGNED = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+# A run of digits or of white space must match in one way only: otherwise the time grows exponentially.
+_UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBER = rf"[-+]?{_UNSIGNED}"
 _NUMBERS = rf"{_NUMBER}(?:\s*,\s*{_NUMBER})*"
-_TERM = rf"\s*(?P<sign>[-+]?)\s*(?:(?P<weight>{_UNSIGNED})\s*\*\s*)?\[(?P<term>[^\[\]]+)\]"
+_TERM = rf"\s*(?:(?P<sign>[-+])\s*)?(?:(?P<weight>{_UNSIGNED})\s*\*\s*)?\[(?P<term>[^\[\]]+)\]"
 _FIXED_POINT = re.compile(rf"fixed-point\s*=\s*(?P<point>{_NUMBERS})")
 _GAIN = re.compile(
-    rf"gain(?:\(u(?P<channel>\d+)?\))?\s*=\s*(?P<gain>{_NUMBER})(?:\s*at\s+(?P<point>{_NUMBERS}))?"
+    rf"gain(?:\(u(?P<channel>\d{1, 3})?\))?\s*=\s*(?P<gain>{_NUMBER})(?:\s*at\s+(?P<point>{_NUMBERS}))?"
 )
 _LINEAR = re.compile(
     rf"(?P<terms>(?:{re.sub(r'P<[a-z]+>', ':', _TERM)})+)\s*(?P<relation><=|>=|=)\s*(?P<target>{_NUMBER})"
@@ -55,7 +56,7 @@ def parse_statements(text: str, names: Mapping[str, tuple[Part, ...]]) -> tuple[
     SettingsError
         A statement cannot be read, or there are more than `MOST_STATEMENTS`.
     """
-    statements = [statement.strip() for statement in text.split(";")]
+    statements = [" ".join(statement.split()) for statement in text.split(";")]
     if len(statements) > MOST_STATEMENTS:
         raise SettingsError(f"{len(statements)} constraints are too many: state at most {MOST_STATEMENTS}")
     parts: list[Part] = []
@@ -111,7 +112,7 @@ def _make_linear(statement: str, match: re.Match[str]) -> Part:
     for position, entry in enumerate(re.finditer(_TERM, match["terms"])):
         if position and not entry["sign"]:
             raise SettingsError(f"{statement!r} lacks a sign before [{entry['term']}]: write + or -")
-        weight = _read_number(statement, f"{entry['sign']}{entry['weight'] or 1}")
+        weight = _read_number(statement, f"{entry['sign'] or ''}{entry['weight'] or 1}")
         factor, item = _read_term(statement, entry["term"])
         # The parameter of 2*u(k-1) is half of that of u(k-1), which the model has.
         weights[item] = weights.get(item, 0.0) + weight / factor
@@ -129,7 +130,7 @@ def _make_linear(statement: str, match: re.Match[str]) -> Part:
 def _read_term(statement: str, text: str) -> tuple[float, Regressor]:
     try:
         factor, item = regressor(parse(text))
-    except ModelError as error:
+    except (ModelError, RecursionError) as error:
         raise SettingsError(f"cannot read the constraint {statement[:80]!r}: {error}") from error
     if item is None:
         raise SettingsError(f"[{text}] in {statement[:80]!r} is identically zero")

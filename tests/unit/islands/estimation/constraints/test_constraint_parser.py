@@ -1,5 +1,7 @@
 """Text of constraints."""
 
+import time
+
 import pytest
 
 from islands.errors import SettingsError
@@ -70,6 +72,29 @@ def test_statements_are_combined():
     found = constraint("hysteresis; odd;[u(k-1)] >= 0; odd")
     assert [each.text for each in found.parts] == ["hysteresis", "odd", "[u(k-1)] >= 0"]
     assert constraint("none; odd").parts == CONSTRAINTS["odd"].parts
+
+
+def test_white_space_does_not_matter():
+    assert part(" [u(k-1)]  -\t2 *[u(k-2)]=1 ") == part("[u(k-1)] - 2 *[u(k-2)]=1")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[u(k-1)] " * 2000,
+        "[u(k-1)]" + " " * 19_000 + "x",
+        "1" * 19_000 + "[u(k-1)] = 1",
+        f"[{'abs(' * 300}u(k-1){')' * 300}] = 0",
+        f"gain(u{'1' * 5000}) = 1",
+    ],
+    ids=["terms", "spaces", "digits", "depth", "channel"],
+)
+def test_long_text_is_refused_at_once(text):
+    """A service reads statements of clients: the time must not grow faster than the length."""
+    began = time.perf_counter()
+    with pytest.raises(SettingsError):
+        constraint(text)
+    assert time.perf_counter() - began < 5.0
 
 
 def test_forms_can_be_read():
