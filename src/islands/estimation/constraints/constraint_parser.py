@@ -34,7 +34,7 @@ _NUMBERS = rf"{_NUMBER}(?:\s*,\s*{_NUMBER})*"
 _TERM = rf"\s*(?:(?P<sign>[-+])\s*)?(?:(?P<weight>{_UNSIGNED})\s*\*\s*)?\[(?P<term>[^\[\]]+)\]"
 _FIXED_POINT = re.compile(rf"fixed-point\s*=\s*(?P<point>{_NUMBERS})")
 _GAIN = re.compile(
-    rf"gain(?:\(u(?P<channel>\d{1, 3})?\))?\s*=\s*(?P<gain>{_NUMBER})(?:\s*at\s+(?P<point>{_NUMBERS}))?"
+    rf"gain(?:\(u(?P<channel>\d{{1,3}})?\))?\s*=\s*(?P<gain>{_NUMBER})(?:\s*at\s+(?P<point>{_NUMBERS}))?"
 )
 _LINEAR = re.compile(
     rf"(?P<terms>(?:{re.sub(r'P<[a-z]+>', ':', _TERM)})+)\s*(?P<relation><=|>=|=)\s*(?P<target>{_NUMBER})"
