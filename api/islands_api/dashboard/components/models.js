@@ -249,9 +249,13 @@ export function makeModelsPanel(job, rank, signal) {
       "Errors are those of the free run. The models are ranked by the validation data, so these errors are "
         + "not an independent test.",
     );
+    const { reasons = [], rank: recommended } = job.summary ?? {};
+    const why = reasons.length
+      ? el("p", {}, `Model ${recommended} is recommended: ${reasons.join("; ")}.`)
+      : "";
     const overview = makeScrollable("Models", makeModelTable(job.id, models));
     const islands = job.progress?.islands?.length ?? 0;
-    body.replaceChildren(overview, note, article, makeSearchFigures(job.id, islands, signal));
+    body.replaceChildren(why, overview, note, article, makeSearchFigures(job.id, islands, signal));
     select(rank);
     return Infinity;
   }, signal);
