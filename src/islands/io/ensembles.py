@@ -34,11 +34,12 @@ class StructureDocument(BaseModel):
 
 
 class BandsDocument(BaseModel):
-    """Width of the bands of a model: the noise, and the factors by level."""
+    """Width of the bands of a model: the noise, the median width, and the factors by level."""
 
     model_config = ConfigDict(frozen=True)
 
     noise: Annotated[FiniteFloat, Field(ge=0)]
+    width: Annotated[FiniteFloat, Field(ge=0)]
     levels: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
     factors: Annotated[tuple[FiniteFloat, ...], Field(min_length=1)]
 
@@ -109,6 +110,7 @@ def bands_document(bands: PredictionBands | None) -> dict[str, Any] | None:
         return None
     return {
         "noise": bands.noise,
+        "width": bands.width,
         "levels": list(bands.factors),
         "factors": list(bands.factors.values()),
     }
@@ -126,7 +128,8 @@ def bands_from_document(document: Any, ensemble: Ensemble | None) -> PredictionB
         return None
     try:
         found = BandsDocument.model_validate(document)
-        return PredictionBands(ensemble, found.noise, dict(zip(found.levels, found.factors, strict=True)))
+        factors = dict(zip(found.levels, found.factors, strict=True))
+        return PredictionBands(ensemble, found.noise, found.width, factors)
     except ValueError as error:
         raise ModelError(f"the bands of the result are damaged: {error}") from error
 

@@ -10,6 +10,7 @@ from islands.io.certificates import summarise_certificates
 from islands.io.model_table import LEGEND, table
 from islands.model.equations import equation, named_equation, named_term
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
+from islands.validation.prediction_bands import LEVEL
 
 #: Smallest R2 of a simulation that counts as good.
 _GOOD_R2 = 0.9
@@ -19,6 +20,9 @@ _LARGE_RATIO = 2.0
 
 #: Standard errors below which a parameter is not significant.
 _SIGNIFICANT = 2.0
+
+#: Inclusion probability from which a term is certain.
+_CERTAIN = 0.9
 
 #: Closure of a loop, in per cent of the output range, above which the loop is open.
 _OPEN_PERCENT = 5.0
@@ -69,6 +73,7 @@ def describe(found: SearchResult) -> list[str]:
         f"    {named_equation(entry.model)}",
         _describe_units(found),
         _describe_error(found, entry),
+        *_describe_uncertainty(found, entry),
     ]
     good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
     bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
@@ -99,6 +104,23 @@ def _describe_error(found: SearchResult, entry: RankedModel) -> str:
         error += f", mean absolute error {free.mape:.3g} % of the output range" if isfinite(free.mape) else ""
         error += f", R2 {free.r2:.5f}" if isfinite(free.r2) else ""
     return f"Error: {error}; one step ahead RMSE {_unit(found, one.rmse)}."
+
+
+def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[str]:
+    if entry.bands is None or found.ensemble is None:
+        return
+    model, ensemble = entry.model, found.ensemble
+    inclusion = [ensemble.inclusion(item) for item in model.regressors]
+    doubtful = [
+        f"{named_term(model, position)} {share:.2f}"
+        for position, share in enumerate(inclusion)
+        if share < _CERTAIN
+    ]
+    text = f"{100 * LEVEL:g} % of new samples of the same kind are within about "
+    text += f"{_unit(found, entry.bands.typical_half_width())} of the free run; "
+    terms = f"doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}"
+    certain = f"every term has an inclusion probability of {_CERTAIN:g} or more"
+    yield f"Uncertainty: {text}{terms if doubtful else certain}."
 
 
 def _unit(found: SearchResult, value: float) -> str:

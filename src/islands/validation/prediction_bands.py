@@ -66,12 +66,15 @@ class PredictionBands:
     noise : float
         Root mean square of the residual of the free run that the spread of the ensemble does not explain, in
         the unit of the output.
+    width : float
+        Median of ``sqrt(noise^2 + spread^2)`` over the data, in the unit of the output.
     factors : mapping
         Half-width of a band in units of ``sqrt(noise^2 + spread^2)``, by level.
     """
 
     ensemble: Ensemble
     noise: float
+    width: float
     factors: Mapping[float, float]
 
     def predict(
@@ -97,15 +100,22 @@ class PredictionBands:
         RecordError
             The record does not match the model, or is too short for it or for a member of the ensemble.
         """
-        if not LEVELS[0] <= level <= LEVELS[-1]:
-            raise SettingsError(f"the level of a band lies between {LEVELS[0]} and {LEVELS[-1]}, got {level}")
-        levels = sorted(self.factors)
-        factor = float(np.interp(level, levels, [self.factors[each] for each in levels]))
+        factor = self._factor(level)
         first = model.maximum_lag if warm_up is None else warm_up
         run = free_run(model, record, first)
         spread = self.ensemble.spread(self.ensemble.simulate(record, first), run.y)
         half = factor * np.sqrt(self.noise**2 + spread**2)
         return PredictionBand(level, run.y, run.y - half, run.y + half)
+
+    def typical_half_width(self, level: float = LEVEL) -> float:
+        """Return the median half-width of a band on the data, in the unit of the output."""
+        return self._factor(level) * self.width
+
+    def _factor(self, level: float) -> float:
+        if not LEVELS[0] <= level <= LEVELS[-1]:
+            raise SettingsError(f"the level of a band lies between {LEVELS[0]} and {LEVELS[-1]}, got {level}")
+        levels = sorted(self.factors)
+        return float(np.interp(level, levels, [self.factors[each] for each in levels]))
 
 
 def calibrate_bands(
@@ -165,4 +175,4 @@ def _calibrate(
     # The correction of a conformal prediction for a finite number of residuals.
     ranks = [int(len(scores) * level * (1.0 + 1.0 / count)) for level in LEVELS]
     factors = [float(scores[min(len(scores) - 1, rank)]) for rank in ranks]
-    return PredictionBands(ensemble, noise, dict(zip(LEVELS, factors, strict=True)))
+    return PredictionBands(ensemble, noise, float(np.median(width)), dict(zip(LEVELS, factors, strict=True)))

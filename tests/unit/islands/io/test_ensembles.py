@@ -41,7 +41,7 @@ def test_a_result_folder_reproduces_the_bands_bit_for_bit(folder):
         bands = read_bands(file, islands.read_model(file))
         expected = result().search_result.ensemble
         own = model.ranked_model.bands
-        assert (bands.noise, bands.factors) == (own.noise, own.factors)
+        assert (bands.noise, bands.width, bands.factors) == (own.noise, own.width, own.factors)
         for found, each in zip(bands.ensemble.structures, expected.structures, strict=True):
             assert (found.model, found.weight) == (each.model, each.weight)
             assert (found.parameters == each.parameters).all()

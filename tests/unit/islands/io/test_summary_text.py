@@ -9,7 +9,9 @@ import islands
 from islands.data.dataset import Dataset
 from islands.io.model_table import table
 from islands.io.summary_text import describe, summary
+from islands.model.equations import named_term
 from islands.simulation.outcome import EvaluationOutcome, Status
+from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import ResidualStructure
 from support.searches import record
@@ -131,3 +133,20 @@ def test_a_parameter_below_two_standard_errors_is_named(findings):
     model = entry.model.with_parameters(theta, [abs(theta[0]), *(abs(value) / 3 for value in theta[1:])])
     weak = describe(replace(findings, models=(replace(entry, model=model),)))[-1]
     assert "y_um(k-1) has less than two standard errors" in weak
+
+
+def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(findings):
+    entry = findings.recommended
+    half = entry.bands.typical_half_width(0.9)
+    sentence = said(findings)["Uncertainty"]
+    assert f"within about {half:.4g} um of the free run" in sentence
+    excluded = replace(findings, ensemble=Ensemble(findings.ensemble.structures[:0]))
+    assert f"{named_term(entry.model, 0)} 0.00" in said(excluded)["Uncertainty"]
+    certain = replace(findings.ensemble.structures[0], model=entry.model, weight=1.0)
+    kept = replace(findings, ensemble=Ensemble((certain,)))
+    assert said(kept)["Uncertainty"].endswith("every term has an inclusion probability of 0.9 or more.")
+
+
+def test_nothing_is_said_about_bands_that_a_result_lacks(findings):
+    lacking = replace(findings, models=(replace(findings.recommended, bands=None),))
+    assert not [line for line in describe(lacking) if line.startswith("Uncertainty")]
