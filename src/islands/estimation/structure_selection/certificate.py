@@ -18,7 +18,7 @@ from islands.estimation.froe import froe
 from islands.kernels.selection.subset_search import Tree, exchange, search
 
 #: Largest number of candidates; the time of a node grows with its cube.
-MOST_CANDIDATES = 500
+MOST_CANDIDATES = 300
 
 #: Relative difference of errors that is rounding.
 ROUNDING = 1e-6
@@ -62,7 +62,8 @@ def certify(problem: SelectionProblem, max_terms: int, nodes: int) -> tuple[Cert
     problem : SelectionProblem
     max_terms : int
     nodes : int
-        Nodes of the search for each number of terms. The result depends on it, and not on the time.
+        Nodes of the search for each number of terms; fewer are evaluated if the library is large. The result
+        depends on it, and not on the time.
 
     Returns
     -------

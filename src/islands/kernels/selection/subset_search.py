@@ -24,6 +24,9 @@ UNRESOLVED = 1e-13
 #: An exchange must reduce the error by this fraction.
 SAME = 1e-9
 
+#: Multiplications of a node, on average; a search of larger nodes evaluates fewer.
+MULTIPLICATIONS = 20_000
+
 
 class Tree(NamedTuple):
     """Binary tree of columns; the last node is the root.
@@ -107,7 +110,7 @@ def search(
     correlation,  # float64 [column]: inner products with the target, which has norm 1
     tree,
     size,  # number of columns to choose
-    limit,  # evaluate at most this number of nodes, apart from the root
+    limit,  # evaluate at most this number of nodes, apart from the root, of average size
     error,  # squared error of a known subset, at most 1
     chosen,  # out, int64 [size]: columns of a better subset, -1 after the last; unchanged if there is none
 ):
@@ -116,12 +119,12 @@ def search(
     scratch = _allocate(count)
     ranges, shares = np.full((limit + 2, size), -1), np.zeros((limit + 2, size), np.int64)
     ranges[0, 0], shares[0, 0] = tree.first.size - 1, size
-    bound, exact = _evaluate(gram, correlation, tree, ranges[0], shares[0], scratch, error, chosen)
+    bound, exact, work = _evaluate(gram, correlation, tree, ranges[0], shares[0], scratch, error, chosen)
     if exact:
         return min(bound, error), min(bound, error), 0
     open_nodes = [(bound, 0)]
-    used, nodes = 1, 0
-    while len(open_nodes) > 0 and open_nodes[0][0] < error and nodes + size + 1 <= limit:
+    used, nodes, most = 1, 0, limit * MULTIPLICATIONS
+    while len(open_nodes) > 0 and open_nodes[0][0] < error and nodes + size + 1 <= limit and work <= most:
         least, index = heappop(open_nodes)
         split, largest = 0, 0
         for place in range(size):
@@ -137,9 +140,10 @@ def search(
                 continue
             _divide(ranges, shares, index, used, split, one, some, other)
             nodes += 1
-            bound, exact = _evaluate(
+            bound, exact, added = _evaluate(
                 gram, correlation, tree, ranges[used], shares[used], scratch, error, chosen
             )
+            work += added
             if exact:
                 error = min(bound, error)
             elif bound < error:
@@ -178,7 +182,7 @@ def _divide(ranges, shares, parent, child, split, one, some, other):
 
 @kernel
 def _evaluate(gram, correlation, tree, ranges, shares, scratch, error, chosen):
-    """Return the lower bound of a node, or the error of its best subset; and whether it is the error.
+    """Return the lower bound of a node, or the error of its best subset; whether it is the error; the work.
 
     Write that subset to ``chosen`` if its error is less than ``error``.
     """
@@ -204,7 +208,7 @@ def _evaluate(gram, correlation, tree, ranges, shares, scratch, error, chosen):
                 split = fixed + tree.last[node] - tree.first[node]
     if left_to_choose > 2:
         explained, rank = _explain(gram, correlation, scratch, columns, columns)
-        return max(0.0, 1.0 - explained), False
+        return max(0.0, 1.0 - explained), False, columns**3 // 6
     explained, rank = _explain(gram, correlation, scratch, fixed, columns)
     if left_to_choose == 2 and split == columns:
         split = fixed  # both columns come from one range
@@ -217,7 +221,7 @@ def _evaluate(gram, correlation, tree, ranges, shares, scratch, error, chosen):
             chosen[fixed] = scratch.columns[one]
         if other >= 0:
             chosen[fixed + 1] = scratch.columns[other]
-    return best, True
+    return best, True, columns**2 * (fixed + 1) // 2
 
 
 @kernel
