@@ -11,7 +11,7 @@ from time import monotonic, perf_counter
 from typing import Any
 
 import islands
-from islands.data.compatibility import match_record
+from islands.data.compatibility import match_rate, match_record
 from islands.data.split import share_samples, split_data
 from islands.errors import ModelError, RecordError, SettingsError
 from islands.evolution.presets import resolve_settings
@@ -137,6 +137,7 @@ def run(
 
 def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: Path) -> None:
     """Simulate the recommended model on the test data; print and write the metrics."""
+    test_data = match_rate(result.best.model, test_data)
     simulated = result.best.simulate(test_data)
     errors_by_name = asdict(metrics(test_data.y, simulated.y)) if simulated.outcome else {}
     numbers = {name: value if isfinite(value) else None for name, value in errors_by_name.items()}

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.split import split_data
+from islands.data.split import average_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics
@@ -102,24 +102,27 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     spec = parse_identification(job.spec)
     datasets = {name: store.datasets.get(job.owner, name) for name in spec.datasets}
     record, validation = read_record_and_validation(spec, datasets, blobs)
-    split = split_data(record, validation)
     settings = resolve_settings(spec.preset, spec.changes)
     document = store.results.document(job.id)
     stored = store.results.models(job.id, rank)
     if document is None or not stored:
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
-    assessed, ensemble = [], None
-    for entry in stored:
-        model = model_from_json(entry.file, f"model {entry.rank}")
-        # Results of earlier versions have no ensemble.
-        ensemble = ensemble or ensemble_from_document(document.get("ensemble"), model)
+    models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
+    average = models[0].average
+    split = average_split(split_data(record, validation), average)
+    # Results of earlier versions have no ensemble.
+    ensemble = ensemble_from_document(document.get("ensemble"), models[0])
+    assessed = []
+    for entry, model in zip(stored, models, strict=True):
         # Results of earlier versions do not state their warm-up.
         warm_up = entry.document.get("warm_up", settings.maximum_lag)
         assessment = assess(model, split, settings.shooting, warm_up, settings.constraints)
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(RankedModel(model, assessment, bands))
     search = _search(document["search"], store.results.history(job.id))
-    return SearchResult(record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble)
+    return SearchResult(
+        record, split, spec.seed, document["settings"], search, tuple(assessed), ensemble, average
+    )
 
 
 def _search(document: Mapping[str, Any], history: list[list[Any]]) -> SearchStatistics:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from islands.data.averaging import average_samples
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
@@ -75,6 +76,13 @@ def split_data(record: Dataset, validation: Dataset | float) -> Split:
             "rows, or a fraction of the record"
         )
     return parts
+
+
+def average_split(split: Split, count: int) -> Split:
+    """Return the split with means of ``count`` samples; the split itself for a count of 1."""
+    if count == 1:
+        return split
+    return Split(average_samples(split.estimation, count), average_samples(split.validation, count))
 
 
 def share_samples(one: Dataset, other: Dataset) -> bool:

@@ -36,6 +36,7 @@ _SEEDED = Settings(
     from_library=0.6,
     distinct=True,
     refine=True,
+    average="auto",
     library="phi-polynomial",
     swap_search=True,
     topology="ring",

@@ -106,6 +106,9 @@ class SearchResult:
     ensemble : Ensemble or None
         Models that the data do not exclude. They give the inclusion probabilities of terms and the prediction
         bands. None if every free run diverged on the validation data.
+    average : int
+        Number of samples of the record whose mean is one sample of the estimation data and of the validation
+        data.
     """
 
     record: Dataset
@@ -115,6 +118,7 @@ class SearchResult:
     search: SearchStatistics
     models: tuple[RankedModel, ...]
     ensemble: Ensemble | None = None
+    average: int = 1
 
     @property
     def requires_property_1(self) -> bool:
@@ -157,6 +161,12 @@ def with_bands(
     calibrated = calibrate_bands([entry.model for entry in found.models], ensemble, found.split, warm_up)
     models = tuple(replace(entry, bands=bands) for entry, bands in zip(found.models, calibrated, strict=True))
     return replace(found, models=models, ensemble=ensemble)
+
+
+def with_average(found: SearchResult, average: int) -> SearchResult:
+    """Return a search result on means of samples; its models state the number of samples of a mean."""
+    models = tuple(replace(entry, model=replace(entry.model, average=average)) for entry in found.models)
+    return replace(found, models=models, average=average)
 
 
 def rank_models(models: Sequence[RankedModel]) -> tuple[RankedModel, ...]:

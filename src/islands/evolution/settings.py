@@ -5,6 +5,7 @@ from dataclasses import Field, dataclass, field
 from math import inf
 from typing import Any, TypeVar
 
+from islands.data.averaging import check_average
 from islands.errors import SettingsError, lookup
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimators import ESTIMATORS
@@ -116,6 +117,9 @@ class Settings:
     estimator : str
         An entry of ``ESTIMATORS``, which estimates the parameters of the final models. Empty: least squares
         and, with ``refine``, refinement; the validation data select between the two.
+    average : int or str
+        Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
+        oversampled record if small models of a library are clearly better on the validation data.
     islands : int
         Number of islands, each with a separate population.
     topology : str
@@ -174,6 +178,7 @@ class Settings:
     estimator: str = _option(
         "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"
     )
+    average: int | str = _option(1, "Samples of a mean that becomes one sample, or auto.")
     islands: int = _option(1, "Number of islands that evolve in parallel.")
     topology: str = _option("isolated", f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
     migrate_every: int | str = _option(
@@ -216,6 +221,7 @@ class Settings:
             raise SettingsError("genes are made of primitives and back-shifts: give at least one of them")
         if self.library:
             get_library(self.library)
+        check_average(self.average)
         lookup(STRUCTURES, self.structure, "structure")
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")

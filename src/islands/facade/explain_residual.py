@@ -17,7 +17,15 @@ from islands.simulation.predictors import free_run
 
 #: Settings of the search: few terms, so that the formula is readable.
 SEARCH: Mapping[str, Any] = MappingProxyType(
-    {"population": 200, "generations": 40, "islands": 2, "max_terms": 5, "initial_terms": (1, 5)}
+    {
+        "population": 200,
+        "generations": 40,
+        "islands": 2,
+        "max_terms": 5,
+        "initial_terms": (1, 5),
+        # The formula is simulated at the sampling time of the diagnosis.
+        "average": 1,
+    }
 )
 
 #: Fraction of the residual, on the hold-out part, that a formula has to exceed by `MIN_IMPROVEMENT`.

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import SettingsError, lookup
@@ -29,8 +30,10 @@ from islands.evolution.search_result import (
     SearchResult,
     SearchStatistics,
     rank_models,
+    with_average,
     with_bands,
 )
+from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set, get_library
@@ -52,6 +55,7 @@ def fit(
     max_terms: int = 10,
     constraints: str | None = None,
     estimator: str = "least-squares",
+    average: int | str = AUTO,
     shooting: int | None = None,
     certificate: int = 10_000,
     seed: int = 0,
@@ -76,6 +80,10 @@ def fit(
         library.
     estimator : str
         An entry of ``ESTIMATORS``, which estimates the parameters of the selected structures.
+    average : int or str
+        Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
+        oversampled record if small models are clearly better on the validation data. Models then have the
+        sampling time of the means.
     shooting : int, optional
         Samples of each interval of multiple shooting.
     certificate : int
@@ -108,7 +116,8 @@ def fit(
         raise SettingsError(f"a model has at least one term, got max_terms = {max_terms}")
     if certificate < 0:
         raise SettingsError(f"a search has at least 0 nodes, got certificate = {certificate}")
-    parts = split_data(record, validation)
+    trial = TrialLibrary(library, degree, lags, constraints)
+    parts, samples = select_rate(split_data(record, validation), average, trial, lags + 3)
     shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
@@ -154,6 +163,7 @@ def fit(
         "max_terms": max_terms,
         "constraints": constraints,
         "estimator": estimator,
+        "average": average,
         "shooting": shooting,
         "certificate": certificate,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
@@ -164,7 +174,7 @@ def fit(
         ValidatedModel(entry.model, interval, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
-    return Result(with_bands(result, estimates, constraints, warm_up))
+    return Result(with_average(with_bands(result, estimates, constraints, warm_up), samples))
 
 
 def _select(

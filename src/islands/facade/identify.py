@@ -22,13 +22,14 @@ from islands.evolution.engine import Engine, SerialEngine, Stop
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem, make_problem
-from islands.evolution.search_result import SearchResult, SearchStatistics, with_bands
+from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
 from islands.facade.final_models import estimate_candidates, select_final_models
+from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
-from islands.model.candidate_library import full_set
+from islands.model.candidate_library import full_set, get_library
 from islands.model.expression import Primitive
 from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import get_source
@@ -101,7 +102,12 @@ def identify(
         raise SettingsError(f"a seed is not negative, got {seed}")
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
-    split = split_data(record, validation)
+    split, count = select_rate(
+        split_data(record, validation),
+        settings.average,
+        _make_trial_library(settings),
+        settings.maximum_lag + _MIN_RESIDUALS,
+    )
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
     search_problem = make_problem(subtract_offsets(split.estimation, offsets), settings)
@@ -132,7 +138,8 @@ def identify(
     described["validation"] = record_document(validation) if isinstance(validation, Dataset) else validation
     statistics = _make_statistics(state, search_problem)
     found = SearchResult(record, split, seed, described, statistics, models)
-    return Result(with_bands(found, candidates, settings.constraints, settings.maximum_lag))
+    banded = with_bands(found, candidates, settings.constraints, settings.maximum_lag)
+    return Result(with_average(banded, count))
 
 
 def _own_primitives(settings: Settings) -> list[Primitive]:
@@ -148,6 +155,16 @@ def _describe(settings: Settings) -> dict[str, Any]:
     if own := _own_primitives(settings):
         document["own_primitives"] = {entry.name: get_source(entry) for entry in own}
     return document
+
+
+def _make_trial_library(settings: Settings) -> TrialLibrary:
+    if settings.library:
+        name, degree, lags = settings.library, settings.library_degree, settings.library_lags
+    else:
+        # A search without a library has terms of its own; a library is needed only to compare rates.
+        name = "phi-polynomial" if constraint(settings.constraints).sums else "polynomial"
+        degree, lags = get_library(name).degree, get_library(name).lags
+    return TrialLibrary(name, degree, lags, settings.constraints)
 
 
 def _check_validation_length(validation: Dataset, settings: Settings) -> None:

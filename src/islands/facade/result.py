@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
 from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.constraint_checks import ConstraintCheck
@@ -101,6 +102,7 @@ class FittedModel:
         Parameters
         ----------
         record : Dataset
+            Its samples are averaged as in the search if it has the sampling time of the search's record.
         mode : str
             ``one-step``, ``shooting`` or ``free-run``.
         warm_up : int, optional
@@ -130,7 +132,7 @@ class FittedModel:
         Parameters
         ----------
         record : Dataset
-            Inputs, and the output of the warm-up.
+            Inputs, and the output of the warm-up; averaged as in `simulate`.
         level : float
             Probability, between 0.5 and 0.99.
         warm_up : int, optional
@@ -149,7 +151,7 @@ class FittedModel:
                 f"model {self.rank} has no prediction bands: its free run diverged, take another"
             )
         warm_up = self.ranked_model.assessment.warm_up if warm_up is None else warm_up
-        return bands.predict(self.model, record, level, warm_up)
+        return bands.predict(self.model, match_rate(self.model, record), level, warm_up)
 
     @property
     def least_squares_bias(self) -> float | None:
@@ -245,7 +247,8 @@ def simulate(
         A model; or a simulator, as its name on the command line (``second-order``), its specification, or
         the document of an extended simulation.
     record : Dataset
-        Inputs, and the output from which initial states are taken.
+        Inputs, and the output from which initial states are taken. Its samples are averaged if the model
+        describes means of samples and the record has the sampling time before averaging (see `match_rate`).
     mode : str
         ``one-step``, ``shooting`` (intervals of ``shooting`` samples) or ``free-run``; a simulator has
         ``free-run`` only.
@@ -266,7 +269,7 @@ def simulate(
     intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
     interval = lookup(intervals, mode, "mode")
     if isinstance(model, Model):
-        return multiple_shooting(model, record, interval, warm_up)
+        return multiple_shooting(model, match_rate(model, record), interval, warm_up)
     if interval is not None:
         raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
     # Import the simulators of the discrepancy analysis only if they are used.

@@ -38,6 +38,7 @@ class ModelDocument(BaseModel):
     inputs: Annotated[tuple[str, ...], Field(min_length=1)]
     output: str
     dt: Annotated[FiniteFloat, Field(gt=0)] | None = None
+    average: Annotated[int, Field(ge=1)] = 1
     equation: str = ""
     latex: str = ""
     terms: Annotated[tuple[TermDocument, ...], Field(min_length=1)]
@@ -65,6 +66,7 @@ def model_json(model: Model) -> str:
         "inputs": model.input_names,
         "output": model.output_name,
         "dt": model.dt,
+        "average": model.average,
         "equation": equation(model),
         "latex": latex_equation(model),
         "terms": terms_document(model),
@@ -141,7 +143,9 @@ def model_from_json(
     theta = _all_or_none([terms[item][0] for item in ordered], f"{name}: parameter")
     errors = _all_or_none([terms[item][1] for item in ordered], f"{name}: standard_error")
     try:
-        return Model(tuple(ordered), theta, document.inputs, document.output, document.dt, errors)
+        return Model(
+            tuple(ordered), theta, document.inputs, document.output, document.dt, errors, document.average
+        )
     except ModelError as error:
         raise ModelError(f"{name}: inputs: {error}") from error
 

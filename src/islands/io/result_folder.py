@@ -37,6 +37,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
     document = {
         "schema": SCHEMA,
         "record": record_document(found.record),
+        "preprocessing": {"average": found.average, "dt": found.split.estimation.dt},
         "seed": found.seed,
         "settings": dict(found.settings),
         "search": {

@@ -91,7 +91,17 @@ def _describe_units(found: SearchResult) -> str:
         (record.output_name, *record.input_names), (record.output_unit, *record.input_units), strict=True
     )
     units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
-    return f"    {f'{units}; ' if units else ''}k counts samples of {record.dt:g} s."
+    return f"    {f'{units}; ' if units else ''}{_describe_rate(found)}."
+
+
+def _describe_rate(found: SearchResult) -> str:
+    record, dt = found.record, found.split.estimation.dt
+    if found.average == 1:
+        return f"k counts samples of {dt:g} s"
+    return (
+        f"k counts steps of {dt:g} s: each value is the mean of {found.average} samples of the record, and "
+        f"simulate averages a record of {record.dt:g} s in the same way"
+    )
 
 
 def _describe_error(found: SearchResult, entry: RankedModel) -> str:

@@ -24,6 +24,9 @@ class Model:
         Sampling time in seconds for which the parameters are valid. None if unspecified.
     standard_errors : tuple of float or None
         Standard errors of the parameters. None if unknown.
+    average : int
+        Number of consecutive samples of a recording whose mean is one sample of the model. ``dt`` is the
+        sampling time of the means.
 
     Raises
     ------
@@ -38,10 +41,13 @@ class Model:
     output_name: str = "y"
     dt: float | None = None
     standard_errors: tuple[float, ...] | None = None
+    average: int = 1
 
     def __post_init__(self) -> None:
         if not self.regressors:
             raise ModelError("a model has at least one regressor")
+        if self.average < 1:
+            raise ModelError(f"a mean has at least 1 sample, got average = {self.average}")
         if list(self.regressors) != canonical_order(self.regressors):
             raise ModelError("a model's regressors must be in canonical order without repetition")
         for name in ("theta", "standard_errors"):

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import islands
+from islands.data.averaging import AUTO
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimators import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
@@ -46,6 +47,9 @@ def fit(
         ),
     ] = None,
     estimator: Annotated[str, typer.Option("--estimator", help=", ".join(ESTIMATORS))] = "least-squares",
+    average: Annotated[
+        str, typer.Option("--average", help="Samples of a mean that becomes one sample, or auto.")
+    ] = AUTO,
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
     ] = None,
@@ -76,6 +80,7 @@ def fit(
             max_terms=max_terms,
             constraints=constraints,
             estimator=estimator,
+            average=average,
             shooting=shooting,
             certificate=certificate,
             seed=seed,

@@ -7,6 +7,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.facade.fit import SHOOTING
@@ -73,7 +74,7 @@ def simulate(
         _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows)
         return
     chosen = options.model(model)
-    data = read_record(
+    recorded = read_record(
         record,
         options.columns(inputs or list(chosen.input_names)),
         output_column or chosen.output_name,
@@ -81,6 +82,9 @@ def simulate(
         parse_rows(rows),
         missing_output=True,
     )
+    data = match_rate(chosen, recorded)
+    if data is not recorded:
+        output.print(f"averaged {chosen.average} samples of {recorded.dt:g} s each: dt {data.dt:g} s")
     compile_kernels()
     reported = read_error_measurement(find_model_file(model)) or ErrorMeasurement(None, SHOOTING)
     interval = reported.shooting if shooting is None else shooting

@@ -96,7 +96,8 @@ def description(model: Model, quote: Callable[[str], str]) -> str:
     names = zip(signals(model)[1:], model.input_names, strict=True)
     inputs = ", ".join(f"{signal} = {quote(name)}" for signal, name in names)
     dt = "any" if model.dt is None else f"{float(model.dt)!r} s"
-    return f"Inputs {inputs}; output y = {quote(model.output_name)}; sampling time {dt}."
+    means = f", means of {model.average} samples" if model.average > 1 else ""
+    return f"Inputs {inputs}; output y = {quote(model.output_name)}; sampling time {dt}{means}."
 
 
 def heading(model: Model, mark: str) -> str:

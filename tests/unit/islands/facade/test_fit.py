@@ -173,19 +173,14 @@ def test_result_has_the_values_of_default_settings():
         "max_terms": 2,
         "constraints": "none",
         "estimator": "least-squares",
+        "average": "auto",
         "shooting": 30,
         "certificate": 10_000,
         "validation": 0.25,
     }
-    asked = islands.fit(
-        tank(), library="polynomial", degree=2, lags=1, constraints="hysteresis", shooting=8, max_terms=2
-    ).search_result
-    assert {name: asked.settings[name] for name in ("degree", "lags", "constraints", "shooting")} == {
-        "degree": 2,
-        "lags": 1,
-        "constraints": "hysteresis",
-        "shooting": 8,
-    }
+    changes = {"degree": 2, "lags": 1, "constraints": "hysteresis", "shooting": 8}
+    asked = islands.fit(tank(), library="polynomial", max_terms=2, **changes).search_result
+    assert {name: asked.settings[name] for name in changes} == changes
     assert asked.search.full_set == {"candidates": 6, "bytes": 8 * 6 * 299}
 
 

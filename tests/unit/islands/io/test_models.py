@@ -92,7 +92,7 @@ def halved(a):
 def test_a_model_file_has_schema_columns_sampling_time_terms_and_equation():
     model = PUBLISHED["12"].model
     fields = json.loads(model_json(model))
-    assert list(fields) == ["schema", "inputs", "output", "dt", "equation", "latex", "terms"]
+    assert list(fields) == ["schema", "inputs", "output", "dt", "average", "equation", "latex", "terms"]
     assert fields["schema"] == "islands.model/1"
     assert (fields["inputs"], fields["output"], fields["dt"]) == (["u_V"], "y_um", 1e-3)
     assert fields["equation"].startswith("y(k) = 1*y(k-1)")

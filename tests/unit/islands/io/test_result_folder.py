@@ -55,7 +55,8 @@ def with_best(findings, **changes):
 def test_a_result_has_every_field_of_the_contract(findings):
     result = loaded(findings)
     assert list(result) == [
-        *("schema", "record", "seed", "settings", "search", "loop", "recommended", "models", "ensemble")
+        *("schema", "record", "preprocessing", "seed", "settings", "search", "loop", "recommended"),
+        *("models", "ensemble"),
     ]
     assert result["schema"] == "islands.result/1"
     assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]

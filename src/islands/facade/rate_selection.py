@@ -1,0 +1,178 @@
+"""Choice of a sampling rate: noise of an oversampled record is averaged before the search.
+
+In one sampling time, an oversampled output changes less than its noise, so a model selected by its
+one-step-ahead error describes the noise. Means of consecutive samples change more and have less noise.
+"""
+
+from dataclasses import dataclass, replace
+from math import comb, inf, lcm
+
+import numpy as np
+from numpy.typing import NDArray
+
+from islands.data.averaging import AUTO, average_samples, check_average
+from islands.data.channel_names import parse_channel_name
+from islands.data.dataset import Dataset
+from islands.data.split import Split, average_split
+from islands.estimation.estimate import estimate
+from islands.estimation.forward_selection import forward_selection
+from islands.estimation.parameter_constraints import constraint
+from islands.estimation.structure_selection.deviations import (
+    OPERATING_POINT,
+    find_offsets,
+    no_offsets,
+    subtract_offsets,
+)
+from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import free_run
+
+#: Samples of a mean that are compared.
+COUNTS = (1, 2, 5, 10, 20, 50)
+
+#: Samples are averaged if the error is at most this fraction of the error without averaging.
+CLEAR_GAIN = 0.8
+
+#: Smallest noise worth a comparison, relative to the root mean square of the increments of a signal.
+_NOISE = 0.05
+
+#: Order of the differences that separate the noise from the signal.
+_ORDER = 4
+
+#: Largest variance within the means, relative to the variance of the signal: a sine of 18 means per period.
+_VARIANCE_WITHIN = 0.01
+
+#: Fewest means of the estimation data, and of the validation data when two rates are compared.
+_LEAST_ESTIMATION, _LEAST_VALIDATION = 500, 100
+
+#: Terms of the trial models, at most.
+_TERMS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class TrialLibrary:
+    """Candidate library and constraints of the models that compare rates."""
+
+    name: str
+    degree: int
+    lags: int
+    constraints: str
+
+
+def select_rate(split: Split, average: int | str, library: TrialLibrary, least: int) -> tuple[Split, int]:
+    """Average the data as the setting ``average`` says.
+
+    ``auto`` compares small models of the same library at several rates. The measure is the error of their
+    free run on the validation data, averaged over the same intervals of time for all rates. A record without
+    noise, or without samples to spare, is not averaged.
+
+    Parameters
+    ----------
+    split : Split
+    average : int or str
+        Samples of a mean, or ``auto``.
+    library : TrialLibrary
+    least : int
+        Fewest samples that a recording must have after averaging.
+
+    Returns
+    -------
+    tuple of Split and int
+        The data, and the number of samples of a mean.
+
+    Raises
+    ------
+    SettingsError
+        ``average`` is neither ``auto`` nor a positive integer.
+    RecordError
+        A recording is too short for the given average, or an input is read one sample early.
+    """
+    check_average(average)
+    count = _choose_count(split, library, least) if average == AUTO else int(average)
+    return average_split(split, count), count
+
+
+def _choose_count(split: Split, library: TrialLibrary, least: int) -> int:
+    # Statistics of very large numbers overflow: such a record is not averaged.
+    with np.errstate(over="ignore", invalid="ignore"):
+        counts = [count for count in COUNTS if _permits(split, count, least)]
+        interval = _limit_interval(split.validation, counts)
+        if len(counts) == 1 or not _is_noisy(split.estimation):
+            return 1
+    squares = np.array(
+        [_compute_errors(average_split(split, count), library, interval // count) ** 2 for count in counts]
+    )
+    # Coarse rates have a longer warm-up: compare the intervals that all of them predict.
+    compared = squares[:, ~np.isnan(squares).any(axis=0)]
+    errors = np.sqrt(compared.mean(axis=1)) if compared.size else np.full(len(counts), inf)
+    best = int(np.argmin(errors))
+    return counts[best] if errors[best] <= CLEAR_GAIN * errors[0] else 1
+
+
+def _permits(split: Split, count: int, least: int) -> bool:
+    """Return whether means of ``count`` samples keep the bandwidth and leave enough samples."""
+    if count == 1:
+        return True
+    estimation, validation = split.estimation, split.validation
+    if any(parse_channel_name(name).at_once for name in estimation.input_names):
+        return False
+    if min(estimation.segments + validation.segments) < least * count:
+        return False
+    if estimation.samples < _LEAST_ESTIMATION * count or validation.samples < _LEAST_VALIDATION * count:
+        return False
+    means = average_samples(estimation, count)
+    pairs = [(estimation.y, means.y), *zip(estimation.u.T, means.u.T, strict=True)]
+    return all(np.var(coarse) >= (1.0 - _VARIANCE_WITHIN) * np.var(fine) for fine, coarse in pairs)
+
+
+def _is_noisy(record: Dataset) -> bool:
+    return any(_measure_noise(signal, record) > _NOISE for signal in (record.y, *record.u.T))
+
+
+def _measure_noise(signal: NDArray[np.float64], record: Dataset) -> float:
+    """Return the standard deviation of white noise relative to the root mean square of the increments.
+
+    High-order differences of an oversampled signal vanish, and those of its noise do not. The median ignores
+    the steps of an input.
+    """
+    parts = [signal[first:last] for first, last in record.bounds]
+    increments = np.concatenate([np.diff(part) for part in parts])
+    size = float(np.sqrt(np.mean(increments**2)))
+    differences = np.concatenate([np.diff(part, _ORDER) for part in parts])
+    noise = float(np.median(np.abs(differences))) / (0.6745 * comb(2 * _ORDER, _ORDER) ** 0.5)
+    return noise / size if size > 0.0 else 0.0
+
+
+def _limit_interval(validation: Dataset, counts: list[int]) -> int:
+    """Remove the largest counts until there are enough common intervals; return their length in samples."""
+    while len(counts) > 1:
+        interval = lcm(*counts)
+        if min(validation.segments) >= interval and validation.samples >= _LEAST_VALIDATION * interval:
+            return interval
+        counts.pop()
+    return 1
+
+
+def _compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[np.float64]:
+    """Return the errors of the best trial model on the validation data, in means over ``count`` samples.
+
+    NaN in the warm-up; infinite if no model can be estimated and simulated.
+    """
+    free = constraint(library.constraints).allows_offsets
+    offsets = find_offsets(split.estimation, OPERATING_POINT) if free else no_offsets(split.estimation)
+    estimation, validation = (
+        subtract_offsets(part, offsets) for part in (split.estimation, split.validation)
+    )
+    pool = screen_candidates(library.name, library.degree, library.lags, estimation, library.constraints)
+    structures = forward_selection(pool, estimation, library.constraints, _TERMS)
+    warm_up = max(item.maximum_lag for item in pool)
+    least, errors = inf, np.full(sum(length // count for length in validation.segments), inf)
+    for structure in () if isinstance(structures, EvaluationOutcome) else structures:
+        found = estimate(structure, estimation, library.constraints, warm_up)
+        if isinstance(found, EvaluationOutcome):
+            continue
+        run = free_run(found.model, validation, warm_up)
+        if run.mean_squared_error < least:
+            least = run.mean_squared_error
+            errors = average_samples(replace(validation, y=validation.y - run.y), count).y
+    return errors

@@ -1,0 +1,121 @@
+"""Choice of a sampling rate: an oversampled record with noise is averaged, any other is not."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import islands
+from islands.data.averaging import average_samples
+from islands.data.dataset import Dataset, join
+from islands.data.split import split
+from islands.facade.rate_selection import TrialLibrary, select_rate
+from islands.io.models import model_from_json, model_json
+from islands.io.result_folder import result_json
+from islands.io.summary_text import summary
+
+LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 4}
+TRIAL = TrialLibrary("polynomial", 1, 3, "none")
+
+
+def lag(noise=0.05, samples=8000, seed=0):
+    """Return a first-order lag with a time constant of 60 samples, slow inputs and measurement noise."""
+    t, rng = np.arange(samples), np.random.default_rng(seed)
+    u = sum(np.sin(2 * np.pi * t / period + period) for period in (400, 730, 1170))
+    y = lfilter([0.0, 1 - np.exp(-1 / 60)], [1.0, -np.exp(-1 / 60)], u)
+    return Dataset(u + noise * rng.normal(size=samples), y + noise * rng.normal(size=samples), 0.001)
+
+
+@pytest.fixture(scope="module")
+def averaged():
+    return islands.fit(lag(), **LIBRARY)
+
+
+def true_error(result, seed=1):
+    """Return the RMSE of the free run on a new noisy record, relative to the output without noise."""
+    count = result.search_result.average
+    run = result.best.simulate(lag(seed=seed))
+    error = run.y - average_samples(lag(noise=0.0), count).y
+    return np.sqrt(np.nanmean(error**2))
+
+
+def test_averaging_a_noisy_oversampled_record_reduces_the_error(averaged):
+    assert averaged.search_result.average > 1
+    assert true_error(averaged) < true_error(islands.fit(lag(), average=1, **LIBRARY)) / 3
+
+
+def test_a_record_without_noise_keeps_its_sampling_time():
+    record = lag(noise=0.0)
+    found, plain = (islands.fit(record, average=average, **LIBRARY) for average in ("auto", 1))
+    assert found.search_result.average == 1
+    assert [each.model for each in found.models] == [each.model for each in plain.models]
+    documents = [json.loads(result_json(each.search_result)) for each in (found, plain)]
+    assert [document["settings"].pop("average") for document in documents] == ["auto", 1]
+    assert documents[0] == documents[1]
+
+
+def white(samples=8000):
+    """Return a record whose input changes completely from sample to sample."""
+    u = np.random.default_rng(0).normal(size=samples)
+    return Dataset(u, lfilter([0.0, 0.5], [1.0, -0.5], u), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("record", "least"),
+    [
+        (white(), 6),
+        (lag(samples=1000), 6),
+        (join(tuple(lag(samples=100, seed=seed) for seed in range(40))), 60),
+        (Dataset(lag().u, lag().y, 0.001, input_names=("u+1",)), 6),
+        (Dataset(np.zeros(8000), np.zeros(8000), 1.0), 6),
+    ],
+    ids=["not oversampled", "short", "short recordings", "read early", "constant"],
+)
+def test_a_record_that_permits_no_means_keeps_its_sampling_time(record, least):
+    data = split(record)
+    assert select_rate(data, "auto", TRIAL, least) == (data, 1)
+
+
+def test_means_do_not_reach_across_recordings():
+    record = join((lag(samples=4005), lag(samples=5003, seed=1)))
+    data, count = select_rate(split(record), "auto", TRIAL, 6)
+    assert count > 1
+    first, second = data.estimation.segments
+    assert (first, second) == (4005 // count, (len(split(record).estimation) - 4005) // count)
+
+
+def test_the_choice_is_deterministic(averaged):
+    assert result_json(islands.fit(lag(), **LIBRARY).search_result) == result_json(averaged.search_result)
+
+
+def test_the_result_states_the_averages(averaged):
+    count, dt = averaged.search_result.average, averaged.best.model.dt
+    assert dt == 0.001 * count
+    document = json.loads(result_json(averaged.search_result))
+    assert document["preprocessing"] == {"average": count, "dt": dt}
+    assert document["settings"]["average"] == "auto"
+    assert f"the mean of {count} samples of the record" in summary(averaged.search_result)
+    assert f"sampling time {dt} s, means of {count} samples" in averaged.best.export("c")
+
+
+def test_simulation_of_the_validation_data_has_the_reported_errors(averaged):
+    best = averaged.best
+    validation = split(lag()).validation
+    run = best.simulate(validation)
+    assert run.mean_squared_error**0.5 == pytest.approx(best.metrics["validation"]["free_run"].rmse)
+    again = model_from_json(model_json(best.model))
+    assert again == best.model
+    same = islands.simulate(again, validation, warm_up=best.ranked_model.assessment.warm_up)
+    assert np.array_equal(same.y, run.y, equal_nan=True)
+    means = average_samples(validation, best.model.average)
+    assert np.array_equal(best.simulate(means).y, run.y, equal_nan=True)
+    assert len(best.bands(validation).upper) == len(means)
+
+
+@pytest.mark.parametrize("library", ["polynomial", ""])
+def test_identify_averages_likewise(library):
+    changes = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 1, "max_height": 1}
+    found = islands.identify(lag(), preset="narx", shifts=(1,), library=library, from_library=0.0, **changes)
+    assert found.search_result.average > 1
+    assert found.best.model.dt == 0.001 * found.search_result.average
