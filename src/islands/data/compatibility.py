@@ -14,6 +14,7 @@ from islands.data.channel_names import (
     parse_channel_name,
 )
 from islands.data.dataset import Dataset, same_dt
+from islands.data.input_lead import advance_inputs
 from islands.errors import RecordError
 
 
@@ -55,13 +56,18 @@ class _Channel:
 
 
 def match_record(
-    reference: Reference, record: Dataset, reference_title: str = "the model", title: str = "the record"
+    reference: Reference,
+    record: Dataset,
+    reference_title: str = "the model",
+    title: str = "the record",
+    advance: bool = True,
 ) -> Dataset:
     """Return a record with its inputs in the order of a model or of another record.
 
     Inputs are matched by name. If no name occurs in both, they are matched by the name without its unit
     (``u`` of ``u_V``). If no such name occurs in both either, they are matched by position: ``u_est_V`` and
-    ``u_val_V`` may be one signal in two recordings. Values are never converted.
+    ``u_val_V`` may be one signal in two recordings. Values are never converted. An input that the reference
+    reads one sample early (``u_V+1``) is advanced if the record has it as measured (``u_V``).
 
     Parameters
     ----------
@@ -70,18 +76,20 @@ def match_record(
     record : Dataset
     reference_title, title : str
         Names of both in error messages.
+    advance : bool
+        Whether inputs may be advanced. False for a caller that continues with its own record.
 
     Returns
     -------
     Dataset
-        The record itself if its inputs have the right order.
+        The record itself if its inputs have the right order and none is advanced.
 
     Raises
     ------
     RecordError
         The numbers of inputs differ; some but not all input names occur in both; an input has the name of the
-        other's output; only one of two matched inputs is read one sample early; known units differ; or the
-        sampling times differ by more than `SAME_DT`.
+        other's output; an input of the record is read one sample early and should not be, or may not be
+        advanced; known units differ; or the sampling times differ by more than `SAME_DT`.
     """
     check_dt(reference.dt, record.dt, reference_title, title)
     titles = (reference_title, title)
@@ -99,8 +107,14 @@ def match_record(
         )
     order = _find_order(expected, given, titles)
     for one, place in zip(expected, order, strict=True):
-        _check_pair(one, given[place], titles)
+        _check_pair(one, given[place], titles, advance)
     _check_units(_output(reference), _output(record), titles)
+    late = [
+        place
+        for one, place in zip(expected, order, strict=True)
+        if one.parts.at_once and not given[place].parts.at_once
+    ]
+    record = advance_inputs(record, late)
     if order == list(range(len(order))):
         return record
     return replace(
@@ -185,9 +199,9 @@ def _part(channel: _Channel, part: str) -> str:
     return channel.name if part == "name" else str(getattr(channel.parts, part))
 
 
-def _check_pair(one: _Channel, other: _Channel, titles: tuple[str, str]) -> None:
+def _check_pair(one: _Channel, other: _Channel, titles: tuple[str, str], advance: bool) -> None:
     """Check that two matched inputs are read at the same instant and have the same unit."""
-    if one.parts.at_once != other.parts.at_once:
+    if other.parts.at_once > one.parts.at_once or (other.parts.at_once != one.parts.at_once and not advance):
         right = other.parts.base + AT_ONCE * one.parts.at_once
         raise RecordError(
             f"{titles[0]} has the input {one.name}, {titles[1]} {other.name}, and {AT_ONCE} is a column that "

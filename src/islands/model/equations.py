@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from html import unescape
 
-from islands.model.expression import Constant, Lagged
+from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
 from islands.model.rendering import (
     MINUS,
@@ -25,13 +25,33 @@ def equation(model: Model, digits: int = 6) -> str:
     """Write a model as one line: ``y(k) = 1*y(k-1) + 0.77*(u(k-1) - u(k-2))``.
 
     The parameters are rounded to ``digits`` significant digits. A model without parameters shows theta1 ...
+    The input of a column that is read one sample early (``u_V+1``) is written as ``u(k)`` for its lag 1.
     """
     parts = []
-    for position, item in enumerate(model.regressors):
+    for position, expression in enumerate(_written(model)):
         weight = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
-        constant = item.expression == Constant(1.0)
-        parts.append(weight if constant else f"{weight}*{plain_factor(item.expression, model.inputs)}")
+        constant = expression == Constant(1.0)
+        parts.append(weight if constant else f"{weight}*{plain_factor(expression, model.inputs)}")
     return f"y(k) = {_join_terms(parts)}"
+
+
+def _written(model: Model) -> list[Expression]:
+    """Return the expressions of the regressors in the columns of the record, without a lead."""
+    leads = model.leads
+    if not any(leads):
+        return [item.expression for item in model.regressors]
+    return [_delay(item.expression, leads) for item in model.regressors]
+
+
+def _delay(expression: Expression, leads: Sequence[int]) -> Expression:
+    match expression:
+        case Lagged(channel, lag):
+            return Lagged(channel, lag - leads[channel])
+        case Shift(samples, argument):
+            return Shift(samples, _delay(argument, leads))
+        case Apply(primitive, arguments):
+            return Apply(primitive, tuple(_delay(argument, leads) for argument in arguments))
+    return expression
 
 
 def named_equation(model: Model, digits: int = 6) -> str:
@@ -45,12 +65,12 @@ def named_equation(model: Model, digits: int = 6) -> str:
 
 def named_term(model: Model, position: int) -> str:
     """Write one regressor of a model with the column names of its record."""
-    return _name_signals(plain_factor(model.regressors[position].expression, model.inputs), model)
+    return _name_signals(plain_factor(_written(model)[position], model.inputs), model)
 
 
 def _name_signals(text: str, model: Model) -> str:
-    names = {"y": model.output_name, "u": model.input_names[0]}
-    names |= {f"u{index}": name for index, name in enumerate(model.input_names, start=1)}
+    names = {"y": model.output_name, "u": model.column_names[0]}
+    names |= {f"u{index}": name for index, name in enumerate(model.column_names, start=1)}
 
     def substitute(leaf: re.Match[str]) -> str:
         name = names[leaf[1]]
@@ -62,14 +82,14 @@ def _name_signals(text: str, model: Model) -> str:
 def latex_equation(model: Model, digits: int = 6) -> str:
     """Write a model as one line of LaTeX without dollar signs."""
     parts = []
-    for position, item in enumerate(model.regressors):
+    for position, expression in enumerate(_written(model)):
         weight = (
             rf"\theta_{{{position + 1}}}"
             if model.theta is None
             else latex_number(f"{model.theta[position]:.{digits}g}")
         )
-        constant = item.expression == Constant(1.0)
-        parts.append(weight if constant else rf"{weight} \, {latex_factor(item.expression, model.inputs)}")
+        constant = expression == Constant(1.0)
+        parts.append(weight if constant else rf"{weight} \, {latex_factor(expression, model.inputs)}")
     return f"y_{{k}} = {_join_terms(parts)}"
 
 
@@ -96,14 +116,14 @@ def mathml_equation(model: Model, digits: int = 6) -> str:
 def _mathml_terms(model: Model, digits: int) -> list[str]:
     """Return the terms of the model, each with its sign."""
     parts = []
-    for position, item in enumerate(model.regressors):
+    for position, expression in enumerate(_written(model)):
         number = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
         if model.theta is None:
             weight = f"<msub><mi>&#x3B8;</mi><mn>{position + 1}</mn></msub>"
         else:
             weight = mathml_number(number.removeprefix("-"))
-        if item.expression != Constant(1.0):
-            weight += TIMES + mathml_factor(item.expression, model.inputs)
+        if expression != Constant(1.0):
+            weight += TIMES + mathml_factor(expression, model.inputs)
         sign = MINUS if number.startswith("-") else "<mo>+</mo>" if position else ""
         # At the start of a row the sign is still a binary operator.
         parts.append((sign.replace("<mo>", '<mo form="infix">') if position else sign) + weight)

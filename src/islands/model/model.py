@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from islands.data.channel_names import AT_ONCE
 from islands.errors import ModelError
 from islands.model.expression import Expression
 from islands.model.regressor import Regressor, regressor
@@ -19,7 +20,8 @@ class Model:
     theta : tuple of float or None
         One parameter per regressor. None before estimation.
     input_names, output_name
-        Names of the columns of the record. ``len(input_names)`` is the number of inputs.
+        Names of the columns of the record. ``len(input_names)`` is the number of inputs. Of an input named
+        ``u_V+1``, the regressor u(k-1) is the column ``u_V`` at sample k.
     dt : float or None
         Sampling time in seconds for which the parameters are valid. None if unspecified.
     standard_errors : tuple of float or None
@@ -69,6 +71,16 @@ class Model:
     def inputs(self) -> int:
         """Number of inputs."""
         return len(self.input_names)
+
+    @property
+    def leads(self) -> tuple[int, ...]:
+        """Number of samples that the output and each input are read early: 0, or 1 for ``u_V+1``."""
+        return (0, *(int(name.endswith(AT_ONCE)) for name in self.input_names))
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of the inputs without the suffix ``+1``."""
+        return tuple(name.removesuffix(AT_ONCE) for name in self.input_names)
 
     @property
     def maximum_lag(self) -> int:

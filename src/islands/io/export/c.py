@@ -21,7 +21,7 @@ enum {{ MAXIMUM_LAG = {lag} }};
 
 {functions}/*
  * Return y(k) from the preceding samples. The pointers point to sample k: the function reads y[-1] ..
- * y[-MAXIMUM_LAG] and the same lags of the inputs, never sample k or later ones.
+ * y[-MAXIMUM_LAG] and the same lags of the inputs, never {present}.
  */
 double predict({signals})
 {{
@@ -56,17 +56,23 @@ def c_source(model: Model) -> str:
     # Compilers warn about unused parameters.
     read = {channel for item in model.regressors for channel, _ in item.lags}
     lines = [f"(void){name};" for channel, name in enumerate(names) if channel not in read]
-    lines += [f"total += {term};" for term in terms(model, lambda name, lag: f"{name}[-{lag}]", _name)]
+    lines += [f"total += {term};" for term in terms(model, lambda name, lag: f"{name}[{-lag}]", _name)]
     pointers = [f"const double *{name}" for name in names]
     return _FILE.format(
         heading=heading(model, " *"),
         lag=model.maximum_lag,
+        present=_describe_future(model),
         functions="".join(f"{text}\n" for text in definitions),
         signals=", ".join(pointers),
         inputs=", ".join(pointers[1:]),
         terms="\n    ".join(lines),
         at_k=", ".join(f"{name} + k" for name in names),
     )
+
+
+def _describe_future(model: Model) -> str:
+    present = [name for name, lead in zip(signals(model), model.leads, strict=True) if lead]
+    return f"a later sample than {'[0], '.join(present)}[0]" if present else "sample k or later ones"
 
 
 def definition(primitive: Primitive, name: str) -> str:

@@ -42,7 +42,7 @@ def matlab_source(model: Model) -> str:
     """
     inputs = signals(model)[1:]
     definitions = [_definition(primitive) for primitive in functions(model)]
-    term_texts = terms(model, lambda name, lag: f"{name}(k-{lag})", _name)
+    term_texts = terms(model, lambda name, lag: f"{name}(k-{lag})" if lag else f"{name}(k)", _name)
     return _FILE.format(
         heading=heading(model, "%"),
         inputs=", ".join(inputs),

@@ -30,7 +30,8 @@ def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[P
     Parameters
     ----------
     sample : callable
-        ``sample("u", 2)`` returns the text of the sample u(k-2).
+        ``sample("u", 2)`` returns the text of the sample u(k-2). The lag is 0 only for an input that the
+        model reads one sample early (``u_V+1``).
     function : callable
         As in `infix`.
 
@@ -39,7 +40,7 @@ def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[P
     ModelError
         The model has no parameters, or a parameter is not finite.
     """
-    names = signals(model)
+    names, leads = signals(model), model.leads
     texts = []
     for parameter, item in zip(model.parameters, model.regressors, strict=True):
         if not math.isfinite(parameter):
@@ -48,7 +49,9 @@ def terms(model: Model, sample: Callable[[str, int], str], function: Callable[[P
             )
         text = repr(float(parameter))
         if item.expression != Constant(1.0):
-            text += "*" + infix(item.expression, lambda channel, lag: sample(names[channel], lag), function)
+            text += "*" + infix(
+                item.expression, lambda channel, lag: sample(names[channel], lag - leads[channel]), function
+            )
         texts.append(text)
     return texts
 
@@ -93,7 +96,7 @@ def body(primitive: Primitive, language: str) -> str:
 
 def description(model: Model, quote: Callable[[str], str]) -> str:
     """Describe the signals and the sampling time; ``quote`` escapes a column name for use in a comment."""
-    names = zip(signals(model)[1:], model.input_names, strict=True)
+    names = zip(signals(model)[1:], model.column_names, strict=True)
     inputs = ", ".join(f"{signal} = {quote(name)}" for signal, name in names)
     dt = "any" if model.dt is None else f"{float(model.dt)!r} s"
     means = f", means of {model.average} samples" if model.average > 1 else ""

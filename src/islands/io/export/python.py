@@ -54,7 +54,7 @@ def python_source(model: Model) -> str:
     """
     used = functions(model)
     inputs = signals(model)[1:]
-    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]", _name)
+    term_texts = terms(model, lambda name, lag: f"{name}[k-{lag}]" if lag else f"{name}[k]", _name)
     sources = [_function_source(primitive) for primitive in used]
     return _MODULE.format(
         equation=equation(model),

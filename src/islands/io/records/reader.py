@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from islands.data.channel_names import parse_unit
 from islands.data.dataset import Dataset
+from islands.data.input_lead import advance_inputs
 from islands.errors import RecordError
 from islands.io.records.column_names import find_column, split_structures, time_column
 from islands.io.records.mat.mat_file import read_matlab
@@ -94,27 +94,18 @@ def read_record(
     step, start = find_sampling(table, columns, time, dt, structures[output])
     for name in () if missing_output else (*sources, output):
         check_varies(columns, name)
-    return Dataset(
-        u=np.column_stack(
-            [
-                columns.numbers[source] if source == name else _advance(columns.numbers[source])
-                for name, source in zip(inputs, sources, strict=True)
-            ]
-        ),
+    record = Dataset(
+        u=np.column_stack([columns.numbers[source] for source in sources]),
         y=columns.numbers[output],
         dt=step,
-        input_names=inputs,
+        input_names=tuple(sources),
         output_name=output,
         input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
         output_unit=parse_unit(output.removeprefix(structures[output])),
         start=step * columns.first if start is None else start,
         sha256=fingerprint(path),
     )
-
-
-def _advance(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Shift a channel one sample early. The last value is repeated; no prediction uses it."""
-    return np.append(values[1:], values[-1])
+    return advance_inputs(record, [place for place, name in enumerate(inputs) if name != sources[place]])
 
 
 def read_columns(path: str | Path) -> tuple[str, ...]:

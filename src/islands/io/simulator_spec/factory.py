@@ -133,7 +133,7 @@ def simulate_spec(
 def _make_saved_extension(document: ExtendedSpec, record: Dataset, columns: Mapping[str, Any]) -> Simulator:
     # The channels may be others: effects find theirs by name.
     driving = ColumnReference(document.inputs[:1], document.output)
-    match_record(driving, record.first_inputs(1), "the extended simulation")
+    match_record(driving, record.first_inputs(1), "the extended simulation", advance=False)
     simulator = make_simulator(document.core, record, columns)
     inner: Simulator = simulator
     if (document.hold, document.times) != ("first-order", 1):
@@ -238,7 +238,7 @@ def make_model_simulator(model: Model, name: str, record: Dataset) -> Simulator:
         raise ModelError(f"{name} has no parameters: estimate them first")
     simulator = NarxSimulator(model, name, record.y[: model.maximum_lag])
     # Further columns of the record are channels, which the model does not read.
-    match_record(model, record.first_inputs(1), name)
+    match_record(model, record.first_inputs(1), name, advance=False)
     return simulator
 
 

@@ -36,6 +36,23 @@ def test_equation_of_the_papers_model_12():
     )
 
 
+def test_an_input_that_is_read_early_is_written_at_its_own_sample():
+    early = make_model(
+        [
+            (parse("y(k-1)"), 0.5),
+            (parse("u1(k-1)*u2(k-1)"), 2.0),
+            (parse("phi1(u1(k-1), u1(k-2))"), 3.0),
+        ],
+        ("u_V+1", "w"),
+        "y_um",
+    )
+    assert equation(early) == "y(k) = 0.5*y(k-1) + 2*u1(k)*u2(k-1) + 3*(u1(k) - u1(k-1))"
+    assert named_equation(early) == "y_um(k) = 0.5*y_um(k-1) + 2*u_V(k)*w(k-1) + 3*(u_V(k) - u_V(k-1))"
+    assert named_term(early, 1) == "u_V(k)*w(k-1)"
+    assert r"u_{1,k} u_{2,k-1}" in latex_equation(early)
+    assert "<mn>1</mn><mo>,</mo><mi>k</mi></mrow>" in mathml_equation(early)
+
+
 def test_latex_of_the_papers_model_12_has_the_requested_digits():
     assert latex_equation(MODEL_12, digits=1).startswith(
         r"y_{k} = 1 \, y_{k-1} - 0.0002 \, y_{k-1} u_{k-2} \left(u_{k-2} - u_{k-3}\right)"

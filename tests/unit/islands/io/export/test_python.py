@@ -53,6 +53,16 @@ def test_the_python_module_simulates_like_the_kernel(name):
     assert module(CASES[name])["MAXIMUM_LAG"] == CASES[name].maximum_lag
 
 
+def test_a_program_reads_the_present_of_an_input_that_the_model_reads_early():
+    exported = model({"y(k-1)": 0.5, "u(k-1)*u(k-2)": 2.0, "u(k-1)": 1.0}, ("u_V+1",))
+    data = Dataset(np.linspace(-1.0, 1.0, 9) ** 3, np.zeros(9), 0.1, ("u_V",))
+    assert_same_free_run(exported, data)
+    assert "u = u_V;" in export(exported, "python")
+    assert "u[0]*u[-1]" in export(exported, "c")
+    assert "never a later sample than u[0]." in export(exported, "c")
+    assert "u(k)*u(k-1)" in export(exported, "matlab")
+
+
 def test_a_zero_input_gives_no_negative_zero():
     # The kernel adds the terms to zero.
     at_rest = Dataset(np.zeros((9, 1)), np.zeros(9), 0.1)

@@ -1,0 +1,30 @@
+"""Inputs that are read one sample early, for an output that responds within the sample."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from islands.data.channel_names import AT_ONCE
+from islands.data.dataset import Dataset
+
+
+def advance_inputs(record: Dataset, places: Sequence[int]) -> Dataset:
+    """Return a record with some inputs read one sample early, so that their u(k-1) is the input at sample k.
+
+    Their names get the suffix ``+1``. The last value of every segment is repeated; no prediction uses it.
+
+    Parameters
+    ----------
+    record : Dataset
+    places : sequence of int
+        Indices of the inputs, from 0. The record itself is returned if there are none.
+    """
+    if not places:
+        return record
+    u = record.u.copy()
+    for begin, end in record.bounds:
+        for place in places:
+            u[begin : end - 1, place] = record.u[begin + 1 : end, place]
+    names = tuple(
+        name + AT_ONCE if place in places else name for place, name in enumerate(record.input_names)
+    )
+    return replace(record, u=u, input_names=names)
