@@ -174,6 +174,13 @@ def test_error(model: FittedModel, record: Dataset) -> float:
     return metrics(record.y, simulated.y).rmse if simulated.outcome else inf
 
 
+def mark(case: Case) -> str:
+    """Return whether the recommended model has the true terms, as `print_cases` shows it."""
+    if case.exact[case.chosen["recommended"]]:
+        return "*"
+    return "." if any(case.exact) else "-"
+
+
 def print_cases(cases: Sequence[Case]) -> None:
     """Print the recommended sizes by seed and the largest ratio of the test error to the least one.
 
@@ -185,10 +192,7 @@ def print_cases(cases: Sequence[Case]) -> None:
         cells = []
         for level in LEVELS:
             own = [case for case in cases if (case.law, case.level) == (name, level)]
-            marks = "".join(
-                "*" if case.exact[case.chosen["recommended"]] else "." if any(case.exact) else "-"
-                for case in own
-            )
+            marks = "".join(mark(case) for case in own if law.in_vocabulary)
             sizes = ",".join(str(case.sizes[case.chosen["recommended"]]) for case in own)
             worst = max((case.ratio("recommended") for case in own), default=0.0)
             cells.append(f"{sizes} {marks} {worst:.2f}".rjust(18))

@@ -71,7 +71,7 @@ class Law:
         A regressor equals a term if both are proportional on the record: with positive inputs ``sqrt(u^2)``
         is ``u``.
         """
-        if model.size != len(self.terms):
+        if not self.in_vocabulary or model.size != len(self.terms):
             return False
         warm_up = max(model.maximum_lag, self.model.maximum_lag)
         own, other = (regressor_matrix(each.regressors, record, warm_up) for each in (self.model, model))
