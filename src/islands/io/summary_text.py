@@ -88,7 +88,9 @@ def describe(found: SearchResult) -> list[str]:
 def _describe_units(found: SearchResult) -> str:
     record = found.record
     columns = zip(
-        (record.output_name, *record.input_names), (record.output_unit, *record.input_units), strict=True
+        (record.output_name, *found.recommended.model.column_names),
+        (record.output_unit, *record.input_units),
+        strict=True,
     )
     units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
     return f"    {f'{units}; ' if units else ''}{_describe_rate(found)}."
