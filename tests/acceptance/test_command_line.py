@@ -60,7 +60,7 @@ def test_result_describes_record_settings_and_search(result: dict[str, Any]) -> 
     assert result["record"]["names"] == {"inputs": ["u_V"], "output": "y_um"}
     assert result["record"]["units"] == {"inputs": ["V"], "output": "um"}
     assert result["settings"]["constraints"] == "hysteresis"
-    assert result["search"]["outcomes"]["ok"] == result["search"]["evaluations"] == len(result["models"])
+    assert result["search"]["outcomes"]["ok"] == result["search"]["evaluations"] >= len(result["models"])
     # Equation (5) for degree 5 and three lags of y and u: C(11, 5).
     assert result["search"]["full_set"]["candidates"] == 462
     assert result["search"]["wall_s"] > 0
@@ -84,7 +84,9 @@ def test_models_are_best_first_with_metrics_and_physics(result: dict[str, Any]) 
 def test_folder_contains_models_figures_and_a_summary(folder: Path, result: dict[str, Any]) -> None:
     for model in result["models"]:
         document = json.loads((folder / "fit" / "models" / f"{model['rank']:02d}.json").read_text())
-        assert document["terms"] == model["terms"]
+        terms = [{**term} for term in model["terms"]]
+        assert all(0.0 <= term.pop("inclusion") <= 1.0 for term in terms)
+        assert document["terms"] == terms
     figures = {path.stem for path in (folder / "fit" / "figures").glob("*.svg")}
     assert figures == {"free-run", "loop", "hold", "residuals", "record", "front"}
     assert result["models"][0]["equation"] in (folder / "fit" / "summary.txt").read_text()

@@ -1,6 +1,6 @@
 """Final models of a search: structures are screened on the validation data, then refined and assessed."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from math import isfinite
 from typing import Protocol, TypeVar
@@ -82,7 +82,8 @@ def estimate_candidates(
     validation = subtract_offsets(split.validation, offsets)
     found = []
     for individuals in _group_by_size(_evaluate_structures(hall_of_fame, problem)):
-        found += _estimate_models(_screen(individuals, problem, validation), problem, split, offsets)
+        kept = screen(individuals, validation, problem.settings.maximum_lag, *_REFINED)
+        found += _estimate_models(kept, problem, split, offsets)
     return found
 
 
@@ -101,22 +102,30 @@ def _group_by_size(items: Iterable[_Sized]) -> Iterable[list[_Sized]]:
     return groups.values()
 
 
-def _screen(individuals: list[Individual], problem: Problem, validation: Dataset) -> list[Individual]:
-    """Return the structures of one size that are estimated again.
+def screen(
+    individuals: Sequence[Individual], validation: Dataset, warm_up: int, most_valid: int, fittest: int = 0
+) -> list[Individual]:
+    """Return the individuals with the least error on the validation data, and the fittest ones.
 
     Parameters
     ----------
+    individuals : sequence of Individual
+        Evaluated individuals with parameters.
     validation : Dataset
         Validation data in the units of the search.
+    warm_up : int
+        Number of samples before the first prediction.
+    most_valid, fittest : int
+        Number of individuals of each kind.
     """
-    record = problem.record
     by_fitness = sorted(individuals, key=lambda each: (each.fitness, each.key))
     models = {
-        Model(each.regressors, each.theta, record.input_names, record.output_name, record.dt): each
+        Model(
+            each.regressors, each.theta, validation.input_names, validation.output_name, validation.dt
+        ): each
         for each in by_fitness
     }
-    by_error = [models[each.model] for each in _validate(models, 1, validation, problem)]
-    most_valid, fittest = _REFINED
+    by_error = [models[each.model] for each in _validate(models, 1, validation, warm_up)]
     return list(unique_structures((*by_error[:most_valid], *by_fitness[:fittest])))
 
 
@@ -139,7 +148,7 @@ def _estimate_models(
     if settings.estimator:
         return _estimate_with_choice(fitted, problem, split)
     estimated = [each.model for each in fitted]
-    validated = _validate(estimated, 1, split.validation, problem)
+    validated = _validate(estimated, 1, split.validation, problem.settings.maximum_lag)
     if settings.refine:
         interval = FITNESSES[settings.fitness](settings.shooting)
         refined = _refine(estimated, interval, problem, split)
@@ -169,7 +178,7 @@ def _estimate_with_choice(
     )
     models = [each.model for each in found if not isinstance(each, EvaluationOutcome)]
     interval = ESTIMATORS[settings.estimator].interval(settings.shooting)
-    return _validate(models, interval, split.validation, problem)
+    return _validate(models, interval, split.validation, problem.settings.maximum_lag)
 
 
 def _refine(
@@ -185,14 +194,13 @@ def _refine(
             models,
         )
         found = [each.model for each in refined if not isinstance(each, EvaluationOutcome)]
-    return _validate(found, interval, split.validation, problem)
+    return _validate(found, interval, split.validation, problem.settings.maximum_lag)
 
 
 def _validate(
-    models: Iterable[Model], interval: int | None, validation: Dataset, problem: Problem
+    models: Iterable[Model], interval: int | None, validation: Dataset, warm_up: int
 ) -> list[ValidatedModel]:
     """Simulate models on the validation data and return them, least error first."""
-    warm_up = problem.settings.maximum_lag
     validated = (
         ValidatedModel(model, interval, free_run(model, validation, warm_up).mean_squared_error)
         for model in models

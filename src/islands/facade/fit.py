@@ -1,10 +1,11 @@
 """Subset selection over a candidate library, (constrained) least squares, assessment."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
-from islands.data.split import split_data
+from islands.data.split import Split, split_data
 from islands.errors import SettingsError, lookup
 from islands.estimation.estimators import ESTIMATORS, estimate_with
 from islands.estimation.forward_selection import (
@@ -24,6 +25,9 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.evolution.generation.evaluation import Evaluator
+from islands.evolution.generation.swap_search import swap_search
+from islands.evolution.problem import MAX_POOL
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import (
     RankedModel,
@@ -33,16 +37,22 @@ from islands.evolution.search_result import (
     with_average,
     with_bands,
 )
+from islands.evolution.settings import Settings
+from islands.facade.final_models import screen
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set, get_library
+from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 from islands.validation.ensemble import ValidatedModel
 
 #: Samples of a shooting interval (case 1 of the paper); at most a tenth of a short record.
 SHOOTING = 500
+
+#: Structures of every size that are simulated on the validation data.
+_SCREENED = 150
 
 
 def fit(
@@ -122,9 +132,17 @@ def fit(
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
 
-    structures, certificates, warm_up = _select(
-        parts.estimation, (library, degree, lags), constraints, max_terms, certificate, progress
+    settings = Settings(
+        library=library,
+        library_degree=degree,
+        library_lags=lags,
+        shifts=(),
+        max_terms=max_terms,
+        initial_terms=(1, max_terms),
+        constraints=constraints,
+        shooting=shooting,
     )
+    structures, certificates, warm_up = _select(parts, settings, certificate, progress)
     outcomes: Counter[str] = Counter()
     models = []
     for done, (structure, offsets) in enumerate(structures, start=1):
@@ -155,7 +173,7 @@ def fit(
         {"candidates": count, "bytes": 8 * count * rows},
         certificates={found.terms: found for found in certificates},
     )
-    settings = {
+    described = {
         "method": "fit",
         "library": library,
         "degree": degree,
@@ -168,7 +186,7 @@ def fit(
         "certificate": certificate,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
-    result = SearchResult(record, parts, seed, settings, search, tuple(best_of_size.values()))
+    result = SearchResult(record, parts, seed, described, search, tuple(best_of_size.values()))
     interval = ESTIMATORS[estimator].interval(shooting)
     estimates = [
         ValidatedModel(entry.model, interval, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
@@ -178,16 +196,12 @@ def fit(
 
 
 def _select(
-    record: Dataset,
-    library: tuple[str, int, int],
-    constraints: str,
-    max_terms: int,
-    nodes: int,
-    progress: ProgressCallback,
+    split: Split, settings: Settings, nodes: int, progress: ProgressCallback
 ) -> tuple[list[tuple[Structure, Offsets]], tuple[Certificate, ...], int]:
     """Return structures, each with the offsets of its signals, the certificates, and the largest lag."""
     # A law in the units of the record has fewer terms there, a law around an operating point has fewer terms
     # in deviations from it. The validation data tell which one holds.
+    record, constraints = split.estimation, settings.constraints
     tried = [no_offsets(record)]
     if constraint(constraints).allows_offsets:
         tried = [find_offsets(record, limit) for limit in (LARGE_OFFSET, OPERATING_POINT)]
@@ -195,16 +209,44 @@ def _select(
     certificates: tuple[Certificate, ...] | None = None
     warm_up = 0
     for offsets in dict.fromkeys(tried):
-        deviations = subtract_offsets(record, offsets)
-        pool = screen_candidates(*library, deviations, constraints)
+        deviations = Split(*(subtract_offsets(part, offsets) for part in (record, split.validation)))
+        pool = screen_candidates(
+            settings.library,
+            settings.library_degree,
+            settings.library_lags,
+            deviations.estimation,
+            constraints,
+        )
         warm_up = max(item.maximum_lag for item in pool)
         progress(f"inner products of {len(pool)} candidates", 0.0)
-        problem = make_selection_problem(pool, deviations, constraints)
+        problem = make_selection_problem(pool, deviations.estimation, constraints)
         if isinstance(problem, EvaluationOutcome):
             raise SettingsError(f"nothing can be fitted with these settings: {problem}")
         progress(f"best subsets of {len(pool)} candidates", 0.0)
-        found = certify(problem, max_terms, nodes)
+        found = certify(problem, settings.max_terms, nodes)
         certificates = combine_certificates(certificates, found)
-        chosen = [*select_forward(problem, max_terms), *(entry.structure for entry in found)]
+        ordered = select_forward(problem, max(settings.max_terms, MAX_POOL))
+        nested = [structure for structure in ordered if len(structure) <= settings.max_terms]
+        starts = [*nested, *(entry.structure for entry in found)]
+        progress(f"exchanges among {len(pool)} candidates", 0.0)
+        exchanged = pool if len(pool) <= MAX_POOL else ordered[-1]
+        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings)]
         structures += [(structure, offsets) for structure in chosen]
     return list(dict.fromkeys(structures)), certificates or (), warm_up
+
+
+def _search_swaps(
+    pool: Sequence[Regressor], starts: Sequence[Structure], split: Split, settings: Settings
+) -> list[Structure]:
+    """Return, for every size, the structure of a swap search with the least error on the validation data."""
+    by_size = swap_search(
+        Evaluator(split.estimation, settings),
+        [item.expression for item in pool],
+        [tuple(item.expression for item in structure) for structure in starts],
+        depth=_SCREENED,
+    )
+    return [
+        each.regressors
+        for individuals in by_size
+        for each in screen(individuals, split.validation, settings.maximum_lag, most_valid=1)
+    ]

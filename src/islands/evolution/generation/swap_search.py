@@ -8,6 +8,8 @@ continues with the next size. Its structures seed the evolution, which is not bo
 from collections.abc import Iterable, Sequence
 from math import inf, isfinite
 
+import numpy as np
+
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import Genes, with_required_genes
 from islands.evolution.gp.individual import Individual, Population
@@ -15,6 +17,9 @@ from islands.model.expression import Expression
 
 #: Smallest relative reduction of the squared error for which an exchange continues.
 _MIN_GAIN = 1e-3
+
+#: Squared error relative to the mean square of the output below which it is a rounding error.
+_ROUNDING = 1e-26
 
 #: A structure whose squared error exceeds that of the current one by this factor is abandoned.
 _ABANDON_FACTOR = 4.0
@@ -47,14 +52,16 @@ def swap_search(
     search = _SwapSearch(evaluator, pool)
     search.evaluate(starts, inf)
     best = with_required_genes((), evaluator.settings)
-    if best:
-        search.evaluate([best], inf)
-    while len(best) < evaluator.settings.max_terms and not search.is_exhausted:
+    exact = _ROUNDING * float(np.mean(evaluator.record.y**2))
+    first = search.evaluate([best], inf) if best else None
+    error = inf if first is None else first.fitness
+    while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
         found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
         start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
         if start is None or start.size <= len(best):
             break
-        best = search.exchange(start).genes
+        exchanged = search.exchange(start)
+        best, error = exchanged.genes, exchanged.fitness
     return search.ranked(depth)
 
 

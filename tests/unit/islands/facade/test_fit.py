@@ -142,7 +142,7 @@ def test_result_is_saved_as_a_folder(result, tmp_path):
     assert figures >= {"free-run.svg", "loop.svg", "hold.svg", "residuals.svg"}
     search = json.loads((folder / "result.json").read_text())["search"]
     assert search["wall_s"] == 2.0
-    assert search["evaluations_per_second"] == pytest.approx(2.5)
+    assert search["evaluations_per_second"] == pytest.approx(search["evaluations"] / 2.0)
     assert result.search_result.search.wall_s is None
 
 
@@ -201,17 +201,19 @@ def test_fraction_at_the_end_of_the_record_validates():
     assert np.array_equal(split.validation.y, tank().y[360:])
 
 
-def test_separate_validation_record_does_not_affect_the_estimation():
+def test_separate_validation_record_selects_structures_but_does_not_affect_their_parameters():
     whole = islands.fit(tank(), tank(150, seed=5), library="polynomial", max_terms=3)
     other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
     described = whole.search_result.settings["validation"]
     assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
     assert whole.search_result.split.estimation.samples == 400
     assert whole.search_result.split.validation.samples == 150
-    by_size = [{m.model.size: m for m in made.models} for made in (whole, other)]
-    for size in (1, 2, 3):
-        assert by_size[0][size].model == by_size[1][size].model
-        errors = [entry[size].metrics["validation"]["free_run"].rmse for entry in by_size]
+    by_structure = [{m.model.regressors: m for m in made.models} for made in (whole, other)]
+    common = by_structure[0].keys() & by_structure[1].keys()
+    assert common
+    for structure in common:
+        assert by_structure[0][structure].model == by_structure[1][structure].model
+        errors = [entry[structure].metrics["validation"]["free_run"].rmse for entry in by_structure]
         assert errors[0] != errors[1]
 
 
@@ -301,7 +303,7 @@ def test_structures_without_estimates_are_counted_by_outcome():
     made = islands.fit(tank(9), tank(100, seed=1), library="polynomial", max_terms=10, certificate=0)
     outcomes = made.search_result.search.outcomes
     assert set(outcomes) == {"ok", "too_few_rows"}
-    assert outcomes["ok"] == len(made.models) == 5
+    assert outcomes["ok"] >= len(made.models) == 5
     assert sum(outcomes.values()) == made.search_result.search.evaluations
 
 
@@ -315,8 +317,8 @@ def test_progress_fractions_are_monotonic(samples):
         tank(samples), tank(100, seed=1), library="polynomial", progress=lambda *news: reports.append(news)
     )
     texts, shares = zip(*reports, strict=True)
-    expected = ("inner products of 84 candidates", "best subsets of 84 candidates", "model of 1 terms")
-    assert texts[:3] == expected
+    steps = ("inner products of", "best subsets of", "exchanges among")
+    assert texts[:4] == (*(f"{step} 84 candidates" for step in steps), "model of 1 terms")
     assert shares[0] == 0.0
     assert list(shares) == sorted(shares)
     assert shares[-1] <= 1.0
