@@ -146,7 +146,7 @@ async def model_figure(
 
 @router.get("/{job}/models/{rank}/simulation", response_model=dict[str, Any])
 async def simulation(job: Id, rank: Rank, caller: Reader, state: AppStateDep) -> Response:
-    """Return the free run of a model over the validation data as numbers, downsampled for a screen."""
+    """Return the free run of a model over the validation data, and its 90 % band, as numbers for a screen."""
     await get_model(state, caller, job, rank)
     return await _figure_response(
         state, caller, job, f"{rank}/{SIMULATION_ARTEFACT}", rank, "application/json"
