@@ -16,8 +16,8 @@ import numpy as np
 from islands.validation.assessment import Assessment
 from islands.validation.physics import PhysicsChecks
 
-#: Standard errors by which a mean squared error may exceed the least.
-STANDARD_ERRORS = 2.0
+#: Standard errors by which a mean squared error may exceed the least, which is a minimum over many models.
+STANDARD_ERRORS = 3.0
 
 #: Largest excess of an RMSE over the least, as a fraction, however uncertain the difference is.
 LARGEST_EXCESS = 0.2
@@ -54,7 +54,7 @@ def recommend(
     checks: holds and excursions stay bounded and, if the search constrains models of hysteresis, Property 1
     holds. Of these, the one with the least RMSE is the reference. A model is as good as the reference if its
     RMSE exceeds that of the reference by at most 1 %, or is below 1e-6 of the output range, or if it exceeds
-    it by at most 20 % and the mean squared errors differ by at most two standard errors. The standard error
+    it by at most 20 % and the mean squared errors differ by at most three standard errors. The standard error
     is that of the mean difference over blocks of the validation data.
 
     Parameters
