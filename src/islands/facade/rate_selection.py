@@ -39,7 +39,12 @@ _NOISE = 0.05
 #: Order of the differences that separate the noise from the signal.
 _ORDER = 4
 
-#: Largest variance within the means, relative to the variance of the signal: a sine of 18 means per period.
+#: Largest variance of the noise, relative to that of the signal. Without oversampling, all of a signal looks
+#: like noise.
+_LARGEST_NOISE = 0.1
+
+#: Largest variance within the means, without noise, relative to that of the signal: a sine has 18 means in a
+#: period.
 _VARIANCE_WITHIN = 0.01
 
 #: Fewest means of the estimation data, and of the validation data when two rates are compared.
@@ -122,25 +127,40 @@ def _permits(split: Split, count: int, least: int) -> bool:
         return False
     means = average_samples(estimation, count)
     pairs = [(estimation.y, means.y), *zip(estimation.u.T, means.u.T, strict=True)]
-    return all(np.var(coarse) >= (1.0 - _VARIANCE_WITHIN) * np.var(fine) for fine, coarse in pairs)
+    return all(_keeps_variance(fine, coarse, count, estimation) for fine, coarse in pairs)
+
+
+def _keeps_variance(
+    fine: NDArray[np.float64], coarse: NDArray[np.float64], count: int, record: Dataset
+) -> bool:
+    """Return whether means of a signal have its variance, except for that of the noise."""
+    variance = float(np.var(fine))
+    noise = min(_estimate_noise(fine, record) ** 2, _LARGEST_NOISE * variance)
+    lost = variance - float(np.var(coarse))
+    return lost <= _VARIANCE_WITHIN * variance + noise * (1.0 - 1.0 / count)
 
 
 def _is_noisy(record: Dataset) -> bool:
-    return any(_measure_noise(signal, record) > _NOISE for signal in (record.y, *record.u.T))
+    return any(
+        _estimate_noise(signal, record) > _NOISE * _measure_increments(signal, record)
+        for signal in (record.y, *record.u.T)
+    )
 
 
-def _measure_noise(signal: NDArray[np.float64], record: Dataset) -> float:
-    """Return the standard deviation of white noise relative to the root mean square of the increments.
+def _measure_increments(signal: NDArray[np.float64], record: Dataset) -> float:
+    """Return the root mean square of the increments of a signal."""
+    increments = np.concatenate([np.diff(signal[first:last]) for first, last in record.bounds])
+    return float(np.sqrt(np.mean(increments**2)))
+
+
+def _estimate_noise(signal: NDArray[np.float64], record: Dataset) -> float:
+    """Return the standard deviation of the white noise of a signal.
 
     High-order differences of an oversampled signal vanish, and those of its noise do not. The median ignores
     the steps of an input.
     """
-    parts = [signal[first:last] for first, last in record.bounds]
-    increments = np.concatenate([np.diff(part) for part in parts])
-    size = float(np.sqrt(np.mean(increments**2)))
-    differences = np.concatenate([np.diff(part, _ORDER) for part in parts])
-    noise = float(np.median(np.abs(differences))) / (0.6745 * comb(2 * _ORDER, _ORDER) ** 0.5)
-    return noise / size if size > 0.0 else 0.0
+    differences = np.concatenate([np.diff(signal[first:last], _ORDER) for first, last in record.bounds])
+    return float(np.median(np.abs(differences)) / (0.6745 * comb(2 * _ORDER, _ORDER) ** 0.5))
 
 
 def _limit_interval(validation: Dataset, counts: list[int]) -> int:

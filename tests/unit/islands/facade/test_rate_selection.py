@@ -77,6 +77,11 @@ def test_a_record_that_permits_no_means_keeps_its_sampling_time(record, least):
     assert select_rate(data, "auto", TRIAL, least) == (data, 1)
 
 
+@pytest.mark.parametrize("noise", [0.01, 0.05, 0.3])
+def test_a_record_with_little_or_much_noise_is_averaged(noise):
+    assert select_rate(split(lag(noise)), "auto", TRIAL, 6)[1] > 1
+
+
 def test_means_do_not_reach_across_recordings():
     record = join((lag(samples=4005), lag(samples=5003, seed=1)))
     data, count = select_rate(split(record), "auto", TRIAL, 6)
