@@ -7,6 +7,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from islands.data.channel_names import parse_channel_name
 from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
@@ -74,9 +75,11 @@ def simulate(
         _simulate_extended(extended, record, mode, out, inputs, output_column, dt, rows)
         return
     chosen = options.model(model)
+    # A model of means reads an input one mean early, not one sample.
+    names = [parse_channel_name(name).base if chosen.average > 1 else name for name in chosen.input_names]
     recorded = read_record(
         record,
-        options.columns(inputs or list(chosen.input_names)),
+        options.columns(inputs or names),
         output_column or chosen.output_name,
         dt,
         parse_rows(rows),

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from islands.errors import IslandsError, RecordError, SettingsError
 from islands.io.models import read_model, write_model
 from islands.io.records import write_record
 from islands.io.records.row_range import parse_rows
+from islands.model.model import make_model
+from islands.model.parsing import parse
 from islands.systems.published_models import PUBLISHED
 from islands_api.cli import options
 from islands_api.cli.output_folder import check_folder
@@ -238,6 +241,19 @@ def test_simulate_starts_after_the_given_warm_up_or_the_lags_of_a_single_file(ru
     Path("out/result.json").write_text("{}")
     code, _, error = run("simulate", "out", "r.csv")
     assert (code, "result.json cannot be read" in error) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["u_V", "u_V+1"])
+def test_simulate_averages_a_record_for_a_model_of_means(run, name):
+    model = make_model([(parse("u(k-1)"), 2.0)], (name,), "y_um", 0.04)
+    write_model(replace(model, average=4), "model.json")
+    write_record(record(), "r.csv")
+    code, out, _ = run("simulate", "model.json", "r.csv", "--out", "s.csv")
+    assert (code, out.splitlines()[0]) == (0, "averaged 4 samples of 0.01 s each: dt 0.04 s")
+    time, simulated = np.loadtxt("s.csv", delimiter=",", skiprows=2, unpack=True)
+    means = 2.0 * record().u[:, 0].reshape(-1, 4).mean(axis=1)
+    assert simulated == pytest.approx(means[:-1] if name == "u_V" else means[1:])
+    assert time == pytest.approx(0.015 + 0.04 * np.arange(1, 30))
 
 
 def test_simulate_rejects_another_sampling_time(run):

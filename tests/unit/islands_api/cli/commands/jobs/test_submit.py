@@ -30,6 +30,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "primitives": (("mul", "phi1"), ["mul", "phi1"]),
     "constraints": (("none",), "none"),
     "estimator": (("free-run",), "free-run"),
+    "average": (("20",), "20"),
     "islands": (("3",), 3),
     "topology": (("ring",), "ring"),
     "migrate_every": (("2,5:3",), "2,5:3"),
