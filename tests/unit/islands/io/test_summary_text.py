@@ -50,7 +50,8 @@ def test_the_summary_begins_with_sentences_and_contains_the_table(findings):
     assert rest[0] == "300 samples, 0.1 s: u_V to y_um"
     assert "library phi-polynomial" in rest[1]
     assert rest[1].endswith("seed 7")
-    assert rest[2] == "4 models estimated: 4 ok"
+    count = findings.search.evaluations
+    assert rest[2] == f"{count} models estimated: {count} ok"
     assert rest[3].startswith("full polynomial set: 462 candidates, a matrix of 1 MB")
     assert rest[5:10] == table(findings)
     assert rest[10] == "* recommended"
