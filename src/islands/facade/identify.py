@@ -161,7 +161,7 @@ def _make_trial_library(settings: Settings) -> TrialLibrary:
     if settings.library:
         name, degree, lags = settings.library, settings.library_degree, settings.library_lags
     else:
-        # A search without a library has terms of its own; a library is needed only to compare rates.
+        # Without a library in the settings, the rates are compared with the default one of the constraint.
         name = "phi-polynomial" if constraint(settings.constraints).sums else "polynomial"
         degree, lags = get_library(name).degree, get_library(name).lags
     return TrialLibrary(name, degree, lags, settings.constraints)

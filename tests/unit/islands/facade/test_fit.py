@@ -201,7 +201,7 @@ def test_fraction_at_the_end_of_the_record_validates():
     assert np.array_equal(split.validation.y, tank().y[360:])
 
 
-def test_separate_validation_record_selects_structures_but_does_not_affect_their_parameters():
+def test_validation_record_does_not_affect_the_parameters_of_a_structure():
     whole = islands.fit(tank(), tank(150, seed=5), library="polynomial", max_terms=3)
     other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
     described = whole.search_result.settings["validation"]
