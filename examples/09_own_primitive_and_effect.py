@@ -67,7 +67,7 @@ law = islands.identify(
     preset="narx",
     primitives=("mul", soft),
     max_terms=2,
-    population=50,
+    population=100,
     generations=10,
 ).best
 print(law.equation)
