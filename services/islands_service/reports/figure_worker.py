@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.split import average_split, split_data
+from islands.data.split import average_split, match_split, split_data
 from islands.errors import IslandsError, SettingsError
 from islands.evolution.presets import resolve_settings
 from islands.evolution.search_result import RankedModel, SearchResult, SearchStatistics
@@ -109,7 +109,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
     average = models[0].average
-    split = average_split(split_data(record, validation), average)
+    split = match_split(models[0], average_split(split_data(record, validation), average))
     # Results of earlier versions have no ensemble.
     ensemble = ensemble_from_document(document.get("ensemble"), models[0])
     assessed = []

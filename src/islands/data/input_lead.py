@@ -5,6 +5,13 @@ from dataclasses import replace
 
 from islands.data.channel_names import AT_ONCE
 from islands.data.dataset import Dataset
+from islands.errors import SettingsError
+
+#: Value of the setting ``feedthrough`` that tests the record.
+AUTO = "auto"
+
+#: Values of the setting ``feedthrough``.
+FEEDTHROUGH = (AUTO, "yes", "no")
 
 
 def advance_inputs(record: Dataset, places: Sequence[int]) -> Dataset:
@@ -28,3 +35,18 @@ def advance_inputs(record: Dataset, places: Sequence[int]) -> Dataset:
         name + AT_ONCE if place in places else name for place, name in enumerate(record.input_names)
     )
     return replace(record, u=u, input_names=names)
+
+
+def check_feedthrough(feedthrough: str) -> None:
+    """Check the setting ``feedthrough``.
+
+    Raises
+    ------
+    SettingsError
+        It is none of `FEEDTHROUGH`.
+    """
+    if feedthrough not in FEEDTHROUGH:
+        raise SettingsError(
+            f"feedthrough is auto, yes or no, got {feedthrough!r}; to choose among several inputs, take no "
+            f"and name the input u{AT_ONCE}"
+        )

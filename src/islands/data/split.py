@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from islands.data.averaging import average_samples
-from islands.data.compatibility import match_record
+from islands.data.compatibility import Reference, match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError, SettingsError
 
@@ -83,6 +83,11 @@ def average_split(split: Split, count: int) -> Split:
     if count == 1:
         return split
     return Split(average_samples(split.estimation, count), average_samples(split.validation, count))
+
+
+def match_split(reference: Reference, split: Split) -> Split:
+    """Return the split with its inputs in the order of a model, advanced if the model reads them early."""
+    return Split(match_record(reference, split.estimation), match_record(reference, split.validation))
 
 
 def share_samples(one: Dataset, other: Dataset) -> bool:

@@ -37,6 +37,7 @@ _SEEDED = Settings(
     distinct=True,
     refine=True,
     average="auto",
+    feedthrough="auto",
     library="phi-polynomial",
     swap_search=True,
     topology="ring",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
 from islands.data.split import Split
@@ -119,6 +120,12 @@ class SearchResult:
     models: tuple[RankedModel, ...]
     ensemble: Ensemble | None = None
     average: int = 1
+
+    @property
+    def direct_inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that the models read at sample k (direct feedthrough)."""
+        channels = map(parse_channel_name, self.split.estimation.input_names)
+        return tuple(channel.base for channel in channels if channel.at_once)
 
     @property
     def requires_property_1(self) -> bool:

@@ -6,6 +6,7 @@ from math import inf
 from typing import Any, TypeVar
 
 from islands.data.averaging import check_average
+from islands.data.input_lead import check_feedthrough
 from islands.errors import SettingsError, lookup
 from islands.estimation.constraints.constraint_parser import FORMS
 from islands.estimation.estimators import ESTIMATORS
@@ -120,6 +121,9 @@ class Settings:
     average : int or str
         Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
         oversampled record if small models of a library are clearly better on the validation data.
+    feedthrough : str
+        Whether models read inputs at sample k: ``yes`` for all inputs, ``no``, or ``auto`` for those to which
+        the output of the estimation data responds within the sample.
     islands : int
         Number of islands, each with a separate population.
     topology : str
@@ -179,6 +183,7 @@ class Settings:
         "", f"{', '.join(ESTIMATORS)}; by default validation selects.", after="constraints"
     )
     average: int | str = _option(1, "Samples of a mean that becomes one sample, or auto.")
+    feedthrough: str = _option("no", "Whether models read u(k): auto (test the record), yes or no.")
     islands: int = _option(1, "Number of islands that evolve in parallel.")
     topology: str = _option("isolated", f"{', '.join(TOPOLOGIES)}, or edges: 0>1,1>2.")
     migrate_every: int | str = _option(
@@ -197,15 +202,8 @@ class Settings:
         _at_least(1, population=self.population, max_terms=self.max_terms, shooting=self.shooting)
         _at_least(0, generations=self.generations, max_height=self.max_height)
         _at_least(1, tournament=self.tournament)
-        _probability(
-            elite=self.elite,
-            crossover=self.crossover,
-            mutation=self.mutation,
-            prune=self.prune,
-            high_level=self.high_level,
-            outer=self.outer,
-            from_library=self.from_library,
-        )
+        _probability(elite=self.elite, crossover=self.crossover, mutation=self.mutation, prune=self.prune)
+        _probability(high_level=self.high_level, outer=self.outer, from_library=self.from_library)
         if not self.tolerance >= 0.0:
             raise SettingsError(f"the tolerance of pruning is not negative, got {self.tolerance}")
         fewest, most = self.initial_terms
@@ -222,6 +220,7 @@ class Settings:
         if self.library:
             get_library(self.library)
         check_average(self.average)
+        check_feedthrough(self.feedthrough)
         lookup(STRUCTURES, self.structure, "structure")
         constraint(self.constraints)
         lookup(FITNESSES, self.fitness, "fitness")

@@ -25,6 +25,7 @@ SEARCH: Mapping[str, Any] = MappingProxyType(
         "initial_terms": (1, 5),
         # The formula is simulated at the sampling time of the diagnosis.
         "average": 1,
+        "feedthrough": "no",
     }
 )
 

@@ -38,6 +38,7 @@ from islands.evolution.search_result import (
     with_bands,
 )
 from islands.evolution.settings import Settings
+from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import screen
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
@@ -66,6 +67,7 @@ def fit(
     constraints: str | None = None,
     estimator: str = "least-squares",
     average: int | str = AUTO,
+    feedthrough: str = AUTO,
     shooting: int | None = None,
     certificate: int = 10_000,
     seed: int = 0,
@@ -94,6 +96,9 @@ def fit(
         Samples of a mean that becomes one sample of the data, 1 for none. ``auto`` averages the noise of an
         oversampled record if small models are clearly better on the validation data. Models then have the
         sampling time of the means.
+    feedthrough : str
+        Whether models read inputs at sample k: ``yes`` for all inputs, ``no``, or ``auto`` for those to which
+        the output of the estimation data responds within the sample.
     shooting : int, optional
         Samples of each interval of multiple shooting.
     certificate : int
@@ -128,6 +133,7 @@ def fit(
         raise SettingsError(f"a search has at least 0 nodes, got certificate = {certificate}")
     trial = TrialLibrary(library, degree, lags, constraints)
     parts, samples = select_rate(split_data(record, validation), average, trial, lags + 3)
+    parts = select_feedthrough(parts, feedthrough, trial)
     shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
@@ -182,6 +188,7 @@ def fit(
         "constraints": constraints,
         "estimator": estimator,
         "average": average,
+        "feedthrough": feedthrough,
         "shooting": shooting,
         "certificate": certificate,
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,

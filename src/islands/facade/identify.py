@@ -25,6 +25,7 @@ from islands.evolution.problem import Problem, make_problem
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
+from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
@@ -102,12 +103,9 @@ def identify(
         raise SettingsError(f"a seed is not negative, got {seed}")
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
-    split, count = select_rate(
-        split_data(record, validation),
-        settings.average,
-        _make_trial_library(settings),
-        settings.maximum_lag + _MIN_RESIDUALS,
-    )
+    trial, least = _make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
+    split, count = select_rate(split_data(record, validation), settings.average, trial, least)
+    split = select_feedthrough(split, settings.feedthrough, trial)
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
     search_problem = make_problem(subtract_offsets(split.estimation, offsets), settings)

@@ -105,7 +105,7 @@ def _choose_count(split: Split, library: TrialLibrary, least: int) -> int:
         if len(counts) == 1 or not _is_noisy(split.estimation):
             return 1
     squares = np.array(
-        [_compute_errors(average_split(split, count), library, interval // count) ** 2 for count in counts]
+        [compute_errors(average_split(split, count), library, interval // count) ** 2 for count in counts]
     )
     # Coarse rates have a longer warm-up: compare the intervals that all of them predict.
     compared = squares[:, ~np.isnan(squares).any(axis=0)]
@@ -173,7 +173,7 @@ def _limit_interval(validation: Dataset, counts: list[int]) -> int:
     return 1
 
 
-def _compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[np.float64]:
+def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[np.float64]:
     """Return the errors of the best trial model on the validation data, in means over ``count`` samples.
 
     NaN in the warm-up; infinite if no model can be estimated and simulated.

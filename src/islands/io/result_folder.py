@@ -37,7 +37,11 @@ def result_document(found: SearchResult) -> dict[str, Any]:
     document = {
         "schema": SCHEMA,
         "record": record_document(found.record),
-        "preprocessing": {"average": found.average, "dt": found.split.estimation.dt},
+        "preprocessing": {
+            "average": found.average,
+            "dt": found.split.estimation.dt,
+            "feedthrough": list(found.direct_inputs),
+        },
         "seed": found.seed,
         "settings": dict(found.settings),
         "search": {

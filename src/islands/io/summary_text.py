@@ -93,7 +93,14 @@ def _describe_units(found: SearchResult) -> str:
         strict=True,
     )
     units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
-    return f"    {f'{units}; ' if units else ''}{_describe_rate(found)}."
+    return f"    {f'{units}; ' if units else ''}{_describe_rate(found)}.{_describe_feedthrough(found)}"
+
+
+def _describe_feedthrough(found: SearchResult) -> str:
+    if not found.direct_inputs:
+        return ""
+    inputs = ", ".join(found.direct_inputs)
+    return f" Direct feedthrough: the output responds to {inputs} within the sample, so models read it at k."
 
 
 def _describe_rate(found: SearchResult) -> str:

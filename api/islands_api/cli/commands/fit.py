@@ -50,6 +50,10 @@ def fit(
     average: Annotated[
         str, typer.Option("--average", help="Samples of a mean that becomes one sample, or auto.")
     ] = AUTO,
+    feedthrough: Annotated[
+        str,
+        typer.Option("--feedthrough", help="Whether models read u(k): auto (test the record), yes or no."),
+    ] = AUTO,
     shooting: Annotated[
         int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
     ] = None,
@@ -81,6 +85,7 @@ def fit(
             constraints=constraints,
             estimator=estimator,
             average=average,
+            feedthrough=feedthrough,
             shooting=shooting,
             certificate=certificate,
             seed=seed,

@@ -174,6 +174,7 @@ def test_result_has_the_values_of_default_settings():
         "constraints": "none",
         "estimator": "least-squares",
         "average": "auto",
+        "feedthrough": "auto",
         "shooting": 30,
         "certificate": 10_000,
         "validation": 0.25,

@@ -1,0 +1,61 @@
+"""Choice of inputs with direct feedthrough, which the model reads at sample k."""
+
+import numpy as np
+
+from islands.data.channel_names import parse_channel_name
+from islands.data.input_lead import advance_inputs, check_feedthrough
+from islands.data.split import Split
+from islands.errors import RecordError
+from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
+from islands.facade.rate_selection import TrialLibrary, compute_errors
+
+#: Largest error on the validation data relative to that of models without feedthrough.
+LARGEST_RATIO = 0.98
+
+
+def select_feedthrough(split: Split, feedthrough: str, library: TrialLibrary) -> Split:
+    """Advance the inputs to which the output responds within the sample, as the setting says.
+
+    ``auto`` tests the estimation data (see `find_direct_inputs`). It advances the inputs that it finds if
+    small models of the library are then better in free run on the validation data. Inputs that the caller
+    already reads one sample early (``u_V+1``) do not change.
+
+    Parameters
+    ----------
+    split : Split
+    feedthrough : str
+        ``auto``, ``yes`` (all inputs) or ``no``.
+    library : TrialLibrary
+        Library and constraints of the models that are compared.
+
+    Raises
+    ------
+    SettingsError
+        The setting is none of the three.
+    """
+    check_feedthrough(feedthrough)
+    names = split.estimation.input_names
+    measured = [place for place, name in enumerate(names) if not parse_channel_name(name).at_once]
+    if feedthrough == "no" or not measured:
+        return split
+    if feedthrough == "yes":
+        return _advance(split, measured)
+    # Statistics of very large numbers overflow: no input of such a record is advanced.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        found = [place for place in find_direct_inputs(split.estimation) if place in measured]
+        if not found:
+            return split
+        advanced = _advance(split, found)
+        return advanced if _error(advanced, library) <= LARGEST_RATIO * _error(split, library) else split
+
+
+def _advance(split: Split, places: list[int]) -> Split:
+    return Split(advance_inputs(split.estimation, places), advance_inputs(split.validation, places))
+
+
+def _error(split: Split, library: TrialLibrary) -> float:
+    try:
+        errors = compute_errors(split, library, 1)
+    except RecordError:
+        return np.inf  # too short for the library: the search reports it
+    return float(np.nanmean(errors**2))

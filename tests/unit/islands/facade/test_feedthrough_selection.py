@@ -1,0 +1,165 @@
+"""Direct feedthrough: inputs to which the output responds within the sample are read at sample k."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter
+
+import islands
+from islands.data.dataset import Dataset, join
+from islands.data.split import split
+from islands.errors import SettingsError
+from islands.estimation.structure_selection.direct_feedthrough import find_direct_inputs
+from islands.facade.feedthrough_selection import select_feedthrough
+from islands.facade.rate_selection import TrialLibrary
+from islands.io.models import model_from_json, model_json
+from islands.io.result_folder import result_json
+from islands.io.summary_text import summary
+from islands.systems.catalogue import make_record
+
+LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 5, "average": 1}
+TRIAL = TrialLibrary("polynomial", 1, 3, "none")
+
+
+def white(seed, samples=2000):
+    return np.random.default_rng(seed).normal(size=samples)
+
+
+def smooth(seed, samples=2000):
+    return lfilter(*butter(3, 0.1), white(seed, samples + 200))[200:]
+
+
+def lag(u, delay, noise=0.0):
+    """Return a first-order lag of an input with some delay in samples."""
+    y = lfilter([0.0] * delay + [0.3], [1.0, -0.7], u)
+    return Dataset(u, y + noise * np.std(y) * white(9, len(u)), 1.0, ("u_V",), "y_um")
+
+
+def first_order_hold(u):
+    """Return the exact response of a first-order lag to an input that is linear between samples."""
+    pole = np.exp(-0.1)
+    slope = 1.0 - (1.0 - pole) / 0.1
+    return Dataset(u, lfilter([slope, 1.0 - pole - slope], [1.0, -pole], u), 1.0)
+
+
+def cubic(u, delay=0):
+    return Dataset(u, np.roll(u + 0.3 * u**3 + 0.2 * u**2, delay), 1.0)
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        lag(white(0), 0),
+        lag(white(0), 0, noise=0.1),
+        lag(smooth(0), 0),
+        cubic(white(1)),
+        cubic(white(1) ** 2),
+        first_order_hold(white(2)),
+        first_order_hold(smooth(2)),
+        join((lag(white(0), 0), lag(white(1), 0))),
+        Dataset(1e5 + 1e-3 * white(0), lag(white(0), 0).y, 1.0),
+    ],
+)
+def test_direct_feedthrough_is_found(record):
+    assert find_direct_inputs(record) == (0,)
+
+
+@pytest.mark.parametrize("delay", [1, 2])
+@pytest.mark.parametrize("make", [white, smooth])
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_delay_is_not_taken_for_direct_feedthrough(make, delay, noise):
+    assert find_direct_inputs(lag(make(3), delay, noise)) == ()
+    assert find_direct_inputs(cubic(make(3), delay)) == ()
+
+
+def test_the_slope_of_the_consistent_piezo_is_not_delayed():
+    found = {
+        name: find_direct_inputs(make_record("bouc-wen-piezo", name, "estimation"))
+        for name in ("consistent", "authors")
+    }
+    assert found == {"consistent": (0,), "authors": ()}
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        lag(white(0, 60), 0),
+        join(tuple(lag(white(seed, 20), 0) for seed in range(100))),
+        Dataset(np.sin(0.05 * np.arange(2000)), np.sin(0.05 * np.arange(2000)), 1.0),
+        Dataset(np.zeros(2000), white(0), 1.0),
+        Dataset(white(0), np.zeros(2000), 1.0),
+    ],
+    ids=["short", "short recordings", "predictable input", "constant input", "constant output"],
+)
+def test_a_record_without_information_has_no_direct_inputs(record):
+    assert find_direct_inputs(record) == ()
+
+
+def test_inputs_are_tested_one_by_one():
+    first = white(0)
+    second = first + 0.5 * white(1)
+    y = lag(first, 0).y + lag(second, 1).y
+    record = Dataset(np.column_stack([first, second]), y, 1.0, ("a_V", "b_V"))
+    assert find_direct_inputs(record) == (0,)
+    found = islands.fit(record, **LIBRARY)
+    assert found.search_result.direct_inputs == ("a_V",)
+    assert "u1(k)" in found.best.equation
+    assert "u2(k)" not in found.best.equation
+    assert found.best.metrics["validation"]["free_run"].rmse < 1e-9
+
+
+@pytest.fixture(scope="module")
+def found():
+    return islands.fit(lag(white(0), 0), **LIBRARY)
+
+
+def test_the_equation_the_summary_and_the_document_state_it(found):
+    assert found.best.equation == "y(k) = 0.7*y(k-1) + 0.3*u(k)"
+    assert "the output responds to u_V within the sample" in summary(found.search_result)
+    document = json.loads(result_json(found.search_result))
+    assert document["preprocessing"]["feedthrough"] == ["u_V"]
+    assert document["settings"]["feedthrough"] == "auto"
+    assert document["record"]["names"]["inputs"] == ["u_V"]
+
+
+def test_a_saved_model_simulates_the_record_as_it_was_measured(found):
+    record = join((lag(white(4, 50), 0), lag(white(5, 70), 0)))
+    again = model_from_json(model_json(found.best.model))
+    for run in (found.best.simulate(record), islands.simulate(again, record)):
+        assert run.outcome
+        assert np.nanmax(np.abs(run.y - record.y)) < 1e-9
+    assert np.isfinite(found.best.bands(record).upper).any()
+
+
+def test_a_record_with_a_delay_gives_the_same_result_as_without_the_test():
+    documents = []
+    for feedthrough in ("auto", "no"):
+        result = islands.fit(lag(smooth(6), 1, noise=0.01), **LIBRARY, feedthrough=feedthrough)
+        documents.append(json.loads(result_json(result.search_result)))
+        documents[-1]["settings"].pop("feedthrough")
+    assert documents[0] == documents[1]
+    assert documents[0]["preprocessing"]["feedthrough"] == []
+
+
+def test_the_setting_decides_without_a_test():
+    data = split(Dataset(np.column_stack([white(0), white(1)]), white(2), 1.0, ("a+1", "b")))
+    assert select_feedthrough(data, "no", TRIAL) is data
+    assert select_feedthrough(data, "yes", TRIAL).validation.input_names == ("a+1", "b+1")
+    with pytest.raises(SettingsError, match="feedthrough is auto, yes or no, got 'perhaps'"):
+        select_feedthrough(data, "perhaps", TRIAL)
+    with pytest.raises(SettingsError, match="feedthrough is auto, yes or no"):
+        islands.identify(lag(white(0), 0), feedthrough="perhaps")
+
+
+def test_models_that_validate_worse_are_not_used():
+    record = lag(white(0), 0)
+    worse = Dataset(white(7, 400), -lag(white(7, 400), 0).y, 1.0, ("u_V",), "y_um")
+    assert islands.fit(record, worse, **LIBRARY).search_result.direct_inputs == ()
+
+
+def test_identify_finds_it_likewise():
+    changes = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 1, "max_height": 1}
+    found = islands.identify(lag(white(0), 0), preset="narx", shifts=(1,), average=1, **changes)
+    assert found.search_result.direct_inputs == ("u_V",)
+    assert "u(k)" in found.best.equation
