@@ -162,7 +162,8 @@ def _make_trial_library(settings: Settings) -> TrialLibrary:
         # Without a library in the settings, the rates are compared with the default one of the constraint.
         name = "phi-polynomial" if constraint(settings.constraints).sums else "polynomial"
         degree, lags = get_library(name).degree, get_library(name).lags
-    return TrialLibrary(name, degree, lags, settings.constraints)
+    shooting = settings.shooting if settings.refine else None
+    return TrialLibrary(name, degree, lags, settings.constraints, shooting)
 
 
 def _check_validation_length(validation: Dataset, settings: Settings) -> None:

@@ -17,6 +17,7 @@ from islands.data.split import Split, average_split
 from islands.estimation.estimate import estimate
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import constraint
+from islands.estimation.refinement import refine
 from islands.estimation.structure_selection.deviations import (
     OPERATING_POINT,
     find_offsets,
@@ -33,8 +34,11 @@ COUNTS = (1, 2, 5, 10, 20, 50)
 #: Samples are averaged if the error is at most this fraction of the error without averaging.
 CLEAR_GAIN = 0.8
 
+#: The same for a search that refines: at the rate of the record, it improves more on the trial models.
+CLEAR_GAIN_REFINED = 0.5
+
 #: Smallest noise worth a comparison, relative to the root mean square of the increments of a signal.
-_NOISE = 0.05
+_NOISE = 0.2
 
 #: Order of the differences that separate the noise from the signal.
 _ORDER = 4
@@ -56,12 +60,16 @@ _TERMS = 10
 
 @dataclass(frozen=True, slots=True)
 class TrialLibrary:
-    """Candidate library and constraints of the models that compare rates."""
+    """Candidate library and constraints of the models that compare rates.
+
+    ``shooting`` is the interval over which the search refines parameters, None if it does not.
+    """
 
     name: str
     degree: int
     lags: int
     constraints: str
+    shooting: int | None = None
 
 
 def select_rate(split: Split, average: int | str, library: TrialLibrary, least: int) -> tuple[Split, int]:
@@ -111,7 +119,8 @@ def _choose_count(split: Split, library: TrialLibrary, least: int) -> int:
     compared = squares[:, ~np.isnan(squares).any(axis=0)]
     errors = np.sqrt(compared.mean(axis=1)) if compared.size else np.full(len(counts), inf)
     best = int(np.argmin(errors))
-    return counts[best] if errors[best] <= CLEAR_GAIN * errors[0] else 1
+    gain = CLEAR_GAIN if library.shooting is None else CLEAR_GAIN_REFINED
+    return counts[best] if errors[best] <= gain * errors[0] else 1
 
 
 def _permits(split: Split, count: int, least: int) -> bool:
@@ -187,12 +196,21 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
     structures = forward_selection(pool, estimation, library.constraints, _TERMS)
     warm_up = max(item.maximum_lag for item in pool)
     least, errors = inf, np.full(sum(length // count for length in validation.segments), inf)
+    best = None
     for structure in () if isinstance(structures, EvaluationOutcome) else structures:
         found = estimate(structure, estimation, library.constraints, warm_up)
         if isinstance(found, EvaluationOutcome):
             continue
         run = free_run(found.model, validation, warm_up)
         if run.mean_squared_error < least:
-            least = run.mean_squared_error
+            least, best = run.mean_squared_error, found.model
             errors = average_samples(replace(validation, y=validation.y - run.y), count).y
+    if best is None or library.shooting is None:
+        return errors
+    refined = refine(best, estimation, library.shooting, library.constraints, warm_up)
+    if isinstance(refined, EvaluationOutcome):
+        return errors
+    run = free_run(refined.model, validation, warm_up)
+    if run.mean_squared_error < least:
+        errors = average_samples(replace(validation, y=validation.y - run.y), count).y
     return errors

@@ -118,9 +118,18 @@ def test_simulation_of_the_validation_data_has_the_reported_errors(averaged):
     assert len(best.bands(validation).upper) == len(means)
 
 
+def identify(**changes):
+    budget = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 1, "max_height": 1}
+    return islands.identify(lag(), preset="narx", shifts=(1,), from_library=0.0, **budget, **changes)
+
+
 @pytest.mark.parametrize("library", ["polynomial", ""])
 def test_identify_averages_likewise(library):
-    changes = {"generations": 0, "population": 10, "max_terms": 4, "library_degree": 1, "max_height": 1}
-    found = islands.identify(lag(), preset="narx", shifts=(1,), library=library, from_library=0.0, **changes)
+    found = identify(library=library, refine=False)
     assert found.search_result.average > 1
     assert found.best.model.dt == 0.001 * found.search_result.average
+
+
+def test_refinement_at_the_rate_of_the_record_makes_averages_unnecessary():
+    assert identify().search_result.average == 1
+    assert identify(average="5").search_result.average == 5
