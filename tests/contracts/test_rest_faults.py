@@ -65,7 +65,7 @@ def test_a_full_disk_rejects_writes_until_space_is_freed(disk, serve):
 @pytest.mark.ci
 def test_a_full_disk_while_drawing_is_reported_as_such(disk, serve):
     with serve(disk) as service:
-        path = f"/v1/jobs/{run_identification(service)}/models/1/figures/loop.svg"
+        path = f"/v1/jobs/{run_identification(service)}/models/1/figures/hold.svg"
         filler = filled(disk)
         assert "free some space" in problem_of(service.client.get(path), 507, "storage-full")
         filler.unlink()
@@ -173,7 +173,7 @@ def corrupt_row(service, table, **values):
     service.store.database.write(
         lambda connection: connection.execute(update(table).where(table.c.job_id == job).values(**values))
     )
-    return f"/v1/jobs/{job}/models/1/figures/loop.svg"
+    return f"/v1/jobs/{job}/models/1/figures/hold.svg"
 
 
 @pytest.mark.nightly
@@ -197,7 +197,7 @@ def test_a_defect_while_drawing_is_logged_and_not_retried_at_once(figure_service
 
 @pytest.mark.nightly
 def test_figures_report_a_lost_blob_and_an_unavailable_database(figure_service):
-    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/loop.svg"
+    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/hold.svg"
     state = figure_service.app.state.islands
     gone = state.settings.model_copy(update={"database": "sqlite:////nowhere/islands.db"})
     figure_service.app.state.islands = replace(state, settings=gone)
@@ -217,7 +217,7 @@ def test_figures_report_a_lost_blob_and_an_unavailable_database(figure_service):
 
 
 def test_a_figure_that_timed_out_is_not_retried_at_once(figure_service, monkeypatch):
-    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/loop.svg"
+    path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/hold.svg"
     monkeypatch.setattr(figures, "_DRAWING_TIMEOUT", 0.1)
     detail = problem_of(figure_service.client.get(path), 500, "failed")
     assert "take longer than" in detail

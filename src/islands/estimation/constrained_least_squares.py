@@ -17,7 +17,11 @@ _REDUNDANT = 1e-10
 
 
 def constrained_least_squares(
-    psi: NDArray[np.float64], y: NDArray[np.float64], S: NDArray[np.float64], c: NDArray[np.float64]
+    psi: NDArray[np.float64],
+    y: NDArray[np.float64],
+    S: NDArray[np.float64],
+    c: NDArray[np.float64],
+    standard_errors: bool = True,
 ) -> Estimate:
     """Estimate the parameters that minimise ``|y - Psi theta|`` subject to ``S theta = c``.
 
@@ -31,6 +35,8 @@ def constrained_least_squares(
         Constraint matrix. No row may be a linear combination of the others.
     c : ndarray, shape (constraints,)
         Right-hand side of the constraints.
+    standard_errors : bool
+        Whether to compute the standard errors; otherwise they are NaN.
 
     Returns
     -------
@@ -44,7 +50,7 @@ def constrained_least_squares(
     found = null_space(S / factors.scale, c)
     if isinstance(found, EvaluationOutcome):
         return failed_estimate(len(psi), found)
-    return solve(factors, *found)
+    return solve(factors, *found, standard_errors)
 
 
 def null_space(

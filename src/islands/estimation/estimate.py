@@ -41,7 +41,11 @@ class FittedStructure:
 
 
 def estimate(
-    regressors: Sequence[Regressor], record: Dataset, constraints: str = "none", warm_up: int | None = None
+    regressors: Sequence[Regressor],
+    record: Dataset,
+    constraints: str = "none",
+    warm_up: int | None = None,
+    standard_errors: bool = True,
 ) -> FittedStructure | EvaluationOutcome:
     """Estimate the parameters of a structure on a record.
 
@@ -54,6 +58,8 @@ def estimate(
         parameter has the wrong sign, the term with the smallest t-ratio of them is removed.
     warm_up : int or None
         Number of samples before the first row. None is the largest lag.
+    standard_errors : bool
+        Whether the model has standard errors, which take as long as the parameters.
 
     Returns
     -------
@@ -74,12 +80,16 @@ def estimate(
         constrained = constraint(constraints).constrain(kept)
         if isinstance(constrained, EvaluationOutcome):
             return constrained
-        fitted = _estimate_constrained(constrained, record, warm_up)
+        # The ratios below need standard errors.
+        fitted = _estimate_constrained(
+            constrained, record, warm_up, standard_errors or bool(constrained.signs.any())
+        )
         if isinstance(fitted, EvaluationOutcome):
             return fitted
-        theta, errors = np.array(fitted.model.theta), np.array(fitted.model.standard_errors)
+        theta = np.array(fitted.model.theta)
         if constrained.has_signs(theta):
             break
+        errors = np.array(fitted.model.standard_errors)
         # The minimum under one sign lies where the parameter is zero, because the squared error is convex.
         ratio = constrained.signs * theta / np.maximum(errors, np.finfo(float).tiny)
         worst = constrained.regressors[int(np.argmin(ratio))]
@@ -93,15 +103,18 @@ def estimate(
 
 
 def _estimate_constrained(
-    constrained: Constrained, record: Dataset, warm_up: int | None
+    constrained: Constrained, record: Dataset, warm_up: int | None, standard_errors: bool
 ) -> FittedStructure | EvaluationOutcome:
     structure = Model(constrained.regressors, None, record.input_names, record.output_name, record.dt)
     first = structure.maximum_lag if warm_up is None else warm_up
     *psi, y = regressor_matrix([*structure.regressors, Lagged(0, 0)], record, first)
-    found = constrained_least_squares(np.array(psi), y, constrained.S, constrained.c)
+    found = constrained_least_squares(np.array(psi), y, constrained.S, constrained.c, standard_errors)
     if not found.outcome:
         return found.outcome
     return FittedStructure(
-        structure.with_parameters(constrained.enforce(found.theta).tolist(), found.standard_errors.tolist()),
+        structure.with_parameters(
+            constrained.enforce(found.theta).tolist(),
+            found.standard_errors.tolist() if standard_errors else None,
+        ),
         found.residual_variance,
     )

@@ -101,7 +101,7 @@ def factorise(psi: NDArray[np.float64], y: NDArray[np.float64]) -> QRFactor | Ev
     return QRFactor(triangle / scale, scale, projection, float(total(residual**2)), q, residual)
 
 
-def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
+def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64], standard_errors: bool = True) -> Estimate:
     """Estimate the parameters that minimise ``|y - Psi theta|``.
 
     Parameters
@@ -110,14 +110,21 @@ def least_squares(psi: NDArray[np.float64], y: NDArray[np.float64]) -> Estimate:
         The regressor matrix, transposed.
     y : ndarray, shape (rows,)
         The target.
+    standard_errors : bool
+        Whether to compute the standard errors, which takes as long as the parameters.
     """
     factors = factorise(psi, y)
     if isinstance(factors, EvaluationOutcome):
         return failed_estimate(len(psi), factors)
-    return solve(factors, np.zeros(len(psi)), np.eye(len(psi)))
+    return solve(factors, np.zeros(len(psi)), np.eye(len(psi)), standard_errors)
 
 
-def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.float64]) -> Estimate:
+def solve(
+    factors: QRFactor,
+    particular: NDArray[np.float64],
+    basis: NDArray[np.float64],
+    standard_errors: bool = True,
+) -> Estimate:
     """Minimise over ``scaled theta = particular + basis eta``.
 
     Parameters
@@ -127,6 +134,8 @@ def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.
         A scaled parameter vector that meets the constraints.
     basis : ndarray, shape (terms, free)
         Orthonormal basis of the directions that preserve the constraints.
+    standard_errors : bool
+        Whether to compute the standard errors; otherwise they are NaN.
     """
     terms, free = basis.shape
     remainder = factors.projection - factors.triangle @ particular
@@ -140,6 +149,9 @@ def solve(factors: QRFactor, particular: NDArray[np.float64], basis: NDArray[np.
     right = q.T @ remainder
     scaled = particular + basis @ solve_triangular(r, right)
     unexplained = remainder - q @ right
+    if not standard_errors:
+        undefined = np.full(terms, np.nan)
+        return _make_estimate(factors, scaled, undefined, float(unexplained @ unexplained), free)
     residual = factors.orthogonal + combine(unexplained[:, None], factors.columns)[0]
     covariance = sandwich(factors.columns, residual, weights=q)
     spread = solve_triangular(r, basis.T, trans="T")

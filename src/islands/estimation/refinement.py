@@ -53,6 +53,7 @@ def refine(
     constraints: str = "none",
     warm_up: int | None = None,
     max_steps: int = 30,
+    standard_errors: bool = True,
 ) -> RefinedModel | EvaluationOutcome:
     """Refine the parameters of a model on the multiple-shooting error.
 
@@ -68,7 +69,9 @@ def refine(
     warm_up : int or None
         Number of samples before the first prediction. None is the largest lag.
     max_steps : int
-        Maximum number of accepted steps.
+        Maximum number of accepted steps. With 0 the parameters stay, and the model gets standard errors.
+    standard_errors : bool
+        Whether the model has standard errors, which take as long as two steps.
 
     Returns
     -------
@@ -127,6 +130,8 @@ def refine(
         if gain < _MIN_GAIN:
             break
     after = residual.mean_square(error)
+    if not standard_errors:
+        return RefinedModel(model.with_parameters(theta.tolist()), before, after, steps)
     covariance = sandwich_of_jacobian(residual.jacobian(theta, directions), error, residual.intervals)
     errors = np.sqrt(np.maximum(np.einsum("ti,ij,tj->t", directions, covariance, directions), 0.0))
     return RefinedModel(model.with_parameters(theta.tolist(), errors.tolist()), before, after, steps)

@@ -7,7 +7,7 @@ from typing import Protocol, TypeVar
 
 from islands.data.dataset import Dataset
 from islands.data.split import Split
-from islands.estimation.estimate import FittedStructure
+from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.estimators import ESTIMATORS, estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
@@ -55,12 +55,26 @@ def select_final_models(
     kept = []
     for entries in _group_by_size(each for each in candidates if isfinite(each.error)):
         for candidate in sorted(entries, key=lambda entry: entry.order):
-            model = candidate.model
+            model = _with_standard_errors(candidate, settings, split.estimation)
             assessment = assess(model, split, settings.shooting, settings.maximum_lag, settings.constraints)
             if _is_valid(assessment, settings):
                 kept.append(RankedModel(model, assessment))
                 break
     return rank_models(kept)
+
+
+def _with_standard_errors(candidate: ValidatedModel, settings: Settings, record: Dataset) -> Model:
+    """Return the model with standard errors; most candidates do not need them, so they have none."""
+    model = candidate.model
+    if model.standard_errors is not None:
+        return model
+    limits = settings.constraints, settings.maximum_lag
+    if candidate.interval == 1:
+        estimated = estimate(model.regressors, record, *limits)
+        if not isinstance(estimated, EvaluationOutcome) and estimated.model.parameters == model.parameters:
+            return estimated.model
+    refined = refine(model, record, candidate.interval, *limits, max_steps=0)
+    return model if isinstance(refined, EvaluationOutcome) else refined.model
 
 
 def _is_valid(assessment: Assessment, settings: Settings) -> bool:
@@ -136,7 +150,12 @@ def _estimate_models(
     settings = problem.settings
     found = (
         estimate_deviations(
-            each.regressors, offsets, split.estimation, settings.constraints, settings.maximum_lag
+            each.regressors,
+            offsets,
+            split.estimation,
+            settings.constraints,
+            settings.maximum_lag,
+            standard_errors=bool(settings.estimator),
         )
         for each in individuals
     )
@@ -189,7 +208,12 @@ def _refine(
     with ThreadPoolExecutor() as threads:
         refined = threads.map(
             lambda model: refine(
-                model, split.estimation, interval, settings.constraints, settings.maximum_lag
+                model,
+                split.estimation,
+                interval,
+                settings.constraints,
+                settings.maximum_lag,
+                standard_errors=False,
             ),
             models,
         )

@@ -161,6 +161,6 @@ def _fit(columns: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[n
     augmented = np.column_stack(
         [columns / norms[:, None], math.sqrt(_RIDGE) * np.eye(count), np.zeros(count)]
     )
-    estimate = least_squares(augmented, np.concatenate([target, np.zeros(count + 1)]))
+    estimate = least_squares(augmented, np.concatenate([target, np.zeros(count + 1)]), False)
     scaled: NDArray[np.float64] = estimate.theta / norms
     return scaled

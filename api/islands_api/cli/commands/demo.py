@@ -24,7 +24,7 @@ from islands_service.engines import ENGINES
 #: Number of islands: one for each core of the smallest supported machine.
 ISLANDS = 2
 
-#: Preset of the result, and preset with the settings of the paper, which is shown beside it.
+#: Preset of the result, and preset with the settings of the paper, shown in the same table.
 PRESETS = ("hysteresis", "paper-case1")
 
 #: System of the paper's case 1.

@@ -218,7 +218,7 @@ function makeSearchFigures(job, islands, signal) {
   return node;
 }
 
-/** Make the panel of the models; `select(rank)` shows the details of a model, of the recommended one for null. */
+/** Make the panel of the models; `select(rank)` shows a model, the recommended one for null. */
 export function makeModelsPanel(job, rank, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
   const article = el("article", { class: "model", "aria-labelledby": "model" });

@@ -102,6 +102,7 @@ def estimate_deviations(
     record: Dataset,
     constraints: str = "none",
     warm_up: int | None = None,
+    standard_errors: bool = True,
 ) -> FittedStructure | EvaluationOutcome:
     """Estimate a structure in deviations on the record in its own units.
 
@@ -113,15 +114,15 @@ def estimate_deviations(
     structure : sequence of Regressor
         Regressors in deviations, without back-shifts.
     offsets : tuple of float
-    record, constraints, warm_up
+    record, constraints, warm_up, standard_errors
         As in `estimate`.
     """
     restored = add_offsets(structure, offsets)
-    found = estimate(restored, record, constraints, warm_up)
+    found = estimate(restored, record, constraints, warm_up, standard_errors)
     smaller = [item for item in restored if item.expression != _ONE]
     if len(restored) == len(structure) or not smaller or isinstance(found, EvaluationOutcome):
         return found
-    without = estimate(smaller, record, constraints, warm_up)
+    without = estimate(smaller, record, constraints, warm_up, standard_errors)
     if isinstance(without, EvaluationOutcome):
         return found
     largest_ratio = record.samples ** (1.0 / record.samples)

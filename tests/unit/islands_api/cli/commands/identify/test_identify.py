@@ -36,7 +36,8 @@ def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     }
     search = json.loads((tmp_path / "out/result.json").read_text())["search"]
     assert (search["generations"], search["evaluations"]) == (3, 40)
-    assert search["feasible_share"] == search["outcomes"]["ok"] / 40
+    feasible = sum(search["outcomes"].get(name, 0) for name in ("ok", "abandoned"))
+    assert search["feasible_share"] == feasible / 40
     assert search["wall_s"] > 0
     archipelago, about = read_checkpoint(tmp_path / "out/checkpoint.json")
     assert archipelago.generation == 3

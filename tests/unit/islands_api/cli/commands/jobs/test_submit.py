@@ -31,6 +31,7 @@ VALUES: dict[str, tuple[tuple[str, ...], Any]] = {
     "constraints": (("none",), "none"),
     "estimator": (("free-run",), "free-run"),
     "average": (("20",), "20"),
+    "feedthrough": (("no",), "no"),
     "islands": (("3",), 3),
     "topology": (("ring",), "ring"),
     "migrate_every": (("2,5:3",), "2,5:3"),
