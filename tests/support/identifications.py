@@ -23,6 +23,9 @@ BUDGET = {
     "library_degree": 5,
     "library_lags": 3,
     "swap_search": False,
+    "refine": False,
+    "average": "1",
+    "feedthrough": "no",
     "from_library": 0.6,
     "migrate_every": 1,
 }

@@ -242,7 +242,15 @@ def run_diagnosis(service: Service, content: bytes, /, **changes: Any) -> str:
 
 
 #: Settings of a search that takes a second.
-QUICK = {"population": 20, "generations": 2, "max_terms": 3, "max_height": 2, "shooting": 20}
+QUICK = {
+    "population": 20,
+    "generations": 2,
+    "max_terms": 3,
+    "max_height": 2,
+    "shooting": 20,
+    "swap_search": False,
+    "refine": False,
+}
 
 
 def run_identification(service: Service, islands: int = 1) -> str:

@@ -28,6 +28,8 @@ SMALL = {
     "max_height": 3,
     "islands": 2,
     "migrate_every": 1,
+    "swap_search": False,
+    "refine": False,
 }
 
 

@@ -29,6 +29,8 @@ SETTINGS = {
     "shooting": 200,
     "islands": 2,
     "migrate_every": 1,
+    "swap_search": False,
+    "refine": False,
 }
 SEED = 2
 

@@ -64,7 +64,7 @@ def test_result_is_never_worse_than_its_forward_selection_seeds(seed, changes):
 
 def test_refinement_never_makes_the_result_worse(data):
     """Validation selects between refined and estimated models."""
-    plain, refined = (identify(data, **BUDGET, seed=5, refine=refine) for refine in (False, True))
+    plain, refined = (identify(data, **{**BUDGET, "refine": refine}, seed=5) for refine in (False, True))
     assert plain.search_result.search.history == refined.search_result.search.history
     errors = {each.model.size: each.metrics["validation"]["free_run"].rmse for each in refined.models}
     gains = [
