@@ -68,7 +68,7 @@ subprocess.run([*command, "-o", library, out / "model.c", "-lm"], check=True)
 #
 # Both programs start from the same first samples and get the same input.
 lag = model.model.maximum_lag
-python = model.simulate(record).y
+python = model.simulate(record, warm_up=lag).y
 
 compiled = np.zeros(record.samples)
 compiled[:lag] = record.y[:lag]
