@@ -21,7 +21,7 @@ _PUBLIC = {
     "discrepancy.interfaces.context": ("Parameter",),
     "discrepancy.interfaces.effect": ("Effect", "Site"),
     "errors": ("IslandsError", "ModelError", "RecordError", "SettingsError"),
-    "estimation.estimators": ("ESTIMATORS",),
+    "estimation.estimator_table": ("ESTIMATORS",),
     "evolution.migration.topology": ("TOPOLOGIES",),
     "evolution.presets": ("PRESETS",),
     "evolution.settings": ("Settings",),

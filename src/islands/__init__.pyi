@@ -13,7 +13,7 @@ from islands.errors import IslandsError as IslandsError
 from islands.errors import ModelError as ModelError
 from islands.errors import RecordError as RecordError
 from islands.errors import SettingsError as SettingsError
-from islands.estimation.estimators import ESTIMATORS as ESTIMATORS
+from islands.estimation.estimator_table import ESTIMATORS as ESTIMATORS
 from islands.evolution.migration.topology import TOPOLOGIES as TOPOLOGIES
 from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings

@@ -1,7 +1,7 @@
-"""Table of estimators: how the parameters of a structure are estimated, and for which noise."""
+"""Functions of the estimators: how the parameters of a structure are estimated."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from islands.data.dataset import Dataset
 from islands.errors import lookup
 from islands.estimation.estimate import FittedStructure, estimate
+from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.extended_least_squares import extended_least_squares
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
@@ -21,27 +22,6 @@ from islands.simulation.outcome import EvaluationOutcome, Status
 EstimatorFunction = Callable[
     [FittedStructure, Dataset, str, int | None, int | None], FittedStructure | EvaluationOutcome
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class Estimator:
-    """An entry of the table.
-
-    Attributes
-    ----------
-    function : callable
-        Maps a structure with the parameters of least squares to the estimate.
-    interval : callable
-        Maps the shooting interval of the settings to that of the error which the estimate minimises, in
-        samples: 1 for the one-step-ahead error, None for the free run.
-    noise : str
-        Noise for which the estimator is recommended: its estimates are consistent, and 95 % intervals contain
-        the true parameters in 92 to 98 % of records.
-    """
-
-    function: EstimatorFunction
-    interval: Callable[[int], int | None]
-    noise: str
 
 
 def estimate_with(
@@ -79,7 +59,7 @@ def estimate_with(
         The estimator is unknown; else as `estimate` and `refine`.
     """
     entry = lookup(ESTIMATORS, estimator, "estimator")
-    found = entry.function(start, record, constraints, warm_up, entry.interval(shooting))
+    found = _FUNCTIONS[estimator](start, record, constraints, warm_up, entry.interval(shooting))
     if isinstance(found, EvaluationOutcome) or found is start:
         return found
     return replace(found, least_squares_bias=_difference(start.model, found.model))
@@ -172,15 +152,11 @@ def _simulate(
     return FittedStructure(found.model, found.after)
 
 
-ESTIMATORS: Mapping[str, Estimator] = MappingProxyType(
+_FUNCTIONS: Mapping[str, EstimatorFunction] = MappingProxyType(
     {
-        "least-squares": Estimator(_keep, lambda _shooting: 1, "white equation noise"),
-        "extended-least-squares": Estimator(_extend, lambda _shooting: 1, "coloured equation noise"),
-        "shooting": Estimator(
-            _simulate,
-            lambda shooting: shooting,
-            "output noise, with intervals much longer than the memory of the system",
-        ),
-        "free-run": Estimator(_simulate, lambda _shooting: None, "output noise"),
+        "least-squares": _keep,
+        "extended-least-squares": _extend,
+        "shooting": _simulate,
+        "free-run": _simulate,
     }
 )

@@ -9,7 +9,7 @@ from islands.data.averaging import check_average
 from islands.data.input_lead import check_feedthrough
 from islands.errors import SettingsError, lookup
 from islands.estimation.constraints.constraint_parser import FORMS
-from islands.estimation.estimators import ESTIMATORS
+from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS, constraint
 from islands.evolution.gp.err_targets import ERR_TARGETS
 from islands.evolution.gp.fitness import FITNESSES

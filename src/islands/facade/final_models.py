@@ -8,7 +8,8 @@ from typing import Protocol, TypeVar
 from islands.data.dataset import Dataset
 from islands.data.split import Split
 from islands.estimation.estimate import FittedStructure, estimate
-from islands.estimation.estimators import ESTIMATORS, estimate_with
+from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimators import estimate_with
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.refinement import refine
 from islands.estimation.structure_selection.deviations import Offsets, estimate_deviations, subtract_offsets

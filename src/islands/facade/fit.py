@@ -7,7 +7,8 @@ from islands.data.averaging import AUTO
 from islands.data.dataset import Dataset
 from islands.data.split import Split, split_data
 from islands.errors import SettingsError, lookup
-from islands.estimation.estimators import ESTIMATORS, estimate_with
+from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimators import estimate_with
 from islands.estimation.forward_selection import (
     Structure,
     make_selection_problem,

@@ -9,7 +9,7 @@ import typer
 import islands
 from islands.data.averaging import AUTO
 from islands.estimation.constraints.constraint_parser import FORMS
-from islands.estimation.estimators import ESTIMATORS
+from islands.estimation.estimator_table import ESTIMATORS
 from islands.estimation.parameter_constraints import CONSTRAINTS
 from islands.io.records import read_record
 from islands.io.records.row_range import parse_rows

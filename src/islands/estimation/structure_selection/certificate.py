@@ -14,7 +14,7 @@ from scipy.cluster.hierarchy import average
 from scipy.spatial.distance import squareform
 
 from islands.estimation.forward_selection import SelectionProblem, Structure
-from islands.estimation.froe import froe
+from islands.estimation.structure_selection.froe import froe
 from islands.kernels.selection.subset_search import Tree, exchange, search
 
 #: Largest number of candidates; the time of a node grows with its cube.

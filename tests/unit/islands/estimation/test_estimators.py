@@ -5,7 +5,8 @@ import pytest
 
 from islands.errors import SettingsError
 from islands.estimation.estimate import estimate
-from islands.estimation.estimators import ESTIMATORS, estimate_with, least_squares_bias
+from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimators import estimate_with, least_squares_bias
 from islands.estimation.refinement import refine
 from islands.evolution.settings import Settings
 from islands.model.model import make_model

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from islands.estimation.estimate import estimate
-from islands.estimation.estimators import ESTIMATORS, estimate_with
+from islands.estimation.estimator_table import ESTIMATORS
+from islands.estimation.estimators import estimate_with
 from islands.facade.fit import fit
 from islands.facade.identify import identify
 from support.noisy_records import make_noisy_record

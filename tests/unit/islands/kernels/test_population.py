@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from islands.data.dataset import Dataset
 from islands.estimation.constrained_least_squares import constrained_least_squares
-from islands.estimation.froe import froe
+from islands.estimation.structure_selection.froe import froe
 from islands.kernels.pair_table import FREE, Pairs
 from islands.kernels.population import (
     ABANDONED,

@@ -22,7 +22,7 @@ DIGEST = """
 import hashlib
 import numpy as np
 from islands.data.dataset import Dataset
-from islands.estimation.froe import froe
+from islands.estimation.structure_selection.froe import froe
 from islands.estimation.least_squares import factorise
 from islands.kernels import simulate as kernel
 from islands.kernels.population import Groups, PopulationContext, empty_results, evaluate

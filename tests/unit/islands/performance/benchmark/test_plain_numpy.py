@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from islands.estimation.froe import froe
+from islands.estimation.structure_selection.froe import froe
 from islands.model.expression import Lagged
 from islands.model.model import Model
 from islands.performance.benchmark import plain_numpy
