@@ -23,6 +23,9 @@ from islands.simulation.outcome import EvaluationOutcome
 
 Structure = tuple[Regressor, ...]
 
+#: Largest pool of a search that exchanges regressors.
+MAX_POOL = 300
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SelectionProblem:
@@ -119,3 +122,16 @@ def select_forward(
             break
         structures.append(structure)
     return tuple(structures)
+
+
+def select_pool(
+    library: Sequence[Regressor], problem: SelectionProblem, max_terms: int
+) -> Sequence[Regressor]:
+    """Return the regressors for a search by exchange.
+
+    They are the library or, if it has more than `MAX_POOL`, those that forward selection finds first.
+    """
+    if len(library) <= MAX_POOL:
+        return library
+    structures = select_forward(problem, max(max_terms, MAX_POOL))
+    return structures[-1] if structures else library

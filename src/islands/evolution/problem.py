@@ -1,10 +1,11 @@
 """Search problem: the record, the settings, the seeds and the gene pool."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from islands.data.dataset import Dataset
-from islands.estimation.forward_selection import forward_selection
+from islands.estimation.forward_selection import make_selection_problem, select_forward, select_pool
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.generation.evaluation import Evaluator
@@ -14,10 +15,8 @@ from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
 from islands.evolution.settings import Settings
 from islands.model.expression import Expression, height
+from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
-
-#: Largest pool of a swap search: of a larger library, the candidates that forward selection finds first.
-MAX_POOL = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,15 +69,15 @@ def make_problem(record: Dataset, settings: Settings) -> Problem:
     genes = {item: with_phi(item.expression) for item in regressors}
     admits = constraint(settings.constraints).admits
     library = [item for item in regressors if height(genes[item]) <= settings.max_height and admits(item)]
-    selected = forward_selection(library, record, settings.constraints, max(settings.max_terms, MAX_POOL))
-    structures = () if isinstance(selected, EvaluationOutcome) else selected
-    seeds = tuple(
-        tuple(genes[item] for item in structure)
-        for structure in structures
-        if len(structure) <= settings.max_terms
-    )
+    seeds: tuple[Genes, ...] = ()
+    exchanged: Sequence[Regressor] = library
+    selection = make_selection_problem(library, record, settings.constraints)
+    if not isinstance(selection, EvaluationOutcome):
+        structures = select_forward(selection, settings.max_terms)
+        seeds = tuple(tuple(genes[item] for item in structure) for structure in structures)
+        if settings.swap_search:
+            exchanged = select_pool(library, selection, settings.max_terms)
     if settings.swap_search:
-        exchanged = library if len(library) <= MAX_POOL or not structures else structures[-1]
         seeds = _search_seeds(record, settings, [genes[item] for item in exchanged], seeds)
     return Problem(record, settings, seeds, tuple(genes[item] for item in library))
 

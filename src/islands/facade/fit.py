@@ -13,6 +13,7 @@ from islands.estimation.forward_selection import (
     Structure,
     make_selection_problem,
     select_forward,
+    select_pool,
 )
 from islands.estimation.parameter_constraints import constraint
 from islands.estimation.structure_selection.certificate import Certificate, certify, combine_certificates
@@ -28,7 +29,6 @@ from islands.estimation.structure_selection.deviations import (
 from islands.estimation.structure_selection.input_ranking import screen_candidates
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.swap_search import swap_search
-from islands.evolution.problem import MAX_POOL
 from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import (
     RankedModel,
@@ -233,11 +233,9 @@ def _select(
         progress(f"best subsets of {len(pool)} candidates", 0.0)
         found = certify(problem, settings.max_terms, nodes)
         certificates = combine_certificates(certificates, found)
-        ordered = select_forward(problem, max(settings.max_terms, MAX_POOL))
-        nested = [structure for structure in ordered if len(structure) <= settings.max_terms]
-        starts = [*nested, *(entry.structure for entry in found)]
+        starts = [*select_forward(problem, settings.max_terms), *(entry.structure for entry in found)]
         progress(f"exchanges among {len(pool)} candidates", 0.0)
-        exchanged = pool if len(pool) <= MAX_POOL else ordered[-1]
+        exchanged = select_pool(pool, problem, settings.max_terms)
         chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings)]
         structures += [(structure, offsets) for structure in chosen]
     return list(dict.fromkeys(structures)), certificates or (), warm_up

@@ -92,9 +92,9 @@ class _SwapSearch:
     def exchange(self, start: Individual) -> Individual:
         """Exchange single genes, each time the best exchange of all, as long as the error falls."""
         best = start
+        required = with_required_genes((), self._evaluator.settings)
         while not self.is_exhausted:
             genes = best.genes
-            required = with_required_genes((), self._evaluator.settings)
             free = [place for place, gene in enumerate(genes) if gene not in required]
             exchanged = self.evaluate(
                 (
