@@ -54,6 +54,7 @@ def test_systems_are_listed_and_made(tmp_path: Path) -> None:
     assert len(rows) == 20_001
 
 
+@pytest.mark.ci
 def test_result_describes_record_settings_and_search(result: dict[str, Any]) -> None:
     assert result["record"]["samples"] == 5_000
     assert result["record"]["dt"] == pytest.approx(1e-3, rel=1e-9)

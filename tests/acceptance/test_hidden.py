@@ -52,6 +52,7 @@ def is_named(found: TrialOutcome) -> bool:
     return found.verdict in ("named", "named with remainder") and found.within_set
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", [mark_level(name) for name in PIEZO.known if name not in SCALE])
 def test_injected_effect_is_named_in_a_short_record(name: str) -> None:
     found = run(name, seed=SHORT_SEEDS.get(name, SEED), band=(1.0, 2.0), seconds=SHORT)
@@ -71,6 +72,7 @@ def test_injected_effect_is_named(name: str, band: tuple[float, float]) -> None:
     assert is_named(found), found
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seconds", [SHORT, pytest.param(SECONDS, marks=nightly)])
 @pytest.mark.parametrize("name", [mark_level(name) for name in SCALE])
 def test_parameter_beyond_its_tolerance_is_named(name: str, seconds: float) -> None:
@@ -87,6 +89,7 @@ def test_stick_slip_and_play_are_distinguished(name: str, seconds: float) -> Non
     assert not {"stiction", "backlash"} & set(found.equivalents[0])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [mark_level(SEED + more, range(SEED, SEED + 3)) for more in range(6)])
 @pytest.mark.parametrize("seconds", [8.0, pytest.param(SECONDS, marks=nightly)])
 def test_clean_record_has_no_discrepancy(seed: int, seconds: float) -> None:
@@ -105,6 +108,7 @@ def test_clean_record_with_coloured_noise_only_yields_coloured_noise(seed: int, 
 
 
 # A slew rate is excluded: sensor lag and others explain nearly all of it and are named (decision 0012).
+@pytest.mark.ci
 @pytest.mark.parametrize("seconds", [SHORT, pytest.param(SECONDS, marks=nightly)])
 @pytest.mark.parametrize("name", [name for name in PIEZO.unknown if name != "slew-rate"])
 def test_cause_outside_the_catalogue_is_reported_as_unknown(name: str, seconds: float) -> None:
@@ -171,6 +175,7 @@ def test_saturation_of_a_single_peak_is_named(pole: float, seconds: float) -> No
     assert found.named == ("output-saturation",)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", [mark_level("coulomb-friction"), mark_level("periodic-disturbance")])
 def test_output_effect_is_named_with_a_recorded_output(name: str) -> None:
     found = run(name, band=(0.5, 2.0), core="column", seconds=20.0)

@@ -73,6 +73,7 @@ def test_folder_contains_models_figures_and_a_checkpoint(folder: Path) -> None:
     assert shown.strip() in (folder / "whole/summary.txt").read_text()
 
 
+@pytest.mark.ci
 def test_run_ended_by_its_budget_resumes_to_the_same_models(folder: Path) -> None:
     out = folder / "budget"
     with undrawn_figures():

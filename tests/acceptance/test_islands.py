@@ -34,6 +34,7 @@ def identify(base: Path, out: str, *options: object) -> str:
         return succeed("identify", base / "record.csv", *COLUMNS, *BUDGET, *options, "--out", base / out)
 
 
+@pytest.mark.ci
 def test_result_contains_the_settings_of_the_islands(folder: Path) -> None:
     result = stored(folder / "serial")
     settings = result["settings"]

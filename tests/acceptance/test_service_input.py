@@ -134,6 +134,7 @@ UNUSABLE = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("case", UNUSABLE)
 def test_unusable_file_is_rejected_and_not_stored(service, case):
     content, name, words = UNUSABLE[case]
@@ -143,6 +144,7 @@ def test_unusable_file_is_rejected_and_not_stored(service, case):
     assert nothing_stored(service)
 
 
+@pytest.mark.ci
 def test_longest_column_name_is_accepted_and_longer_ones_are_shortened(service):
     """Messages and lists of data sets would repeat a long name many times."""
     name = "y" * 199
@@ -255,6 +257,7 @@ def test_defect_of_a_record_is_reported_and_rejects_its_jobs(service, case):
     assert service.client.get("/v1/jobs").json()["items"] == []
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("case", ["text", "two lengths", "uneven time"])
 def test_upload_with_columns_is_rejected_like_a_job(service, case):
     content, words = DEFECTIVE[case]

@@ -219,6 +219,7 @@ def test_a_record_with_an_inconclusive_preview_is_inspected_again(service, order
     problem_of(submit_diagnosis(service, **{**order, "dataset": "0-csv"}), 404, "no-such-dataset")
 
 
+@pytest.mark.ci
 def test_a_diagnosis_names_the_injected_effect(finished):
     service, job = finished
     result = service.client.get(f"/v1/jobs/{job}/result").json()

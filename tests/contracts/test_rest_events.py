@@ -165,6 +165,7 @@ def test_a_stream_of_another_owners_job_is_not_found(service):
     problem_of(service.client.get(f"/v1/jobs/{job}/events"), 404, "no-such-job")
 
 
+@pytest.mark.ci
 def test_many_streams_of_one_job_have_the_same_events(service):
     job = queued(service.store).id
     lease = claimed(service.store)

@@ -22,6 +22,7 @@ def dataset(service):
     return service.upload(csv()).json()["id"]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "changes",
     [
@@ -103,6 +104,7 @@ def test_columns_with_unusual_names_are_accepted(service):
     assert service.client.get(answer.headers["location"]).json() == answer.json()
 
 
+@pytest.mark.ci
 def test_columns_of_two_recordings_cannot_be_combined(service):
     """The columns are valid, but those of different recordings have different lengths."""
     names = ("u", "y", "v", "z")

@@ -157,6 +157,7 @@ def test_the_number_of_active_jobs_of_an_owner_is_limited(service):
     assert service.submit(mine, **order, seed=9).status_code == 202
 
 
+@pytest.mark.ci
 def test_the_stored_bytes_of_an_owner_are_limited(service):
     mine = service.key()
 

@@ -59,6 +59,7 @@ def test_parts_of_a_report_appear_together(store, lease):
     assert event.at == reported.updated
 
 
+@pytest.mark.ci
 def test_reader_never_sees_a_part_of_a_report(database):
     with open_stores(database, 2) as (writer, reader):
         job = submitted(writer)

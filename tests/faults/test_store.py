@@ -99,6 +99,7 @@ def killed_after(process, lines):
     return [line.split() for line in said if line.endswith("\n") and line.strip()]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("lines", [1, 40])
 def test_acknowledged_jobs_of_a_killed_process_are_stored(database, lines):
     with child(SUBMIT, database) as process:
@@ -129,6 +130,7 @@ def test_repeated_kills_lose_no_acknowledged_job(database):
         assert len(set(found.values())) == len(found)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("reports", [1, 2, 9, 30])
 def test_killed_coordinator_leaves_complete_reports(database, reports):
     with Store(database) as store:

@@ -173,6 +173,7 @@ def test_genes_of_emigrants_conform_to_the_settings(policy, structure):
                 assert not isinstance(node, Lagged) or node.lag == 1
 
 
+@pytest.mark.ci
 def test_long_search_with_front_policy_has_only_valid_genes():
     """The evaluator raises an error for genes that exceed the maximum lag."""
     setting = replace(

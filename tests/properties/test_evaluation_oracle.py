@@ -216,6 +216,7 @@ def test_slow_inputs_agree_with_the_oracle(constraints, rate):
     assert seen["ill"] > 15
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("constraints", "ends"),
     [

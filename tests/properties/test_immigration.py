@@ -124,6 +124,7 @@ def test_random_policy_replaces_every_position():
         assert (own == drawn) == (purpose is Purpose.IMMIGRATION)
 
 
+@pytest.mark.ci
 @every_replacement_policy
 @given(islands(), arrivals())
 def test_immigration_does_not_depend_on_the_cache(replaced, island, arriving):

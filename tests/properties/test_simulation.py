@@ -119,6 +119,7 @@ def draw_records(data):
 # Kernel and definition.
 
 
+@pytest.mark.ci
 @every_model
 @pytest.mark.parametrize("interval", [1, 2, 3, 7, 63, 64, 65, 140, None])
 def test_kernel_equals_the_recursion_bit_for_bit(name, interval):

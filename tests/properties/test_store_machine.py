@@ -293,6 +293,7 @@ def new_sqlite(prepared_sqlite, tmp_path):
 # A step of the store takes milliseconds: fewer examples than the profile has, and more of them at night.
 
 
+@pytest.mark.ci
 def test_on_sqlite_the_store_is_a_dictionary(new_sqlite, monkeypatch):
     play(new_sqlite, monkeypatch, examples=5, steps=30)
 

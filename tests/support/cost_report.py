@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 #: CPU time in seconds that a test without a mark may take, including its fixtures.
-LIMIT = 1.0
+LIMIT = 0.5
 
 _spent = 0.0
 

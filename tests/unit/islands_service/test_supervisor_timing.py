@@ -139,6 +139,7 @@ def test_role_with_heartbeats_keeps_running(start_role: StartRole) -> None:
     assert role.log.getvalue() == ""
 
 
+@pytest.mark.ci
 def test_starting_role_may_take_longer_until_its_first_heartbeat(start_role: StartRole) -> None:
     """Ray takes seconds to start, and the compilation of kernels a minute."""
     role = start_role(SILENT, patience=5.0)

@@ -88,6 +88,7 @@ def make_injections(surrogates: Surrogates, effect: Effect, seed: int = 0) -> tu
     return injection_strengths(surrogates, effect, np.random.default_rng(seed))
 
 
+@pytest.mark.ci
 def test_surrogate_is_the_simulation_plus_noise_of_the_record() -> None:
     faulty = inject([], np.random.default_rng(5), 6.0, 0.8, perturbed=False)
     simulator = RecordedOutput("theirs", faulty.nominal)
@@ -213,6 +214,7 @@ def test_result_depends_on_the_seed(column: tuple[Diagnosis, RecordedOutput], te
     assert other.detection_limits[INJECTED[-1]] != tested.detection_limits[INJECTED[-1]]
 
 
+@pytest.mark.ci
 def test_detection_limit_does_not_depend_on_other_effects(
     column: tuple[Diagnosis, RecordedOutput], tested: SelfTest
 ) -> None:
@@ -225,6 +227,7 @@ def stub_map(named: str, score: float, recognised: bool = False) -> Callable[...
     return lambda _function, cases: [SurrogateOutcome(named, recognised, score) for _ in cases]
 
 
+@pytest.mark.ci
 def test_p_value_counts_surrogates_as_good_as_the_record(diagnosis: Diagnosis) -> None:
     best = replace(diagnosis, candidates=(Candidate("delay", 3.0, 0.1), Candidate("offset", 50.0, 0.5)))
     for score, p in ((49.9, 1 / 21), (50.0, 1.0)):

@@ -34,6 +34,7 @@ def with_input(record: Dataset, column: int, values: object) -> Dataset:
     return replace(record, u=u)
 
 
+@pytest.mark.ci
 def test_injected_drag_is_named_with_its_strength_and_gain(found: Diagnosis) -> None:
     assert found.verdict == Verdict.NAMED
     (finding,) = found.effects
@@ -59,6 +60,7 @@ def test_diagnosis_is_reproducible(record: Dataset, found: Diagnosis) -> None:
     assert as_json(diagnosis_document(again)) == as_json(diagnosis_document(found))
 
 
+@pytest.mark.ci
 def test_holdout_part_only_changes_the_gain(record: Dataset, found: Diagnosis) -> None:
     y = np.array(record.y)
     fitted = int((1 - HOLDOUT_FRACTION) * record.samples)
@@ -87,6 +89,7 @@ def test_parameter_without_a_tolerance_is_calibrated(clean: Dataset) -> None:
     assert diagnose(clean, DETUNED).verdict == Verdict.NOTHING
 
 
+@pytest.mark.ci
 def test_parameter_beyond_its_tolerance_is_a_discrepancy(clean: Dataset) -> None:
     found = diagnose(clean, DETUNED, TOLERANCE)
     assert {each.name for each in found.effects} <= {"wrong-parameter", "sensor-gain", "input-gain"}

@@ -58,6 +58,7 @@ SPOILT: dict[str, Callable[[Dataset], Dataset]] = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("case", SPOILT)
 @pytest.mark.parametrize("name", SIMULATIONS)
 def test_uninformative_record_is_rejected_for_every_simulation(record: Dataset, name: str, case: str) -> None:

@@ -86,6 +86,7 @@ def test_scores_are_summed_over_shooting_intervals():
 STRUCTURE = [regressor(parse(text))[1] for text in TERMS]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("noise", "interval"), [("equation", 20), ("equation", None), ("output", None)])
 def test_refined_parameters_lie_within_two_standard_errors_as_often_as_claimed(noise, interval):
     """With the formula for a white residual the coverage under equation noise was 0.45 to 0.65."""

@@ -25,6 +25,7 @@ def start(record):
     return estimate(STRUCTURE, record)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("noise", "estimator"), RECOMMENDED.items())
 def test_intervals_of_the_recommended_estimator_contain_the_true_parameters(noise, estimator):
     records = [make_noisy_record(noise, seed, 1000) for seed in range(30)]

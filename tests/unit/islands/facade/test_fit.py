@@ -109,6 +109,7 @@ def test_free_run_uses_measured_outputs_only_in_the_warm_up(result):
 KINDS = ("free-run", "loop", "hold", "residuals")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", KINDS)
 def test_model_draws_every_figure(result, kind):
     figure = result.best.plot(kind)
@@ -299,6 +300,7 @@ def test_models_that_diverge_one_step_ahead_are_ranked_last(tmp_path, drawing):
     made.save(tmp_path)
 
 
+@pytest.mark.ci
 def test_structures_without_estimates_are_counted_by_outcome():
     # Nine samples give six rows after the warm-up, which suffice for five parameters.
     made = islands.fit(tank(9), tank(100, seed=1), library="polynomial", max_terms=10, certificate=0)
@@ -311,6 +313,7 @@ def test_structures_without_estimates_are_counted_by_outcome():
 # Progress.
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("samples", [9, 400])
 def test_progress_fractions_are_monotonic(samples):
     reports = []
@@ -353,6 +356,7 @@ def test_setting_out_of_range_raises_settings_error(settings, message):
     assert message in str(caught.value)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("samples", "error", "message"),
     [
@@ -373,6 +377,7 @@ def test_too_short_record_raises_an_error_with_advice(samples, error, message):
     assert message in str(caught.value)
 
 
+@pytest.mark.ci
 def test_shortest_possible_record_is_fitted():
     assert islands.fit(tank(24), library="polynomial").models
 

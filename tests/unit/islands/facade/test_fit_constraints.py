@@ -160,6 +160,7 @@ SEARCH = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("text", [*TRUE, "[u(k-2)] - [u(k-1)] = -0.2", "hysteresis; [u(k-1)] >= 0"])
 def test_every_identified_model_meets_its_constraints(text):
     result = islands.identify(make_record(), **SEARCH, constraints=text)
@@ -173,6 +174,7 @@ def test_every_identified_model_meets_its_constraints(text):
     assert outcomes["ok"] + outcomes.get("abandoned", 0) > 0.5 * sum(outcomes.values())
 
 
+@pytest.mark.ci
 def test_correct_constraints_improve_an_identified_model():
     """Compare the free runs on a record without noise."""
     text = "[u(k-1)] - [u(k-2)] = 0.2; odd; gain = 2; fixed-point = 1, 2.25"
@@ -185,6 +187,7 @@ def test_correct_constraints_improve_an_identified_model():
     assert errors[text] < 0.5 * errors["none"]
 
 
+@pytest.mark.ci
 def test_search_under_constraints_can_be_repeated():
     first, again = (islands.identify(make_record(), **SEARCH, constraints=TRUE[5]) for _ in range(2))
     assert [fitted.model for fitted in first.models] == [fitted.model for fitted in again.models]

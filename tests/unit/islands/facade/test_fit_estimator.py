@@ -33,6 +33,7 @@ def test_fit_estimates_with_the_chosen_estimator():
     assert poles["least-squares"] < 0.895 < min(poles["free-run"], poles["extended-least-squares"])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("estimator", ["least-squares", "extended-least-squares", "free-run"])
 def test_identify_estimates_all_models_with_the_chosen_estimator(estimator):
     record = make_noisy_record("arma", 0, 800)

@@ -130,6 +130,7 @@ def test_identify_averages_likewise(library):
     assert found.best.model.dt == 0.001 * found.search_result.average
 
 
+@pytest.mark.ci
 def test_refinement_at_the_rate_of_the_record_makes_averages_unnecessary():
     assert identify().search_result.average == 1
     assert identify(average="5").search_result.average == 5

@@ -81,6 +81,7 @@ def test_spectrum_integrates_to_the_variance_of_the_residual() -> None:
     assert np.trapezoid(density**2, frequency) == pytest.approx(np.var(residual), rel=0.25)
 
 
+@pytest.mark.ci
 def test_input_with_few_levels_has_no_empty_cells() -> None:
     """An empty cell has no mean; zero would look like a residual that vanishes."""
     found = diagnosis(levels=2)

@@ -39,6 +39,7 @@ def stems(axes: "Axes") -> np.ndarray:
     return np.array([segment[1] for segment in collection.get_segments()])
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("inputs", [1, 2])
 def test_correlation_tests_have_one_panel_each_with_label(inputs):
     tests = run_tests(inputs)

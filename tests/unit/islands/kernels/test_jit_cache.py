@@ -363,6 +363,7 @@ def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
     assert get_output(start(READY))["compiled"]
 
 
+@pytest.mark.ci
 def test_kernel_that_cannot_be_saved_is_still_used(start, tmp_path):
     code = """if True:
         import json, shutil, toys

@@ -65,6 +65,7 @@ def test_division_by_zero_gives_nan_without_a_crash():
     assert np.isnan(run(entry, [0.125, 3.0])[0])
 
 
+@pytest.mark.ci
 def test_uncompilable_function_is_refused():
     entry = primitive("slow", lambda a: float(decimal.Decimal(a)))
     with pytest.raises(

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -55,6 +56,7 @@ def node_values(pool, signal):
     return found
 
 
+@pytest.mark.ci
 @given(several, signals())
 def test_factors_of_a_term_multiply_to_the_value_of_the_expression(terms, signal):
     try:
@@ -95,6 +97,7 @@ def test_known_terms_keep_their_index_and_add_no_node(terms, others):
     assert size == len({item.text for item in (*terms, *others)})
 
 
+@pytest.mark.ci
 @given(several, several)
 def test_program_does_not_depend_on_other_terms_of_the_pool(terms, others):
     """The nodes have other indices, the program is the same."""

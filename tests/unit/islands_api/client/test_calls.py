@@ -42,6 +42,7 @@ def test_package_exports_the_public_names() -> None:
 # Data sets.
 
 
+@pytest.mark.ci
 def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> None:
     dataset = client.upload(record, ["u_V"], "y_um")
     assert isinstance(dataset, DatasetView)
@@ -55,6 +56,7 @@ def test_upload_returns_the_preview_of_the_record(client: Any, record: Path) -> 
     assert client.datasets().items[0] == dataset
 
 
+@pytest.mark.ci
 def test_upload_with_columns_is_checked_like_a_job(client: Any, me: Any, tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_bytes(csv(y_um={8: "nan"}))

@@ -42,6 +42,7 @@ def test_lost_answer_to_a_submission_creates_no_second_job(
     assert [found.id for found in service.store.jobs.page(me.owner).jobs] == [job.id]
 
 
+@pytest.mark.ci
 def test_lost_answer_to_an_upload_creates_no_second_data_set(
     connect: Any, me: Any, wire: Any, tmp_path: Any
 ) -> None:

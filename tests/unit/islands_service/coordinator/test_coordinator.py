@@ -82,6 +82,7 @@ def replace_runner(monkeypatch: pytest.MonkeyPatch, how: Callable[..., JobOutcom
 DONE = JobOutcome(JobState.SUCCEEDED, {}, (), {"done": True})
 
 
+@pytest.mark.ci
 def test_coordinator_runs_one_job_after_the_other(
     store: Store, job: Job, coordinator: Callable[..., Thread], undisturbed: Found
 ) -> None:

@@ -47,6 +47,7 @@ class Interruption:
             raise JobCancelled("enough")
 
 
+@pytest.mark.ci
 def test_job_finds_the_models_of_a_single_process(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found
 ) -> None:
@@ -63,6 +64,7 @@ def test_job_finds_the_models_of_a_single_process(
     assert ended.progress["generation"] == ended.progress["generations"]
 
 
+@pytest.mark.ci
 def test_interrupted_job_ends_with_the_same_models_and_history(
     store: Store,
     blobs: Blobs,
@@ -91,6 +93,7 @@ def test_rare_reports_store_the_same_history_as_frequent_ones(
     assert store.results.history(job.id) == undisturbed[1]
 
 
+@pytest.mark.ci
 def test_wall_time_includes_all_attempts(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -170,6 +173,7 @@ def test_job_with_a_lost_lease_stops_at_its_next_report(store: Store, blobs: Blo
     assert store.jobs.get(ALICE, job.id).checkpoint is None
 
 
+@pytest.mark.ci
 def test_unavailable_store_does_not_cause_repeated_checkpoints(
     store: Store, blobs: Blobs, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,7 @@ from collections import deque
 from dataclasses import replace
 from itertools import pairwise
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -29,6 +30,7 @@ from support.epoch_runs import (
 )
 
 
+@pytest.mark.ci
 @given(searches(), orders)
 def test_every_epoch_comes_once_in_order_and_with_the_right_values(search, choose):
     problem_, ends, ahead = search

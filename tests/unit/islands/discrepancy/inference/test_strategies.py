@@ -62,6 +62,7 @@ def assessed(request):
     return record, fitted, outcome, assess_evidence(outcome, fitted, np.random.default_rng(0))
 
 
+@pytest.mark.ci
 def test_overflow_is_found_and_reduces_the_error(assessed) -> None:
     record, fitted, _, outcome = assessed
     causes = {effect.name for effect in outcome.hypothesis.effects}

@@ -57,6 +57,7 @@ def error(result, size):
     return sized.metrics["validation"]["free_run"].rmse / np.std(result.search_result.record.y)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 @pytest.mark.parametrize(("output", "source"), OFFSETS)
 @pytest.mark.parametrize("law", LAWS)

@@ -102,6 +102,7 @@ def test_search_ends_with_the_first_epoch_that_reaches_max_evaluations(data, sta
     assert found.search_result.settings["max_evaluations"] == budget
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("place", [0, 2, 4])
 def test_search_ends_with_the_first_epoch_that_reaches_target_error(data, states, place):
     seen = []

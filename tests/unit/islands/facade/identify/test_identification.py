@@ -85,6 +85,7 @@ def test_constrained_models_have_property_1_and_standard_errors(result):
         assert all(error >= 0.0 for error in fitted.model.standard_errors)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_models_without_property_1_are_rejected_under_the_constraint(data, seed):
     """With y(k-2) instead of y(k-1) the cluster sums are met, but two undamped solutions interleave."""
@@ -104,6 +105,7 @@ def test_models_without_property_1_are_rejected_under_the_constraint(data, seed)
 # Seeds and starts.
 
 
+@pytest.mark.ci
 def test_equal_seeds_give_equal_bits_and_other_seeds_other_results(data, result):
     again = identify(data, **BUDGET, seed=5)
     assert parameters(again) == parameters(result)
@@ -152,6 +154,7 @@ def islands_budget(**changes):
     return {**BUDGET, "population": 12, "generations": 3, "migrants": 3, "emigrants": "random", **changes}
 
 
+@pytest.mark.ci
 def test_islands_evolve_independently_between_migrations(data):
     one, three, isolated = [], [], []
     for states, changes in (

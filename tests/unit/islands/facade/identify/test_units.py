@@ -36,6 +36,7 @@ def reference():
     return identified()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("units", [(-40, -40, -40), (-20, 10, 30)])
 def test_models_and_errors_scale_exactly_with_the_units(reference, units):
     found = identified(*units)

@@ -19,6 +19,7 @@ from support.identifications import BUDGET, parameters, record, two_inputs
 from support.searches import distinct_genes
 
 
+@pytest.mark.ci
 def test_validation_data_may_be_a_separate_record(data, result):
     parts = split(data, 0.25)
     separate = identify(parts.estimation, parts.validation, **BUDGET, seed=5)
@@ -62,6 +63,7 @@ def test_result_is_never_worse_than_its_forward_selection_seeds(seed, changes):
     assert compared >= 3
 
 
+@pytest.mark.ci
 def test_refinement_never_makes_the_result_worse(data):
     """Validation selects between refined and estimated models."""
     plain, refined = (identify(data, **{**BUDGET, "refine": refine}, seed=5) for refine in (False, True))
@@ -93,6 +95,7 @@ def test_record_with_two_inputs_and_segments_is_identified():
     assert found.best.metrics["validation"]["free_run"].mape < 2.0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("preset", PRESETS)
 def test_presets_run_with_a_small_budget(data, preset):
     found = identify(data[:1500], preset=preset, population=12, generations=1, max_terms=4)

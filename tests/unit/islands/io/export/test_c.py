@@ -84,6 +84,7 @@ def test_compiled_primitives_equal_the_kernels_at_jumps_and_limits(name, folder)
         assert bits(theirs) == bits(ours)
 
 
+@pytest.mark.ci
 @needs_compiler
 @part_of_the_examples(3)  # each is compiled
 @given(models(), st.integers(0, 2**32 - 1))

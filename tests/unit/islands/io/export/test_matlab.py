@@ -69,6 +69,7 @@ def cases(tmp_path_factory):
     return dict(zip(CASES, found, strict=True))
 
 
+@pytest.mark.ci
 @needs_octave
 @pytest.mark.parametrize("name", CASES)
 def test_octave_simulates_like_the_kernel(name, cases):

@@ -71,6 +71,7 @@ def test_a_zero_input_gives_no_negative_zero():
     assert bits(free_run(exported, at_rest).y[1:]) == [0] * 8
 
 
+@pytest.mark.ci
 @given(models(), st.integers(0, 2**32 - 1))
 def test_the_python_module_equals_the_model_bit_for_bit(random_model, seed):
     data = record(2, seed)

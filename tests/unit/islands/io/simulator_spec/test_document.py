@@ -94,6 +94,7 @@ def assert_same_output(case: SpecAndRecord, fit: CalibrationResult) -> None:
     )
 
 
+@pytest.mark.ci
 def test_a_document_has_the_output_of_the_written_simulation(case: SpecAndRecord) -> None:
     assert_same_output(case, extend(case, effect_of_each_site(case)))
 
@@ -136,6 +137,7 @@ def test_a_file_of_an_extension_is_parsed_as_a_model(case: SpecAndRecord, tmp_pa
     assert as_json(parse_spec(f"model:{path}")) == text
 
 
+@pytest.mark.ci
 def test_an_extension_can_be_extended_again(case: SpecAndRecord) -> None:
     """The outer extension contains the effects of the inner one, at their values."""
     first, *_ = effect_of_each_site(case)

@@ -52,6 +52,7 @@ def test_signal_handlers_are_restored_after_a_run(run):
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
+@pytest.mark.ci
 def test_files_of_an_earlier_run_are_deleted(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--test", "0.2")[0] == 0
     assert (tmp_path / "out/test.json").exists()
@@ -83,6 +84,7 @@ def test_hall_of_fame_of_all_islands_is_written_with_the_checkpoint(run, tmp_pat
 # Test data.
 
 
+@pytest.mark.ci
 def test_values_of_the_test_data_do_not_change_the_models(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "one", "--test", "0.2")[0] == 0
     spoilt = record()
@@ -99,6 +101,7 @@ def test_values_of_the_test_data_do_not_change_the_models(run, tmp_path):
     assert f"not used before: free run ok, MAPE {bad['mape']:.4f} %" in out
 
 
+@pytest.mark.ci
 def test_test_data_is_a_file_or_rows_of_the_record(run, tmp_path):
     write_record(record(seed=3), "t.csv")
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "file", "--test", "t.csv")[0] == 0
@@ -217,6 +220,7 @@ def test_options_reach_the_settings(run, tmp_path):
     assert (settings["max_terms"], settings["max_height"]) == (3, 3)
 
 
+@pytest.mark.ci
 def test_options_of_islands_reach_the_settings(run, tmp_path):
     own = (
         *("--islands", "3", "--topology", "random-regular:2", "--migrate-every", "1,2:5"),
@@ -246,6 +250,7 @@ def test_options_of_islands_reach_the_settings(run, tmp_path):
     assert json.loads((tmp_path / "out/result.json").read_text())["settings"] == document["settings"]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("options", "ended_by", "generations"),
     [

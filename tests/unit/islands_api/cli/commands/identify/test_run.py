@@ -20,6 +20,7 @@ from support.identify_runs import COLUMNS, SMALL, STEPWISE, TWO, Broken, models,
 # Stopped and resumed.
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("generation", "number", "budget"),
     [(0, signal.SIGINT, STEPWISE), (2, signal.SIGTERM, STEPWISE), (2, signal.SIGINT, TWO)],
@@ -99,6 +100,7 @@ def test_infinite_fitness_is_stored_as_null_and_restored(tmp_path):
     assert command.load_run(tmp_path) == ({"seed": 5}, state, 12.5)
 
 
+@pytest.mark.ci
 def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "whole")[0] == 0
     engines(Broken())
@@ -147,6 +149,7 @@ def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_
     assert written == [0, 3, 6, 6]
 
 
+@pytest.mark.ci
 def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     clock = [50.0]
     monkeypatch.setattr(command, "monotonic", lambda: clock[0])
@@ -169,6 +172,7 @@ def test_wall_time_ends_a_run(run, watched, monkeypatch, tmp_path):
     assert run("--resume", "out")[2] == ""
 
 
+@pytest.mark.ci
 def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted, tmp_path):
     interrupted(0)
     assert run("r.csv", *COLUMNS, *STEPWISE, "--out", "out")[0] == 0
@@ -183,6 +187,7 @@ def test_wall_time_of_a_resumed_run_includes_earlier_processes(run, interrupted,
     assert search["evaluations_per_second"] == pytest.approx(40 / search["wall_s"])
 
 
+@pytest.mark.ci
 def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
     before = models(tmp_path / "out")
@@ -190,6 +195,7 @@ def test_resuming_a_finished_run_gives_the_same_result(run, tmp_path):
     assert models(tmp_path / "out") == before
 
 
+@pytest.mark.ci
 def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monkeypatch):
     write_record(record(seed=1), "v.csv")
     interrupted(1)
@@ -199,6 +205,7 @@ def test_run_can_be_resumed_from_another_folder(run, interrupted, tmp_path, monk
     assert run("--resume", "../out")[0] == 0
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("changed", ["r.csv", "v.csv", "t.csv"])
 def test_changed_file_is_rejected_on_resuming(run, interrupted, tmp_path, changed):
     for seed, name in enumerate(("v.csv", "t.csv"), start=1):
@@ -250,6 +257,7 @@ def test_resume_rejects_record_and_settings(run, more):
 # Engines do not change the result.
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("number", "words", "expected"),
     [
@@ -270,6 +278,7 @@ def test_ray_runs_several_islands_by_default(run, engines, number, words, expect
     assert requested == [expected] * 2
 
 
+@pytest.mark.ci
 def test_islands_of_a_preset_select_the_engine(run, engines, monkeypatch):
     several = {"several": resolve_settings("hysteresis", {"islands": 2})}
     monkeypatch.setattr(sys.modules["islands.evolution.presets"], "PRESETS", several)
@@ -296,6 +305,7 @@ def test_unknown_engine_is_rejected(run, tmp_path, more):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.ci
 def test_engine_may_change_on_resuming(run, engines, interrupted, tmp_path):
     requested = engines(SerialEngine())
     assert run("r.csv", *COLUMNS, *TWO, "--out", "whole")[0] == 0

@@ -62,6 +62,7 @@ def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: s
     assert run("show", job)[1] == f"job {job}: failed\nit broke\n"
 
 
+@pytest.mark.ci
 def test_succeeded_job_shows_its_equation(run: Run, done: str, found: JobOutcome) -> None:
     assert found.summary is not None
     out = run("show", done)[1]
@@ -108,6 +109,7 @@ def test_watch_prints_the_problem_of_a_failed_job(run: Run, service: Service, ow
     assert json.loads(out)["problem"]["detail"] == "it broke"
 
 
+@pytest.mark.ci
 def test_interrupting_watch_does_not_cancel_the_job(service: Service, owner: str) -> None:
     job = ahead(service, owner)
     taken(service.store, job)
@@ -174,6 +176,7 @@ def test_result_is_replaced_completely_and_only_with_force(run: Run, done: str) 
 # Errors: one line, exit code 2.
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

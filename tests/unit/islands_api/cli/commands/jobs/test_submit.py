@@ -73,6 +73,7 @@ def test_submitted_job_is_stored_and_printed_as_json(run: Run, service: Service,
     }  # options that are not given are not sent
 
 
+@pytest.mark.ci
 def test_all_settings_reach_the_job(run: Run, service: Service, owner: str) -> None:
     assert set(VALUES) == set(SETTINGS)
     given = [word for name, (texts, _) in VALUES.items() for text in texts for word in (option(name), text)]
@@ -111,6 +112,7 @@ def test_default_name_is_the_printable_file_name(run: Run, tmp_path: Path) -> No
     assert json.loads(out)["spec"]["validation"] == 0.4
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -151,6 +153,7 @@ def diagnosed(service: Service, owner: str) -> str:
     return job
 
 
+@pytest.mark.ci
 def test_options_of_diagnose_reach_the_job(run: Run, service: Service, owner: str) -> None:
     words = ("--simulation", "bouc-wen-piezo", "--tolerance", "dp=0.01", "--seed", 3, "--priority", 5)
     code, out, err = run("diagnose", "r.csv", *COLUMNS, *words, "--rows", "0:150", "--json")
