@@ -14,6 +14,8 @@ from islands.systems.bouc_wen import consistent_estimation, consistent_validatio
 from support.command_line import fail, succeed
 from support.undrawn import undrawn_figures
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture(scope="module")
 def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -54,7 +56,6 @@ def test_systems_are_listed_and_made(tmp_path: Path) -> None:
     assert len(rows) == 20_001
 
 
-@pytest.mark.ci
 def test_result_describes_record_settings_and_search(result: dict[str, Any]) -> None:
     assert result["record"]["samples"] == 5_000
     assert result["record"]["dt"] == pytest.approx(1e-3, rel=1e-9)
@@ -101,14 +102,12 @@ def assert_same_files(one: Path, other: Path) -> None:
         assert path.read_bytes() == (other / path.relative_to(one)).read_bytes(), path.name
 
 
-@pytest.mark.ci
 def test_repeated_fit_gives_bit_identical_models(folder: Path) -> None:
     with undrawn_figures():
         fit(folder, "again")
     assert_same_files(folder / "fit", folder / "again")
 
 
-@pytest.mark.ci
 def test_repeated_fit_draws_bit_identical_figures(records: Path) -> None:
     for out in ("drawn", "drawn again"):
         fit(records, out)

@@ -268,6 +268,7 @@ def test_upload_with_columns_is_rejected_like_a_job(service, case):
     assert nothing_stored(service)
 
 
+@pytest.mark.ci
 def test_upload_with_an_output_only_is_checked(service):
     detail = problem_of(service.upload(csv(y_um={7: "NaN"}), "a.csv", output="y_um"), 422, "invalid-record")
     assert "a.csv, line 7, column y_um is empty or NaN" in detail

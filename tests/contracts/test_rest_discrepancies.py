@@ -236,6 +236,7 @@ def test_a_diagnosis_names_the_injected_effect(finished):
     assert [effect["name"] for effect in extended.json()["effects"]] == [HIDDEN]
 
 
+@pytest.mark.ci
 def test_the_report_is_self_contained_and_has_a_strict_policy(finished):
     service, job = finished
     answer = service.client.get(f"/v1/jobs/{job}/report")
@@ -274,6 +275,7 @@ def test_resources_of_a_search_do_not_exist_for_a_diagnosis(finished, resource):
     assert "/report" in detail
 
 
+@pytest.mark.ci
 def test_a_search_has_no_extended_simulation(service):
     job = run_identification(service)
     detail = problem_of(service.client.get(f"/v1/jobs/{job}/extended"), 404, "not-found")

@@ -216,6 +216,7 @@ def test_figures_report_a_lost_blob_and_an_unavailable_database(figure_service):
     assert str(blob.parent.parent) not in answer.text
 
 
+@pytest.mark.ci
 def test_a_figure_that_timed_out_is_not_retried_at_once(figure_service, monkeypatch):
     path = f"/v1/jobs/{run_identification(figure_service)}/models/1/figures/hold.svg"
     monkeypatch.setattr(figures, "_DRAWING_TIMEOUT", 0.1)

@@ -90,6 +90,7 @@ def test_an_infinite_number_is_rejected(service, dataset):
     assert service.client.get("/v1/jobs").status_code == 200
 
 
+@pytest.mark.ci
 def test_columns_with_unusual_names_are_accepted(service):
     header = ",".join('"' + name.replace('"', '""') + '"' for name in UNUSUAL_NAMES)
     lines = [

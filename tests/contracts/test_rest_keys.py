@@ -107,6 +107,7 @@ def test_a_key_shows_only_the_data_of_its_owner(service):
         assert "owner" not in jobs[0]
 
 
+@pytest.mark.ci
 def test_the_same_bytes_of_two_owners_are_two_data_sets(service):
     mine, theirs = service.key(), service.key()
     files = {"file": ("a.csv", csv())}

@@ -131,6 +131,7 @@ def test_responses_of_get_requests_match_the_documentation(service, document, fi
     check_response(document, answer)
 
 
+@pytest.mark.ci
 def test_responses_of_other_requests_match_the_documentation(service, document):
     content = csv(100)
     dataset = check_response(document, service.upload(content))

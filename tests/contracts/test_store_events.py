@@ -70,6 +70,7 @@ def test_versions_of_many_jobs_are_returned_together(store):
     assert store.jobs.versions([]) == {}
 
 
+@pytest.mark.ci
 def test_reader_that_continues_from_the_last_number_misses_nothing(database):
     """The coordinator reports while the owner cancels and resumes, and both write at the same time."""
     with open_stores(database, 3) as (coordinator, owner, reader):

@@ -231,6 +231,7 @@ def test_store_opens_again_when_a_full_disk_has_space(disk):
         submitted(store)
 
 
+@pytest.mark.ci
 def test_file_size_limit_counts_as_a_full_disk(prepared_sqlite, tmp_path):
     path = shutil.copyfile(prepared_sqlite, tmp_path / "islands.db")
     with child(NARROW, f"sqlite:///{path}", "500000") as process:

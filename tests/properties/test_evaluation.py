@@ -120,6 +120,7 @@ def test_pool_has_all_outcomes():
     }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", SETTINGS)
 @given(st.sampled_from(LIMITS), st.lists(st.tuples(populations, thresholds_by_size), min_size=1, max_size=4))
 def test_evaluation_does_not_depend_on_batch_and_cache(name, limits, history):

@@ -22,6 +22,7 @@ from support.searches import SMALL, evolved, islands_of, record
 LIMITS = Limits(pairs=1 << 14, genes=100_000, structures=40_000)
 
 
+@pytest.mark.ci
 def test_caches_exceed_their_limits_by_at_most_one_generation():
     evaluator = Evaluator(record(), SMALL, LIMITS)
     # Genes with regressors, and individuals of a generation, including those evaluated for tournaments.

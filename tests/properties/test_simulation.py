@@ -129,6 +129,7 @@ def test_kernel_equals_the_recursion_bit_for_bit(name, interval):
     assert equal_bits(found.y, recursion(MODELS[name], data, interval))
 
 
+@pytest.mark.ci
 @given(st.data())
 def test_kernel_equals_the_recursion_for_random_layouts(data):
     chosen, drawn, warm_up = draw_records(data)
@@ -162,6 +163,7 @@ def test_functions_of_the_mathematical_library_agree_to_rounding():
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.ci
 @every_model
 @pytest.mark.parametrize("interval", [1, 7, None])
 @pytest.mark.parametrize("width", WIDTHS)

@@ -235,6 +235,7 @@ def test_p_value_counts_surrogates_as_good_as_the_record(diagnosis: Diagnosis) -
         assert found.p_value == pytest.approx(p)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("named", "value"), [("delay", 1.0), (NOTHING, 0.0), (UNKNOWN, 0.0)])
 def test_false_alarm_is_a_named_cause(diagnosis: Diagnosis, named: str, value: float) -> None:
     found = self_test(diagnosis, SIMULATOR, TOLERANCE, 0, stub_map(named, 0.0), (), 20)

@@ -192,6 +192,7 @@ def test_tanks_with_negative_levels_have_a_verdict(record: Dataset, effects: tup
     assert found.verdict in (Verdict.UNKNOWN, Verdict.NAMED, Verdict.REMAINDER)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["column", "python", "bouc-wen-piezo"])
 def test_simulation_equal_to_the_record_has_no_discrepancy(record: Dataset, name: str) -> None:
     """The simulation equals the record bit for bit, without noise."""

@@ -158,6 +158,7 @@ def test_equal_arguments_give_equal_bits(result):
     ]
 
 
+@pytest.mark.ci
 def test_seed_is_stored_and_does_not_affect_the_models():
     first, second = (islands.fit(tank(), library="polynomial", max_terms=3, seed=seed) for seed in (1, 2))
     assert (first.search_result.seed, second.search_result.seed) == (1, 2)

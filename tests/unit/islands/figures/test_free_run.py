@@ -151,6 +151,7 @@ def diverging(record: Dataset, at: int) -> np.ndarray:
     return np.where(k < at, np.exp(0.1 * np.minimum(k, at)) - 1.0, np.nan)
 
 
+@pytest.mark.ci
 def test_divergence_is_annotated_and_does_not_flatten_other_lines(tmp_path):
     record = sine(3)
     figure = draw_free_run(record, diverging(record, 120))
@@ -184,6 +185,7 @@ def test_axes_follow_a_bounded_simulation_with_large_errors():
     assert annotations(figure.axes[0]) == []
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("periods", "value"), [(3, np.nan), (3, np.inf), (3, 1e300), (40, np.nan)])
 def test_simulation_without_values_is_announced_in_the_title(periods, value, tmp_path):
     record = sine(periods, 4000)

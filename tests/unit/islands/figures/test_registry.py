@@ -16,6 +16,7 @@ from support.searches import record
 MODEL = make_model([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("warm_up", [None, 60])
 def test_free_run_figure_has_the_error_of_the_assessment(warm_up):
     split = Split(record(400), record(300, seed=1))

@@ -70,6 +70,7 @@ def test_long_title_is_wrapped_and_line_breaks_are_kept():
     assert blank(3.0, "word " * 40 + "\nend").get_suptitle().count("\n") == 3
 
 
+@pytest.mark.ci
 def test_equal_content_gives_equal_bytes(tmp_path):
     figure = example()
     save(figure, tmp_path / "first.svg")

@@ -21,6 +21,8 @@ from islands.model.model import Model, make_model
 from islands.model.parsing import parse
 from islands.validation.residual_tests import residual_tests
 
+pytestmark = pytest.mark.ci
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Text
@@ -133,7 +135,6 @@ def drawn(name: str) -> Drawn:
     return Drawn(figure, [(text, text.get_window_extent()) for text in texts.values()])
 
 
-@pytest.mark.ci
 @every_figure
 def test_text_is_not_cut_off_at_the_edge(name):
     edge, texts = drawn(name).figure.bbox, drawn(name).texts
@@ -161,7 +162,6 @@ def test_text_has_at_least_seven_points(name):
     assert min(text.get_fontsize() for text, _ in drawn(name).texts) >= 7.0
 
 
-@pytest.mark.ci
 @fast(SAVED)
 def test_saving_twice_gives_equal_bytes(name, tmp_path):
     for file in ("first", "second"):

@@ -18,6 +18,8 @@ import pytest
 import islands
 from support.forks import Fork, fork_server
 
+pytestmark = pytest.mark.ci
+
 Start = Callable[..., "subprocess.Popen[str] | Fork"]
 
 SOURCE = Path(islands.__file__).parent / "kernels" / "jit_cache.py"
@@ -200,7 +202,6 @@ def test_kernels_are_stored_in_the_users_cache_folder_by_default(start, tmp_path
     assert expected.is_relative_to(tmp_path)
 
 
-@pytest.mark.ci
 def test_cache_folder_is_named_after_the_processor(start, start_new):
     here, haswell = get_output(start(READY)), get_output(start_new(READY, NUMBA_CPU_NAME="haswell"))
     assert here["compiled"]
@@ -363,7 +364,6 @@ def test_kernels_stay_in_memory_if_the_disk_is_full(start, full):
     assert get_output(start(READY))["compiled"]
 
 
-@pytest.mark.ci
 def test_kernel_that_cannot_be_saved_is_still_used(start, tmp_path):
     code = """if True:
         import json, shutil, toys
@@ -374,7 +374,6 @@ def test_kernel_that_cannot_be_saved_is_still_used(start, tmp_path):
     assert get_output(start(code)) == 1.5
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("moment", ["before", "while", "after"])
 def test_cache_folder_may_be_deleted_at_any_time(start, moment):
     code = """if True:

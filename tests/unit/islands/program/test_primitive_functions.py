@@ -30,6 +30,7 @@ def expected(entry, *arguments):
     return [entry.scalar(*values) for values in zip(*arguments, strict=True)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("entry", PRIMITIVES.values(), ids=list(PRIMITIVES))
 def test_row_function_equals_its_scalar_function_on_every_lane(entry):
     pairs = [PROBES] if entry.arity == 1 else zip(*[(a, b) for a in PROBES for b in PROBES], strict=True)

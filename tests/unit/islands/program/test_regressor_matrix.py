@@ -145,6 +145,7 @@ def test_gram_matrix_equals_the_inner_products_bit_for_bit(segments):
     np.testing.assert_array_equal(gram_matrix(terms, record, 3), products(terms, record, 3))
 
 
+@pytest.mark.ci
 @given(records(longest=400), st.lists(regressors(height=2), min_size=1, max_size=3))
 def test_gram_matrix_equals_the_inner_products_for_any_segments(record, terms):
     warm_up = max(item.maximum_lag for item in terms)

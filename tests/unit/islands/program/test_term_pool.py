@@ -112,6 +112,7 @@ def test_program_does_not_depend_on_other_terms_of_the_pool(terms, others):
     assert (operand_index == -1).all()
 
 
+@pytest.mark.ci
 def test_pool_grows_and_keeps_its_terms():
     pool = TermPool()
     texts = [f"exp({factor}*u(k-{lag})) + y(k-1)" for factor in range(2, 30) for lag in range(1, 40)]

@@ -61,6 +61,7 @@ def assert_close(found: SecondOrder, truth: SecondOrder, rel: float = 1e-5) -> N
     assert found.rate == pytest.approx(truth.rate, abs=rel * size * frequency)
 
 
+@pytest.mark.ci
 @part_of_the_examples(10)
 @given(systems)
 def test_estimate_recovers_the_system_of_a_record(system: tuple[float, float, float, float, float]) -> None:
@@ -71,6 +72,7 @@ def test_estimate_recovers_the_system_of_a_record(system: tuple[float, float, fl
 GIVEN = [names for count in (1, 2, 3) for names in combinations("mck", count)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("names", GIVEN, ids="".join)
 def test_given_parameters_are_kept_and_the_others_recovered(names: tuple[str, ...]) -> None:
     truth, u = make_oscillator(3.0, 0.08, 0.4, 0.5, -0.7), make_input()
@@ -82,6 +84,7 @@ def test_given_parameters_are_kept_and_the_others_recovered(names: tuple[str, ..
     assert {name: kept[name] for name in names} == chosen
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("names", ["m", "c", "k"])
 def test_wrong_given_parameters_are_kept(names: str) -> None:
     truth, u = make_oscillator(3.0, 0.08, 0.4, 0.5, -0.7), make_input()

@@ -62,6 +62,7 @@ def reader(connect: Callable[..., Any], service: Service, finished: tuple[str, s
     return connect(service.url, finished[0])
 
 
+@pytest.mark.ci
 def test_succeeded_job_contains_a_summary_of_the_best_model(reader: Any, job: str) -> None:
     done = reader.wait(job)
     best = reader.models(job)[0]

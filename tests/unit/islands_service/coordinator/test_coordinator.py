@@ -93,6 +93,7 @@ def test_coordinator_runs_one_job_after_the_other(
         assert [model.document for model in store.results.models(each.id)] == undisturbed[0]
 
 
+@pytest.mark.ci
 def test_coordinator_runs_jobs_of_every_kind(
     store: Store, job: Job, coordinator: Callable[..., Thread]
 ) -> None:

@@ -86,6 +86,7 @@ def test_interrupted_job_ends_with_the_same_models_and_history(
     assert store.results.history(job.id) == undisturbed[1]
 
 
+@pytest.mark.ci
 def test_rare_reports_store_the_same_history_as_frequent_ones(
     store: Store, blobs: Blobs, job: Job, undisturbed: Found
 ) -> None:
@@ -147,6 +148,7 @@ class Flaky:
         return getattr(self._store, name)
 
 
+@pytest.mark.ci
 def test_failed_reports_do_not_affect_the_result(
     store: Store,
     blobs: Blobs,

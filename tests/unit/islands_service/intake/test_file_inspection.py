@@ -67,6 +67,7 @@ def test_record_is_described(record):
     assert (found["samples"], found["dt"], found["time"]) == (200, 0.01, "t_s")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("asked", "words"),
     [

@@ -75,6 +75,7 @@ def plain_cube(offset):
     return "u(k-1)^3" if not offset else f"(u(k-1) {'-' if offset > 0 else '+'} {abs(offset):.0f})^3"
 
 
+@pytest.mark.ci
 def test_law_in_absolute_units_keeps_its_terms():
     steps = np.random.default_rng(5)
     u = 10.0 + np.repeat(steps.uniform(-1.7, 1.7, 150), 8) + 0.1 * steps.normal(size=1200)

@@ -151,6 +151,7 @@ def test_stopped_search_keeps_its_last_epoch(data, states):
     assert found.search_result.search.history == states[1].history
 
 
+@pytest.mark.ci
 def test_search_stopped_within_an_epoch_keeps_the_previous_epoch(data, states):
     calls = []
 

@@ -114,6 +114,7 @@ def test_equal_seeds_give_equal_bits_and_other_seeds_other_results(data, result)
     assert other.search_result.search.history != result.search_result.search.history
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("stop", [0, 2, 4])
 def test_run_from_a_start_state_equals_an_uninterrupted_run(data, result, states, stop, tmp_path):
     write_checkpoint(states[stop].archipelago, tmp_path / "checkpoint.json", {})

@@ -30,6 +30,7 @@ def test_validation_data_may_be_a_separate_record(data, result):
     assert elsewhere.search_result.search.history == result.search_result.search.history
 
 
+@pytest.mark.ci
 def test_validation_data_do_not_affect_the_search(data, result):
     """Only the selection and order of models may depend on them."""
     parts = split(data, 0.25)
@@ -40,6 +41,7 @@ def test_validation_data_do_not_affect_the_search(data, result):
     assert parameters(other) != parameters(result)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("seed", "changes"),
     # Strong pruning removes the seeds from the first population, but they remain final candidates.

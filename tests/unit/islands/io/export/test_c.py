@@ -60,6 +60,7 @@ def of_the_library(exported):
     return any(entry.name in OF_THE_LIBRARY for entry in functions(exported))
 
 
+@pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("name", CASES)
 def test_the_compiled_program_simulates_like_the_kernel(name, folder):
@@ -73,6 +74,7 @@ def test_the_compiled_program_simulates_like_the_kernel(name, folder):
         assert bits(theirs[lag:]) == bits(ours.y[lag:])
 
 
+@pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("name", PRIMITIVES)
 def test_compiled_primitives_equal_the_kernels_at_jumps_and_limits(name, folder):
@@ -131,6 +133,7 @@ def test_simulate_does_not_write_outside_its_range(samples, folder):
     assert not np.isin(y[written], np.arange(1.0, 9.0)).any()
 
 
+@pytest.mark.ci
 @needs_compiler
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
 def test_a_column_name_cannot_break_the_file(name, folder):

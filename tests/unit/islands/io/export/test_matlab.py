@@ -80,6 +80,7 @@ def test_octave_simulates_like_the_kernel(name, cases):
     np.testing.assert_allclose(cases[name][lag:], ours.y[lag:], rtol=1e-12)
 
 
+@pytest.mark.ci
 @needs_octave
 def test_octave_primitives_equal_the_kernels_at_jumps_and_limits(tmp_path):
     programs = [at_the_edges(name) for name in PRIMITIVES]
@@ -191,6 +192,7 @@ OWN = {
 }
 
 
+@pytest.mark.ci
 @needs_octave
 def test_a_user_defined_primitive_runs_with_its_body(tmp_path):
     programs = []

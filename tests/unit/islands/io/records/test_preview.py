@@ -264,6 +264,7 @@ def test_a_stated_sampling_time_is_shown_and_compared_with_the_time(tmp_path):
     assert preview(file).warnings == (refusal(file, ["u"], "y"),)
 
 
+@pytest.mark.ci
 def test_an_invalid_stated_sampling_time_is_a_warning(tmp_path):
     file = archive(tmp_path, u=U, y=Y, dt=0.0)
     assert read_columns(file) == ("u", "y", "dt")

@@ -120,6 +120,7 @@ def test_the_initial_state_of_an_effect_is_fitted() -> None:
     assert_same_output(case, replace(fit, values=values, output=fit.simulation.simulate(values)))
 
 
+@pytest.mark.ci
 def test_a_document_is_unchanged_after_reading_and_writing(case: SpecAndRecord) -> None:
     text = extended_json(extend(case, effect_of_each_site(case)), case.record)
     spec = LocalExtendedSpec.model_validate(json.loads(text))

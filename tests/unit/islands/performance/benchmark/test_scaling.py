@@ -113,6 +113,7 @@ def test_figure_shows_points_line_and_units(example):
     assert axes.get_xlim()[0] == axes.get_ylim()[0] == 0.0
 
 
+@pytest.mark.ci
 def test_figures_are_files_named_after_the_scaling(tmp_path):
     written = save_scalings(EXAMPLES.values(), tmp_path / "new" / "folder")
     assert [path.name for path in written] == ["samples.svg", "islands.svg"]

@@ -19,6 +19,7 @@ from support.identify_runs import COLUMNS, DEEPEST, SMALL, STEPWISE, TWO, models
 # Files of a run.
 
 
+@pytest.mark.ci
 def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     code, out, error = run("r.csv", *COLUMNS, *SMALL, "--out", "out", "--seed", "4")
     assert (code, error) == (0, "")
@@ -46,6 +47,7 @@ def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     assert search["ended_by"] == "generations"
 
 
+@pytest.mark.ci
 def test_signal_handlers_are_restored_after_a_run(run):
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0

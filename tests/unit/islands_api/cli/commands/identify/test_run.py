@@ -73,6 +73,7 @@ def test_second_ctrl_c_interrupts_and_keeps_finished_epochs(run, interrupted, tm
     assert read_checkpoint(tmp_path / "out/checkpoint.json")[0].generation == 1
 
 
+@pytest.mark.ci
 def test_epoch_is_kept_if_its_display_fails(run, watched, tmp_path):
     def broken(state):
         if state.archipelago.generation == 2:
@@ -112,6 +113,7 @@ def test_failing_engine_loses_no_finished_epoch(run, engines, tmp_path):
     assert models(tmp_path / "out") == models(tmp_path / "whole")
 
 
+@pytest.mark.ci
 def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tmp_path):
     """An epoch takes six seconds of the replaced clock."""
     clock, found = [0.0], []
@@ -129,6 +131,7 @@ def test_checkpoints_are_written_every_ten_seconds(run, watched, monkeypatch, tm
     assert json.loads((tmp_path / "out/checkpoint.json").read_text())["about"]["wall_s"] == 42.0
 
 
+@pytest.mark.ci
 def test_slow_checkpoints_are_written_less_often(run, watched, monkeypatch, tmp_path):
     """A checkpoint takes one second of the replaced clock and an epoch ten; the limit is a twentieth."""
     clock, written = [0.0], []

@@ -73,6 +73,7 @@ def test_succeeded_job_shows_its_equation(run: Run, done: str, found: JobOutcome
 # Watch.
 
 
+@pytest.mark.ci
 def test_job_is_submitted_watched_and_shown(
     run: Run, service: Service, owner: str, found: JobOutcome, in_background: Callable[..., None]
 ) -> None:

@@ -96,6 +96,7 @@ def test_identify_and_submit_have_the_same_search_options() -> None:
     }
 
 
+@pytest.mark.ci
 def test_name_priority_and_idempotency_key_reach_the_job(run: Run, service: Service, owner: str) -> None:
     words = ("--name", "[red] one", "--priority", 5, "--idempotency-key", "k-1")
     job = json.loads(run("submit", "r.csv", *COLUMNS, *words, "--json")[1])
