@@ -342,10 +342,7 @@ def test_progress_fractions_are_monotonic(samples):
         ({"max_terms": 0}, "a model has at least one term, got max_terms = 0"),
         ({"degree": 0}, "degree and lags are at least 1, got 0 and 3"),
         ({"lags": 1}, "phi-polynomial needs lags of at least 2"),
-        (
-            {"library": "polynomial", "degree": 5, "lags": 11},
-            "80730 candidates are more than a library may have",
-        ),
+        ({"library": "polynomial", "degree": 5, "lags": 11}, "80730 candidates are more than a library"),
         ({"shooting": 0}, "a shooting interval has at least 1 sample, got 0"),
         ({"validation": 1.0}, "the validation fraction lies between 0 and 1, got 1.0"),
         ({"validation": 0.0001}, "leaves a part empty"),
@@ -363,11 +360,7 @@ def test_setting_out_of_range_raises_settings_error(settings, message):
     [
         (1, SettingsError, "leaves a part empty"),
         (4, RecordError, "has 3 samples and 3 are needed before the first row: take a longer recording"),
-        (
-            5,
-            SettingsError,
-            "no model could be estimated: {'too_few_rows': 1}; take another library or a longer",
-        ),
+        (5, SettingsError, "no model could be estimated: {'too_few_rows': 1}; take another library"),
         (10, RecordError, "has 2 samples and the warm-up takes 3: take a longer recording"),
         (20, RecordError, "has 5 samples, of which the warm-up takes 3: testing the residual takes 3 more"),
     ],
