@@ -25,6 +25,7 @@ from islands.figures.style import save
 from islands.io.checkpoints import history_from_document
 from islands.io.ensembles import bands_from_document, ensemble_from_document
 from islands.io.models import model_from_json
+from islands.io.result_models import read_shooting_interval
 from islands.simulation.predictors import free_run
 from islands.validation.assessment import assess
 from islands_service.domain.job import REPORT, Job
@@ -108,7 +109,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     if document is None or not stored:
         raise SettingsError(f"job {job.id} has no such model: wait until it has succeeded")
     models = [model_from_json(entry.file, f"model {entry.rank}") for entry in stored]
-    average = models[0].average
+    average, shooting = models[0].average, read_shooting_interval(document)
     split = match_split(models[0], average_split(split_data(record, validation), average))
     # Results of earlier versions have no ensemble.
     ensemble = ensemble_from_document(document.get("ensemble"), models[0])
@@ -116,7 +117,7 @@ def read_search_result(job: Job, store: Store, blobs: Blobs, rank: int | None) -
     for entry, model in zip(stored, models, strict=True):
         # Results of earlier versions do not state their warm-up.
         warm_up = entry.document.get("warm_up", settings.maximum_lag)
-        assessment = assess(model, split, settings.shooting, warm_up, settings.constraints)
+        assessment = assess(model, split, shooting, warm_up, settings.constraints)
         bands = bands_from_document(entry.document.get("bands"), ensemble)
         assessed.append(RankedModel(model, assessment, bands))
     search = _search(document["search"], store.results.history(job.id))

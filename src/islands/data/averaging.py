@@ -63,6 +63,11 @@ def average_samples(record: Dataset, count: int) -> Dataset:
     )
 
 
+def count_means(samples: int, count: int) -> int:
+    """Return the number of means of ``count`` samples in an interval of ``samples``, at least one."""
+    return max(1, round(samples / count))
+
+
 def check_average(average: int | str) -> None:
     """Check the setting ``average``.
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from islands.data.averaging import count_means
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.data.loops import has_loops
@@ -120,6 +121,11 @@ class SearchResult:
     models: tuple[RankedModel, ...]
     ensemble: Ensemble | None = None
     average: int = 1
+
+    @property
+    def shooting_interval(self) -> int:
+        """Samples of the data in each shooting interval; the setting counts samples of the record."""
+        return count_means(int(self.settings["shooting"]), self.average)
 
     @property
     def direct_inputs(self) -> tuple[str, ...]:

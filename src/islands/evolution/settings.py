@@ -90,7 +90,7 @@ class Settings:
     fitness : str
         An entry of ``FITNESSES``.
     shooting : int
-        Samples of each interval of multiple shooting.
+        Samples of the record, before averaging, in each interval of multiple shooting.
     tournament : int
         Contestants of a tournament. The paper does not give it; 3 is the usual choice of its toolbox.
     high_level : float
@@ -166,7 +166,7 @@ class Settings:
     structure: str = "phi"
     constraints: str = _option("hysteresis", f"{', '.join(CONSTRAINTS)}, or statements: {'; '.join(FORMS)}.")
     fitness: str = "shooting"
-    shooting: int = _option(500, "Samples of a shooting interval.", after="max_height")
+    shooting: int = _option(500, "Samples of a shooting interval, before averaging.", after="max_height")
     tournament: int = 3
     high_level: float = 0.5
     outer: float = 0.5

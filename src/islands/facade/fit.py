@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from islands.data.averaging import AUTO
+from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
 from islands.data.split import Split, split_data
 from islands.errors import SettingsError, lookup
@@ -101,7 +101,7 @@ def fit(
         Whether models read inputs at sample k: ``yes`` for all inputs, ``no``, or ``auto`` for those to which
         the output of the estimation data responds within the sample.
     shooting : int, optional
-        Samples of each interval of multiple shooting.
+        Samples of the record, before averaging, in each interval of multiple shooting.
     certificate : int
         Nodes of the search for the best structure of each size, and for the bound on the one-step-ahead error
         of all others; 0 for forward selection only.
@@ -133,11 +133,13 @@ def fit(
     if certificate < 0:
         raise SettingsError(f"a search has at least 0 nodes, got certificate = {certificate}")
     trial = TrialLibrary(library, degree, lags, constraints)
-    parts, samples = select_rate(split_data(record, validation), average, trial, lags + 3)
-    parts = select_feedthrough(parts, feedthrough, trial)
-    shooting = min(SHOOTING, max(1, parts.estimation.samples // 10)) if shooting is None else shooting
+    whole = split_data(record, validation)
+    shooting = min(SHOOTING, max(1, whole.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
         raise SettingsError(f"a shooting interval has at least 1 sample, got {shooting}")
+    parts, samples = select_rate(whole, average, trial, lags + 3)
+    parts = select_feedthrough(parts, feedthrough, trial)
+    interval = count_means(shooting, samples)
 
     settings = Settings(
         library=library,
@@ -147,7 +149,7 @@ def fit(
         max_terms=max_terms,
         initial_terms=(1, max_terms),
         constraints=constraints,
-        shooting=shooting,
+        shooting=interval,
     )
     structures, certificates, warm_up = _select(parts, settings, certificate, progress)
     outcomes: Counter[str] = Counter()
@@ -155,14 +157,14 @@ def fit(
     for done, (structure, offsets) in enumerate(structures, start=1):
         estimated = estimate_deviations(structure, offsets, parts.estimation, constraints, warm_up)
         if not isinstance(estimated, EvaluationOutcome):
-            estimated = estimate_with(estimator, estimated, parts.estimation, constraints, warm_up, shooting)
+            estimated = estimate_with(estimator, estimated, parts.estimation, constraints, warm_up, interval)
         if isinstance(estimated, EvaluationOutcome):
             outcomes[estimated.verdict.name.lower()] += 1
             continue
         if estimated.model.size > max_terms:
             continue
         outcomes["ok"] += 1
-        assessment = assess(estimated.model, parts, shooting, warm_up, constraints)
+        assessment = assess(estimated.model, parts, interval, warm_up, constraints)
         models.append(RankedModel(estimated.model, assessment))
         progress(f"model of {estimated.model.size} terms", done / len(structures))
     if not models:
@@ -195,9 +197,9 @@ def fit(
         "validation": record_document(validation) if isinstance(validation, Dataset) else validation,
     }
     result = SearchResult(record, parts, seed, described, search, tuple(best_of_size.values()))
-    interval = ESTIMATORS[estimator].interval(shooting)
+    minimised = ESTIMATORS[estimator].interval(interval)
     estimates = [
-        ValidatedModel(entry.model, interval, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
+        ValidatedModel(entry.model, minimised, entry.assessment.metrics["validation"]["free_run"].rmse ** 2)
         for entry in models
     ]
     return Result(with_average(with_bands(result, estimates, constraints, warm_up), samples))

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
+from islands.data.averaging import count_means
 from islands.data.dataset import Dataset
 from islands.data.split import split_data
 from islands.errors import RecordError, SettingsError
@@ -105,10 +106,11 @@ def identify(
         row_address(entry)  # compile it before the search starts
     trial, least = _make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
     split, count = select_rate(split_data(record, validation), settings.average, trial, least)
-    split = select_feedthrough(split, settings.feedthrough, trial)
+    split = select_feedthrough(split, settings.feedthrough, trial.at_rate(count))
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
-    search_problem = make_problem(subtract_offsets(split.estimation, offsets), settings)
+    scaled = replace(settings, shooting=count_means(settings.shooting, count))
+    search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled)
     stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [

@@ -4,20 +4,21 @@ In one sampling time, an oversampled output changes less than its noise, so a mo
 one-step-ahead error describes the noise. Means of consecutive samples change more and have less noise.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import comb, inf, lcm
+from math import comb, inf, isfinite, lcm
 
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.averaging import AUTO, average_samples, check_average
+from islands.data.averaging import AUTO, average_samples, check_average, count_means
 from islands.data.channel_names import parse_channel_name
 from islands.data.dataset import Dataset
 from islands.data.split import Split, average_split
-from islands.estimation.estimate import estimate
+from islands.estimation.estimate import FittedStructure, estimate
 from islands.estimation.forward_selection import forward_selection
 from islands.estimation.parameter_constraints import constraint
-from islands.estimation.refinement import refine
+from islands.estimation.refinement import RefinedModel, refine
 from islands.estimation.structure_selection.deviations import (
     OPERATING_POINT,
     find_offsets,
@@ -25,8 +26,9 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
-from islands.simulation.predictors import free_run
+from islands.simulation.predictors import Simulation, free_run
 
 #: Samples of a mean that are compared.
 COUNTS = (1, 2, 5, 10, 20, 50)
@@ -62,7 +64,8 @@ _TERMS = 10
 class TrialLibrary:
     """Candidate library and constraints of the models that compare rates.
 
-    ``shooting`` is the interval over which the search refines parameters, None if it does not.
+    ``shooting`` is the interval over which the search refines parameters, in samples of the data; None if it
+    does not refine them.
     """
 
     name: str
@@ -70,6 +73,10 @@ class TrialLibrary:
     lags: int
     constraints: str
     shooting: int | None = None
+
+    def at_rate(self, count: int) -> "TrialLibrary":
+        """Return the library for means of ``count`` samples, with the same interval of time."""
+        return self if self.shooting is None else replace(self, shooting=count_means(self.shooting, count))
 
 
 def select_rate(split: Split, average: int | str, library: TrialLibrary, least: int) -> tuple[Split, int]:
@@ -113,7 +120,10 @@ def _choose_count(split: Split, library: TrialLibrary, least: int) -> int:
         if len(counts) == 1 or not _is_noisy(split.estimation):
             return 1
     squares = np.array(
-        [compute_errors(average_split(split, count), library, interval // count) ** 2 for count in counts]
+        [
+            compute_errors(average_split(split, count), library.at_rate(count), interval // count) ** 2
+            for count in counts
+        ]
     )
     # Coarse rates have a longer warm-up: compare the intervals that all of them predict.
     compared = squares[:, ~np.isnan(squares).any(axis=0)]
@@ -195,22 +205,29 @@ def compute_errors(split: Split, library: TrialLibrary, count: int) -> NDArray[n
     pool = screen_candidates(library.name, library.degree, library.lags, estimation, library.constraints)
     structures = forward_selection(pool, estimation, library.constraints, _TERMS)
     warm_up = max(item.maximum_lag for item in pool)
-    least, errors = inf, np.full(sum(length // count for length in validation.segments), inf)
-    best = None
-    for structure in () if isinstance(structures, EvaluationOutcome) else structures:
-        found = estimate(structure, estimation, library.constraints, warm_up)
-        if isinstance(found, EvaluationOutcome):
-            continue
-        run = free_run(found.model, validation, warm_up)
-        if run.mean_squared_error < least:
-            least, best = run.mean_squared_error, found.model
-            errors = average_samples(replace(validation, y=validation.y - run.y), count).y
-    if best is None or library.shooting is None:
-        return errors
-    refined = refine(best, estimation, library.shooting, library.constraints, warm_up)
-    if isinstance(refined, EvaluationOutcome):
-        return errors
-    run = free_run(refined.model, validation, warm_up)
-    if run.mean_squared_error < least:
-        errors = average_samples(replace(validation, y=validation.y - run.y), count).y
-    return errors
+    estimated = (
+        estimate(structure, estimation, library.constraints, warm_up)
+        for structure in (() if isinstance(structures, EvaluationOutcome) else structures)
+    )
+    best = min(_simulate(estimated, validation, warm_up), key=_squared_error, default=None)
+    if best is None:
+        return np.full(sum(length // count for length in validation.segments), inf)
+    if library.shooting is not None:
+        refined = refine(best[0], estimation, library.shooting, library.constraints, warm_up)
+        best = min((best, *_simulate([refined], validation, warm_up)), key=_squared_error)
+    return average_samples(replace(validation, y=validation.y - best[1].y), count).y
+
+
+def _simulate(
+    estimated: Iterable[FittedStructure | RefinedModel | EvaluationOutcome], validation: Dataset, warm_up: int
+) -> Iterator[tuple[Model, Simulation]]:
+    """Yield the estimated models and their free runs on the validation data, except for diverging ones."""
+    for found in estimated:
+        if not isinstance(found, EvaluationOutcome):
+            run = free_run(found.model, validation, warm_up)
+            if isfinite(run.mean_squared_error):
+                yield found.model, run
+
+
+def _squared_error(simulated: tuple[Model, Simulation]) -> float:
+    return simulated[1].mean_squared_error

@@ -108,7 +108,7 @@ class FittedModel:
         warm_up : int, optional
             Number of samples before the first prediction; by default that of the errors in `metrics`.
         """
-        shooting = int(self.search_result.settings["shooting"])
+        shooting = self.search_result.shooting_interval
         warm_up = self.ranked_model.assessment.warm_up if warm_up is None else warm_up
         return simulate(self.model, record, mode, shooting, warm_up=warm_up)
 
@@ -253,7 +253,7 @@ def simulate(
         ``one-step``, ``shooting`` (intervals of ``shooting`` samples) or ``free-run``; a simulator has
         ``free-run`` only.
     shooting : int
-        Samples of each interval.
+        Steps of the model in each interval; a step of a model of means is a mean.
     columns : mapping, optional
         Recorded simulations by name for the simulator ``column:NAME``, each of shape (samples,).
     warm_up : int, optional

@@ -41,6 +41,7 @@ def result_document(found: SearchResult) -> dict[str, Any]:
             "average": found.average,
             "dt": found.split.estimation.dt,
             "feedthrough": list(found.direct_inputs),
+            "shooting_interval": found.shooting_interval,
         },
         "seed": found.seed,
         "settings": dict(found.settings),

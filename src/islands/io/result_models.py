@@ -1,6 +1,7 @@
 """Models of a result folder, and how their errors were measured."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ class ErrorMeasurement:
     warm_up : int or None
         Number of samples before the first prediction. None if the result was written without it.
     shooting : int
-        Samples of an interval of multiple shooting.
+        Steps of the model in an interval of multiple shooting.
     """
 
     warm_up: int | None
@@ -66,9 +67,16 @@ def read_error_measurement(model_file: str | Path) -> ErrorMeasurement | None:
     try:
         entries = {entry["rank"]: entry for entry in document["models"]}
         entry = entries.get(int(file.stem))
-        return entry and ErrorMeasurement(entry.get("warm_up"), int(document["settings"]["shooting"]))
+        return entry and ErrorMeasurement(entry.get("warm_up"), read_shooting_interval(document))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise _damaged(result, error) from error
+
+
+def read_shooting_interval(document: Mapping[str, Any]) -> int:
+    """Return the steps of the models of a result in an interval of multiple shooting."""
+    # Results of earlier versions had intervals of as many means as the setting has samples.
+    preprocessing = document.get("preprocessing", {})
+    return int(preprocessing.get("shooting_interval", document["settings"]["shooting"]))
 
 
 def _read_object(result: Path) -> dict[str, Any]:

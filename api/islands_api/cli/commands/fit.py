@@ -55,7 +55,7 @@ def fit(
         typer.Option("--feedthrough", help="Whether models read u(k): auto (test the record), yes or no."),
     ] = AUTO,
     shooting: Annotated[
-        int | None, typer.Option("--shooting", help="Samples of an interval of multiple shooting.")
+        int | None, typer.Option("--shooting", help="Samples of a shooting interval, before averaging.")
     ] = None,
     certificate: Annotated[
         int,

@@ -46,7 +46,7 @@ def simulate(
         int | None,
         typer.Option(
             "--shooting",
-            help=f"Samples of a shooting interval; by default those of the result, or {SHOOTING}.",
+            help=f"Steps of the model in a shooting interval; by default those of the result, or {SHOOTING}.",
         ),
     ] = None,
     warm_up: Annotated[

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.averaging import average_samples, check_average
+from islands.data.averaging import average_samples, check_average, count_means
 from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
 from islands.data.split import Split, average_split
@@ -35,6 +35,13 @@ def test_no_mean_contains_samples_of_two_segments():
     assert means.y.tolist() == [5.0, 25.0, 55.0, 75.0, 95.0]
     parts = [average_samples(part, 2).y for part in (record[:5], record[5:])]
     assert means.y.tolist() == np.concatenate(parts).tolist()
+
+
+@pytest.mark.parametrize(
+    ("samples", "count", "means"), [(500, 1, 500), (500, 20, 25), (52, 5, 10), (3, 20, 1)]
+)
+def test_an_interval_has_as_many_means_as_fill_its_time(samples, count, means):
+    assert count_means(samples, count) == means
 
 
 def test_means_of_one_sample_are_the_record():

@@ -9,10 +9,11 @@ from scipy.signal import lfilter
 import islands
 from islands.data.averaging import average_samples
 from islands.data.dataset import Dataset, join
-from islands.data.split import split
+from islands.data.split import average_split, split
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.io.models import model_from_json, model_json
-from islands.io.result_folder import result_json
+from islands.io.result_folder import result_json, write_result
+from islands.io.result_models import read_error_measurement
 from islands.io.summary_text import summary
 
 LIBRARY = {"library": "polynomial", "degree": 1, "max_terms": 4}
@@ -134,3 +135,65 @@ def test_identify_averages_likewise(library):
 def test_refinement_at_the_rate_of_the_record_makes_averages_unnecessary():
     assert identify().search_result.average == 1
     assert identify(average="5").search_result.average == 5
+
+
+# A shooting interval lasts the same time at every rate.
+
+SHORT = lag(samples=2000)
+
+
+def with_or_without_means(search, **changes):
+    """Return the results of a search that averages 5 samples, and of the same search on means."""
+    data = average_split(split(SHORT), 5)
+    return search(SHORT, shooting=52, average=5, **changes), search(
+        data.estimation, data.validation, shooting=10, average=1, **changes
+    )
+
+
+def fit_with_shooting(record, validation=0.25, **changes):
+    return islands.fit(record, validation, estimator="shooting", **LIBRARY, **changes)
+
+
+def identify_in_two_epochs(record, validation=0.25, **changes):
+    budget = {"generations": 2, "migrate_every": 1, "population": 10, "max_terms": 3, "library_degree": 1}
+    small = {"max_height": 1, "shifts": (1,), "from_library": 0.0, "feedthrough": "no"}
+    return islands.identify(record, validation, preset="narx", **budget, **small, **changes)
+
+
+def measurements(result):
+    return [(each.model.parameters, each.metrics) for each in result.models]
+
+
+@pytest.mark.parametrize("search", [fit_with_shooting, identify_in_two_epochs])
+def test_a_search_that_averages_equals_the_search_on_means(search):
+    one, other = with_or_without_means(search)
+    assert measurements(one) == measurements(other)
+
+
+def test_a_run_with_the_recorded_settings_equals_the_run():
+    found = fit_with_shooting(SHORT, average=5)
+    again = fit_with_shooting(SHORT, average=5, shooting=found.search_result.settings["shooting"])
+    assert measurements(again) == measurements(found)
+
+
+def test_a_resumed_run_on_means_equals_an_uninterrupted_one():
+    states = []
+    found = identify_in_two_epochs(SHORT, average=5, progress=lambda state, _: states.append(state))
+    resumed = identify_in_two_epochs(SHORT, average=5, start=states[0])
+    assert measurements(resumed) == measurements(found)
+
+
+def test_a_simulation_over_shooting_intervals_has_the_reported_error(tmp_path):
+    found = fit_with_shooting(SHORT, average=5, shooting=52)
+    run = found.best.simulate(split(SHORT).validation, "shooting")
+    rmse = found.best.metrics["validation"]["multiple_shooting"].rmse
+    assert run.mean_squared_error**0.5 == pytest.approx(rmse)
+    write_result(found.search_result, tmp_path)
+    document = json.loads((tmp_path / "result.json").read_text())
+    assert document["settings"]["shooting"] == 52
+    assert document["preprocessing"]["shooting_interval"] == 10
+    assert read_error_measurement(tmp_path / "models/01.json").shooting == 10
+    # Results of earlier versions state the setting only, and used it as the number of means.
+    del document["preprocessing"]["shooting_interval"]
+    (tmp_path / "result.json").write_text(json.dumps(document))
+    assert read_error_measurement(tmp_path / "models/01.json").shooting == 52

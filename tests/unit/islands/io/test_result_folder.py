@@ -171,9 +171,10 @@ def test_numbers_that_json_cannot_represent_become_null(findings):
 
 def test_numpy_numbers_in_settings_are_written_as_numbers(findings):
     settings = {"max_terms": np.int64(4), "validation": np.float64(0.25), "flag": np.bool_(True), "x": np.nan}
-    result = loaded(replace(findings, settings={"constraints": "none"} | settings))
+    result = loaded(replace(findings, settings={"constraints": "none", "shooting": 500} | settings))
     assert result["settings"] == {
         "constraints": "none",
+        "shooting": 500,
         "max_terms": 4,
         "validation": 0.25,
         "flag": True,

@@ -27,6 +27,7 @@ SETTINGS = {
     "max_terms": 4,
     "max_height": 3,
     "shooting": 200,
+    "average": 2,
     "islands": 2,
     "migrate_every": 1,
     "swap_search": False,

@@ -4,6 +4,7 @@ import gzip
 import json
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from islands_service.coordinator import identification_job as work
 from islands_service.coordinator.heartbeat import JobCancelled
 from islands_service.coordinator.identification_job import run_identification_job
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, LeaseLostError
+from islands_service.reports.figure_worker import read_search_result
 from islands_service.store import Store
 from islands_service.store.blobs import Blobs
 from islands_service.store.database import StoreUnavailableError
@@ -62,6 +64,9 @@ def test_job_finds_the_models_of_a_single_process(
     assert ended.summary["models"] == len(undisturbed[0])
     assert ended.progress is not None
     assert ended.progress["generation"] == ended.progress["generations"]
+    drawn = read_search_result(ended, store, blobs, None)
+    errors = [asdict(entry.assessment.metrics["validation"]["multiple_shooting"]) for entry in drawn.models]
+    assert errors == [model["metrics"]["validation"]["multiple_shooting"] for model in undisturbed[0]]
 
 
 @pytest.mark.ci
