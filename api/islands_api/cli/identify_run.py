@@ -113,7 +113,14 @@ def run(
         began = perf_counter() - spent
         try:
             result = islands.identify(
-                data, held_out, start=state, progress=checkpoints, stop=stop, engine=engine, **arguments
+                data,
+                held_out,
+                start=state,
+                progress=checkpoints,
+                stage=show,
+                stop=stop,
+                engine=engine,
+                **arguments,
             )
         finally:
             # Also after an engine failure, so that no finished epoch is lost.

@@ -106,7 +106,9 @@ def job_progress_bar() -> Iterator[Callable[[JobView], None]]:
             done = status.get("generation", 0)
             best = _format_number(status.get("best_error"))
             text = f"{job.state}, generation {done}/{status.get('generations', '?')}, best error {best}"
-            if job.kind == DISCREPANCY:
+            # The other phases of a search are the stages before and after its epochs.
+            searching = job.state in TERMINAL or status.get("phase", "search") == "search"
+            if job.kind == DISCREPANCY or not searching:
                 text = f"{job.state}, {status.get('phase', 'waiting')}"
             islands = [
                 f"  island {index:3d}  RMSE {_format_number(error)}"

@@ -74,6 +74,7 @@ def run_identification_job(
         preset=spec.preset,
         seed=spec.seed,
         progress=reporter,
+        stage=reporter.report_stage,
         stop=stop,
         start=start,
         engine=engine,
@@ -147,6 +148,16 @@ class _ProgressReporter:
         self._last = state, settings
         if monotonic() >= min(self._report_at, self._checkpoint_at):
             self._report(state, settings)
+
+    def report_stage(self, message: str, _fraction: float | None = None, /) -> None:
+        """Store the stage before or after the epochs as the phase."""
+        self._check()
+        reached = self._progress(*self._last) if self._last else self._lease.job.progress or {}
+        try:
+            self._store.leases.report(self._lease, ProgressReport({**reached, "phase": message}))
+        except StoreError as error:
+            # Continue the search. The next report has the progress.
+            log.warning("report failed", job=self._lease.job.id, reason=str(error))
 
     def flush(self) -> None:
         """Store the last state. Retry while the store is unavailable."""

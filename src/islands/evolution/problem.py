@@ -13,6 +13,7 @@ from islands.evolution.generation.swap_search import swap_search
 from islands.evolution.generation.variation import Genes
 from islands.evolution.gp.gene_structure import with_phi
 from islands.evolution.gp.island_profiles import ISLAND_PROFILES
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.settings import Settings
 from islands.model.expression import Expression, height
 from islands.model.regressor import Regressor
@@ -48,10 +49,19 @@ class Problem:
         return replace(self.settings, **ISLAND_PROFILES[profiles[island % len(profiles)]])
 
 
-def make_problem(record: Dataset, settings: Settings) -> Problem:
+def make_problem(
+    record: Dataset, settings: Settings, progress: ProgressCallback = ignore_progress
+) -> Problem:
     """Make a search problem; run the forward selection if the settings have a library.
 
     Regressors of the library that exceed the maximum height of a gene are left out.
+
+    Parameters
+    ----------
+    record : Dataset
+    settings : Settings
+    progress : ProgressCallback
+        Called before each step of the selection and of the swap search.
 
     Raises
     ------
@@ -71,6 +81,7 @@ def make_problem(record: Dataset, settings: Settings) -> Problem:
     library = [item for item in regressors if height(genes[item]) <= settings.max_height and admits(item)]
     seeds: tuple[Genes, ...] = ()
     exchanged: Sequence[Regressor] = library
+    progress(f"forward selection among {len(library)} candidates", 0.0)
     selection = make_selection_problem(library, record, settings.constraints)
     if not isinstance(selection, EvaluationOutcome):
         structures = select_forward(selection, settings.max_terms)
@@ -78,12 +89,7 @@ def make_problem(record: Dataset, settings: Settings) -> Problem:
         if settings.swap_search:
             exchanged = select_pool(library, selection, settings.max_terms)
     if settings.swap_search:
-        seeds = _search_seeds(record, settings, [genes[item] for item in exchanged], seeds)
+        pool = [genes[item] for item in exchanged]
+        by_size = swap_search(Evaluator(record, settings), pool, seeds, progress=progress)
+        seeds = tuple(each.genes for rank in zip_longest(*by_size) for each in rank if each is not None)
     return Problem(record, settings, seeds, tuple(genes[item] for item in library))
-
-
-def _search_seeds(
-    record: Dataset, settings: Settings, pool: list[Expression], starts: tuple[Genes, ...]
-) -> tuple[Genes, ...]:
-    by_size = swap_search(Evaluator(record, settings), pool, starts)
-    return tuple(each.genes for rank in zip_longest(*by_size) for each in rank if each is not None)

@@ -1,6 +1,6 @@
 """Final models of a search: structures are screened on the validation data, then refined and assessed."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from math import isfinite
 from typing import Protocol, TypeVar
@@ -18,6 +18,7 @@ from islands.evolution.gp.fitness import FITNESSES
 from islands.evolution.gp.individual import Individual, unique_structures
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.problem import Problem
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import RankedModel, rank_models
 from islands.evolution.settings import Settings
 from islands.model.model import Model
@@ -85,7 +86,11 @@ def _is_valid(assessment: Assessment, settings: Settings) -> bool:
 
 
 def estimate_candidates(
-    hall_of_fame: HallOfFame, problem: Problem, split: Split, offsets: Offsets
+    hall_of_fame: HallOfFame,
+    problem: Problem,
+    split: Split,
+    offsets: Offsets,
+    progress: ProgressCallback = ignore_progress,
 ) -> list[ValidatedModel]:
     """Estimate and refine the best structures of every size, and validate them.
 
@@ -94,11 +99,13 @@ def estimate_candidates(
     The best of every size are estimated again in the units of the record and, if the settings ask for it,
     refined over several shooting intervals. An estimator in the settings replaces both.
     """
-    validation = subtract_offsets(split.validation, offsets)
+    settings, validation = problem.settings, subtract_offsets(split.validation, offsets)
     found = []
-    for individuals in _group_by_size(_evaluate_structures(hall_of_fame, problem)):
-        kept = screen(individuals, validation, problem.settings.maximum_lag, *_REFINED)
-        found += _estimate_models(kept, problem, split, offsets)
+    groups = _group_by_size(_evaluate_structures(hall_of_fame, problem))
+    for done, individuals in enumerate(groups):
+        progress(f"estimation of the final models of {individuals[0].size} terms", done / len(groups))
+        kept = screen(individuals, validation, settings.maximum_lag, *_REFINED)
+        found += _estimate_models(kept, settings, split, offsets)
     return found
 
 
@@ -110,7 +117,7 @@ def _evaluate_structures(hall_of_fame: HallOfFame, problem: Problem) -> tuple[In
     return tuple(each for each in unique_structures(evaluated) if each.outcome)
 
 
-def _group_by_size(items: Iterable[_Sized]) -> Iterable[list[_Sized]]:
+def _group_by_size(items: Iterable[_Sized]) -> Collection[list[_Sized]]:
     groups: dict[int, list[_Sized]] = {}
     for item in items:
         groups.setdefault(item.size, []).append(item)
@@ -145,10 +152,9 @@ def screen(
 
 
 def _estimate_models(
-    individuals: list[Individual], problem: Problem, split: Split, offsets: Offsets
+    individuals: list[Individual], settings: Settings, split: Split, offsets: Offsets
 ) -> list[ValidatedModel]:
     """Return models with estimated and with refined parameters in the units of the record."""
-    settings = problem.settings
     found = (
         estimate_deviations(
             each.regressors,
@@ -166,25 +172,24 @@ def _estimate_models(
         if not isinstance(each, EvaluationOutcome) and each.model.size <= settings.max_terms
     ]
     if settings.estimator:
-        return _estimate_with_choice(fitted, problem, split)
+        return _estimate_with_choice(fitted, settings, split)
     estimated = [each.model for each in fitted]
-    validated = _validate(estimated, 1, split.validation, problem.settings.maximum_lag)
+    validated = _validate(estimated, 1, split.validation, settings.maximum_lag)
     if settings.refine:
         interval = FITNESSES[settings.fitness](settings.shooting)
-        refined = _refine(estimated, interval, problem, split)
+        refined = _refine(estimated, interval, settings, split)
         validated += refined
         best = [each.model for each in refined[:_MOST_PROMISING]]
         lengths = [max(1, round(factor * interval)) for factor in _INTERVALS] if interval else []
         for length in lengths:
-            validated += _refine(best, length, problem, split)
+            validated += _refine(best, length, settings, split)
     return validated
 
 
 def _estimate_with_choice(
-    fitted: list[FittedStructure], problem: Problem, split: Split
+    fitted: list[FittedStructure], settings: Settings, split: Split
 ) -> list[ValidatedModel]:
     """Return models with the parameters of the estimator that the settings choose."""
-    settings = problem.settings
     found = (
         estimate_with(
             settings.estimator,
@@ -198,14 +203,13 @@ def _estimate_with_choice(
     )
     models = [each.model for each in found if not isinstance(each, EvaluationOutcome)]
     interval = ESTIMATORS[settings.estimator].interval(settings.shooting)
-    return _validate(models, interval, split.validation, problem.settings.maximum_lag)
+    return _validate(models, interval, split.validation, settings.maximum_lag)
 
 
 def _refine(
-    models: list[Model], interval: int | None, problem: Problem, split: Split
+    models: list[Model], interval: int | None, settings: Settings, split: Split
 ) -> list[ValidatedModel]:
     """Refine models over shooting intervals and validate them; the kernels run in parallel threads."""
-    settings = problem.settings
     with ThreadPoolExecutor() as threads:
         refined = threads.map(
             lambda model: refine(
@@ -219,7 +223,7 @@ def _refine(
             models,
         )
         found = [each.model for each in refined if not isinstance(each, EvaluationOutcome)]
-    return _validate(found, interval, split.validation, problem.settings.maximum_lag)
+    return _validate(found, interval, split.validation, settings.maximum_lag)
 
 
 def _validate(

@@ -133,6 +133,7 @@ def fit(
     if certificate < 0:
         raise SettingsError(f"a search has at least 0 nodes, got certificate = {certificate}")
     trial = TrialLibrary(library, degree, lags, constraints)
+    progress("sampling rate and direct feedthrough", 0.0)
     whole = split_data(record, validation)
     shooting = min(SHOOTING, max(1, whole.estimation.samples // 10)) if shooting is None else shooting
     if shooting < 1:
@@ -236,15 +237,18 @@ def _select(
         found = certify(problem, settings.max_terms, nodes)
         certificates = combine_certificates(certificates, found)
         starts = [*select_forward(problem, settings.max_terms), *(entry.structure for entry in found)]
-        progress(f"exchanges among {len(pool)} candidates", 0.0)
         exchanged = select_pool(pool, problem, settings.max_terms)
-        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings)]
+        chosen = [*starts, *_search_swaps(exchanged, starts, deviations, settings, progress)]
         structures += [(structure, offsets) for structure in chosen]
     return list(dict.fromkeys(structures)), certificates or (), warm_up
 
 
 def _search_swaps(
-    pool: Sequence[Regressor], starts: Sequence[Structure], split: Split, settings: Settings
+    pool: Sequence[Regressor],
+    starts: Sequence[Structure],
+    split: Split,
+    settings: Settings,
+    progress: ProgressCallback,
 ) -> list[Structure]:
     """Return, for every size, the structure of a swap search with the least error on the validation data."""
     by_size = swap_search(
@@ -252,6 +256,7 @@ def _search_swaps(
         [item.expression for item in pool],
         [tuple(item.expression for item in structure) for structure in starts],
         depth=_SCREENED,
+        progress=progress,
     )
     return [
         each.regressors

@@ -23,6 +23,7 @@ from islands.evolution.engine import Engine, SerialEngine, Stop
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem, make_problem
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
@@ -54,6 +55,7 @@ def identify(
     preset: str = "hysteresis",
     seed: int = 0,
     progress: SearchCallback | None = None,
+    stage: ProgressCallback = ignore_progress,
     stop: Stop | None = None,
     start: SearchState | None = None,
     engine: Engine | None = None,
@@ -73,6 +75,8 @@ def identify(
         Seed of the random generator; the same seed gives the same result, bit for bit.
     progress : callable, optional
         Called with the `SearchState` and the `Settings` after every epoch.
+    stage : callable, optional
+        Called with a message and the completed fraction of each stage before and after the epochs.
     stop : callable, optional
         Called frequently. Once it returns true, the search ends with the best models so far.
     start : SearchState, optional
@@ -104,13 +108,14 @@ def identify(
         raise SettingsError(f"a seed is not negative, got {seed}")
     for entry in _own_primitives(settings):
         row_address(entry)  # compile it before the search starts
+    stage("sampling rate and direct feedthrough", 0.0)
     trial, least = _make_trial_library(settings), settings.maximum_lag + _MIN_RESIDUALS
     split, count = select_rate(split_data(record, validation), settings.average, trial, least)
     split = select_feedthrough(split, settings.feedthrough, trial.at_rate(count))
     _check_validation_length(split.validation, settings)
     offsets = _find_search_offsets(split.estimation, settings)
     scaled = replace(settings, shooting=count_means(settings.shooting, count))
-    search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled)
+    search_problem = make_problem(subtract_offsets(split.estimation, offsets), scaled, stage)
     stop = stop or (lambda: False)
     state = start or SearchState(empty_archipelago(settings.islands, seed))
     if [(island.index, island.seed) for island in state.archipelago.islands] != [
@@ -127,7 +132,8 @@ def identify(
                 progress(state, settings)
     if state.archipelago.generation < 0:
         raise SettingsError("stopped before the first populations were evaluated: there is no model to keep")
-    candidates = estimate_candidates(state.archipelago.hall_of_fame, search_problem, split, offsets)
+    candidates = estimate_candidates(state.archipelago.hall_of_fame, search_problem, split, offsets, stage)
+    stage("assessment of the final models", 1.0)
     models = select_final_models(candidates, search_problem, split)
     if not models:
         raise SettingsError(

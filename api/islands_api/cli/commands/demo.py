@@ -60,6 +60,7 @@ def demo(
                 preset=preset,
                 islands=ISLANDS,
                 progress=search_progress(show),
+                stage=show,
                 engine=engine,
             )
             by_preset[preset] = found.with_wall_time(perf_counter() - began)

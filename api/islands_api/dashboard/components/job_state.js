@@ -27,9 +27,16 @@ export function makeBadge() {
   };
 }
 
+/** Return whether a search runs a stage before or after its epochs, such as the estimation of the final models. */
+function isBetweenEpochs(job) {
+  const { phase = "search" } = job.progress ?? {};
+  return job.state === "running" && phase !== "search";
+}
+
 function formatProgress(job) {
   if (isDiagnosis(job) && job.summary) return formatVerdict(job.summary);
   const { phase, note, generation, generations } = job.progress ?? {};
+  if (isBetweenEpochs(job)) return note ?? phase;
   if (job.state === "queued" && generation === undefined) return "waiting";
   if (generation === undefined) return note ?? phase ?? "";
   const at = `${formatCount(generation)} / ${formatCount(generations)}`;
@@ -48,7 +55,7 @@ export function makeProgressBar() {
       // The duration of a diagnosis is unknown.
       if (isDiagnosis(job) && job.state === "running") bar.removeAttribute("value");
       bar.className = getState(job);
-      text.classList.toggle("long", isDiagnosis(job));
+      text.classList.toggle("long", isDiagnosis(job) || isBetweenEpochs(job));
       setText(text, formatProgress(job));
     },
   };

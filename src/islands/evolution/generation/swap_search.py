@@ -13,6 +13,7 @@ import numpy as np
 from islands.evolution.generation.evaluation import Evaluator
 from islands.evolution.generation.variation import Genes, with_required_genes
 from islands.evolution.gp.individual import Individual, Population
+from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.model.expression import Expression
 
 #: Smallest relative reduction of the squared error for which an exchange continues.
@@ -29,7 +30,11 @@ MAX_EVALUATIONS = 60_000
 
 
 def swap_search(
-    evaluator: Evaluator, pool: Sequence[Expression], starts: Iterable[Genes] = (), depth: int = 40
+    evaluator: Evaluator,
+    pool: Sequence[Expression],
+    starts: Iterable[Genes] = (),
+    depth: int = 40,
+    progress: ProgressCallback = ignore_progress,
 ) -> tuple[Population, ...]:
     """Search structures over a pool of genes.
 
@@ -43,6 +48,8 @@ def swap_search(
         Further structures; the exchanges start from one of them if it is better than the forward step.
     depth : int
         Number of structures that are returned for every size.
+    progress : ProgressCallback
+        Called before each size.
 
     Returns
     -------
@@ -56,6 +63,7 @@ def swap_search(
     first = search.evaluate([best], inf) if best else None
     error = inf if first is None else first.fitness
     while error > exact > 0.0 and len(best) < evaluator.settings.max_terms and not search.is_exhausted:
+        progress(f"swap search among {len(pool)} candidates: {len(best) + 1} terms", None)
         found = search.evaluate(((*best, gene) for gene in pool if gene not in best), inf)
         start = min((each for each in (found, search.best(len(best) + 1)) if each), key=_order, default=None)
         if start is None or start.size <= len(best):

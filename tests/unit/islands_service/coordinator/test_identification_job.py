@@ -45,7 +45,7 @@ class Interruption:
 
     def __call__(self) -> None:
         progress = self._store.jobs.get(ALICE, self._job).progress
-        if progress is not None and progress["generation"] >= self._at:
+        if progress is not None and progress.get("generation", -1) >= self._at:
             raise JobCancelled("enough")
 
 
@@ -125,6 +125,24 @@ def test_wall_time_includes_all_attempts(
     assert before > 0.2
     spent = outcome.document["search"]["wall_s"]
     assert before + checks[-1] - checks[0] <= spent <= before + last + 0.01
+
+
+@pytest.mark.ci
+def test_stages_of_a_job_are_its_phases_and_keep_its_generation(store: Store, blobs: Blobs, job: Job) -> None:
+    seen: list[Any] = []
+
+    def watch() -> None:
+        seen.append(store.jobs.get(ALICE, job.id).progress)
+
+    run_job(claim(store), store, blobs, watch)
+    phases = [progress["phase"] for progress in seen if progress]
+    assert phases[0] == "sampling rate and direct feedthrough"
+    assert {phase.split(" of ")[0] for phase in phases} >= {"search", "estimation"}
+    ended = store.jobs.get(ALICE, job.id).progress
+    assert ended is not None
+    assert ended["phase"] == "search"
+    reached = [progress.get("generation", -1) for progress in seen if progress]
+    assert reached == sorted(reached)
 
 
 def test_first_populations_are_stored_in_a_checkpoint_at_once(store: Store, blobs: Blobs, job: Job) -> None:

@@ -19,7 +19,7 @@ from islands.model.candidate_library import full_set
 from islands.validation.assessment import MODES
 from islands.validation.metrics import metrics
 from islands.validation.physics import check_physics
-from support.identifications import BUDGET, RecordingEngine, parameters
+from support.identifications import BUDGET, RecordingEngine, parameters, record
 
 # Contents of a result.
 
@@ -224,3 +224,31 @@ def test_simulations_of_the_parts_have_the_reported_errors(result):
                 assert metrics(data.y, fitted.simulate(data, mode).y) == fitted.metrics[part][name]
     own = result.best.simulate(split.validation, warm_up=result.best.model.maximum_lag)
     assert np.isnan(own.y).sum() == result.best.model.maximum_lag
+
+
+# Stages.
+
+
+def test_stages_before_and_after_the_epochs_are_reported_and_have_no_effect():
+    small = BUDGET | {"generations": 1, "population": 10, "max_terms": 3, "initial_terms": (1, 3)}
+    search = small | {"library_degree": 1, "swap_search": True, "refine": True}
+    news = []
+    found = identify(
+        record(600),
+        **search,
+        seed=5,
+        progress=lambda _state, _settings: news.append("epoch"),
+        stage=lambda message, _fraction=None: news.append(message),
+    )
+    assert parameters(found) == parameters(identify(record(600), **search, seed=5))
+    first, last = news.index("epoch"), len(news) - news[::-1].index("epoch")
+    assert news[0] == "sampling rate and direct feedthrough"
+    assert any(message.startswith("swap search among") for message in news[:first])
+    assert set(news[first:last]) == {"epoch"}
+    assert all(message.startswith("estimation of the final models of") for message in news[last:-1])
+    assert news[-1] == "assessment of the final models"
+
+
+def test_stages_are_not_printed_by_default(capsys):
+    identify(record(600), **BUDGET | {"generations": 0, "population": 10, "library_degree": 1})
+    assert capsys.readouterr() == ("", "")

@@ -3,6 +3,7 @@
 import json
 import shutil
 import signal
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -45,6 +46,21 @@ def test_run_writes_a_result_and_a_checkpoint_only(run, with_figures, tmp_path):
     assert about["job"]["seed"] == archipelago.islands[0].seed == 4
     assert [about["history"][at][0] for at in (0, -1)] == [0, 3]
     assert search["ended_by"] == "generations"
+
+
+@pytest.mark.ci
+def test_stages_before_and_after_the_epochs_are_displayed(run, monkeypatch):
+    shown = []
+
+    @contextmanager
+    def bar(_title):
+        yield lambda message, *_fraction, **_lines: shown.append(message)
+
+    monkeypatch.setattr(command, "progress", bar)
+    assert run("r.csv", *COLUMNS, *SMALL, "--out", "out")[0] == 0
+    stages = ("sampling rate", "swap search", "generation 3/3", "estimation of the final models", "figures")
+    first = [next(at for at, text in enumerate(shown) if text.startswith(stage)) for stage in stages]
+    assert first == sorted(first)
 
 
 @pytest.mark.ci
