@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from html import unescape
 
+from islands.data.channel_names import parse_channel_name
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
 from islands.model.rendering import (
@@ -27,12 +28,16 @@ def equation(model: Model, digits: int = 6) -> str:
     The parameters are rounded to ``digits`` significant digits. A model without parameters shows theta1 ...
     The input of a column that is read one sample early (``u_V+1``) is written as ``u(k)`` for its lag 1.
     """
+    return f"y(k) = {_join_terms(_plain_terms(model, digits))}"
+
+
+def _plain_terms(model: Model, digits: int) -> list[str]:
     parts = []
     for position, expression in enumerate(_written(model)):
         weight = f"theta{position + 1}" if model.theta is None else f"{model.theta[position]:.{digits}g}"
         constant = expression == Constant(1.0)
         parts.append(weight if constant else f"{weight}*{plain_factor(expression, model.inputs)}")
-    return f"y(k) = {_join_terms(parts)}"
+    return parts
 
 
 def _written(model: Model) -> list[Expression]:
@@ -57,10 +62,25 @@ def _delay(expression: Expression, leads: Sequence[int]) -> Expression:
 def named_equation(model: Model, digits: int = 6) -> str:
     """Write a model as one line with the column names of its record: ``y_um(k) = 0.9*y_um(k-1) + u_V(k-1)``.
 
-    A name that is not an identifier is written in brackets, ``[flow (l/s)](k-1)``. The text is for readers;
+    The signals have the names of `signal_names`; a factor of 1 is left out. The text is for readers;
     `parse` needs that of `equation`.
     """
-    return _name_signals(equation(model, digits), model)
+    terms = [re.sub(r"^(-?)1\*", r"\1", term) for term in _plain_terms(model, digits)]
+    return _name_signals(f"y(k) = {_join_terms(terms)}", model)
+
+
+def signal_names(model: Model) -> tuple[str, ...]:
+    """Return the names of the output and of every input in the text of an equation.
+
+    They are the columns of the record. A unit in brackets is left out (``flow`` for ``flow (l/s)``), unless
+    two signals would have the same name. Other names are written in brackets: ``[flow 2]``.
+    """
+    columns = (model.output_name, *model.column_names)
+    stems = [name if name.isidentifier() else parse_channel_name(name).stem for name in columns]
+    return tuple(
+        stem if stem.isidentifier() and stems.count(stem) == 1 else f"[{name}]"
+        for name, stem in zip(columns, stems, strict=True)
+    )
 
 
 def named_term(model: Model, position: int) -> str:
@@ -69,14 +89,9 @@ def named_term(model: Model, position: int) -> str:
 
 
 def _name_signals(text: str, model: Model) -> str:
-    names = {"y": model.output_name, "u": model.column_names[0]}
-    names |= {f"u{index}": name for index, name in enumerate(model.column_names, start=1)}
-
-    def substitute(leaf: re.Match[str]) -> str:
-        name = names[leaf[1]]
-        return f"{name if name.isidentifier() else f'[{name}]'}(k"
-
-    return re.sub(r"\b(y|u\d*)\(k(?=[-)])", substitute, text)
+    output, *inputs = signal_names(model)
+    names = {"y": output, "u": inputs[0]} | {f"u{index}": name for index, name in enumerate(inputs, start=1)}
+    return re.sub(r"\b(y|u\d*)\(k(?=[-)])", lambda leaf: f"{names[leaf[1]]}(k", text)
 
 
 def latex_equation(model: Model, digits: int = 6) -> str:

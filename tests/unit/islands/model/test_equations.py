@@ -6,7 +6,14 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import given
 
-from islands.model.equations import equation, latex_equation, mathml_equation, named_equation, named_term
+from islands.model.equations import (
+    equation,
+    latex_equation,
+    mathml_equation,
+    named_equation,
+    named_term,
+    signal_names,
+)
 from islands.model.expression import Apply, Lagged, Primitive
 from islands.model.model import make_model
 from islands.model.parsing import parse
@@ -83,12 +90,26 @@ def test_named_equation_has_the_column_names_of_the_record():
     model = make_model([(parse(text), value) for text, value in terms], names, "T_out")
     assert sorted(named_equation(model).removeprefix("T_out(k) = ").split(" + ")) == [
         "0.5*T_out(k-1)",
-        "1*max(T_out(k-4), heat(k-3))",
-        "2*u2(k-2)*[flow (l/s)](k-1)",
+        "2*u2(k-2)*flow(k-1)",
+        "max(T_out(k-4), heat(k-3))",
     ]
     assert {named_term(model, position) for position in range(3)} >= {"T_out(k-1)"}
     single = make_model([(parse("u(k-1)"), 2.0), (parse("sqrt(u(k-2))"), 1.0)], ("u_V",), "y_um")
-    assert named_equation(single) == "y_um(k) = 2*u_V(k-1) + 1*sqrt(u_V(k-2))"
+    assert named_equation(single) == "y_um(k) = 2*u_V(k-1) + sqrt(u_V(k-2))"
+
+
+def test_signals_are_named_by_their_columns_without_units_in_brackets():
+    model = make_model(
+        [(parse("y(k-1)"), -1.0), (parse("u1(k-1)*u2(k-1)"), 11.0), (parse("u3(k-1)"), 1.0)],
+        ("flow (l/s)", "flow [m]", "valve 2 [V]"),
+        "speed [rad/s]",
+    )
+    assert signal_names(model) == ("speed", "[flow (l/s)]", "[flow [m]]", "[valve 2 [V]]")
+    assert sorted(named_equation(model).removeprefix("speed(k) = ").split(" + ")) == [
+        "-speed(k-1)",
+        "11*[flow (l/s)](k-1)*[flow [m]](k-1)",
+        "[valve 2 [V]](k-1)",
+    ]
 
 
 def test_quotient_keeps_its_brackets_after_its_parameter():
