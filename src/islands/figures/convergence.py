@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogFormatter, MaxNLocator
 
 from islands.evolution.search_result import SearchResult
-from islands.figures.style import MEASURED, SIMULATED, blank, finish, house_style
+from islands.figures.style import MEASURED, RESIDUAL, SIMULATED, blank, finish, house_style
 
 #: Entries of a legend column.
 _LEGEND_ROWS = 15
@@ -59,7 +59,7 @@ def draw_islands(result: SearchResult) -> Figure:
 
 @house_style()
 def draw_front(result: SearchResult) -> Figure:
-    """Draw the free-run error of every model against its number of terms."""
+    """Draw the free-run error of every model against its number of terms, and mark the recommended model."""
     figure = blank(3.2)
     axes = figure.subplots()
     for part, colour, marker in (("estimation", MEASURED, "o"), ("validation", SIMULATED, "s")):
@@ -68,6 +68,9 @@ def draw_front(result: SearchResult) -> Figure:
         )
         sizes, errors = zip(*points, strict=True)
         axes.plot(sizes, errors, marker=marker, color=colour, label=part)
+    chosen = result.recommended
+    error = chosen.assessment.metrics["validation"]["free_run"].mape
+    axes.plot(chosen.model.size, error, "o", ms=13, mfc="none", color=RESIDUAL, label="recommended")
     _set_log_scale(axes)
     axes.set_xlabel("terms")
     axes.set_ylabel("free-run MAPE (% of the range)")

@@ -39,8 +39,9 @@ def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
     """Draw the output while the input is held at five levels, reached while loading and while unloading.
 
     Time 0 is the first sample of the hold; negative times show the approach. The title of each side gives
-    the largest drift, as in `HoldTest`, in percent of the output range of the record, and the number of
-    diverged holds. The axis limits follow a diverging output up to one output range beyond the record.
+    the largest change of the output, which is the drift of `HoldTest`, in percent of the output range of the
+    record, and the number of diverged holds. A model without hysteresis changes until it has settled. The
+    axis limits follow a diverging output up to one output range beyond the record.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def draw_holds(model: Model, record: Dataset, title: str = "") -> Figure:
     for (words, side), (left, right) in zip(sides.items(), axes, strict=True):
         _draw_side(left, right, side)
         left.set_title(f"input, {words}")
-        right.set_title(_describe_drift(f"after {words}", side))
+        right.set_title(_describe_change(f"after {words}", side))
         right.set_ylabel(label(record.output_name, record.output_unit))
         _label_input_axis(left, record)
     for panel in axes[1]:
@@ -89,17 +90,17 @@ def _simulate_hold(model: Model, record: Dataset, level: float, loading: bool) -
     return _Hold(time, u, y, drift)
 
 
-def _describe_drift(words: str, side: Sequence[_Hold]) -> str:
+def _describe_change(words: str, side: Sequence[_Hold]) -> str:
     drifts = [held.drift_percent for held in side if held.known.all()]
     lost = f"{words}: {len(side) - len(drifts)} of {len(side)} diverged"
     if not drifts:
         return lost
     largest = max(drifts)
     share = "below 0.01" if largest < 0.01 else f"{largest:.2f}" if largest < 10 else f"{largest:.0f}"
-    drift = f"{share} % of the output range"
+    change = f"{share} % of the output range"
     if len(drifts) == len(side):
-        return f"{words}: largest drift {drift}"
-    return f"{lost},\nlargest drift of the others {drift}"
+        return f"{words}: largest change {change}"
+    return f"{lost},\nlargest change of the others {change}"
 
 
 def _draw_side(left: Axes, right: Axes, side: Sequence[_Hold]) -> None:

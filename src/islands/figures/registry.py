@@ -1,6 +1,7 @@
 """Tables of the figures of a model and of the figures of a search."""
 
 from collections.abc import Callable, Mapping
+from math import isfinite
 from types import MappingProxyType
 
 import numpy as np
@@ -44,8 +45,12 @@ def _hold(entry: RankedModel, split: Split) -> Figure:
 
 
 def _residuals(entry: RankedModel, _split: Split) -> Figure:
-    """Draw the correlation functions of the residual with their 95 % band."""
-    return draw_residual_correlations(entry.assessment.residual_tests)
+    """Draw the correlation functions of the residual with their 95 % band, and its verdict."""
+    structure = entry.assessment.residual_structure
+    shares = ((structure.one_step_share, "one step ahead"), (structure.free_run_share, "in free run"))
+    parts = ", ".join(f"{100 * share:.0f} % {mode}" for share, mode in shares if isfinite(share))
+    title = f"residual {structure.verdict}" + (f": predictable part {parts}" if parts else "")
+    return draw_residual_correlations(entry.assessment.residual_tests, title)
 
 
 FIGURES: Mapping[str, ModelFigure] = MappingProxyType(

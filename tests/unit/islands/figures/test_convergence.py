@@ -25,7 +25,8 @@ def make_result(history=(), models=()):
         )
         for size, estimation, validation in models
     )
-    return SimpleNamespace(search=SimpleNamespace(history=tuple(history)), models=entries)
+    search = SimpleNamespace(history=tuple(history))
+    return SimpleNamespace(search=search, models=entries, recommended=entries[-1] if entries else None)
 
 
 #: Two sizes from the start, a third from generation 2 on; squared errors.
@@ -91,6 +92,7 @@ def test_front_shows_both_parts_over_the_number_of_terms():
     assert get_lines(figure) == {
         "estimation": [[1.0, 20.0], [2.0, 2.0], [3.0, 0.2]],
         "validation": [[1.0, 30.0], [2.0, 1.0], [3.0, 0.3]],
+        "recommended": [[2.0, 1.0]],
     }
     assert integer_ticks(get_axes(figure)) == [1, 2, 3]
 

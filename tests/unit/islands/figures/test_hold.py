@@ -84,7 +84,7 @@ def test_time_is_in_seconds_from_the_start_of_the_hold(stationary):
 
 def test_model_with_a_continuum_of_equilibria_has_no_drift(stationary):
     for axes, words in ((stationary.axes[1], "after loading"), (stationary.axes[3], "after unloading")):
-        assert axes.get_title(loc="left") == f"{words}: largest drift below 0.01 % of the output range"
+        assert axes.get_title(loc="left") == f"{words}: largest change below 0.01 % of the output range"
         for line in held(axes):
             assert np.ptp(line.get_ydata()[2:]) < 1e-9
     ends = [line.get_ydata()[-1] for line in held(stationary.axes[1])]
@@ -96,7 +96,7 @@ def test_drift_of_a_leaking_model_equals_that_of_the_physics_check(record):
     largest = check_physics(LEAKING, record).hold_drift_percent
     said = [axes.get_title(loc="left") for axes in (figure.axes[1], figure.axes[3])]
     assert largest > 10
-    assert any(f"largest drift {largest:.0f} % of the output range" in title for title in said)
+    assert any(f"largest change {largest:.0f} % of the output range" in title for title in said)
     low, high = figure.axes[1].get_ylim()
     moved = max(np.ptp(line.get_ydata()[2:]) for line in held(figure.axes[1]))
     assert moved > 0.1 * (high - low)
@@ -136,7 +136,7 @@ def test_title_has_the_drift_of_the_levels_that_did_not_diverge(record, tmp_path
     )
     figure = draw_holds(unstable, record)
     for axes in (figure.axes[1], figure.axes[3]):
-        assert "2 of 5 diverged,\nlargest drift of the others" in axes.get_title(loc="left")
+        assert "2 of 5 diverged,\nlargest change of the others" in axes.get_title(loc="left")
     save(figure, tmp_path / "some.svg")
 
 

@@ -1,6 +1,8 @@
 """Figures of the registry agree with the metrics of the model."""
 
 import re
+from dataclasses import replace
+from math import nan
 
 import pytest
 
@@ -14,6 +16,20 @@ from support.searches import record
 
 #: The initial state decays slowly, so the error of the free run depends on where the run begins.
 MODEL = make_model([(parse("y(k-1)"), 0.999), (parse("u(k-1)"), 0.3)], ("u",))
+
+
+def test_the_figure_of_the_residual_gives_its_verdict_before_the_tests():
+    split = Split(record(400), record(300, seed=1))
+    entry = RankedModel(MODEL, assess(MODEL, split, 50))
+    structure = replace(entry.assessment.residual_structure, one_step_share=0.04, free_run_share=0.314)
+    for shares, words in (
+        (structure, f"residual {structure.verdict}: predictable part 4 % one step ahead, 31 % in free run"),
+        (replace(structure, free_run_share=nan), "predictable part 4 % one step ahead"),
+    ):
+        assessed = replace(entry, assessment=replace(entry.assessment, residual_structure=shares))
+        verdict, tests = FIGURES["residuals"](assessed, split).get_suptitle().split("\n")
+        assert verdict.endswith(words)
+        assert tests.startswith("residual tests ")
 
 
 @pytest.mark.ci
