@@ -61,7 +61,8 @@ def show_jobs(jobs: Sequence[JobView], as_json: bool) -> None:
     output.print(_LINE.format("job", "state", "generation", "best error", "created", "name"), markup=False)
     for job in jobs:
         status = job.progress or {}
-        generation = f"{status.get('generation', '-')}/{status.get('generations', '-')}"
+        done = status.get("generation")
+        generation = "-" if done is None else f"{done}/{status.get('generations', '-')}"
         best, created = _format_number(status.get("best_error")), f"{job.created:%Y-%m-%d %H:%M:%S}"
         line = _LINE.format(job.id, job.state, generation, best, created, f"{job.name}{_format_verdict(job)}")
         output.print(line, markup=False)
@@ -78,8 +79,8 @@ def show_models(models: Sequence[ModelView]) -> None:
     """Show the models of a job: a table of errors and physical properties, and the equations."""
     # Only models of hysteresis have Property 1; the drift of others is no defect.
     hysteresis = any(model.physics["property_1"] for model in models)
-    claims = ("hold drift %", "Property 1") if hysteresis else ()
-    table = Table("rank", "terms", "MAPE est. %", "MAPE val. %", *claims)
+    claims = ("drift %", "Property 1") if hysteresis else ()
+    table = Table("rank", "terms", "MAPE est. %", "MAPE val. %", *claims, "residuals")
     for model in models:
         mape = [model.metrics[part]["free_run"]["mape"] for part in ("estimation", "validation")]
         drift = _format_number(model.physics["hold_drift_percent"])
@@ -88,6 +89,8 @@ def show_models(models: Sequence[ModelView]) -> None:
             str(model.size),
             *map(_format_number, mape),
             *((drift, "yes" if model.physics["property_1"] else "no") if hysteresis else ()),
+            # Results of earlier versions have no verdict.
+            model.residual_tests.get("verdict", "-"),
         )
     output.print(table)
     output.print(LEGEND, markup=False)

@@ -27,7 +27,8 @@ def certificates_document(found: SearchResult) -> list[dict[str, Any]]:
 def summarise_certificates(found: SearchResult) -> list[str]:
     """Return the gap of every model as a line of text; no line without certificates."""
     gaps = [
-        f"{entry['terms']} terms: " + ("none" if entry["proved"] else f"{entry['gap_percent']:.1f} %")
+        f"{entry['terms']} term{'s' if entry['terms'] > 1 else ''}: "
+        + ("none" if entry["proved"] else f"{entry['gap_percent']:.1f} %")
         for entry in certificates_document(found)
     ]
     return (

@@ -8,14 +8,14 @@ from islands.validation.assessment import PARTS
 #: Mark of the recommended model, after its rank.
 MARK = "*"
 
-#: Explanation of the mark.
-LEGEND = f"{MARK} recommended"
+#: Explanation of the mark and of the order.
+LEGEND = f"{MARK} recommended; ranked by the RMSE of the free run on the validation data"
 
 #: Columns of every table.
 _COLUMNS = ("rank", "terms", "MAPE est. %", "MAPE val. %", "R2 val.", "residuals")
 
 #: Columns of models of hysteresis.
-_HYSTERESIS_COLUMNS = ("hold drift %", "Property 1")
+_HYSTERESIS_COLUMNS = ("drift %", "Property 1")
 
 
 def table(found: SearchResult) -> list[str]:

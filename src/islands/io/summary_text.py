@@ -1,16 +1,20 @@
 """Text summary of a result: the recommended model in sentences, the search, and the table of models."""
 
 from collections.abc import Iterator
-from math import isfinite
+from math import floor, isfinite
+from textwrap import fill
 
 import numpy as np
 
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.certificates import summarise_certificates
 from islands.io.model_table import LEGEND, table
-from islands.model.equations import equation, named_equation, named_term
+from islands.model.equations import equation, named_equation, named_term, signal_names
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
 from islands.validation.prediction_bands import LEVEL
+
+#: Width of the lines of settings in characters.
+_WIDTH = 80
 
 #: Smallest R2 of a simulation that counts as good.
 _GOOD_R2 = 0.9
@@ -33,7 +37,7 @@ _HINTS = {
     "u_xi": "linear or odd terms in {input}, also at other lags",
     "xi_xiu": "products of past outputs and {input}",
     "u2_xi": "even terms in {input}, such as squares or absolute values",
-    "u2_xi2": "terms that grow with {input}; the size of the residual depends on it",
+    "u2_xi2": "terms that grow with {input}, because the size of the residual depends on it",
 }
 
 
@@ -46,8 +50,7 @@ def summary(found: SearchResult) -> str:
         *describe(found),
         "",
         f"{record.samples} samples, {record.dt:g} s: {', '.join(record.input_names)} to {record.output_name}",
-        ", ".join(f"{name} {value}" for name, value in found.settings.items() if name != "own_primitives")
-        + f", seed {found.seed}",
+        *_describe_settings(found),
         f"{search.evaluations} models estimated: {outcomes}",
         f"full polynomial set: {full['candidates']} candidates, a matrix of {full['bytes'] / 1e6:.0f} MB",
         "",
@@ -58,6 +61,20 @@ def summary(found: SearchResult) -> str:
         *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _describe_settings(found: SearchResult) -> list[str]:
+    settings = {name: value for name, value in found.settings.items() if name != "own_primitives"}
+    settings["seed"] = found.seed
+    text = ", ".join(f"{name} {_format_setting(name, value)}" for name, value in settings.items())
+    return fill(
+        text, _WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    ).splitlines()
+
+
+def _format_setting(name: str, value: object) -> str:
+    text = " ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)
+    return text or ("by validation" if name == "estimator" else "none")
 
 
 def describe(found: SearchResult) -> list[str]:
@@ -88,7 +105,7 @@ def describe(found: SearchResult) -> list[str]:
 def _describe_units(found: SearchResult) -> str:
     record = found.record
     columns = zip(
-        (record.output_name, *found.recommended.model.column_names),
+        signal_names(found.recommended.model),
         (record.output_unit, *record.input_units),
         strict=True,
     )
@@ -131,12 +148,13 @@ def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[s
     model, ensemble = entry.model, found.ensemble
     inclusion = [ensemble.inclusion(item) for item in model.regressors]
     doubtful = [
-        f"{named_term(model, position)} {share:.2f}"
+        # Rounded down: a term below the limit never shows the limit.
+        f"{named_term(model, position)} {floor(100 * share) / 100:.2f}"
         for position, share in enumerate(inclusion)
         if share < _CERTAIN
     ]
-    text = f"{100 * LEVEL:g} % of new samples of the same kind are within about "
-    text += f"{_unit(found, entry.bands.typical_half_width())} of the free run; "
+    text = f"the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
+    text += f"{_unit(found, entry.bands.typical_half_width())}; "
     terms = f"doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}"
     certain = f"every term has an inclusion probability of {_CERTAIN:g} or more"
     yield f"Uncertainty: {text}{terms if doubtful else certain}."
@@ -204,7 +222,7 @@ def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
         largest = max(found.models, key=lambda other: other.model.size).model.size
         if entry.model.size == largest and "max_terms" in found.settings:
             steps.append(f"allow more than {largest} terms")
-        steps.append(f"try {_suggest_terms(found, entry)}")
+        steps.append(f"try {_suggest_terms(entry)}")
     errors = [entry.assessment.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
     if errors[1] > _LARGE_RATIO * errors[0] > 0:
         steps.append("estimate from a record that covers the amplitudes and rates of the validation data")
@@ -218,11 +236,11 @@ def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
     return steps
 
 
-def _suggest_terms(found: SearchResult, entry: RankedModel) -> str:
+def _suggest_terms(entry: RankedModel) -> str:
     """Return the hint of the test with an input that exceeds its limit by most, or of the one without."""
     past, *tests = entry.assessment.residual_tests.tests
     # The residual of a slow record is correlated in time whatever term is missing.
     excess = [float(np.abs(test.values).max()) / test.limit for test in tests]
     worst = tests[int(np.argmax(excess))] if max(excess) > 1.0 else past
-    name = "" if worst.input is None else found.record.input_names[worst.input]
+    name = "" if worst.input is None else signal_names(entry.model)[1 + worst.input]
     return _HINTS[worst.name].format(input=name)

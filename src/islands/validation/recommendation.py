@@ -107,7 +107,7 @@ def _is_as_good(entry: Assessment, reference: Assessment) -> bool:
 
 def _describe_choice(chosen: int, best: int, count: int, assessments: Sequence[Assessment], unit: str) -> str:
     error, least = (f"{_rmse(assessments[at]):.4g} {unit}".rstrip() for at in (chosen, best))
-    if count == 1:
+    if chosen == best:
         return f"least free-run error on the validation data, RMSE {error}; no smaller model is as good"
     return (
         f"smallest of {count} models whose free-run errors on the validation data do not differ "
@@ -116,7 +116,8 @@ def _describe_choice(chosen: int, best: int, count: int, assessments: Sequence[A
 
 
 def _describe_physics(sound: bool, hysteresis: bool) -> str:
-    checks = "bounded in all holds and excursions" + (", and Property 1 holds" if hysteresis else "")
+    checks = "bounded at held inputs and at other amplitudes and rates"
+    checks += ", and Property 1 holds" if hysteresis else ""
     return checks if sound else f"no model passes the physics checks ({checks})"
 
 

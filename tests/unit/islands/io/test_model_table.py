@@ -51,8 +51,8 @@ def test_only_the_recommended_model_has_a_mark(findings):
 def test_columns_of_hysteresis_need_a_model_that_claims_it(findings):
     plain = islands.fit(record(300), library="polynomial", degree=1, max_terms=2).search_result
     assert not any(entry.assessment.physics.property_1 for entry in plain.models)
-    assert not {"hold drift %", "Property 1"} & set(columns(plain))
-    assert {"hold drift %", "Property 1"} <= set(columns(findings))
+    assert not {"drift %", "Property 1"} & set(columns(plain))
+    assert {"drift %", "Property 1"} <= set(columns(findings))
     free = replace(findings, settings={**findings.settings, "constraints": "none"})
     assert columns(free) == columns(findings)
     assert all(len(row) == len(columns(plain)) for row in rows(plain))
@@ -70,7 +70,7 @@ def test_the_table_distinguishes_divergence_from_an_undefined_number(findings):
     assert cells["MAPE est. %"] == f"{first.metrics['estimation']['free_run'].mape:.4f}"
     holds = (replace(first.physics.holds[0], bounded=False, drift_percent=inf), *first.physics.holds[1:])
     cells = first_cells(findings, physics=replace(first.physics, holds=holds))
-    assert (cells["hold drift %"], cells["Property 1"]) == ("diverged", "no")
+    assert (cells["drift %"], cells["Property 1"]) == ("diverged", "no")
 
 
 def test_a_number_is_shown_in_the_given_format():

@@ -114,5 +114,12 @@ def test_reasons_give_the_errors_in_the_unit_of_the_output():
     assert found.reasons[0].endswith(f"RMSE {least * sqrt(1.001):.4g} um, least {least:.4g} um")
 
 
+def test_the_best_model_is_not_compared_with_itself():
+    entries = [Candidate(3, NOISE).assessment(), Candidate(9, NOISE * 1.001).assessment()]
+    found = recommend([3, 9], entries, False)
+    assert found.rank == 1
+    assert found.reasons[0].startswith("least free-run error on the validation data")
+
+
 def test_a_single_block_has_no_standard_error():
     assert chosen(Candidate(3, NOISE[:1] * 1.03), Candidate(9, NOISE[:1])) == 9

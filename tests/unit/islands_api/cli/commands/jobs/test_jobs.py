@@ -33,7 +33,7 @@ def test_jobs_are_listed_newest_first(run: Run, service: Service, owner: str) ->
     code, out, _ = run("list")
     assert code == 0
     _, one, other = (line.split() for line in out.splitlines())
-    assert (one[:4], one[-1]) == ([second, "queued", "-/-", "-"], "two")
+    assert (one[:4], one[-1]) == ([second, "queued", "-", "-"], "two")
     assert (other[:4], other[-2:]) == ([first, "running", "3/-", "-"], ["[/b]", "one"])
     listed = [job["id"] for job in json.loads(run("list", "--json")[1])["items"]]
     assert listed == [second, first]
