@@ -11,8 +11,7 @@ from markupsafe import Markup
 from islands.evolution.search_result import SearchResult
 from islands.io.model_table import LEGEND, columns, number, rows
 from islands.io.summary_text import describe
-from islands.model.equations import mathml_equation
-from islands.model.rendering import plain
+from islands.model.equations import mathml_equation, named_term
 
 #: Environment of the HTML templates.
 TEMPLATES = Environment(
@@ -74,12 +73,14 @@ def _terms(found: SearchResult) -> list[tuple[str, str, str, str]]:
     errors = model.standard_errors or (nan,) * model.size
     return [
         (
-            plain(item.expression, model.inputs),
+            named_term(model, position),
             f"{theta:.6g}",
             number(error, "{:.2g}", bounded=True),
             "-" if found.ensemble is None else f"{found.ensemble.inclusion(item):.2f}",
         )
-        for item, theta, error in zip(model.regressors, model.parameters, errors, strict=True)
+        for position, (item, theta, error) in enumerate(
+            zip(model.regressors, model.parameters, errors, strict=True)
+        )
     ]
 
 

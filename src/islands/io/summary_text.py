@@ -6,10 +6,11 @@ from textwrap import fill
 
 import numpy as np
 
+from islands.estimation.constraints.constraint_checks import ConstraintCheck
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.certificates import summarise_certificates
 from islands.io.model_table import LEGEND, table
-from islands.model.equations import equation, named_equation, named_term, signal_names
+from islands.model.equations import equation, named_equation, named_statement, named_term, signal_names
 from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
 from islands.validation.prediction_bands import LEVEL
 
@@ -58,9 +59,18 @@ def summary(found: SearchResult) -> str:
         LEGEND,
         *summarise_certificates(found),
         "",
+        *_describe_signals(found),
         *(f"{rank:2d}  {equation(entry.model)}" for rank, entry in enumerate(found.models, start=1)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _describe_signals(found: SearchResult) -> Iterator[str]:
+    model = found.recommended.model
+    if model.inputs > 1:
+        output, *inputs = signal_names(model)
+        numbered = ", ".join(f"u{index} is {name}" for index, name in enumerate(inputs, start=1))
+        yield f"y is {output}, {numbered}:"
 
 
 def _describe_settings(found: SearchResult) -> list[str]:
@@ -91,6 +101,7 @@ def describe(found: SearchResult) -> list[str]:
         _describe_units(found),
         _describe_error(found, entry),
         *_describe_uncertainty(found, entry),
+        *_describe_constraints(entry),
     ]
     good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
     bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
@@ -160,6 +171,17 @@ def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[s
     yield f"Uncertainty: {text}{terms if doubtful else certain}."
 
 
+def _describe_constraints(entry: RankedModel) -> Iterator[str]:
+    met = [named_statement(check.text, entry.model) for check in _list_statements(entry) if check.met]
+    if met:
+        yield f"Constraints that the model meets: {'; '.join(met)}."
+
+
+def _list_statements(entry: RankedModel) -> list[ConstraintCheck]:
+    """Return the constraints of the user; the physics checks state whether Property 1 holds."""
+    return [check for check in entry.assessment.constraints if check.text != "hysteresis"]
+
+
 def _unit(found: SearchResult, value: float) -> str:
     return f"{value:.4g} {found.record.output_unit}".rstrip()
 
@@ -177,6 +199,10 @@ def _list_uses(entry: RankedModel) -> Iterator[str]:
 def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
     assessment = entry.assessment
     errors = {part: assessment.metrics[part]["free_run"] for part in ("estimation", "validation")}
+    for check in _list_statements(entry):
+        if not check.met:
+            value = f"{check.value:.6g}" if isfinite(check.value) else "undefined"
+            yield f"the constraint {named_statement(check.text, entry.model)} (value {value})"
     if errors["validation"].r2 < _GOOD_R2:
         yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
     physics = assessment.physics

@@ -7,6 +7,7 @@ from html import unescape
 from islands.data.channel_names import parse_channel_name
 from islands.model.expression import Apply, Constant, Expression, Lagged, Shift
 from islands.model.model import Model
+from islands.model.parsing import parse
 from islands.model.rendering import (
     MINUS,
     TIMES,
@@ -15,6 +16,7 @@ from islands.model.rendering import (
     mathml,
     mathml_factor,
     mathml_number,
+    plain,
     plain_factor,
 )
 
@@ -86,6 +88,23 @@ def signal_names(model: Model) -> tuple[str, ...]:
 def named_term(model: Model, position: int) -> str:
     """Write one regressor of a model with the column names of its record."""
     return _name_signals(plain_factor(_written(model)[position], model.inputs), model)
+
+
+def named_statement(text: str, model: Model) -> str:
+    """Write a statement about a model with the column names of its record.
+
+    ``[u2(k-1)] >= 0`` becomes ``[flow(k-1)] >= 0``, and ``gain(u2) = 2`` becomes ``gain(flow) = 2``. An input
+    that is read one sample early has its sample in the record, as in `equation`.
+    """
+
+    def name_term(term: re.Match[str]) -> str:
+        written = _delay(parse(term[1]), model.leads)
+        return f"[{_name_signals(plain(written, model.inputs), model)}]"
+
+    def name_gain(gain: re.Match[str]) -> str:
+        return f"gain({signal_names(model)[int(gain[1] or 1)]})"
+
+    return re.sub(r"gain\(u(\d*)\)", name_gain, re.sub(r"\[([^\[\]]+)\]", name_term, text))
 
 
 def _name_signals(text: str, model: Model) -> str:

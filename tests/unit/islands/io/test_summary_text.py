@@ -16,6 +16,7 @@ from islands.simulation.outcome import EvaluationOutcome, Status
 from islands.validation.ensemble import Ensemble
 from islands.validation.metrics import Metrics
 from islands.validation.predictable_residual import ResidualStructure
+from support.identifications import two_inputs
 from support.searches import record
 
 LOST = EvaluationOutcome(Status.DIVERGED, "at sample 17")
@@ -158,3 +159,23 @@ def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(f
 def test_nothing_is_said_about_bands_that_a_result_lacks(findings):
     lacking = replace(findings, models=(replace(findings.recommended, bands=None),))
     assert not [line for line in describe(lacking) if line.startswith("Uncertainty")]
+
+
+def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(findings):
+    data = two_inputs(seed=0)
+    named = Dataset(data.u, data.y, 0.01, ("heat_W", "valve"), "T_K", ("W", ""), "K")
+    statements = "[u2(k-1)] >= 0; gain(u2) = 0"
+    settings = {"library": "polynomial", "degree": 1, "lags": 1, "max_terms": 2, "certificate": 0}
+    found = islands.fit(named[:400], constraints=statements, average=1, **settings).search_result
+    lines = summary(found).splitlines()
+    assert "Constraints that the model meets: [valve(k-1)] >= 0; gain(valve) = 0." in lines
+    assert "y is T_K, u1 is heat_W, u2 is valve:" in lines
+    checks = [
+        replace(check, value=value, met=False)
+        for check, value in zip(found.recommended.assessment.constraints, (-0.5, nan), strict=True)
+    ]
+    failed = said(found, constraints=tuple(checks))
+    assert "Constraints that the model meets" not in failed
+    assert "the constraint [valve(k-1)] >= 0 (value -0.5)" in failed["Fails at"]
+    assert "the constraint gain(valve) = 0 (value undefined)" in failed["Fails at"]
+    assert "Constraints that the model meets" not in said(findings)  # Property 1 is a physics check

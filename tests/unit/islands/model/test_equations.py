@@ -11,6 +11,7 @@ from islands.model.equations import (
     latex_equation,
     mathml_equation,
     named_equation,
+    named_statement,
     named_term,
     signal_names,
 )
@@ -58,6 +59,18 @@ def test_an_input_that_is_read_early_is_written_at_its_own_sample():
     assert named_term(early, 1) == "u_V(k)*w(k-1)"
     assert r"u_{1,k} u_{2,k-1}" in latex_equation(early)
     assert "<mn>1</mn><mo>,</mo><mi>k</mi></mrow>" in mathml_equation(early)
+
+
+def test_statements_have_the_names_and_the_samples_of_the_record():
+    terms = [(parse("u1(k-1)*u2(k-1)"), 1.0)]
+    model = make_model(terms, ("flow (l/s)", "valve"), "T")
+    statement = "[u1(k-1)] - 2*[y(k-2)*u2(k-3)^2] = 1"
+    assert named_statement(statement, model) == "[flow(k-1)] - 2*[T(k-2)*valve(k-3)^2] = 1"
+    assert named_statement("gain(u2) = 2 at 1, 0, 3", model) == "gain(valve) = 2 at 1, 0, 3"
+    assert named_statement("gain(u) = 2", model) == "gain(flow) = 2"
+    assert named_statement("odd", model) == "odd"
+    early = make_model(terms, ("u_V+1", "w"), "y_um")
+    assert named_statement("[u1(k-1)*u2(k-1)] <= 0", early) == "[u_V(k)*w(k-1)] <= 0"
 
 
 def test_latex_of_the_papers_model_12_has_the_requested_digits():
