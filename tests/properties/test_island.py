@@ -15,7 +15,7 @@ import pytest
 from islands.evolution.archipelago import empty_archipelago
 from islands.evolution.engine import SerialEngine
 from islands.evolution.generation.evaluation import Evaluator
-from islands.evolution.gp.individual import Individual, make_regressor
+from islands.evolution.gp.individual import Individual, make_regressor, unique_niches
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.island import _breed_pair, first_generation, select_elite, step
@@ -249,11 +249,15 @@ def test_elite_is_the_best_of_previous_elite_and_offspring(distinct):
         union = (*before.elite, *island.population)
         if distinct:
             assert len({each.key for each in island.elite}) == len(island.elite)
-            best = sorted({each.key: each.fitness for each in union}.values())
+            worst = before.elite[-1].fitness if len(before.elite) == setting.elites else inf
+            contenders = sorted((each.fitness, each.niche) for each in union if each.fitness <= worst)
+            best = {niche: fitness for fitness, niche in reversed(contenders)}
+            assert [each.fitness for each in unique_niches(island.elite)] == sorted(best.values())[
+                : len(fitness)
+            ]
         else:
             assert len(island.elite) == 6
-            best = sorted(each.fitness for each in union)
-        assert fitness == best[: len(fitness)]
+            assert fitness == sorted(each.fitness for each in union)[: len(fitness)]
         assert len(island.population) == setting.population
 
 
@@ -265,7 +269,8 @@ def test_ties_for_the_elite_are_broken_by_size_and_then_by_text():
     large, late, early = each("y(k-1)", "u(k-1)"), each("y(k-3)"), each("y(k-2)")
     assert select_elite((large, late, early), 3, False) == (early, late, large)
     assert select_elite((large, late, early, early), 2, False) == (early, early)
-    assert select_elite((large, late, early, early), 2, True) == (early, late)
+    assert select_elite((large, late, early, early), 2, True) == (early, large)
+    assert select_elite((large, late, early, early), 3, True) == (early, late, large)
 
 
 def finite(fitness, text="y(k-1)"):

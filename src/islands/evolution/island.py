@@ -18,7 +18,7 @@ from islands.evolution.generation.variation import (
     repair_genes,
     with_required_genes,
 )
-from islands.evolution.gp.individual import Individual, Population, unique_structures
+from islands.evolution.gp.individual import Individual, Population, unique_niches, unique_structures
 from islands.evolution.gp.rng import Purpose, Stream
 from islands.evolution.hall_of_fame import HallOfFame, with_entries
 from islands.evolution.settings import Settings
@@ -246,8 +246,19 @@ def _thresholds_by_size(hall: HallOfFame, threshold: float, largest: int) -> lis
 
 
 def select_elite(contenders: Iterable[Individual], count: int, distinct: bool) -> Population:
-    """Return the fittest individuals; ties are broken by size, then by the text of the structure."""
-    ordered = sorted(contenders, key=lambda each: (each.fitness, each.size, each.key))
+    """Return the fittest individuals; ties are broken by size, then by the text of the structure.
+
+    If they have to be distinct, the fittest of every niche come first, and others only fill the elite.
+    """
+    ordered = sorted(contenders, key=_elite_order)
     if distinct:
-        ordered = list(unique_structures(ordered))
+        structures = unique_structures(ordered)
+        leading = unique_niches(structures)[:count]
+        keys = {each.key for each in leading}
+        others = [each for each in structures if each.key not in keys]
+        ordered = sorted((*leading, *others[: count - len(leading)]), key=_elite_order)
     return tuple(ordered[:count])
+
+
+def _elite_order(individual: Individual) -> tuple[float, int, tuple[str, ...]]:
+    return individual.fitness, individual.size, individual.key

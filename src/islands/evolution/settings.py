@@ -112,7 +112,8 @@ class Settings:
     from_library : float
         Probability that an outer mutation uses the library; no effect without a library.
     distinct : bool
-        Whether the elite contains each structure only once.
+        Whether the elite contains each structure only once, and of structures that differ only in their
+        lags the fittest one first.
     refine : bool
         Whether to refine the parameters of the hall of fame by minimising the shooting error.
     estimator : str

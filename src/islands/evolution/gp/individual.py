@@ -1,7 +1,9 @@
 """Individual: a vector of trees (genes), each the basis function of one term (equation (10))."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, isnan
 
 from islands.errors import ModelError
@@ -48,6 +50,11 @@ class Individual:
         """Structure of the model as text; equal keys mean equal structures."""
         return tuple(item.text for item in self.regressors)
 
+    @property
+    def niche(self) -> tuple[str, ...]:
+        """Terms of the model as text without lags: individuals of one niche differ only in their lags."""
+        return tuple(sorted(_erase_lags(item.text) for item in self.regressors))
+
 
 Population = tuple[Individual, ...]
 
@@ -58,6 +65,19 @@ def unique_structures(individuals: Iterable[Individual]) -> Population:
     for each in individuals:
         first.setdefault(each.key, each)
     return tuple(first.values())
+
+
+def unique_niches(individuals: Iterable[Individual]) -> Population:
+    """Return the first individual of every niche."""
+    first: dict[tuple[str, ...], Individual] = {}
+    for each in individuals:
+        first.setdefault(each.niche, each)
+    return tuple(first.values())
+
+
+@lru_cache(1 << 14)
+def _erase_lags(text: str) -> str:
+    return re.sub(r"\(k-\d+\)", "(k)", text)
 
 
 def make_regressor(gene: Expression) -> Regressor | None:
