@@ -167,17 +167,17 @@ def _breed_pair(
         if not rng.chance(settings.mutation):
             children.append(with_required_genes(genes, settings))
             continue
-        mutate = (
-            partial(outer_mutation, genes, settings, inputs, rng, pool)
-            if rng.chance(settings.outer)
-            else partial(inner_mutation, genes, settings, inputs, rng)
-        )
-        children += _breed_new(partial(_as_family, mutate), [genes], evaluator, settings)
+        mutate = partial(_mutate, genes, settings, inputs, rng, pool, rng.chance(settings.outer))
+        children += _breed_new(mutate, [genes], evaluator, settings)
     return children
 
 
-def _as_family(mutate: Callable[[], Genes]) -> tuple[Genes]:
-    return (mutate(),)
+def _mutate(
+    genes: Genes, settings: Settings, inputs: int, rng: Stream, pool: Sequence[Expression], outer: bool
+) -> tuple[Genes]:
+    if outer:
+        return (outer_mutation(genes, settings, inputs, rng, pool),)
+    return (inner_mutation(genes, settings, inputs, rng),)
 
 
 def _breed_new(

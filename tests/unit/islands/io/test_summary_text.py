@@ -179,3 +179,9 @@ def test_constraints_of_the_user_are_stated_with_the_names_of_the_record(finding
     assert "the constraint [valve(k-1)] >= 0 (value -0.5)" in failed["Fails at"]
     assert "the constraint gain(valve) = 0 (value undefined)" in failed["Fails at"]
     assert "Constraints that the model meets" not in said(findings)  # Property 1 is a physics check
+
+
+def test_an_empty_estimator_is_named_in_the_settings(findings):
+    chosen = replace(findings, settings=dict(findings.settings) | {"estimator": "", "own_primitives": {}})
+    assert "estimator by validation," in " ".join(summary(chosen).split())
+    assert "own_primitives" not in summary(chosen)

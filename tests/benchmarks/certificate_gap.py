@@ -3,7 +3,7 @@
 The gap is the fraction by which another model could reduce the one-step-ahead error of the best model that
 the search meets; 0 is a proof.
 
-    python benchmarks/certificate_gap.py
+    python tests/benchmarks/certificate_gap.py
 """
 
 from time import perf_counter
