@@ -3,6 +3,7 @@
 In canonical form, back-shifts are merged into the leaves, products and sums are flat and in canonical order,
 numeric factors are extracted (the factor of a regressor belongs to its parameter), and equal terms of a sum
 are merged. ``sign^3`` becomes ``sign``, but ``sign^2`` never becomes 1: it is 0 while the input is constant.
+``x*sign(x)^2`` becomes ``x``, which it equals exactly.
 """
 
 import math
@@ -20,10 +21,12 @@ from islands.model.expression import (
     lags,
     remove_shifts,
 )
-from islands.model.primitives import ADD, MUL, SIGN, SUB
+from islands.model.primitives import ADD, MUL, PRIMITIVES, SIGN, SUB
 from islands.model.rendering import plain
 
 _ONE = Constant(1.0)
+
+_ABS = PRIMITIVES["abs"]
 
 #: A sum of weights whose ratio to the sum of their absolute values is not larger counts as zero.
 _ROUNDING = 1e-14
@@ -128,11 +131,19 @@ def _product(parts: list[tuple[float, Expression]]) -> tuple[float, Expression]:
 
 
 def _reduce_sign_powers(cores: list[Expression]) -> list[Expression]:
-    """Reduce odd powers of a sign to the first, even powers to the second (which is 0 at rest, not 1)."""
+    """Reduce odd powers of a sign to the first, even powers to the second (which is 0 at rest, not 1).
+
+    An even power in a product with its argument or the absolute value of it is left out: all are 0
+    at the same time.
+    """
     signs = [core for core in cores if isinstance(core, Apply) and core.primitive == SIGN]
-    kept = [core for core in cores if core not in signs]
+    others = [core for core in cores if core not in signs]
+    kept = list(others)
     for sign in dict.fromkeys(signs):
-        kept += [sign] if signs.count(sign) % 2 else [sign, sign]
+        if signs.count(sign) % 2:
+            kept.append(sign)
+        elif not {*sign.arguments, Apply(_ABS, sign.arguments)}.intersection(others):
+            kept += [sign, sign]
     return kept
 
 
