@@ -1,6 +1,6 @@
 """Recommended model of 24 simulated laws with known terms, and an ablation of the rule that recommends it.
 
-    PYTHONPATH=tests python tests/benchmarks/laws.py [--seeds 0 1] [--samples 2000] [--laws tank friction]
+    python tests/benchmarks/laws.py [--seeds 0 1] [--samples 2000] [--laws tank friction]
 
 Every law is simulated without noise and with noise of 0.3 and 1 % of the standard deviation of its output,
 identified with a small search, and tested on another record with the same noise. Other rules choose among the
@@ -8,12 +8,16 @@ same models. Results are printed, not asserted.
 """
 
 import argparse
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, log, sqrt
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import islands
 from islands.data.dataset import Dataset

@@ -1,5 +1,7 @@
 """Layout of a record's shooting intervals in memory, in the kernel's order [block][time][lane]."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,8 @@ from islands.kernels.simulate import WIDTHS, Layout
 _OVERHEAD_LANES = 24
 
 
+# The layouts of recent calls are kept: a search simulates many models on few records, which never change.
+@lru_cache(maxsize=8)
 def layout(record: Dataset, warm_up: int, interval: int | None = None) -> Layout:
     """Lay out a record for a simulation.
 
