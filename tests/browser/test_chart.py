@@ -50,6 +50,14 @@ def heights(chart: Any, name: str) -> list[float]:
     return [float(point.split()[1]) for point in path.replace("M", "L").split("L")[1:]]
 
 
+def test_long_tick_labels_do_not_cover_the_title_of_the_axis(page: Any) -> None:
+    chart = draw(page, [{"name": "a", "points": [[0, 1.02345e-4], [1, 1.02346e-4]]}])
+    assert max(map(len, chart.locator("text.tick.end").all_text_contents())) > 8
+    title = chart.get_by_text("RMS error").bounding_box()
+    for tick in chart.locator("text.tick.end").all():
+        assert tick.bounding_box()["x"] > title["x"] + title["width"]
+
+
 def test_equal_ratios_are_equal_distances_on_a_logarithmic_axis(page: Any) -> None:
     points = [[at, 10.0**-at] for at in range(5)]
     drawn = heights(draw(page, [{"name": "a", "points": points}], **LOG), "a")

@@ -79,6 +79,40 @@ def test_a_finished_job_shows_its_models_with_their_metrics(
 
 
 @pytest.mark.ci
+def test_the_panel_begins_with_the_sentences_and_the_report(
+    opened: Callable[..., Any], service: Service, finished: str, expect: Any
+) -> None:
+    page = opened(f"#/jobs/{finished}")
+    words = service.ask("GET", f"/v1/jobs/{finished}").json()["summary"]["words"].splitlines()
+    expect(page.locator(".sentences > p, .sentences > code")).to_have_text([line.strip() for line in words])
+    expect(page.locator(".sentences code")).to_have_text([words[1].strip()])
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save the report").click()
+    assert words[0] in saved.value.path().read_text()
+
+
+@pytest.mark.ci
+def test_a_diverged_error_is_one_word_with_the_reason_as_title(
+    opened: Callable[..., Any], finished: str, expect: Any
+) -> None:
+    reason = "diverged: |y| left 3.45e+08 at sample 486; take fewer terms"
+
+    def diverge(route: Any) -> None:
+        answer = route.fetch()
+        document = answer.json()
+        document["items"][-1]["metrics"]["estimation"]["free_run"]["mape"] = None
+        document["items"][-1]["outcomes"]["estimation"]["free_run"] = reason
+        route.fulfill(response=answer, json=document)
+
+    page = opened("#/jobs")
+    page.route("**/models", diverge)
+    page.goto(f"{page.url.partition('#')[0]}#/jobs/{finished}")
+    cell = page.locator("table.models tbody tr").last.locator("td span.no").first
+    expect(cell).to_have_text("diverged")
+    expect(cell).to_have_attribute("title", reason)
+
+
+@pytest.mark.ci
 def test_the_equation_is_mathml_that_matches_the_model(
     opened: Callable[..., Any], service: Service, finished: str, expect: Any
 ) -> None:
@@ -111,7 +145,7 @@ def test_figures_are_loaded_when_they_scroll_into_view(
     expect(page.get_by_text("Drawing…").first).to_be_visible()
     page.locator(".rendered").last.scroll_into_view_if_needed()
     expect(page.locator(".gallery img")).to_have_count(4, timeout=60_000)
-    for name in ("Free run", "Hysteresis loop", "Held input", "Residual correlations"):
+    for name in ("Free run", "Output over input", "Held input", "Residual correlations"):
         picture = page.get_by_role("img", name=f"{name}, drawn by the service")
         expect(picture).to_be_visible()
         eventually(lambda shown=picture: shown.evaluate("img => img.complete && img.naturalWidth > 300"))
@@ -152,8 +186,8 @@ def test_every_export_format_has_a_button(opened: Callable[..., Any], finished: 
     from islands.io.export import EXPORTS
 
     page = opened(f"#/jobs/{finished}")
-    expect(page.locator(".exports button")).not_to_have_count(0)
-    shown = page.locator(".exports button").evaluate_all("all => all.map((one) => one.dataset.format)")
+    expect(page.locator(".model .exports button")).not_to_have_count(0)
+    shown = page.locator(".model .exports button").evaluate_all("all => all.map((one) => one.dataset.format)")
     assert set(shown) == set(EXPORTS)
 
 

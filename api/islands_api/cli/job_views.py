@@ -39,7 +39,8 @@ def show_job(job: JobView, as_json: bool) -> None:
     if job.kind == DISCREPANCY:
         show_diagnosis(job)
     elif job.summary is not None:
-        output.print(job.summary["equation"], markup=False)
+        # Results of earlier versions have no sentences.
+        output.print(job.summary.get("words", job.summary["equation"]), markup=False, soft_wrap=True)
     if job.problem is not None:
         output.print(job.problem["detail"], markup=False)
 

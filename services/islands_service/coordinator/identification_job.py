@@ -23,6 +23,7 @@ from islands.io.checkpoints import (
 )
 from islands.io.models import model_json
 from islands.io.result_folder import result_document
+from islands.io.summary_text import describe
 from islands.model.equations import equation
 from islands_service.domain.job import Job, JobOutcome, JobState, Lease, ProgressReport
 from islands_service.domain.job_spec import parse_identification
@@ -94,6 +95,7 @@ def make_outcome(found: SearchResult) -> JobOutcome:
         "models": len(models),
         "rank": recommended["rank"],
         "reasons": recommended["reasons"],
+        "words": "\n".join(describe(found)),
         "equation": equation(found.recommended.model),
         "size": best["size"],
         "metrics": best["metrics"]["validation"]["free_run"],

@@ -8,7 +8,10 @@ import { el, setText, svg } from "../lib/dom.js";
 import { formatNumber, formatShort } from "../lib/numbers.js";
 import { makeScale } from "../lib/scale.js";
 
-const MARGIN = { left: 58, right: 12, top: 10, bottom: 36 };
+const MARGIN = { right: 12, top: 10, bottom: 36 };
+
+/** Smallest left margin, and widths of its space without tick labels and of a character. */
+const LEFT = { least: 58, space: 31, character: 6.8 };
 const HEIGHT = 250;
 
 /** Number of line colours in job.css; further series are dashed. */
@@ -90,24 +93,25 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
   function updateScales(width) {
     const points = series.flatMap((each) => each.points);
     const values = points.map((point) => point[1]).filter((value) => value !== null);
-    scales = {
-      x: makeScale(points.map((point) => point[0]), [MARGIN.left, width - MARGIN.right], {
-        log: xAxis.log,
-        integer: xAxis.integer,
-        maxTicks: width < 480 ? 5 : 8,
-        padding: marks ? 0.06 : 0,
-      }),
-      y: makeScale(values, [HEIGHT - MARGIN.bottom, MARGIN.top], { log: yAxis.log, padding: 0.05 }),
-    };
+    const y = makeScale(values, [HEIGHT - MARGIN.bottom, MARGIN.top], { log: yAxis.log, padding: 0.05 });
+    const longest = Math.max(0, ...y.ticks.map((value) => formatShort(value).length));
+    const left = Math.max(LEFT.least, LEFT.space + LEFT.character * longest);
+    const x = makeScale(points.map((point) => point[0]), [left, width - MARGIN.right], {
+      log: xAxis.log,
+      integer: xAxis.integer,
+      maxTicks: width < 480 ? 5 : 8,
+      padding: marks ? 0.06 : 0,
+    });
+    scales = { x, y, left };
   }
 
   function makeAxes(width) {
-    const [bottom, right] = [HEIGHT - MARGIN.bottom, width - MARGIN.right];
+    const [bottom, right, { left }] = [HEIGHT - MARGIN.bottom, width - MARGIN.right, scales];
     const grid = scales.y.ticks.flatMap((value) => {
       const at = scales.y.at(value);
       return [
-        svg("line", { class: "grid", x1: MARGIN.left, x2: right, y1: at, y2: at }),
-        svg("text", { class: "tick end", x: MARGIN.left - 7, y: at + 4 }, formatShort(value)),
+        svg("line", { class: "grid", x1: left, x2: right, y1: at, y2: at }),
+        svg("text", { class: "tick end", x: left - 7, y: at + 4 }, formatShort(value)),
       ];
     });
     const xTicks = scales.x.ticks.flatMap((value) => {
@@ -117,13 +121,13 @@ export function makeLineChart({ title, x: xAxis, y: yAxis, marks = false }) {
         svg("text", { class: "tick middle", x: at, y: bottom + 17 }, formatShort(value)),
       ];
     });
-    const xLine = svg("line", { class: "axis", x1: MARGIN.left, x2: right, y1: bottom, y2: bottom });
+    const xLine = svg("line", { class: "axis", x1: left, x2: right, y1: bottom, y2: bottom });
     const rotation = `rotate(-90 12 ${(bottom + MARGIN.top) / 2})`;
     return [
       ...grid,
       ...xTicks,
       xLine,
-      svg("text", { class: "tick middle", x: (MARGIN.left + right) / 2, y: HEIGHT - 3 }, xAxis.label),
+      svg("text", { class: "tick middle", x: (left + right) / 2, y: HEIGHT - 3 }, xAxis.label),
       svg(
         "text",
         { class: "tick middle", x: 12, y: (bottom + MARGIN.top) / 2, transform: rotation },

@@ -1,8 +1,7 @@
 /** Result of a discrepancy job: the verdict in words, the report, and the extended simulation. */
 
-import { download, key } from "../lib/api.js";
-import { el, runOnceAtATime } from "../lib/dom.js";
-import { showProblem } from "./banner.js";
+import { el } from "../lib/dom.js";
+import { makeReportButtons, makeSaveButton } from "./report.js";
 
 /** Return whether a job is a discrepancy diagnosis. */
 export const isDiagnosis = (job) => job.kind === "discrepancy";
@@ -13,13 +12,8 @@ export const formatVerdict = ({ verdict: word, effects }) =>
 
 /** Make the panel of the result. */
 export function makeFindingsPanel(job) {
-  const path = `v1/jobs/${encodeURIComponent(job.id)}`;
-  const save = (resource, name) =>
-    runOnceAtATime(() => download(`${path}/${resource}`, name).catch(showProblem));
-  const button = (text, resource, name) =>
-    el("button", { type: "button", "data-resource": resource, on: { click: save(resource, name) } }, text);
   const { summary } = job;
-  const reportLink = { class: "button", href: `${path}/report`, target: "_blank" };
+  const file = `extended-${job.id.slice(0, 8)}.json`;
   const [first, ...lines] = summary.words.split("\n");
   return el(
     "section",
@@ -30,12 +24,10 @@ export function makeFindingsPanel(job) {
     el(
       "div",
       { class: "row exports" },
-      // A link cannot send the key.
-      key.get() ? null : el("a", reportLink, "Read the report"),
-      button("Save the report", "report", `report-${job.id.slice(0, 8)}.html`),
+      makeReportButtons(job),
       summary.reduction_percent === null
         ? null
-        : button("Save the extended simulation", "extended", `extended-${job.id.slice(0, 8)}.json`),
+        : makeSaveButton(job, "Save the extended simulation", "extended", file),
     ),
   );
 }

@@ -5,7 +5,7 @@ import { el } from "../lib/dom.js";
 
 const TITLES = {
   "free-run": "Free run",
-  loop: "Hysteresis loop",
+  loop: "Output over input",
   hold: "Held input",
   residuals: "Residual correlations",
   record: "Record",

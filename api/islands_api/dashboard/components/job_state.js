@@ -27,7 +27,7 @@ export function makeBadge() {
   };
 }
 
-/** Return whether a search runs a stage before or after its epochs, such as the estimation of the final models. */
+/** Return whether a search runs a stage before or after its epochs, such as the final estimation. */
 function isBetweenEpochs(job) {
   const { phase = "search" } = job.progress ?? {};
   return job.state === "running" && phase !== "search";

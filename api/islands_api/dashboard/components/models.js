@@ -7,6 +7,7 @@ import { poll } from "../lib/polling.js";
 import { showProblem } from "./banner.js";
 import { loadEquation } from "./equation.js";
 import { makeFigure } from "./figures.js";
+import { makeReportButtons } from "./report.js";
 
 /** Display names of the export formats. */
 const EXPORTS = {
@@ -30,11 +31,12 @@ function makeExactValue(value, format) {
 const formatR2 = (value) =>
   Math.abs(value) < 100 ? value.toFixed(5).replace("-", "−") : formatNumber(value);
 
-/** Make a metric of the free run, or the outcome (for example "diverged") if there is no value. */
+/** Make a metric of the free run, or the kind of the outcome ("diverged") if there is no value. */
 function makeMetric(model, part, name, format) {
   const value = model.metrics[part].free_run[name];
   const outcome = model.outcomes[part].free_run;
-  if (value === null && outcome !== "ok") return el("span", { class: "no" }, outcome);
+  if (value === null && outcome !== "ok")
+    return el("span", { class: "no", title: outcome }, outcome.split(":", 1)[0]);
   return makeExactValue(value, format);
 }
 
@@ -80,9 +82,11 @@ function makeRow(job, model, hysteresis) {
   ];
 }
 
+/** Return whether models are of hysteresis: only these have Property 1; the drift of others is no defect. */
+const claimHysteresis = (models) => models.some((model) => model.physics.property_1);
+
 function makeModelTable(job, models) {
-  // Only models of hysteresis have Property 1; the drift of others is no defect.
-  const hysteresis = models.some((model) => model.physics.property_1);
+  const hysteresis = claimHysteresis(models);
   const names = HEADINGS.toSpliced(-1, 0, ...(hysteresis ? HYSTERESIS_HEADINGS : []));
   const headings = names.map((name, at) => [name, at === 0 ? null : "figure"]);
   const rows = models.map((model) => makeRow(job, model, hysteresis));
@@ -96,7 +100,8 @@ function makeTermTable(model) {
     "Terms of the model",
     ["Regressor", ["Parameter", "figure"], ["Standard error", "figure"], ["Inclusion", "figure"]],
     model.terms.map((term) => [
-      el("code", {}, term.regressor),
+      // Lines break between factors only.
+      el("code", {}, term.regressor.split(/(?<=\*)/).map((factor) => el("span", {}, factor))),
       makeExactValue(term.parameter, (value) => formatNumber(value, 6)),
       makeExactValue(term.standard_error, formatNumber),
       makeExactValue(term.inclusion ?? null, formatNumber),
@@ -130,17 +135,20 @@ const listPredictable = ({ predictable_share: shares, predictable_percent: perce
     ? [
       ["Predictable residual, one step ahead", formatShare(shares.one_step_ahead)],
       ["Predictable residual, free run", formatShare(shares.free_run)],
-      ["Its RMS in the output range", formatShare(percent === null ? null : percent / 100)],
+      [
+        "RMS of the predictable part",
+        percent === null ? "diverged" : `${formatPercent(percent)} of the range`,
+      ],
     ]
     : [];
 
 const listClusterSum = ({ cluster, sum: value, target }) => [
   `Sum of cluster ${cluster}`,
-  `${formatShort(value)}${formatTarget(target)}`,
+  `${formatNumber(value, 6)}${formatTarget(target)}`,
 ];
 
 const listExcursion = ({ name, bounded, range_percent: range }) => [
-  `Range, ${name}`,
+  `Output range, ${name}`,
   bounded ? formatPercent(range) : el("span", { class: "no" }, "diverges"),
 ];
 
@@ -173,7 +181,7 @@ function makeGallery(path, signal, skip = () => false) {
   return host;
 }
 
-function makeDetail(job, model, signal) {
+function makeDetail(job, model, hysteresis, signal) {
   const path = `v1/jobs/${encodeURIComponent(job)}/models/${model.rank}`;
   const { physics, information } = model;
   return [
@@ -198,7 +206,7 @@ function makeDetail(job, model, signal) {
     ),
     makeFacts([
       ...listPredictable(model.residual_tests),
-      ...physics.clusters.map(listClusterSum),
+      ...(hysteresis ? physics.clusters.map(listClusterSum) : []),
       ...physics.excursions.map(listExcursion),
       ["AIC", formatNumber(information.aic, 6)],
       ["BIC", formatNumber(information.bic, 6)],
@@ -218,6 +226,17 @@ function makeSearchFigures(job, islands, signal) {
   return node;
 }
 
+/** Make the sentences about the recommended model; results of earlier versions have none. */
+function makeSentences(job) {
+  const lines = job.summary?.words?.split("\n") ?? [];
+  return el(
+    "div",
+    { class: "sentences" },
+    lines.map((line) => el(line.includes("(k) = ") ? "code" : "p", {}, line.trim())),
+    el("div", { class: "row exports" }, makeReportButtons(job)),
+  );
+}
+
 /** Make the panel of the models; `select(rank)` shows a model, the recommended one for null. */
 export function makeModelsPanel(job, rank, signal) {
   const body = el("div", {}, el("p", { class: "loading" }, "Loading…"));
@@ -232,7 +251,8 @@ export function makeModelsPanel(job, rank, signal) {
     controller.abort();
     controller = new AbortController();
     article.dataset.rank = model.rank;
-    article.replaceChildren(...makeDetail(job.id, model, AbortSignal.any([signal, controller.signal])));
+    const shown = AbortSignal.any([signal, controller.signal]);
+    article.replaceChildren(...makeDetail(job.id, model, claimHysteresis(models), shown));
     for (const link of body.querySelectorAll("table.models a")) {
       const current = link.textContent === String(model.rank);
       link.closest("tr").classList.toggle("current", current);
@@ -249,13 +269,10 @@ export function makeModelsPanel(job, rank, signal) {
       "Errors are those of the free run. The models are ranked by the validation data, so these errors are "
         + "not an independent test.",
     );
-    const { reasons = [], rank: recommended } = job.summary ?? {};
-    const why = reasons.length
-      ? el("p", {}, `Model ${recommended} is recommended: ${reasons.join("; ")}.`)
-      : "";
     const overview = makeScrollable("Models", makeModelTable(job.id, models));
     const islands = job.progress?.islands?.length ?? 0;
-    body.replaceChildren(why, overview, note, article, makeSearchFigures(job.id, islands, signal));
+    const figures = makeSearchFigures(job.id, islands, signal);
+    body.replaceChildren(makeSentences(job), overview, note, article, figures);
     select(rank);
     return Infinity;
   }, signal);

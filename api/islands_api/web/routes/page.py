@@ -33,6 +33,7 @@ FILES = {
     "components/figures.js": _SCRIPT,
     "components/job_state.js": _SCRIPT,
     "components/models.js": _SCRIPT,
+    "components/report.js": _SCRIPT,
     "lib/api.js": _SCRIPT,
     "lib/clock.js": _SCRIPT,
     "lib/dom.js": _SCRIPT,
