@@ -1,6 +1,5 @@
 """`explain_residual`: search for a formula of the part of a residual that no effect explains."""
 
-import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -12,7 +11,7 @@ from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.evolution.engine import Engine
 from islands.facade.identify import identify
-from islands.model.equations import equation
+from islands.model.equations import named_equation
 from islands.simulation.predictors import free_run
 
 #: Settings of the search: few terms, so that the formula is readable.
@@ -35,6 +34,9 @@ MIN_EXPLAINED_FRACTION = 0.1
 #: Increase of that fraction for which a model replaces one with a smaller validation error.
 MIN_IMPROVEMENT = 0.02
 
+#: RMS of a residual that is rounding error, as a fraction of the output range.
+ROUNDING = 1e-9
+
 #: Name of the residual in a formula.
 RESIDUAL = "residual"
 
@@ -50,12 +52,15 @@ def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = No
     Returns
     -------
     ResidualFormula or None
-        None if the verdict leaves no unexplained residual, or if no formula explains enough of it.
+        None if the verdict leaves no unexplained residual, if it is rounding error, or if no formula
+        explains enough of it.
     """
     if found.verdict not in (Verdict.UNKNOWN, Verdict.REMAINDER):
         return None
     record = found.record
     residual = record.y - found.best.output
+    if np.sqrt(np.mean(residual**2)) <= ROUNDING * record.output_range:
+        return None
     dataset = Dataset(
         u=np.column_stack([record.u[:, 0], found.best.output]),
         y=residual,
@@ -79,7 +84,4 @@ def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = No
             best, explained = each.model, fraction
     if best is None:
         return None
-    names = {"u1": record.input_names[0], "u2": SIMULATED, "y": RESIDUAL}
-    return ResidualFormula(
-        re.sub(r"\b(u1|u2|y)(?=\()", lambda name: names[name[1]], equation(best)), explained
-    )
+    return ResidualFormula(named_equation(best), explained)
