@@ -153,7 +153,7 @@ def _evaluate_test(result: islands.Result, test_data: islands.Dataset, folder: P
     text = f"test data, not used before: free run {simulated.outcome}"
     if errors_by_name:
         mape, r2, rmse = (errors_by_name[name] for name in ("mape", "r2", "rmse"))
-        text += f", MAPE {mape:.4f} %, R2 {r2:.5f}, RMSE {rmse:.6g}"
+        text += f", MAPE {mape:.4f} %, R2 {r2:.5f}, RMSE {rmse:.6g} {test_data.output_unit}".rstrip()
     output.print(text, markup=False)
 
 

@@ -221,8 +221,8 @@ def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
     structure = assessment.residual_structure
     if structure.verdict != ADEQUATE and isfinite(structure.percent):
         yield (
-            f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable, "
-            f"{structure.percent:.2g} % of the output range"
+            f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable "
+            f"(RMS {structure.percent:.2g} % of the output range)"
         )
     ratio = errors["validation"].rmse / errors["estimation"].rmse if errors["estimation"].rmse > 0 else 0.0
     if ratio > _LARGE_RATIO:
@@ -254,9 +254,10 @@ def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
         steps.append("estimate from a record that covers the amplitudes and rates of the validation data")
     weak = _list_insignificant(entry)
     if weak:
-        more = f" and {len(weak) - 1} more" if len(weak) > 1 else ""
+        more = f" (and of {len(weak) - 1} more)" if len(weak) > 1 else ""
         steps.append(
-            f"try a longer record or a smaller model, since {weak[0]}{more} has less than two standard errors"
+            f"try a longer record or a smaller model, since the parameter of {weak[0]}{more} is within "
+            "two standard errors of zero"
         )
     steps.append("check the model on a record that was not used (islands simulate)")
     return steps

@@ -120,7 +120,7 @@ def test_structure_in_the_residual_is_a_failure_with_a_hint(findings):
     changed = replace(tests, tests=(*tests.tests[:3], replace(worst, values=values), tests.tests[4]))
     structure = ResidualStructure(0.4, 0.5, 0.7, "minor")
     found = said(findings, residual_tests=changed, residual_structure=structure)
-    assert "50 % of the free-run residual is predictable, 0.7 % of the output range" in found["Fails at"]
+    assert "50 % of the free-run residual is predictable (RMS 0.7 % of the output range)" in found["Fails at"]
     assert "even terms in u_V" in found["Next"]
     assert "no structure" not in found["Good for"]
     clean = ResidualStructure(0.02, 0.5, 0.7, "adequate")
@@ -137,7 +137,7 @@ def test_a_parameter_below_two_standard_errors_is_named(findings):
     assert "standard errors" not in certain
     model = entry.model.with_parameters(theta, [abs(theta[0]), *(abs(value) / 3 for value in theta[1:])])
     weak = describe(replace(findings, models=(replace(entry, model=model),)))[-1]
-    assert "y_um(k-1) has less than two standard errors" in weak
+    assert "the parameter of y_um(k-1) is within two standard errors of zero" in weak
 
 
 def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(findings):
