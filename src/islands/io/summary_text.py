@@ -11,7 +11,7 @@ from islands.evolution.search_result import RankedModel, SearchResult
 from islands.io.certificates import summarise_certificates
 from islands.io.model_table import LEGEND, table
 from islands.model.equations import equation, named_equation, named_statement, named_term, signal_names
-from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE
+from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, ResidualStructure
 from islands.validation.prediction_bands import LEVEL
 
 #: Width of the lines of settings in characters.
@@ -28,6 +28,9 @@ _SIGNIFICANT = 2.0
 
 #: Inclusion probability from which a term is certain.
 _CERTAIN = 0.9
+
+#: Inclusion probability below which most of the weight is on models without the term.
+_UNLIKELY = 0.5
 
 #: Closure of a loop, in per cent of the output range, above which the loop is open.
 _OPEN_PERCENT = 5.0
@@ -156,19 +159,25 @@ def _describe_error(found: SearchResult, entry: RankedModel) -> str:
 def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[str]:
     if entry.bands is None or found.ensemble is None:
         return
-    model, ensemble = entry.model, found.ensemble
-    inclusion = [ensemble.inclusion(item) for item in model.regressors]
-    doubtful = [
-        # Rounded down: a term below the limit never shows the limit.
-        f"{named_term(model, position)} {floor(100 * share) / 100:.2f}"
-        for position, share in enumerate(inclusion)
-        if share < _CERTAIN
-    ]
+    # Rounded down: a term below the limit never shows the limit.
+    doubtful = [f"{term} {floor(100 * share) / 100:.2f}" for term, share in _list_doubtful(found, entry)]
     text = f"the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
     text += f"{_unit(found, entry.bands.typical_half_width())}; "
     terms = f"doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}"
     certain = f"every term has an inclusion probability of {_CERTAIN:g} or more"
     yield f"Uncertainty: {text}{terms if doubtful else certain}."
+
+
+def _list_doubtful(found: SearchResult, entry: RankedModel) -> list[tuple[str, float]]:
+    """Return the terms that are not certain, each with the probability of its inclusion."""
+    if found.ensemble is None:
+        return []
+    inclusion = [found.ensemble.inclusion(item) for item in entry.model.regressors]
+    return [
+        (named_term(entry.model, position), share)
+        for position, share in enumerate(inclusion)
+        if share < _CERTAIN
+    ]
 
 
 def _describe_constraints(entry: RankedModel) -> Iterator[str]:
@@ -193,7 +202,19 @@ def _list_uses(entry: RankedModel) -> Iterator[str]:
     elif one.r2 >= _GOOD_R2:
         yield "prediction one step ahead"
     if entry.assessment.residual_structure.verdict == ADEQUATE:
-        yield f"no structure is left in the residual (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
+        yield _describe_adequate_residual(entry.assessment.residual_structure)
+
+
+def _describe_adequate_residual(structure: ResidualStructure) -> str:
+    shares = {
+        "free-run residual, as with noise of the measurement": structure.free_run_share,
+        "one-step-ahead residual, as with noise within the system": structure.one_step_share,
+    }
+    white = [name for name, share in shares.items() if share <= LARGEST_SHARE]
+    if not white:
+        return "the residual is a rounding error"
+    name = "residual" if len(white) == len(shares) else white[0]
+    return f"no structure is left in the {name} (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
 
 
 def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
@@ -258,6 +279,12 @@ def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
         steps.append(
             f"try a longer record or a smaller model, since the parameter of {weak[0]}{more} is within "
             "two standard errors of zero"
+        )
+    unlikely = min(_list_doubtful(found, entry), key=lambda each: each[1], default=("", 1.0))
+    if unlikely[1] < _UNLIKELY and not weak:
+        steps.append(
+            f"try a longer record, since models without {unlikely[0]} are about as good (probability of its "
+            f"inclusion {unlikely[1]:.2f})"
         )
     steps.append("check the model on a record that was not used (islands simulate)")
     return steps

@@ -123,9 +123,20 @@ def test_structure_in_the_residual_is_a_failure_with_a_hint(findings):
     assert "50 % of the free-run residual is predictable (RMS 0.7 % of the output range)" in found["Fails at"]
     assert "even terms in u_V" in found["Next"]
     assert "no structure" not in found["Good for"]
-    clean = ResidualStructure(0.02, 0.5, 0.7, "adequate")
-    found = said(findings, residual_structure=clean)
-    assert "no structure is left in the residual" in found["Good for"]
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        ((0.02, 0.5), "no structure is left in the one-step-ahead residual, as with noise within"),
+        ((0.5, 0.02), "no structure is left in the free-run residual, as with noise of the measurement"),
+        ((0.02, 0.02), "no structure is left in the residual (at most 10 % is predictable)"),
+        ((0.5, 0.5), "the residual is a rounding error"),
+    ],
+)
+def test_the_unpredictable_residual_is_named(findings, shares, expected):
+    found = said(findings, residual_structure=ResidualStructure(*shares, 0.7, "adequate"))
+    assert expected in found["Good for"]
     assert "terms in" not in found["Next"]
 
 
@@ -146,7 +157,9 @@ def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(f
     sentence = said(findings)["Uncertainty"]
     assert f"90 % prediction band of the free run has a median half-width of {half:.4g} um;" in sentence
     excluded = replace(findings, ensemble=Ensemble(findings.ensemble.structures[:0]))
-    assert f"{named_term(entry.model, 0)} 0.00" in said(excluded)["Uncertainty"]
+    found = said(excluded)
+    assert f"{named_term(entry.model, 0)} 0.00" in found["Uncertainty"]
+    assert f"models without {named_term(entry.model, 0)} are about as good" in found["Next"]
     almost = replace(findings.ensemble.structures[0], model=entry.model, weight=0.8999)
     other = replace(almost, model=make_model([(parse("u(k-9)"), 1.0)]), weight=0.1001)
     doubtful = said(replace(findings, ensemble=Ensemble((almost, other))))["Uncertainty"]
@@ -154,6 +167,7 @@ def test_the_uncertainty_has_the_half_width_of_the_band_and_the_doubtful_terms(f
     certain = replace(findings.ensemble.structures[0], model=entry.model, weight=1.0)
     kept = replace(findings, ensemble=Ensemble((certain,)))
     assert said(kept)["Uncertainty"].endswith("every term has an inclusion probability of 0.9 or more.")
+    assert "models without" not in said(kept)["Next"]
 
 
 def test_nothing_is_said_about_bands_that_a_result_lacks(findings):
