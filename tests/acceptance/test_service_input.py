@@ -98,7 +98,7 @@ UNUSABLE = {
     "header alone": (b"t_s,u_V,y_um\n", "a.csv", ("a header in line 1 but no samples",)),
     "text as archive": (csv(), "a.npz", ("a.npz is not a NumPy archive", "numpy.savez")),
     "program": (csv(), "a.exe", ("a.exe: its name must end in one of .csv", "export the record")),
-    "picture": (PNG, "a.csv", ("a.csv, line 1: byte 0x89", "is not UTF-8: save the file as UTF-8")),
+    "picture": (PNG, "a.csv", ("a.csv is not a text file", "export the record as text")),
     "2 GB header": (
         make_archive_with_false_size(2**28),
         "a.npz",

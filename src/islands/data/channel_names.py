@@ -6,6 +6,9 @@ from dataclasses import dataclass
 #: Suffix of an input's name: read the column one sample early, for a system that responds within the sample.
 AT_ONCE = "+1"
 
+#: Quantity and unit in the notation of ISO 80000: ``t/s``, ``U_1/mV``. Products of units are in brackets.
+_QUOTIENT = re.compile(r"([^/]+?)\s*/\s*([^/\s]+)")
+
 _BRACKETED = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]")
 
 #: Exponents of ten of the SI prefixes.
@@ -40,21 +43,32 @@ def parse_channel_name(name: str) -> ChannelName:
     unit = parse_unit(base)
     stem = base
     if is_unit(unit):
-        bracketed = _BRACKETED.fullmatch(base)
-        stem = bracketed[1] if bracketed else base.rpartition("_")[0]
+        marked = _BRACKETED.fullmatch(base) or _match_quotient(base)
+        stem = marked[1] if marked else base.rpartition("_")[0]
     return ChannelName(base, stem or base, unit, base != name)
 
 
 def parse_unit(name: str) -> str:
-    """Return the unit in a column's name: ``V`` for ``u_V``, ``u_est_V``, ``u [V]`` and ``u (V)``.
+    """Return the unit in a column's name: ``V`` for ``u_V``, ``u_est_V``, ``u [V]``, ``u (V)`` and ``u/V``.
 
-    The unit is the text in brackets or the text after the last underscore, unless that is a number (``u_1``).
-    Empty if the name has no unit.
+    The unit is the text in brackets, the unit behind a slash, or the text after the last underscore, unless
+    that is a number (``u_1``). Empty if the name has no unit.
     """
     if bracketed := _BRACKETED.fullmatch(name):
         return bracketed[2]
+    if (quotient := _match_quotient(name)) is not None:
+        return quotient[2]
     suffix = name.rpartition("_")[2] if "_" in name else ""
     return "" if suffix.isdigit() else suffix
+
+
+def _match_quotient(name: str) -> re.Match[str] | None:
+    """Match a quantity divided by its unit; ``v_m/s`` and ``km/h`` are quotients of two units."""
+    quotient = _QUOTIENT.fullmatch(name)
+    if quotient is None or not is_unit(quotient[2]):
+        return None
+    last = quotient[1].rpartition("_")[2]
+    return None if is_unit(last) and ("_" in quotient[1] or len(last) > 1) else quotient
 
 
 def is_unit(text: str) -> bool:

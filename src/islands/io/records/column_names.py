@@ -13,7 +13,7 @@ TIME_UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0
 #: Units with which a capital T means a temperature.
 TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
-_TIME = re.compile(r"t(_.*|\s*[\[(].*)?|time.*", re.IGNORECASE)
+_TIME = re.compile(r"t(_.*|\s*[\[(/].*)?|(?:time|zeit).*", re.IGNORECASE)
 
 
 def split_structures(names: Iterable[str]) -> dict[str, str]:
@@ -32,7 +32,10 @@ def find_column(name: str, columns: Iterable[str]) -> str:
 
 
 def looks_like_time(name: str) -> bool:
-    """Return whether a column's name is ``t``, ``t_*`` or ``time*``; ``T_K`` is a temperature."""
+    """Return whether a column's name is ``t``, ``t_*``, ``t/*``, ``time*`` or ``Zeit*``.
+
+    ``T_K`` is a temperature.
+    """
     return bool(_TIME.fullmatch(name)) and not (name[0] == "T" and parse_unit(name) in TEMPERATURE_UNITS)
 
 

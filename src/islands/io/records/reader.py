@@ -16,7 +16,7 @@ from islands.io.records.npz import read_archive
 from islands.io.records.parquet import read_parquet
 from islands.io.records.sampling import find_sampling
 from islands.io.records.table import Table
-from islands.io.records.text_table import read_delimited
+from islands.io.records.text.text_table import read_delimited
 from islands.io.records.validation import check_choice, check_length, check_values, check_varies
 
 #: Readers by file suffix. To add a format, write a reader and add an entry.
@@ -41,9 +41,10 @@ def read_record(
 ) -> Dataset:
     """Read inputs and an output from a file (CSV, NPZ, MAT or Parquet) and check them.
 
-    A column named ``t``, ``t_*`` or ``time*`` that is neither input nor output is the time, in the unit at
-    the end of its name (s, ms, us, ns, min, h; s by default). The text after the last underscore of a name is
-    the unit: ``u_V``. The separator and a decimal comma of a text file are inferred. In a MAT-file, a field
+    A column named ``t``, ``t_*``, ``time*`` or ``Zeit*`` that is neither input nor output is the time, in the
+    unit of its name (s, ms, us, ns, min, h; s by default). The unit of a column is the end of its name:
+    ``u_V``, ``u [V]`` or ``u/V``. Encoding, header, row of units, separator and decimal comma of a text file
+    are inferred. In a MAT-file, a field
     of a structure is the column ``run.u``, its time ``run.t``; a matrix ``x`` of a few channels gives the
     columns ``x_1, x_2 ...``.
 

@@ -279,7 +279,7 @@ def test_a_structure_is_shown_with_its_own_time(save):
     assert (units["b_1.u_V"], units["b_1.y"]) == ("V", "")
 
 
-@pytest.mark.parametrize("content", [b"", b"t_s,u,y\n", b"t,u\n0,\xb5\n"])
+@pytest.mark.parametrize("content", [b"", b"t_s,u,y\n", b"\x89PNG\r\n\x1a\n" + bytes(range(256))])
 def test_an_unreadable_file_is_refused(tmp_path, content):
     (tmp_path / "r.csv").write_bytes(content)
     with pytest.raises(RecordError, match=r"r\.csv"):

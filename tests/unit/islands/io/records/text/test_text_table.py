@@ -36,13 +36,6 @@ def test_a_file_with_a_header_only_is_refused(tmp_path, content):
     assert "bad.csv has a header in line 1 but no samples" in message
 
 
-def test_a_file_that_is_not_utf_8_is_refused_at_its_byte(tmp_path):
-    rows = changed(3, 1, "5µ")
-    message = refusal(tmp_path, "\n".join(rows).encode("latin-1"))
-    assert "bad.csv, line 3: byte 0xb5 at position" in message
-    assert "save the file as UTF-8" in message
-
-
 def test_decimal_commas_and_points_in_one_file_are_refused(tmp_path):
     rows = ["t_s;u_V;y_um", *(f"{k / 100:.2f};{k % 7},5;{k % 11}" for k in range(60))]
     message = refusal(tmp_path, rows)

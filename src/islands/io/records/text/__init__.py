@@ -1,0 +1,1 @@
+"""Text tables: encoding, place of the header, cells, numbers. Read `text_table` first."""

@@ -1,0 +1,175 @@
+"""Start of a table in a text file: its separator, the lines before it, its header and its row of units."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from islands.data.channel_names import is_unit, parse_unit
+from islands.errors import RecordError
+from islands.io.records.text.number_parsing import MISSING, is_number
+
+#: Separators in order of preference. The comma follows the others because it may be a decimal mark; runs of
+#: blanks come last.
+SEPARATORS = (";", "\t", "|", ",", " ")
+
+#: Marks of a comment. numpy.savetxt writes its header as a comment.
+_COMMENTS = "#%!"
+
+#: Lines of samples that decide where a table starts, and lines that may precede it.
+_SAMPLES, _MOST_LINES = 5, 300
+
+
+@dataclass(frozen=True, slots=True)
+class TableStart:
+    """Start of a table.
+
+    Attributes
+    ----------
+    separator : str
+        One of `SEPARATORS`.
+    header : int
+        Index of the line with the names.
+    names : tuple of str
+        Names of the columns, with the units of a row of units in brackets.
+    first : int
+        Index of the line after the header and the units.
+    described : bool
+        Whether lines with a description of the measurement precede the header.
+    """
+
+    separator: str
+    header: int
+    names: tuple[str, ...]
+    first: int
+    described: bool
+
+
+def find_table(lines: Sequence[str], file: str) -> TableStart:
+    """Find the header of a table.
+
+    The header is the first line if one of the lines below is a sample with as many cells. Otherwise it is the
+    line above the samples, or above their row of units, and the lines before it describe the measurement.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Lines of the file, of which at least one is not blank.
+    file : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    RecordError
+        The samples have no header.
+    """
+    top = next(index for index, line in enumerate(lines) if line.strip())
+    separator = _infer_separator(lines[top].lstrip(_COMMENTS), list(islice(_list_filled(lines, top + 1), 5)))
+    start = top
+    if not _fits(lines, top, separator) and (found := _find_samples(lines, top)):
+        separator, samples = found
+        start = _find_header(lines, top, samples, separator, file)
+    names = [name.strip() for name in split(lines[start].lstrip(_COMMENTS), separator)]
+    _check_header(names, file, start + 1)
+    following = next((at for at in range(start + 1, len(lines)) if lines[at].strip()), None)
+    units = [] if following is None else _read_units(lines[following].lstrip(_COMMENTS), separator)
+    if following is None or len(units) != len(names):
+        return TableStart(separator, start, tuple(names), start + 1, start > top)
+    return TableStart(separator, start, tuple(map(_add_unit, names, units)), following + 1, start > top)
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Split a line into cells."""
+    return next(csv.reader([collapse_blanks(line, separator)], delimiter=separator), [])
+
+
+def collapse_blanks(line: str, separator: str) -> str:
+    """Replace every run of blanks by a single blank if the separator is a blank."""
+    return " ".join(line.split()) if separator == " " else line
+
+
+def _list_filled(lines: Sequence[str], start: int) -> Iterator[str]:
+    return (line for line in islice(lines, start, None) if line.strip())
+
+
+def _infer_separator(header: str, first: Sequence[str]) -> str:
+    """Infer the separator.
+
+    It must split the header. A separator that splits the first lines into the same number of cells is
+    preferred.
+    """
+    blank = not any(mark in header for mark in ";|,")  # "t, u" is separated by its comma
+    usable = [mark for mark in SEPARATORS if len(split(header, mark)) > 1 and (mark != " " or blank)]
+    agreeing = (
+        mark for mark in usable if all(len(split(line, mark)) == len(split(header, mark)) for line in first)
+    )
+    return next(agreeing, usable[0] if usable else ",")
+
+
+def _fits(lines: Sequence[str], header: int, separator: str) -> bool:
+    """Return whether one of the first lines below a header is a sample of as many cells."""
+    width = len(split(lines[header].lstrip(_COMMENTS), separator))
+    below = [split(line, separator) for line in islice(_list_filled(lines, header + 1), _SAMPLES)]
+    return not below or any(len(cells) == width and _is_sample(cells) for cells in below)
+
+
+def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
+    """Return the separator and the index of the first sample, None if no lines look like samples."""
+    for at in range(top, min(len(lines), top + _MOST_LINES)):
+        if not lines[at].strip():
+            continue
+        block = list(islice(_list_filled(lines, at), _SAMPLES))
+        for separator in SEPARATORS:
+            cells = [split(line, separator) for line in block]
+            if (
+                len(cells[0]) > 1
+                and {len(row) for row in cells} == {len(cells[0])}
+                and all(map(_is_sample, cells))
+            ):
+                return separator, at
+    return None
+
+
+def _is_sample(cells: Sequence[str]) -> bool:
+    """Return whether all cells but one, which may be a time stamp, are numbers or missing."""
+    numbers = sum(is_number(cell) for cell in cells)
+    others = sum(not is_number(cell) and cell.strip().lower() not in MISSING for cell in cells)
+    return numbers > 0 and others <= 1
+
+
+def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, file: str) -> int:
+    """Return the index of the header above the samples; the line above may be a row of units."""
+    width = len(split(lines[samples], separator))
+    above = [at for at in range(top, samples) if lines[at].strip()]
+    fitting = [at for at in above if len(split(lines[at].lstrip(_COMMENTS), separator)) == width]
+    if above == [top] or (fitting and fitting[0] == top and fitting[-1] != above[-1]):
+        return (
+            top  # another number of cells in the samples or in the first ones is reported when they are read
+        )
+    if not fitting or fitting[-1] != above[-1]:
+        raise RecordError(
+            f"{file}, line {samples + 1} is the first sample, and the line above has no names of its {width} "
+            "columns: add a header line, for example t_s,u_V,y_um"
+        )
+    is_units = len(_read_units(lines[fitting[-1]].lstrip(_COMMENTS), separator)) == width
+    return fitting[-2] if is_units and len(fitting) > 1 and fitting[-2] == above[-2] else fitting[-1]
+
+
+def _read_units(line: str, separator: str) -> list[str]:
+    """Return the cells of a row of units without brackets; empty if it is not such a row."""
+    cells = [cell.strip().strip("[]()").strip() for cell in split(line, separator)]
+    units = [cell for cell in cells if cell not in ("", "-")]
+    return cells if units and all(map(is_unit, units)) else []
+
+
+def _add_unit(name: str, unit: str) -> str:
+    return name if unit in ("", "-") or parse_unit(name) else f"{name} [{unit}]"
+
+
+def _check_header(names: Sequence[str], file: str, line: int) -> None:
+    number = next((name for name in names if is_number(name)), None)
+    if number is not None:
+        raise RecordError(
+            f"{file}, line {line} contains the number {number} instead of a name: add a header line, "
+            "for example t_s,u_V,y_um"
+        )

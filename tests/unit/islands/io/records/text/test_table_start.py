@@ -1,0 +1,77 @@
+"""The header of a table is found below a description of the measurement, and above a row of units."""
+
+import numpy as np
+import pytest
+
+from islands.errors import RecordError
+from islands.io.records import preview, read_record
+from islands.io.records.text.table_start import find_table
+
+SAMPLES = [f"{k / 100:.2f};{k % 7};{k % 11}" for k in range(60)]
+
+
+def start(*lines):
+    return find_table([f"{line}\n" for line in lines], "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("above", "header"),
+    [
+        ((), "t;u;y"),
+        (("Motor 3", "", "Date: 2026-05-01; operator: K"), "t;u;y"),
+        (("# Motor 3", "# gain: 2"), "# t;u;y"),
+        (("Motor;3", "Date;1.5.2026"), "t;u;y"),
+        (("%%%", "a,b,c,d"), "% t;u;y"),
+    ],
+)
+def test_the_header_is_the_line_above_the_samples(above, header):
+    found = start(*above, header, *SAMPLES[:8])
+    assert (found.names, found.separator) == (("t", "u", "y"), ";")
+    assert (found.header, found.first) == (len(above), len(above) + 1)
+    assert found.described == bool(above)
+
+
+@pytest.mark.parametrize(
+    ("units", "names"),
+    [
+        ("s;V;um", ("t [s]", "u [V]", "y [um]")),
+        ("[s];[V];[-]", ("t [s]", "u [V]", "y")),
+        ("(s);;(m/s2)", ("t [s]", "u", "y [m/s2]")),
+    ],
+)
+@pytest.mark.parametrize("above", [(), ("Motor 3",)])
+def test_a_row_of_units_belongs_to_the_names(above, units, names):
+    found = start(*above, "t;u;y", units, *SAMPLES[:8])
+    assert found.names == names
+    assert found.first == len(above) + 2
+
+
+def test_units_in_names_take_precedence_over_the_row_of_units():
+    assert start("t_s;u (mV);y", "ms;V;m", *SAMPLES[:8]).names == ("t_s", "u (mV)", "y [m]")
+
+
+def test_samples_without_a_header_are_refused():
+    with pytest.raises(RecordError, match=r"line 3 is the first sample, .* no names of its 3 columns"):
+        start("Motor 3", "x;y", *SAMPLES[:8])
+
+
+def test_an_instrument_file_is_read(tmp_path):
+    path = tmp_path / "logger.csv"
+    path.write_text("\n".join(["Logger 7", "rate: 100 Hz", "", "t;u;y", "s;V;um", *SAMPLES]))
+    record = read_record(path, "u [V]", "y [um]")
+    assert (record.dt, record.input_units, record.output_unit) == (pytest.approx(0.01), ("V",), "um")
+    np.testing.assert_array_equal(record.y, np.arange(60) % 11)
+    warnings = preview(path).warnings
+    assert "the header of logger.csv is line 4; the lines above are ignored" in warnings
+    assert "line 5 of logger.csv is read as the units of the columns" in warnings
+    path.write_text(path.read_text().replace("0.02;2;2", "0.02;x;2"))
+    with pytest.raises(RecordError, match=r"logger\.csv, line 8, column u \[V\]"):
+        read_record(path, "u [V]", "y [um]")
+
+
+@pytest.mark.parametrize("time", ["t/s", "Zeit [s]", "Time (s)", "zeit_s", "t [s]"])
+def test_common_names_of_the_time_are_read(tmp_path, time):
+    path = tmp_path / "named.csv"
+    path.write_text("\n".join([f"{time};U_1/mV;v_m/s", *SAMPLES]))
+    record = read_record(path, "U_1/mV", "v_m/s")
+    assert (record.dt, record.input_units, record.output_unit) == (pytest.approx(0.01), ("mV",), "m/s")
