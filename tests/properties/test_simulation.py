@@ -172,6 +172,7 @@ def test_result_does_not_depend_on_the_block_width(monkeypatch, name, interval, 
     usual = multiple_shooting(MODELS[name], data, interval)
     assert usual.outcome
     monkeypatch.setattr("islands.simulation.layout.WIDTHS", (width,))
+    layout.cache_clear()
     assert layout(data, MODELS[name].maximum_lag, interval).width == width
     other = multiple_shooting(MODELS[name], data, interval)
     assert equal_bits(usual.y, other.y)

@@ -63,11 +63,12 @@ def test_job_is_shown_cancelled_and_resumed(run: Run, service: Service, owner: s
 
 
 @pytest.mark.ci
-def test_succeeded_job_shows_its_equation(run: Run, done: str, found: JobOutcome) -> None:
+def test_succeeded_job_shows_the_sentences_about_its_model(run: Run, done: str, found: JobOutcome) -> None:
     assert found.summary is not None
     out = run("show", done)[1]
     assert out.splitlines()[0] == f"job {done}: succeeded"
-    assert found.summary["equation"] in out
+    assert found.summary["words"]
+    assert all(line in out for line in found.summary["words"])
 
 
 # Watch.
