@@ -117,6 +117,10 @@ class Dataset:
         present = self.y[~np.isnan(self.y)]
         return float(np.ptp(present)) if present.size else float("nan")
 
+    def __repr__(self) -> str:
+        names = ", ".join(self.input_names)
+        return f"<Dataset of {self.samples} samples of {self.dt:g} s: {names} to {self.output_name}>"
+
     def __len__(self) -> int:
         return self.samples
 

@@ -13,9 +13,10 @@ from islands.errors import ModelError, SettingsError, lookup
 from islands.estimation.constraints.constraint_checks import ConstraintCheck
 from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import RankedModel, SearchResult
+from islands.facade.notebook_html import render_html
 from islands.io.export import export
 from islands.io.result_folder import write_result
-from islands.io.summary_text import summary
+from islands.io.summary_text import describe, summary
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
@@ -178,6 +179,14 @@ class FittedModel:
     def __str__(self) -> str:
         return self.equation
 
+    def __repr__(self) -> str:
+        return f"<FittedModel of rank {self.rank}: {self.equation}>"
+
+    def _repr_html_(self) -> str:
+        error, unit = self.metrics["validation"]["free_run"].rmse, self.search_result.record.output_unit
+        sentence = f"Rank {self.rank}: free-run RMSE on the validation data {error:.4g} {unit}".rstrip()
+        return render_html(self.model, [sentence], self.plot())
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
@@ -229,6 +238,15 @@ class Result:
 
     def __str__(self) -> str:
         return summary(self.search_result)
+
+    def __repr__(self) -> str:
+        models = len(self.search_result.models)
+        return f"<Result of {models} model{'s' * (models > 1)}, recommended: {self.best.equation}>"
+
+    def _repr_html_(self) -> str:
+        # The equation, which is indented, is shown in MathML.
+        sentences = [line for line in describe(self.search_result) if not line.startswith(" ")]
+        return render_html(self.best.model, sentences, self.best.plot())
 
 
 def simulate(
