@@ -20,6 +20,9 @@ _UNIT = re.compile(
     r"|([pnumcdkMGT]?)(m|g|s|A|K|mol|cd|Hz|N|Pa|J|W|C|V|F|ohm|S|Wb|T|H|L|l|bar|eV|rad)"
 )
 
+#: Units of time that divide the unit before them.
+_DIVISORS = frozenset({"s", "s2", "min", "h"})
+
 #: Spellings of the same symbol.
 _SPELLINGS = str.maketrans({"\N{MICRO SIGN}": "u", "μ": "u", "Ω": "ohm", "\N{OHM SIGN}": "ohm"})
 
@@ -40,26 +43,31 @@ class ChannelName:
 def parse_channel_name(name: str) -> ChannelName:
     """Return the parts of the name of an input or an output."""
     base = name.removesuffix(AT_ONCE)
-    unit = parse_unit(base)
-    stem = base
-    if is_unit(unit):
-        marked = _BRACKETED.fullmatch(base) or _match_quotient(base)
-        stem = marked[1] if marked else base.rpartition("_")[0]
+    stem, unit = _split_unit(base)
     return ChannelName(base, stem or base, unit, base != name)
 
 
 def parse_unit(name: str) -> str:
-    """Return the unit in a column's name: ``V`` for ``u_V``, ``u_est_V``, ``u [V]``, ``u (V)`` and ``u/V``.
+    """Return the unit in a column's name, empty if it has none: ``V`` for ``u_est_V``, ``u [V]`` and ``u/V``.
 
-    The unit is the text in brackets, the unit behind a slash, or the text after the last underscore, unless
-    that is a number (``u_1``). Empty if the name has no unit.
+    The unit is the text in brackets, behind a slash, or after the last underscore. A time after another unit
+    divides it: ``omega_rad_s`` is in ``rad/s``. Text that is not a unit is a part of the name:
+    ``oven_temperature``, ``speed (measured)``.
     """
-    if bracketed := _BRACKETED.fullmatch(name):
-        return bracketed[2]
+    return _split_unit(name)[1]
+
+
+def _split_unit(name: str) -> tuple[str, str]:
+    """Return the name without its unit, and the unit."""
+    if (bracketed := _BRACKETED.fullmatch(name)) and is_unit(bracketed[2]):
+        return bracketed[1], bracketed[2]
     if (quotient := _match_quotient(name)) is not None:
-        return quotient[2]
-    suffix = name.rpartition("_")[2] if "_" in name else ""
-    return "" if suffix.isdigit() else suffix
+        return quotient[1], quotient[2]
+    stem, _, last = name.rpartition("_")
+    if not (stem and is_unit(last)):
+        return name, ""
+    above, _, unit = stem.rpartition("_")
+    return (above, f"{unit}/{last}") if last in _DIVISORS and above and is_unit(unit) else (stem, last)
 
 
 def _match_quotient(name: str) -> re.Match[str] | None:
@@ -73,7 +81,7 @@ def _match_quotient(name: str) -> re.Match[str] | None:
 
 def is_unit(text: str) -> bool:
     """Return whether a text is a unit, or a product or quotient of units, such as ``m/s2``."""
-    factors = re.split(r"[/.*·]", normalise_unit(text))
+    factors = re.split(r"[/.*·]", normalise_unit(text).removeprefix("1/"))
     return all(_UNIT.fullmatch(re.sub(r"\^?-?[0-9]$", "", factor)) for factor in factors)
 
 

@@ -15,6 +15,9 @@ TEMPERATURE_UNITS = ("K", "C", "degC", "°C", "F", "degF", "°F")
 
 _TIME = re.compile(r"t(_.*|\s*[\[(/].*)?|(?:time|zeit).*", re.IGNORECASE)
 
+#: End of the name of a time column: its unit in any case, a number, or another word.
+_END = re.compile(r"[_\[(/]\s*([^_\[\](/)]*?)\s*[\])]?$")
+
 
 def split_structures(names: Iterable[str]) -> dict[str, str]:
     """Return the structure that contains each column: ``run_1.`` for ``run_1.u_V``, ``""`` at the top level.
@@ -41,7 +44,8 @@ def looks_like_time(name: str) -> bool:
 
 def seconds_per_unit(name: str) -> float | None:
     """Return the unit of a time column in seconds, None if the unit is unknown."""
-    return TIME_UNITS.get(parse_unit(name).lower())
+    end = _END.search(name)
+    return TIME_UNITS.get("" if end is None or end[1].isdigit() else end[1].lower())
 
 
 def time_column(

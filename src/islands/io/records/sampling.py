@@ -7,7 +7,6 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.channel_names import parse_unit
 from islands.errors import RecordError
 from islands.io.records.column_names import TIME_UNITS, looks_like_time, seconds_per_unit
 from islands.io.records.table import Columns, RowRange, Table
@@ -48,7 +47,9 @@ def find_sampling(
     start = None
     if time is not None:
         stamps = columns.numbers[time]
-        seconds = TIME_UNITS[parse_unit(time.removeprefix(structure)).lower()]
+        seconds = seconds_per_unit(time.removeprefix(structure))
+        if seconds is None:
+            raise RecordError(_unknown_sampling_message(table, file, structure))
         known[f"column {time}"] = uniform_step(stamps, time, columns.rows) * seconds
         start = float(stamps[0]) * seconds
     if dt is not None:

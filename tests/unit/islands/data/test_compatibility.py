@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from islands.data.channel_names import conversion_factor, is_unit, parse_channel_name
 from islands.data.compatibility import match_record
 from islands.data.dataset import Dataset
 from islands.errors import RecordError
@@ -113,27 +112,3 @@ def test_different_sampling_times_are_refused_for_records_and_models(dt):
 def test_model_without_a_sampling_time_matches_every_record():
     model = make_model([(parse("u(k-1)"), 1.0)], ("u",), "y_um")
     assert match_record(model, record("u", dt=7.0)).dt == 7.0
-
-
-@pytest.mark.parametrize(
-    ("name", "parts"),
-    [
-        ("u_mV+1", ("u_mV", "u", "mV", True)),
-        ("speed (m/s)", ("speed (m/s)", "speed", "m/s", False)),
-        ("u_est", ("u_est", "u_est", "est", False)),
-        ("u_1", ("u_1", "u_1", "", False)),
-    ],
-)
-def test_name_is_split_into_base_stem_unit_and_lead(name, parts):
-    found = parse_channel_name(name)
-    assert (found.base, found.stem, found.unit, found.at_once) == parts
-
-
-def test_units_with_prefixes_convert_by_powers_of_ten():
-    assert conversion_factor("mV", "V") == 1e-3
-    assert conversion_factor("kOhm", "mΩ") == 1e6
-    assert conversion_factor("V", "A") is None
-    assert conversion_factor("min", "h") is None
-    assert [text for text in ("V", "N.m", "m/s2", "degC", "est", "", "B", "set") if is_unit(text)] == [
-        *("V", "N.m", "m/s2", "degC")
-    ]

@@ -1,0 +1,47 @@
+"""Names of channels: the stem, the unit, and the mark of an input that acts at once."""
+
+import pytest
+
+from islands.data.channel_names import conversion_factor, is_unit, parse_channel_name, parse_unit
+
+
+@pytest.mark.parametrize(
+    ("name", "stem", "unit"),
+    [
+        ("u_V", "u", "V"),
+        ("u_est_V", "u_est", "V"),
+        ("u [V]", "u", "V"),
+        ("u (m/s2)", "u", "m/s2"),
+        ("U_1/mV", "U_1", "mV"),
+        ("F/N", "F", "N"),
+        ("v_m/s", "v", "m/s"),
+        ("omega_rad_s", "omega", "rad/s"),
+        ("flow_m3_h", "flow", "m3/h"),
+        ("a_m_s2", "a", "m/s2"),
+        ("n [1/min]", "n", "1/min"),
+        ("t_s", "t", "s"),
+    ],
+)
+def test_a_unit_is_the_end_of_a_name(name, stem, unit):
+    for suffix in ("", "+1"):
+        channel = parse_channel_name(name + suffix)
+        assert (channel.base, channel.stem, channel.unit, channel.at_once) == (name, stem, unit, bool(suffix))
+    assert is_unit(unit)
+
+
+@pytest.mark.parametrize(
+    "name", ["oven_temperature", "u_est", "u_1", "speed (measured)", "h", "V", "_V", "km/h", "valve"]
+)
+def test_text_that_is_not_a_unit_is_a_part_of_the_name(name):
+    assert parse_unit(name) == ""
+    assert parse_channel_name(name).stem == name
+
+
+def test_units_with_prefixes_convert_by_powers_of_ten():
+    assert conversion_factor("mV", "V") == 1e-3
+    assert conversion_factor("kOhm", "mΩ") == 1e6
+    assert conversion_factor("V", "A") is None
+    assert conversion_factor("min", "h") is None
+    assert [text for text in ("V", "N.m", "m/s2", "degC", "est", "", "B", "set") if is_unit(text)] == [
+        *("V", "N.m", "m/s2", "degC")
+    ]
