@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import islands
 from islands.data.dataset import Dataset
 from islands.errors import IslandsError, RecordError, SettingsError
 from islands.io.models import read_model, write_model
@@ -43,6 +44,10 @@ def undrawn():
 def run(command_line):
     """Run a command in a temporary folder; return exit code, standard output, standard error."""
     return command_line
+
+
+def test_the_version_is_that_of_the_package(run):
+    assert run("--version")[:2] == (0, f"islands {islands.__version__}\n")
 
 
 FIT = ("fit", "r.csv", "--input", "u_V", "--output", "y_um", "--max-terms", "3", "--out", "out")
