@@ -3,7 +3,7 @@
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain, islice
 
 from islands.data.channel_names import is_unit, parse_unit
 from islands.errors import RecordError
@@ -36,6 +36,8 @@ class TableStart:
         Index of the line after the header and the units.
     described : bool
         Whether lines with a description of the measurement precede the header.
+    has_units : bool
+        Whether a row of units follows the header.
     """
 
     separator: str
@@ -43,6 +45,7 @@ class TableStart:
     names: tuple[str, ...]
     first: int
     described: bool
+    has_units: bool
 
 
 def find_table(lines: Sequence[str], file: str) -> TableStart:
@@ -65,17 +68,32 @@ def find_table(lines: Sequence[str], file: str) -> TableStart:
     """
     top = next(index for index, line in enumerate(lines) if line.strip())
     separator = _infer_separator(lines[top].lstrip(_COMMENTS), list(islice(_list_filled(lines, top + 1), 5)))
+    cells, first = _read_row(lines, top, separator)
     start = top
-    if not _fits(lines, top, separator) and (found := _find_samples(lines, top)):
+    if not _fits(len(cells), lines, first, separator) and (found := _find_samples(lines, top)):
         separator, samples = found
         start = _find_header(lines, top, samples, separator, file)
-    names = [name.strip() for name in split(lines[start].lstrip(_COMMENTS), separator)]
+        cells, first = _read_row(lines, start, separator)
+    if first == len(lines) > start + 1:
+        raise RecordError(f"{file}, line {start + 1}: is a quote never closed?")
+    names = tuple(name.strip() for name in cells)
     _check_header(names, file, start + 1)
-    following = next((at for at in range(start + 1, len(lines)) if lines[at].strip()), None)
+    following = next((at for at in range(first, len(lines)) if lines[at].strip()), None)
     units = [] if following is None else _read_units(lines[following].lstrip(_COMMENTS), separator)
-    if following is None or len(units) != len(names):
-        return TableStart(separator, start, tuple(names), start + 1, start > top)
-    return TableStart(separator, start, tuple(map(_add_unit, names, units)), following + 1, start > top)
+    if following is not None and len(units) == len(names):
+        names, first = tuple(map(_add_unit, names, units)), following + 1
+        return TableStart(separator, start, names, first, described=start > top, has_units=True)
+    return TableStart(separator, start, names, first, described=start > top, has_units=False)
+
+
+def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str], int]:
+    """Return the cells of the row that begins at a line, and the index of the line after it.
+
+    A quoted cell may contain line ends.
+    """
+    rows = chain([lines[at].lstrip(_COMMENTS)], islice(lines, at + 1, None))
+    reader = csv.reader((collapse_blanks(line, separator) for line in rows), delimiter=separator)
+    return next(reader, []), at + reader.line_num
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -106,10 +124,9 @@ def _infer_separator(header: str, first: Sequence[str]) -> str:
     return next(agreeing, usable[0] if usable else ",")
 
 
-def _fits(lines: Sequence[str], header: int, separator: str) -> bool:
-    """Return whether one of the first lines below a header is a sample of as many cells."""
-    width = len(split(lines[header].lstrip(_COMMENTS), separator))
-    below = [split(line, separator) for line in islice(_list_filled(lines, header + 1), _SAMPLES)]
+def _fits(width: int, lines: Sequence[str], first: int, separator: str) -> bool:
+    """Return whether one of the first lines below a header is a sample with as many cells."""
+    below = [split(line, separator) for line in islice(_list_filled(lines, first), _SAMPLES)]
     return not below or any(len(cells) == width and _is_sample(cells) for cells in below)
 
 

@@ -128,6 +128,6 @@ def _list_notes(file: str, encoding: str, start: TableStart) -> tuple[str, ...]:
     notes = [f"{file} is not UTF-8 and is read as {encoding}"] if encoding else []
     if start.described:
         notes.append(f"the header of {file} is line {start.header + 1}; the lines above are ignored")
-    if start.first > start.header + 1:
+    if start.has_units:
         notes.append(f"line {start.first} of {file} is read as the units of the columns")
     return tuple(notes)

@@ -50,6 +50,20 @@ def test_units_in_names_take_precedence_over_the_row_of_units():
     assert start("t_s;u (mV);y", "ms;V;m", *SAMPLES[:8]).names == ("t_s", "u (mV)", "y [m]")
 
 
+def test_a_quoted_name_may_contain_line_ends():
+    found = start('t,"u\nin","y ""x"""', "0,1,2", "1,2,3")
+    assert found.names == ("t", "u\nin", 'y "x"')
+
+
+def test_a_quote_in_the_header_that_is_never_closed_is_refused():
+    with pytest.raises(RecordError, match=r"a\.csv, line 1: is a quote never closed\?"):
+        start('t,"u,y', "0,1,2", "1,2,3")
+
+
+def test_quotes_in_the_description_are_ignored():
+    assert start('"Motor 5" disc', '"gain', "t,u,y", "0,1,2", "1,2,3").names == ("t", "u", "y")
+
+
 def test_samples_without_a_header_are_refused():
     with pytest.raises(RecordError, match=r"line 3 is the first sample, .* no names of its 3 columns"):
         start("Motor 3", "x;y", *SAMPLES[:8])
