@@ -11,7 +11,7 @@ SAMPLES = [f"{k / 100:.2f};{k % 7};{k % 11}" for k in range(60)]
 
 
 def start(*lines):
-    return find_table([f"{line}\n" for line in lines], "a.csv")
+    return find_table("\n".join(lines).splitlines(keepends=True), "a.csv")
 
 
 @pytest.mark.parametrize(
