@@ -57,7 +57,7 @@ def test_three_killed_actors_do_not_change_the_result(posed, undisturbed, engine
     for epoch in engine.run(posed, empty_archipelago(3, SEED), never):
         found.append(exactly(epoch.archipelago))
         if len(found) in (2, 4, 6):
-            victim = min(actors())
+            victim = min(eventually(actors))
             kill(victim)
             eventually(lambda pid=victim: not alive([pid]))
             # The engine is suspended: the loss occurs before the next step.
@@ -87,7 +87,7 @@ def test_standby_actor_replaces_a_lost_one_until_its_restart(posed, engine, mess
         full_size = min(3, len(os.sched_getaffinity(0))) + 1
         eventually(lambda: found.maintain(at_once=True) and len(found.slots) == full_size)
         regular = [found.actor_for(island) for island in range(3)]
-        kill(min(actors()))
+        kill(min(eventually(actors)))
         eventually(lambda: found.maintain(at_once=True) and messages)
         assert found.slots[0] == actor_pool.STANDBY
         assert len(found.slots) == full_size - 1
