@@ -61,17 +61,18 @@ Population = tuple[Individual, ...]
 
 def unique_structures(individuals: Iterable[Individual]) -> Population:
     """Return the first individual of every structure."""
-    first: dict[tuple[str, ...], Individual] = {}
-    for each in individuals:
-        first.setdefault(each.key, each)
-    return tuple(first.values())
+    return _keep_first((each.key, each) for each in individuals)
 
 
 def unique_niches(individuals: Iterable[Individual]) -> Population:
     """Return the first individual of every niche."""
+    return _keep_first((each.niche, each) for each in individuals)
+
+
+def _keep_first(labelled: Iterable[tuple[tuple[str, ...], Individual]]) -> Population:
     first: dict[tuple[str, ...], Individual] = {}
-    for each in individuals:
-        first.setdefault(each.niche, each)
+    for label, each in labelled:
+        first.setdefault(label, each)
     return tuple(first.values())
 
 

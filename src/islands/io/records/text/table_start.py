@@ -67,7 +67,7 @@ def find_table(lines: Sequence[str], file: str) -> TableStart:
         The samples have no header.
     """
     top = next(index for index, line in enumerate(lines) if line.strip())
-    separator = _infer_separator(lines[top].lstrip(_COMMENTS), list(islice(_list_filled(lines, top + 1), 5)))
+    separator = _infer_separator(_uncomment(lines[top]), list(islice(_list_filled(lines, top + 1), _SAMPLES)))
     cells, first = _read_row(lines, top, separator)
     start = top
     if not _fits(len(cells), lines, first, separator) and (found := _find_samples(lines, top)):
@@ -79,11 +79,11 @@ def find_table(lines: Sequence[str], file: str) -> TableStart:
     names = tuple(name.strip() for name in cells)
     _check_header(names, file, start + 1)
     following = next((at for at in range(first, len(lines)) if lines[at].strip()), None)
-    units = [] if following is None else _read_units(lines[following].lstrip(_COMMENTS), separator)
-    if following is not None and len(units) == len(names):
+    units = [] if following is None else _read_units(lines[following], separator)
+    has_units = following is not None and len(units) == len(names)
+    if following is not None and has_units:
         names, first = tuple(map(_add_unit, names, units)), following + 1
-        return TableStart(separator, start, names, first, described=start > top, has_units=True)
-    return TableStart(separator, start, names, first, described=start > top, has_units=False)
+    return TableStart(separator, start, names, first, start > top, has_units)
 
 
 def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str], int]:
@@ -91,12 +91,16 @@ def _read_row(lines: Sequence[str], at: int, separator: str) -> tuple[list[str],
 
     A quoted cell may contain line ends.
     """
-    rows = chain([lines[at].lstrip(_COMMENTS)], islice(lines, at + 1, None))
+    rows = chain([_uncomment(lines[at])], islice(lines, at + 1, None))
     reader = csv.reader((collapse_blanks(line, separator) for line in rows), delimiter=separator)
     return next(reader, []), at + reader.line_num
 
 
-def split(line: str, separator: str) -> list[str]:
+def _uncomment(line: str) -> str:
+    return line.lstrip(_COMMENTS)
+
+
+def _split(line: str, separator: str) -> list[str]:
     """Split a line into cells."""
     return next(csv.reader([collapse_blanks(line, separator)], delimiter=separator), [])
 
@@ -117,16 +121,16 @@ def _infer_separator(header: str, first: Sequence[str]) -> str:
     preferred.
     """
     blank = not any(mark in header for mark in ";|,")  # "t, u" is separated by its comma
-    usable = [mark for mark in SEPARATORS if len(split(header, mark)) > 1 and (mark != " " or blank)]
+    usable = [mark for mark in SEPARATORS if len(_split(header, mark)) > 1 and (mark != " " or blank)]
     agreeing = (
-        mark for mark in usable if all(len(split(line, mark)) == len(split(header, mark)) for line in first)
+        mark for mark in usable if all(len(_split(line, mark)) == len(_split(header, mark)) for line in first)
     )
     return next(agreeing, usable[0] if usable else ",")
 
 
 def _fits(width: int, lines: Sequence[str], first: int, separator: str) -> bool:
     """Return whether one of the first lines below a header is a sample with as many cells."""
-    below = [split(line, separator) for line in islice(_list_filled(lines, first), _SAMPLES)]
+    below = [_split(line, separator) for line in islice(_list_filled(lines, first), _SAMPLES)]
     return not below or any(len(cells) == width and _is_sample(cells) for cells in below)
 
 
@@ -137,7 +141,7 @@ def _find_samples(lines: Sequence[str], top: int) -> tuple[str, int] | None:
             continue
         block = list(islice(_list_filled(lines, at), _SAMPLES))
         for separator in SEPARATORS:
-            cells = [split(line, separator) for line in block]
+            cells = [_split(line, separator) for line in block]
             if (
                 len(cells[0]) > 1
                 and {len(row) for row in cells} == {len(cells[0])}
@@ -156,25 +160,24 @@ def _is_sample(cells: Sequence[str]) -> bool:
 
 def _find_header(lines: Sequence[str], top: int, samples: int, separator: str, file: str) -> int:
     """Return the index of the header above the samples; the line above may be a row of units."""
-    width = len(split(lines[samples], separator))
+    width = len(_split(lines[samples], separator))
     above = [at for at in range(top, samples) if lines[at].strip()]
-    fitting = [at for at in above if len(split(lines[at].lstrip(_COMMENTS), separator)) == width]
+    fitting = [at for at in above if len(_split(_uncomment(lines[at]), separator)) == width]
     if above == [top] or (fitting and fitting[0] == top and fitting[-1] != above[-1]):
-        return (
-            top  # another number of cells in the samples or in the first ones is reported when they are read
-        )
+        # Another number of cells, in all samples or in the first ones, is reported when they are read.
+        return top
     if not fitting or fitting[-1] != above[-1]:
         raise RecordError(
             f"{file}, line {samples + 1} is the first sample, and the line above has no names of its {width} "
             "columns: add a header line, for example t_s,u_V,y_um"
         )
-    is_units = len(_read_units(lines[fitting[-1]].lstrip(_COMMENTS), separator)) == width
+    is_units = len(_read_units(lines[fitting[-1]], separator)) == width
     return fitting[-2] if is_units and len(fitting) > 1 and fitting[-2] == above[-2] else fitting[-1]
 
 
 def _read_units(line: str, separator: str) -> list[str]:
     """Return the cells of a row of units without brackets; empty if it is not such a row."""
-    cells = [cell.strip().strip("[]()").strip() for cell in split(line, separator)]
+    cells = [cell.strip().strip("[]()").strip() for cell in _split(_uncomment(line), separator)]
     units = [cell for cell in cells if cell not in ("", "-")]
     return cells if units and all(map(is_unit, units)) else []
 
