@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -81,9 +82,35 @@ def read_record(
     RecordError
         The record cannot be used as it is. The message names the row and the column and says what to do.
     """
+    record = read_table(open_record(path), Path(path).name, inputs, output, dt, rows, missing_output)
+    return replace(record, sha256=fingerprint(path))
+
+
+def read_table(
+    table: Table,
+    file: str,
+    inputs: Sequence[str],
+    output: str,
+    dt: float | None = None,
+    rows: slice | None = None,
+    missing_output: bool = False,
+) -> Dataset:
+    """Read inputs and an output from an open table and check them.
+
+    Parameters
+    ----------
+    table : Table
+    file : str
+        Name of the table in messages.
+    inputs, output, dt, rows, missing_output
+        As in `read_record`.
+
+    Raises
+    ------
+    RecordError
+        As in `read_record`.
+    """
     inputs = (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    table = open_record(path)
-    file = Path(path).name
     sources = [find_column(name, table.names) for name in inputs]
     check_choice(table.names, sources, output, file)
     structures = split_structures(table.names)
@@ -104,7 +131,6 @@ def read_record(
         input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
         output_unit=parse_unit(output.removeprefix(structures[output])),
         start=step * columns.first if start is None else start,
-        sha256=fingerprint(path),
     )
     return advance_inputs(record, [place for place, name in enumerate(inputs) if name != sources[place]])
 
