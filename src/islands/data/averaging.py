@@ -17,7 +17,8 @@ def average_samples(record: Dataset, count: int) -> Dataset:
     """Return a record of the means of ``count`` consecutive samples.
 
     No mean contains samples of two segments: the last samples of a segment that do not fill a mean are left
-    out. The time of a mean is the middle of its samples. A mean over a missing output is missing.
+    out, and so are segments that are shorter than a mean. The time of a mean is the middle of its samples. A
+    mean over a missing output is missing.
 
     Parameters
     ----------
@@ -35,8 +36,8 @@ def average_samples(record: Dataset, count: int) -> Dataset:
     SettingsError
         The count is less than 1.
     RecordError
-        A segment has fewer than ``count`` samples, or an input is read one sample early: the column refers to
-        the sampling time of the record.
+        Every segment has fewer than ``count`` samples, or an input is read one sample early: the column
+        refers to the sampling time of the record.
     """
     if count < 1:
         raise SettingsError(f"a mean has at least 1 sample, got {count}")
@@ -47,17 +48,19 @@ def average_samples(record: Dataset, count: int) -> Dataset:
             f"{early[0]} is read one sample early, so it has no means: read the input without "
             "+1, or set average to 1"
         )
-    if min(record.segments) < count:
+    if max(record.segments) < count:
         raise RecordError(
-            f"a recording of {min(record.segments)} samples has no mean of {count}: give longer "
+            f"a recording of {max(record.segments)} samples has no mean of {count}: give longer "
             "recordings, or average fewer samples"
         )
+    lengths = [length // count for length in record.segments]
     return replace(
         record,
         u=np.column_stack([_average(signal, record, count) for signal in record.u.T]),
         y=_average(record.y, record, count),
         dt=record.dt * count,
-        segments=tuple(length // count for length in record.segments),
+        segments=tuple(length for length in lengths if length),
+        recordings=tuple(name for name, length in zip(record.recordings, lengths, strict=True) if length),
         start=record.start + 0.5 * (count - 1) * record.dt,
         sha256="",
     )

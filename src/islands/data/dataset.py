@@ -29,8 +29,11 @@ class Dataset:
     input_units, output_unit
         Units. Empty if unknown.
     segments : tuple of int
-        Lengths of the consecutive recordings in samples; they sum to ``samples``. No regressor reaches across
+        Lengths of the consecutive segments in samples; they sum to ``samples``. No regressor reaches across
         a boundary.
+    recordings : tuple of str
+        Name of the recording of every segment, empty if it has none. A recording that was cut at a gap has
+        several consecutive segments.
     start : float
         Time of the first sample in seconds.
     sha256 : str
@@ -51,6 +54,7 @@ class Dataset:
     input_units: tuple[str, ...] = ("",)
     output_unit: str = ""
     segments: tuple[int, ...] = ()
+    recordings: tuple[str, ...] = ()
     start: float = 0.0
     sha256: str = ""
 
@@ -78,6 +82,9 @@ class Dataset:
             raise RecordError(
                 f"the segments' lengths {segments} must be positive and sum to the {len(y)} samples"
             )
+        recordings = tuple(self.recordings) or ("",) * len(segments)
+        if len(recordings) != len(segments):
+            raise RecordError(f"{len(segments)} segments need {len(segments)} names, got {recordings}")
         _check_finite(u, y, names, self.output_name)
         for array in (u, y):
             array.setflags(write=False)
@@ -87,6 +94,7 @@ class Dataset:
             ("input_names", tuple(names)),
             ("input_units", units),
             ("segments", segments),
+            ("recordings", recordings),
         ):
             object.__setattr__(self, field, value)
 
@@ -110,6 +118,14 @@ class Dataset:
         """First sample of every segment and the sample after its last."""
         ends = np.cumsum(self.segments)
         return tuple((int(end) - length, int(end)) for end, length in zip(ends, self.segments, strict=True))
+
+    @property
+    def rows_by_recording(self) -> dict[str, slice]:
+        """Samples of every recording, by its name."""
+        rows: dict[str, slice] = {}
+        for name, (begin, end) in zip(self.recordings, self.bounds, strict=True):
+            rows[name] = slice(rows[name].start if name in rows else begin, end)
+        return rows
 
     @property
     def output_range(self) -> float:
@@ -138,16 +154,17 @@ class Dataset:
         first, last, step = rows.indices(self.samples)
         if step != 1 or last <= first:
             raise RecordError(f"take a non-empty slice of step 1 of the record's {self.samples} samples")
-        segments = tuple(
-            min(last, end) - max(first, begin)
-            for begin, end in self.bounds
+        kept = [
+            (min(last, end) - max(first, begin), name)
+            for (begin, end), name in zip(self.bounds, self.recordings, strict=True)
             if min(last, end) > max(first, begin)
-        )
+        ]
         return replace(
             self,
             u=self.u[first:last],
             y=self.y[first:last],
-            segments=segments,
+            segments=tuple(length for length, _ in kept),
+            recordings=tuple(name for _, name in kept),
             start=self.start + first * self.dt,
         )
 
@@ -179,7 +196,10 @@ def same_dt(one: float, other: float) -> bool:
 
 
 def join(recordings: tuple[Dataset, ...]) -> Dataset:
-    """Join several recordings of one system; each remains a separate segment.
+    """Join several recordings of one system; no regressor reaches from one into another.
+
+    Recordings without a name get the number of their place as a name. If a name occurs before, the number is
+    added to it.
 
     Raises
     ------
@@ -204,5 +224,17 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
         u=np.concatenate([recording.u for recording in recordings]),
         y=np.concatenate([recording.y for recording in recordings]),
         segments=tuple(length for recording in recordings for length in recording.segments),
+        recordings=_name_recordings(recordings),
         sha256="",
     )
+
+
+def _name_recordings(recordings: tuple[Dataset, ...]) -> tuple[str, ...]:
+    """Return a name for every segment; recordings that are joined have different names."""
+    names: list[str] = []
+    for number, recording in enumerate(recordings, start=1):
+        known = set(names)
+        for name in recording.recordings:
+            numbered = f"{name} ({number})" if name else str(number)
+            names.append(numbered if not name or name in known else name)
+    return tuple(names)

@@ -1,13 +1,15 @@
 """Split of the data into an estimation part and a validation part."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from islands.data.averaging import average_samples
 from islands.data.compatibility import Reference, match_record
-from islands.data.dataset import Dataset
-from islands.errors import RecordError, SettingsError
+from islands.data.dataset import Dataset, join
+from islands.data.missing_outputs import skip_missing_outputs
+from islands.errors import SettingsError
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +40,7 @@ class Split:
 
 
 def split(record: Dataset, fraction: float = 0.25) -> Split:
-    """Split off the last ``fraction`` of the record for validation.
+    """Split off the last ``fraction`` of every recording for validation.
 
     The warm-up of the validation part uses samples of that part, never of the estimation part.
 
@@ -49,27 +51,35 @@ def split(record: Dataset, fraction: float = 0.25) -> Split:
     """
     if not 0.0 < fraction < 1.0:
         raise SettingsError(f"the validation fraction lies between 0 and 1, got {fraction}")
-    boundary = record.samples - round(record.samples * fraction)
-    if boundary in (0, record.samples):
+    estimation, validation = [], []
+    for rows in record.rows_by_recording.values():
+        boundary = rows.stop - round((rows.stop - rows.start) * fraction)
+        estimation.append(slice(rows.start, boundary))
+        validation.append(slice(boundary, rows.stop))
+    parts = [
+        tuple(record[each] for each in rows if each.stop > each.start) for rows in (estimation, validation)
+    ]
+    if not all(parts):
         raise SettingsError(f"a fraction of {fraction} of {record.samples} samples leaves a part empty")
-    return Split(record[:boundary], record[boundary:])
+    return Split(*(part[0] if len(part) == 1 else join(part) for part in parts))
 
 
 def split_data(record: Dataset, validation: Dataset | float) -> Split:
     """Return the split of two records, or of one record and a validation fraction.
 
+    Samples without an output are skipped: the parts before and after them become segments.
+
     Raises
     ------
     RecordError
-        The validation data has other columns, units or another sampling time, or an output is missing.
+        The validation data has other columns, units or another sampling time, or every output is missing.
     SettingsError
         The fraction leaves a part empty, or the validation data has samples of the record.
     """
-    _check_complete(record, "the record")
     if not isinstance(validation, Dataset):
-        return split(record, validation)
-    _check_complete(validation, "the validation data")
-    parts = Split(record, validation)
+        parts = split(record, validation)
+        return Split(*map(skip_missing_outputs, (parts.estimation, parts.validation)))
+    parts = Split(skip_missing_outputs(record), skip_missing_outputs(validation))
     if share_samples(parts.estimation, parts.validation):
         raise SettingsError(
             "the validation data has samples that are used for estimation: give another recording, other "
@@ -93,9 +103,15 @@ def match_split(reference: Reference, split: Split) -> Split:
 def share_samples(one: Dataset, other: Dataset) -> bool:
     """Return whether two records with the same sampling time have samples in common.
 
-    They do if one has the samples of the other, or if they overlap in time and either are the same column of
-    one file or agree, with an output that is not constant, throughout the overlap.
+    They do if a recording of one has the samples of a recording of the other, or if the two overlap in time
+    and either are the same column of one file or agree, with an output that is not constant, throughout the
+    overlap.
     """
+    pairs = product(*([each[rows] for rows in each.rows_by_recording.values()] for each in (one, other)))
+    return any(_recordings_share_samples(*pair) for pair in pairs)
+
+
+def _recordings_share_samples(one: Dataset, other: Dataset) -> bool:
     if one.samples == other.samples and _agree(one, other):
         return True
     offset = round((other.start - one.start) / one.dt)
@@ -110,12 +126,3 @@ def share_samples(one: Dataset, other: Dataset) -> bool:
 
 def _agree(one: Dataset, other: Dataset) -> bool:
     return np.array_equal(one.y, other.y) and np.array_equal(one.u, other.u)
-
-
-def _check_complete(record: Dataset, title: str) -> None:
-    missing = np.flatnonzero(np.isnan(record.y))
-    if missing.size:
-        raise RecordError(
-            f"{title}: {record.output_name} is missing at sample {missing[0]}; a search needs every sample: "
-            "interpolate it, or cut the record there and join the parts as segments"
-        )

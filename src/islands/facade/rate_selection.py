@@ -56,6 +56,9 @@ _VARIANCE_WITHIN = 0.01
 #: Fewest means of the estimation data, and of the validation data when two rates are compared.
 _LEAST_ESTIMATION, _LEAST_VALIDATION = 500, 100
 
+#: Smallest share of the samples that must be in segments long enough for a prediction at the lower rate.
+_LEAST_SHARE = 0.9
+
 #: Terms of the trial models, at most.
 _TERMS = 10
 
@@ -93,7 +96,8 @@ def select_rate(split: Split, average: int | str, library: TrialLibrary, least: 
         Samples of a mean, or ``auto``.
     library : TrialLibrary
     least : int
-        Fewest samples that a recording must have after averaging.
+        Fewest samples of a segment after averaging that permit a prediction. ``auto`` keeps nine tenths of
+        the samples in such segments.
 
     Returns
     -------
@@ -140,13 +144,18 @@ def _permits(split: Split, count: int, least: int) -> bool:
     estimation, validation = split.estimation, split.validation
     if any(parse_channel_name(name).at_once for name in estimation.input_names):
         return False
-    if min(estimation.segments + validation.segments) < least * count:
-        return False
-    if estimation.samples < _LEAST_ESTIMATION * count or validation.samples < _LEAST_VALIDATION * count:
-        return False
+    # Segments that are too short for a prediction at this rate are lost.
+    for part, fewest in ((estimation, _LEAST_ESTIMATION), (validation, _LEAST_VALIDATION)):
+        if _count_in_segments(part, least * count) < max(fewest * count, _LEAST_SHARE * part.samples):
+            return False
     means = average_samples(estimation, count)
     pairs = [(estimation.y, means.y), *zip(estimation.u.T, means.u.T, strict=True)]
     return all(_keeps_variance(fine, coarse, count, estimation) for fine, coarse in pairs)
+
+
+def _count_in_segments(record: Dataset, least: int) -> int:
+    """Return the number of samples in segments of at least ``least`` samples."""
+    return sum(length for length in record.segments if length >= least)
 
 
 def _keeps_variance(
@@ -186,7 +195,7 @@ def _limit_interval(validation: Dataset, counts: list[int]) -> int:
     """Remove the largest counts until there are enough common intervals; return their length in samples."""
     while len(counts) > 1:
         interval = lcm(*counts)
-        if min(validation.segments) >= interval and validation.samples >= _LEAST_VALIDATION * interval:
+        if _count_in_segments(validation, interval) >= _LEAST_VALIDATION * interval:
             return interval
         counts.pop()
     return 1

@@ -15,8 +15,9 @@ from islands.estimation.estimators import least_squares_bias
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.facade.notebook_html import render_html
 from islands.io.export import export
+from islands.io.model_description import describe
 from islands.io.result_folder import write_result
-from islands.io.summary_text import describe, summary
+from islands.io.summary_text import summary
 from islands.model.equations import equation, latex_equation
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome

@@ -82,6 +82,7 @@ def record_document(record: Dataset) -> dict[str, Any]:
         "names": {"inputs": list(record.input_names), "output": record.output_name},
         "units": {"inputs": list(record.input_units), "output": record.output_unit},
         "segments": list(record.segments),
+        "recordings": list(record.recordings),
     }
 
 
@@ -114,6 +115,10 @@ def _model_document(
         },
         "outcomes": {
             part: {mode: str(value) for mode, value in assessment.outcomes[part].items()} for part in PARTS
+        },
+        "recordings": {
+            part: {name: asdict(value) for name, value in by_name.items()}
+            for part, by_name in assessment.recordings.items()
         },
         "warm_up": assessment.warm_up,
         "information": asdict(assessment.information),

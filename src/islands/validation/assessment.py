@@ -1,7 +1,7 @@
 """Assessment of a model: errors, residual tests and physics checks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
@@ -61,6 +61,9 @@ class Assessment:
         there are fewer predictions), as a fraction of the squared output range. Empty if it diverged.
     constraints : tuple of ConstraintCheck
         The constraints, each with its target and the value of the model.
+    recordings : mapping
+        ``recordings[part][name]``: metrics of the free run on each recording, with the range of the whole
+        part as the scale of the MAPE. Empty for a part that consists of one recording.
     """
 
     metrics: Mapping[str, Mapping[str, Metrics]]
@@ -72,6 +75,7 @@ class Assessment:
     warm_up: int
     block_errors: tuple[float, ...]
     constraints: tuple[ConstraintCheck, ...] = ()
+    recordings: Mapping[str, Mapping[str, Metrics]] = field(default_factory=dict)
 
 
 def assess(
@@ -104,6 +108,7 @@ def assess(
     intervals = dict(zip(MODES, (1, shooting, None), strict=True))
     errors: dict[str, dict[str, Metrics]] = {}
     outcomes: dict[str, dict[str, EvaluationOutcome]] = {}
+    recordings: dict[str, dict[str, Metrics]] = {}
     runs: dict[str, Simulation] = {}
     for part, record in zip(PARTS, (split.estimation, split.validation), strict=True):
         runs = {mode: multiple_shooting(model, record, m, warm_up) for mode, m in intervals.items()}
@@ -111,6 +116,7 @@ def assess(
         errors[part] = {
             mode: metrics(record.y, run.y) if run.outcome else _UNDEFINED for mode, run in runs.items()
         }
+        recordings[part] = _compute_recording_metrics(record, runs["free_run"])
     return Assessment(
         errors,
         outcomes,
@@ -121,7 +127,15 @@ def assess(
         # The loop ends with the validation data.
         _compute_block_errors(split.validation, runs["free_run"]),
         check_constraints(model, constraints),
+        recordings,
     )
+
+
+def _compute_recording_metrics(record: Dataset, run: Simulation) -> dict[str, Metrics]:
+    rows = record.rows_by_recording
+    if len(rows) == 1:
+        return {}
+    return {name: metrics(record.y[each], run.y[each], record.output_range) for name, each in rows.items()}
 
 
 def _compute_block_errors(record: Dataset, run: Simulation) -> tuple[float, ...]:

@@ -185,8 +185,20 @@ def test_cutting_and_joining_at_a_boundary_returns_the_record():
     made = record(segments=(3, 7))
     again = join((made[:3], made[3:]))
     assert again.segments == made.segments
+    assert again.recordings == ("1", "2")
     assert np.array_equal(again.u, made.u)
     assert np.array_equal(again.y, made.y)
+
+
+def test_joined_recordings_have_different_names():
+    named = [record(recordings=(name,)) for name in ("a.csv", "b.csv", "a.csv", "")]
+    joined = join((*named, record(segments=(4, 6), recordings=("b.csv", "c.csv"))))
+    assert joined.recordings == ("a.csv", "b.csv", "a.csv (3)", "4", "b.csv (5)", "c.csv")
+    assert joined[5:25].rows_by_recording == {
+        "a.csv": slice(0, 5),
+        "b.csv": slice(5, 15),
+        "a.csv (3)": slice(15, 20),
+    }
 
 
 def test_recordings_with_different_columns_or_units_are_not_joined():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from islands.data.dataset import Dataset
+from islands.data.dataset import Dataset, join
 from islands.data.split import Split, share_samples, split, split_data
 from islands.errors import RecordError, SettingsError
 
@@ -108,11 +108,27 @@ def test_samples_of_one_file_are_shared_if_the_rows_and_the_column_are():
     assert not share_samples(first, replace(drawn(seed=1), output_name="y_val", sha256="a" * 64))
 
 
-def test_missing_validation_output_is_refused():
+def test_samples_without_an_output_separate_segments_of_both_parts():
     data, other = drawn(), drawn(seed=1)
     y = other.y.copy()
-    y[17] = np.nan
-    with pytest.raises(RecordError, match="the validation data: y is missing at sample 17; a search needs"):
-        split_data(data, replace(other, y=y))
-    with pytest.raises(RecordError, match="the record: y is missing at sample 17; a search needs"):
-        split_data(replace(other, y=y), 0.8)
+    y[17:19] = np.nan
+    holed = replace(other, y=y)
+    for parts, cut in ((split_data(data, holed), 1), (split_data(holed, data), 0)):
+        record = (parts.estimation, parts.validation)[cut]
+        assert record.segments == (17, other.samples - 19)
+        assert record.y.tolist() == [*other.y[:17], *other.y[19:]]
+    assert split_data(holed, 0.2).estimation.segments == (17, round(0.8 * other.samples) - 19)
+
+
+def test_every_recording_gives_its_end_to_the_validation_data():
+    joined = join((drawn(seed=1)[:40], drawn(seed=2)[:20], drawn(seed=3)[:1]))
+    parts = split(joined, 0.25)
+    assert parts.estimation.rows_by_recording == {"1": slice(0, 30), "2": slice(30, 45), "3": slice(45, 46)}
+    assert parts.validation.rows_by_recording == {"1": slice(0, 10), "2": slice(10, 15)}
+    assert parts.validation.y.tolist() == [*drawn(seed=1).y[30:40], *drawn(seed=2).y[15:20]]
+
+
+def test_a_recording_among_several_is_found_again():
+    one, other, third = (drawn(seed=seed) for seed in (1, 2, 3))
+    assert share_samples(join((one, other)), other)
+    assert not share_samples(join((one, other)), third)

@@ -59,14 +59,16 @@ def test_a_result_has_every_field_of_the_contract(findings):
         *("models", "ensemble"),
     ]
     assert result["schema"] == "islands.result/1"
-    assert list(result["record"]) == ["sha256", "samples", "dt", "start", "names", "units", "segments"]
+    assert list(result["record"]) == [
+        *("sha256", "samples", "dt", "start", "names", "units", "segments", "recordings")
+    ]
     contract = ["evaluations", "evaluations_per_second", "wall_s", "outcomes", "full_set"]
     assert list(result["search"])[:5] == contract
     assert set(result["search"]["full_set"]) == {"candidates", "bytes"}
     for model in result["models"]:
         assert list(model) == [
             *("rank", "recommended", "size", "equation", "latex", "terms", "bands", "metrics", "outcomes"),
-            *("warm_up", "information", "constraints", "physics", "residual_tests"),
+            *("recordings", "warm_up", "information", "constraints", "physics", "residual_tests"),
         ]
         for term in model["terms"]:
             assert list(term) == ["regressor", "parameter", "standard_error", "inclusion"]

@@ -7,8 +7,9 @@ import pytest
 
 import islands
 from islands.data.dataset import Dataset
+from islands.io.model_description import describe
 from islands.io.model_table import table
-from islands.io.summary_text import describe, summary
+from islands.io.summary_text import summary
 from islands.model.equations import named_term
 from islands.model.model import make_model
 from islands.model.parsing import parse

@@ -180,6 +180,16 @@ def test_metrics_of_several_recordings_cover_all_their_samples():
     assert found.rmse == pytest.approx(math.sqrt(np.mean(errors**2)), rel=1e-12)
 
 
+def test_errors_of_the_recordings_add_up_to_those_of_the_part():
+    recordings = [record(80, 1), record(60, 2)]
+    found = assess(LINEAR, Split(record(200), join(tuple(recordings))), SHOOTING)
+    whole = found.metrics["validation"]["free_run"]
+    first, second = found.recordings["validation"].values()
+    assert whole.mape == pytest.approx((78 * first.mape + 58 * second.mape) / 136, rel=1e-12)
+    assert 136 * whole.rmse**2 == pytest.approx(78 * first.rmse**2 + 58 * second.rmse**2, rel=1e-12)
+    assert found.recordings["estimation"] == {}
+
+
 def test_recording_shorter_than_the_warm_up_is_ignored():
     long = record(80, 1)
     both = assess(LINEAR, Split(record(200), join((record(2, 7), long))), SHOOTING)

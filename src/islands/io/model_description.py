@@ -1,0 +1,263 @@
+"""Description of the recommended model in sentences."""
+
+from collections.abc import Iterator
+from math import floor, isfinite
+
+import numpy as np
+
+from islands.estimation.constraints.constraint_checks import ConstraintCheck
+from islands.evolution.search_result import RankedModel, SearchResult
+from islands.model.equations import named_equation, named_statement, named_term, signal_names
+from islands.validation.predictable_residual import ADEQUATE, LARGEST_SHARE, ResidualStructure
+from islands.validation.prediction_bands import LEVEL
+
+#: Smallest R2 of a simulation that counts as good.
+_GOOD_R2 = 0.9
+
+#: Ratio of the errors on validation data and estimation data above which a model does not generalise.
+_LARGE_RATIO = 2.0
+
+#: Standard errors below which a parameter is not significant.
+_SIGNIFICANT = 2.0
+
+#: Inclusion probability from which a term is certain.
+_CERTAIN = 0.9
+
+#: Inclusion probability below which most of the weight is on models without the term.
+_UNLIKELY = 0.5
+
+#: Closure of a loop, in per cent of the output range, above which the loop is open.
+_OPEN_PERCENT = 5.0
+
+#: Where to look for missing terms, by correlation test.
+_HINTS = {
+    "xi_xi": "terms in past outputs (larger lags, other powers), or a model of coloured noise",
+    "u_xi": "linear or odd terms in {input}, also at other lags",
+    "xi_xiu": "products of past outputs and {input}",
+    "u2_xi": "even terms in {input}, such as squares or absolute values",
+    "u2_xi2": "terms that grow with {input}, because the size of the residual depends on it",
+}
+
+
+def describe(found: SearchResult) -> list[str]:
+    """Describe the recommended model in sentences: equation, error, uses, failures and next steps.
+
+    Every statement is about a quantity of the assessment.
+    """
+    entry, recommendation = found.recommended, found.recommendation
+    choice, physics = (*recommendation.reasons, "")[:2]
+    rank, count = recommendation.rank, len(found.models)
+    lines = [
+        f"Recommended: model {rank} of {count}, size {entry.model.size}: {choice}.",
+        f"    {named_equation(entry.model)}",
+        _describe_units(found),
+        _describe_error(found, entry),
+        *_describe_recordings(found, entry),
+        *_describe_uncertainty(found, entry),
+        *_describe_constraints(entry),
+    ]
+    good = [*_list_uses(entry), *([physics] if physics and not physics.startswith("no model") else [])]
+    bad = [*([physics] if physics.startswith("no model") else []), *_list_failures(found, entry)]
+    return [
+        *lines,
+        f"Good for: {'; '.join(good) or 'no use: every check failed'}.",
+        f"Fails at: {'; '.join(bad) or 'none of the checks'}.",
+        f"Next: {'; '.join(_list_next_steps(found, entry))}.",
+    ]
+
+
+def _describe_units(found: SearchResult) -> str:
+    record = found.record
+    columns = zip(
+        signal_names(found.recommended.model),
+        (record.output_unit, *record.input_units),
+        strict=True,
+    )
+    units = ", ".join(f"{name} in {unit}" for name, unit in columns if unit)
+    return f"    {f'{units}; ' if units else ''}{_describe_rate(found)}.{_describe_feedthrough(found)}"
+
+
+def _describe_feedthrough(found: SearchResult) -> str:
+    if not found.direct_inputs:
+        return ""
+    inputs = ", ".join(found.direct_inputs)
+    return f" Direct feedthrough: the output responds to {inputs} within the sample, so models read it at k."
+
+
+def _describe_rate(found: SearchResult) -> str:
+    record, dt = found.record, found.split.estimation.dt
+    if found.average == 1:
+        return f"k counts samples of {dt:g} s"
+    return (
+        f"k counts steps of {dt:g} s: each value is the mean of {found.average} samples of the record, and "
+        f"simulate averages a record of {record.dt:g} s in the same way"
+    )
+
+
+def _describe_error(found: SearchResult, entry: RankedModel) -> str:
+    free, one = (entry.assessment.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
+    if not isfinite(free.rmse):
+        error = "the free run on the validation data diverges"
+    else:
+        error = f"free run on the validation data, from the inputs alone, RMSE {_unit(found, free.rmse)}"
+        # Both are undefined for a constant output.
+        error += f", mean absolute error {free.mape:.3g} % of the output range" if isfinite(free.mape) else ""
+        error += f", R2 {free.r2:.5f}" if isfinite(free.r2) else ""
+    return f"Error: {error}; one step ahead RMSE {_unit(found, one.rmse)}."
+
+
+def _describe_recordings(found: SearchResult, entry: RankedModel) -> Iterator[str]:
+    errors = entry.assessment.recordings.get("validation", {})
+    if errors:
+        listed = ", ".join(f"{name} {_unit(found, each.rmse)}" for name, each in errors.items())
+        yield f"RMSE of the free run by recording: {listed}."
+    missing = int(np.isnan(found.record.y).sum())
+    if missing:
+        yield (
+            f"Missing outputs: {missing} of {found.record.samples} samples are skipped, and every simulation "
+            "is started again after them."
+        )
+
+
+def _describe_uncertainty(found: SearchResult, entry: RankedModel) -> Iterator[str]:
+    if entry.bands is None or found.ensemble is None:
+        return
+    # Rounded down: a term below the limit never shows the limit.
+    doubtful = [f"{term} {floor(100 * share) / 100:.2f}" for term, share in _list_doubtful(found, entry)]
+    text = f"the {100 * LEVEL:g} % prediction band of the free run has a median half-width of "
+    text += f"{_unit(found, entry.bands.typical_half_width())}; "
+    terms = f"doubtful terms, with the probability of their inclusion: {', '.join(doubtful)}"
+    certain = f"every term has an inclusion probability of {_CERTAIN:g} or more"
+    yield f"Uncertainty: {text}{terms if doubtful else certain}."
+
+
+def _list_doubtful(found: SearchResult, entry: RankedModel) -> list[tuple[str, float]]:
+    """Return the terms that are not certain, each with the probability of its inclusion."""
+    if found.ensemble is None:
+        return []
+    inclusion = [found.ensemble.inclusion(item) for item in entry.model.regressors]
+    return [
+        (named_term(entry.model, position), share)
+        for position, share in enumerate(inclusion)
+        if share < _CERTAIN
+    ]
+
+
+def _describe_constraints(entry: RankedModel) -> Iterator[str]:
+    met = [named_statement(check.text, entry.model) for check in _list_statements(entry) if check.met]
+    if met:
+        yield f"Constraints that the model meets: {'; '.join(met)}."
+
+
+def _list_statements(entry: RankedModel) -> list[ConstraintCheck]:
+    """Return the constraints of the user; the physics checks state whether Property 1 holds."""
+    return [check for check in entry.assessment.constraints if check.text != "hysteresis"]
+
+
+def _unit(found: SearchResult, value: float) -> str:
+    return f"{value:.4g} {found.record.output_unit}".rstrip()
+
+
+def _list_uses(entry: RankedModel) -> Iterator[str]:
+    free, one = (entry.assessment.metrics["validation"][mode] for mode in ("free_run", "one_step_ahead"))
+    if free.r2 >= _GOOD_R2:
+        yield "simulation from the inputs alone"
+    elif one.r2 >= _GOOD_R2:
+        yield "prediction one step ahead"
+    if entry.assessment.residual_structure.verdict == ADEQUATE:
+        yield _describe_adequate_residual(entry.assessment.residual_structure)
+
+
+def _describe_adequate_residual(structure: ResidualStructure) -> str:
+    shares = {
+        "free-run residual, as with noise of the measurement": structure.free_run_share,
+        "one-step-ahead residual, as with noise within the system": structure.one_step_share,
+    }
+    white = [name for name, share in shares.items() if share <= LARGEST_SHARE]
+    if not white:
+        return "the residual is a rounding error"
+    name = "residual" if len(white) == len(shares) else white[0]
+    return f"no structure is left in the {name} (at most {100 * LARGEST_SHARE:.0f} % is predictable)"
+
+
+def _list_failures(found: SearchResult, entry: RankedModel) -> Iterator[str]:
+    assessment = entry.assessment
+    errors = {part: assessment.metrics[part]["free_run"] for part in ("estimation", "validation")}
+    for check in _list_statements(entry):
+        if not check.met:
+            value = f"{check.value:.6g}" if isfinite(check.value) else "undefined"
+            yield f"the constraint {named_statement(check.text, entry.model)} (value {value})"
+    if errors["validation"].r2 < _GOOD_R2:
+        yield f"simulation from the inputs alone: R2 {errors['validation'].r2:.3f}"
+    physics = assessment.physics
+    diverging = [f"{test.name}" for test in physics.excursions if not test.bounded]
+    if diverging:
+        yield f"diverges at {', '.join(diverging)}"
+    held = sum(not hold.bounded for hold in physics.holds)
+    if held:
+        yield f"diverges in {held} of {len(physics.holds)} holds of the inputs"
+    if found.requires_property_1 and not physics.property_1 and isfinite(physics.hold_drift_percent):
+        yield f"the output drifts by {physics.hold_drift_percent:.3g} % of its range at constant input"
+    opened = [test for test in physics.excursions if test.bounded and test.closure_percent > _OPEN_PERCENT]
+    if found.claims_hysteresis and opened:
+        worst = max(opened, key=lambda test: test.closure_percent)
+        yield f"loops do not close at {worst.name}: {worst.closure_percent:.3g} % of the output range"
+    structure = assessment.residual_structure
+    if structure.verdict != ADEQUATE and isfinite(structure.percent):
+        yield (
+            f"{100 * structure.free_run_share:.0f} % of the free-run residual is predictable "
+            f"(RMS {structure.percent:.2g} % of the output range)"
+        )
+    ratio = errors["validation"].rmse / errors["estimation"].rmse if errors["estimation"].rmse > 0 else 0.0
+    if ratio > _LARGE_RATIO:
+        yield f"the free-run error on the validation data is {ratio:.2g} times that on the estimation data"
+
+
+def _list_insignificant(entry: RankedModel) -> list[str]:
+    model = entry.model
+    if model.standard_errors is None:
+        return []
+    values = zip(model.parameters, model.standard_errors, strict=True)
+    return [
+        named_term(model, position)
+        for position, (theta, error) in enumerate(values)
+        if abs(theta) < _SIGNIFICANT * error
+    ]
+
+
+def _list_next_steps(found: SearchResult, entry: RankedModel) -> list[str]:
+    steps = []
+    structure = entry.assessment.residual_structure
+    if structure.verdict != ADEQUATE:
+        largest = max(found.models, key=lambda other: other.model.size).model.size
+        if entry.model.size == largest and "max_terms" in found.settings:
+            steps.append(f"allow more than {largest} terms")
+        steps.append(f"try {_suggest_terms(entry)}")
+    errors = [entry.assessment.metrics[part]["free_run"].rmse for part in ("estimation", "validation")]
+    if errors[1] > _LARGE_RATIO * errors[0] > 0:
+        steps.append("estimate from a record that covers the amplitudes and rates of the validation data")
+    weak = _list_insignificant(entry)
+    if weak:
+        more = f" (and of {len(weak) - 1} more)" if len(weak) > 1 else ""
+        steps.append(
+            f"try a longer record or a smaller model, since the parameter of {weak[0]}{more} is within "
+            "two standard errors of zero"
+        )
+    unlikely = min(_list_doubtful(found, entry), key=lambda each: each[1], default=("", 1.0))
+    if unlikely[1] < _UNLIKELY and not weak:
+        steps.append(
+            f"try a longer record, since models without {unlikely[0]} are about as good (probability of its "
+            f"inclusion {unlikely[1]:.2f})"
+        )
+    steps.append("check the model on a record that was not used (islands simulate)")
+    return steps
+
+
+def _suggest_terms(entry: RankedModel) -> str:
+    """Return the hint of the test with an input that exceeds its limit by most, or of the one without."""
+    past, *tests = entry.assessment.residual_tests.tests
+    # The residual of a slow record is correlated in time whatever term is missing.
+    excess = [float(np.abs(test.values).max()) / test.limit for test in tests]
+    worst = tests[int(np.argmax(excess))] if max(excess) > 1.0 else past
+    name = "" if worst.input is None else signal_names(entry.model)[1 + worst.input]
+    return _HINTS[worst.name].format(input=name)
