@@ -23,7 +23,7 @@ from islands.evolution.migration.topology import TOPOLOGIES, WITH_DEGREE
 from islands.evolution.presets import PRESET_SUMMARIES, PRESETS
 from islands.evolution.settings import Settings
 from islands.figures.registry import FIGURES, SEARCH_FIGURES
-from islands.io.export import EXPORTS
+from islands.io.export import EXPORTS, FILE_EXPORTS
 from islands.io.records import READERS
 from islands.model.candidate_library import LIBRARIES
 from islands.model.primitives import PRIMITIVES
@@ -165,7 +165,7 @@ def output_formats() -> str:
     return page(
         "Export formats and figures",
         "Formats of `islands show --format`, `export` in Python and over REST; figures of a result.",
-        section("Export formats", entries("Format", EXPORTS)),
+        section("Export formats", entries("Format", {**EXPORTS, **FILE_EXPORTS})),
         section("Figures of a model", "`best.plot(name)` draws them in Python.", entries("Figure", FIGURES)),
         section("Figures of a search", entries("Figure", SEARCH_FIGURES)),
         section("Record formats", "[Records](records.md) has the details.", entries("Suffix", READERS)),

@@ -1,13 +1,16 @@
-"""Export of models to text formats and programming languages.
+"""Export of models to text formats, programming languages and blocks of simulators.
 
-Each format is an entry of `EXPORTS`. Read `parts` and `infix` first: all programs share them.
+Each text format is an entry of `EXPORTS`, each binary one of `FILE_EXPORTS`. Read `parts` and `infix` first:
+all programs share them.
 """
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 
-from islands.errors import lookup
+from islands.errors import SettingsError, lookup
 from islands.io.export.c import c_source
+from islands.io.export.fmu.archive import fmu2, fmu3
 from islands.io.export.matlab import matlab_source
 from islands.io.export.python import python_source
 from islands.io.models import model_json
@@ -27,12 +30,32 @@ EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
 )
 
 
+#: Formats that are not text.
+FILE_EXPORTS: Mapping[str, Callable[[Model], bytes]] = MappingProxyType({"fmu": fmu3, "fmu2": fmu2})
+
+
 def export(model: Model, kind: str) -> str:
     """Return a model as text in one of the formats of ``EXPORTS``.
 
     Raises
     ------
     SettingsError
+        The format is unknown or is not text.
+    """
+    if kind in FILE_EXPORTS:
+        raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
+    return lookup(EXPORTS, kind, "format")(model)
+
+
+def write_export(model: Model, kind: str, path: str | Path) -> None:
+    """Write a model to a file in one of the formats of ``EXPORTS`` or ``FILE_EXPORTS``.
+
+    Raises
+    ------
+    SettingsError
         The format is unknown.
     """
-    return lookup(EXPORTS, kind, "format")(model)
+    if kind in FILE_EXPORTS:
+        Path(path).write_bytes(FILE_EXPORTS[kind](model))
+        return
+    Path(path).write_text(f"{export(model, kind).rstrip()}\n", encoding="utf-8")

@@ -52,11 +52,11 @@ def c_source(model: Model) -> str:
         The model has no finite parameters, or a user-defined primitive has no C body.
     """
     names = signals(model)
-    definitions = [definition(primitive, _name(primitive)) for primitive in functions(model)]
+    definitions = [definition(primitive, c_name(primitive)) for primitive in functions(model)]
     # Compilers warn about unused parameters.
     read = {channel for item in model.regressors for channel, _ in item.lags}
     lines = [f"(void){name};" for channel, name in enumerate(names) if channel not in read]
-    lines += [f"total += {term};" for term in terms(model, lambda name, lag: f"{name}[{-lag}]", _name)]
+    lines += [f"total += {term};" for term in terms(model, lambda name, lag: f"{name}[{-lag}]", c_name)]
     pointers = [f"const double *{name}" for name in names]
     return _FILE.format(
         heading=heading(model, " *"),
@@ -87,6 +87,7 @@ def definition(primitive: Primitive, name: str) -> str:
     return f"static double {name}({arguments})\n{{\n{textwrap.indent(body(primitive, 'c'), '    ')}\n}}\n"
 
 
-def _name(primitive: Primitive) -> str:
+def c_name(primitive: Primitive) -> str:
+    """Return the name of a primitive's C function."""
     # The prefix avoids names of the C library (tanh) and reserved names (leading underscore).
     return f"f_{primitive.name}"

@@ -7,8 +7,6 @@ cannot use it; it shows the cost of a general kernel.
 
 import ctypes
 import hashlib
-import shutil
-import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,16 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from islands.data.dataset import Dataset
-from islands.errors import ModelError
 from islands.io.export.c import definition
+from islands.io.export.fmu.compiler import compile_library
 from islands.model.primitives import SIGN
 from islands.model.regressor import Regressor
 from islands.performance.benchmark.expression_source import infix
-
-
-def find_compiler() -> str | None:
-    """Return the path of the C compiler, or None."""
-    return shutil.which("cc")
 
 
 def compile_model(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDLL:
@@ -42,20 +35,10 @@ def compile_model(source: str, flags: Sequence[str], folder: Path) -> ctypes.CDL
     ModelError
         If there is no compiler, or if it rejects the source or a flag; the message is the compiler's.
     """
-    command = find_compiler()
-    if command is None:
-        raise ModelError("there is no C compiler named cc: install one, or leave C out of the comparison")
     name = hashlib.sha256("\n".join((source, *flags)).encode()).hexdigest()
     written, library = folder / f"{name}.c", folder / f"{name}.so"
     written.write_text(source, encoding="ascii")
-    done = subprocess.run(
-        [command, *flags, "-shared", "-fPIC", "-o", str(library), str(written), "-lm"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode != 0:
-        raise ModelError(f"{command} {' '.join(flags)} does not compile the benchmark: {done.stderr.strip()}")
+    compile_library(written, library, flags)
     return ctypes.CDLL(str(library))
 
 

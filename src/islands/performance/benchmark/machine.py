@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from islands.io.export.fmu.compiler import find_compiler
 from islands.performance.benchmark.clock import cpu
-from islands.performance.benchmark.compiled_c import compile_model, find_compiler
+from islands.performance.benchmark.compiled_c import compile_model
 
 #: Packages whose versions influence the times.
 _PACKAGES = ("islands", "numpy", "numba", "llvmlite", "scipy")

@@ -283,6 +283,13 @@ def test_help_lists_the_commands(run):
         assert name in out
 
 
+def test_an_export_is_written_to_a_file(run, tmp_path):
+    for kind in ("c", "fmu"):
+        assert run("show", "published:12", "--format", kind, "--out", str(tmp_path / kind)) == (0, "", "")
+    assert (tmp_path / "c").read_text() == run("show", "published:12", "--format", "c")[1]
+    assert (tmp_path / "fmu").read_bytes().startswith(b"PK")
+
+
 # Errors: one line that says what to do, and no traceback.
 
 
@@ -292,6 +299,7 @@ def test_help_lists_the_commands(run):
         (("show", "[/red]"), "cannot read the model file [/red]"),
         (("show", "y[k-1].json"), "cannot read the model file y[k-1].json"),
         (("show", "published:12", "--format", "[bold]"), "unknown format '[bold]'"),
+        (("show", "published:12", "--format", "fmu"), "the format fmu is not text: write a file with --out"),
         (("simulate", "published:12", "nowhere.csv"), "there is no file nowhere.csv"),
         (("systems", "make", "s1", "--out", "no/where.csv"), "cannot write no/where.csv: No such file"),
     ],

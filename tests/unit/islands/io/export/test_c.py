@@ -12,10 +12,11 @@ import islands
 from islands.data.dataset import Dataset
 from islands.errors import ModelError
 from islands.io.export import export
+from islands.io.export.fmu.compiler import find_compiler
 from islands.io.export.parts import functions
 from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import primitive
-from islands.performance.benchmark.compiled_c import compile_model, find_compiler
+from islands.performance.benchmark.compiled_c import compile_model
 from islands.simulation.predictors import free_run, one_step_ahead
 from islands.systems.published_models import PUBLISHED
 from support.programs import (

@@ -5,9 +5,9 @@ from dataclasses import asdict, replace
 import pytest
 
 from islands.errors import ModelError
+from islands.io.export.fmu.compiler import find_compiler
 from islands.model.model import Model
 from islands.performance.benchmark import comparison, kernel_evaluator
-from islands.performance.benchmark.compiled_c import find_compiler
 from islands.performance.benchmark.workload import (
     CASE1,
     INTERVAL,
