@@ -64,7 +64,7 @@ print(f"{estimation.samples} samples in segments of {estimation.segments}, input
 #
 # The second argument is the validation data: a record, or the fraction of the first record that is kept at
 # its end.
-result = islands.fit(estimation, validation, library="polynomial", degree=2, lags=3)
+result = islands.fit(estimation, validation=validation, library="polynomial", degree=2, lags=3)
 for model in sorted(result.models, key=lambda model: model.model.size)[:5]:
     error = model.metrics["validation"]["free_run"].rmse
     print(f"{model.model.size} terms, RMSE {error:.4f} K: {model}")
@@ -82,7 +82,7 @@ chosen.plot("free-run").savefig(out / "free-run.svg")
 # Without the fan the error is much larger, however many terms the model has. `first_inputs(1)` keeps the
 # first input only.
 alone = islands.fit(
-    estimation.first_inputs(1), validation.first_inputs(1), library="polynomial", degree=2, lags=3
+    estimation.first_inputs(1), validation=validation.first_inputs(1), library="polynomial", degree=2, lags=3
 )
 for name, model in (("heater and fan", chosen), ("heater only", alone.best)):
     error = model.metrics["validation"]["free_run"]

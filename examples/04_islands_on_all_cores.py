@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 import islands
-from islands_service.engines import ray_engine
 
 parser = argparse.ArgumentParser(description="Islands in parallel on this machine.")
 parser.add_argument("--out", type=Path, help="folder of the results; a temporary one by default")
@@ -50,9 +49,9 @@ print(f"error {serial.best.metrics['validation']['free_run'].mape:.3f} %")
 # %%
 # ## On all cores
 #
-# `ray_engine()` starts Ray on the cores of this machine and stops it at the end of the block. The islands
-# run in several processes at the same time. Starting Ray takes a few seconds, so it pays off in searches
-# that take longer than this one.
+# `engine="ray"` starts Ray on the cores of this machine and stops it at the end of the search;
+# `engine=islands.Ray(cpus=2)` uses two cores. The islands run in several processes at the same time. Starting
+# Ray takes a few seconds, so it pays off in searches that take longer than this one.
 #
 # `progress` is called after the first generation and after every migration, with the state of the search
 # and its settings.
@@ -63,8 +62,7 @@ def show(state, settings):
     print(f"generation {state.archipelago.generation} of {settings.generations}: {state.evaluations} models")
 
 
-with ray_engine() as engine:
-    parallel = islands.identify(record, seed=0, engine=engine, progress=show, **settings)
+parallel = islands.identify(record, seed=0, engine="ray", progress=show, **settings)
 
 # %%
 # ## The same result

@@ -27,7 +27,6 @@ from pathlib import Path
 import numpy as np
 
 import islands
-from islands_service.engines import ray_engine
 
 parser = argparse.ArgumentParser(description="Islands on a Ray cluster.")
 parser.add_argument("--out", type=Path, help="folder of the results; a temporary one by default")
@@ -53,18 +52,17 @@ for k in range(1, u.size):
 level += 0.005 * rng.standard_normal(u.size)
 record = islands.Dataset(u, level, 1.0, ("u_V",), "level_cm", ("V",), "cm")
 
-with ray_engine(address) as engine:
-    result = islands.identify(
-        record,
-        preset="narx",
-        seed=0,
-        engine=engine,
-        islands=8,
-        population=50,
-        generations=30,
-        max_terms=5,
-        max_evaluations=8000,
-    )
+result = islands.identify(
+    record,
+    preset="narx",
+    seed=0,
+    engine=islands.Ray(address=address),
+    islands=8,
+    population=50,
+    generations=30,
+    max_terms=5,
+    max_evaluations=8000,
+)
 
 # %%
 # `ended_by` names the budget that ended the search.

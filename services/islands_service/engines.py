@@ -1,4 +1,4 @@
-"""Table of search engines: serial and Ray."""
+"""Table of search engines: serial and Ray. The core finds Ray by its entry point in ``pyproject.toml``."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
@@ -9,14 +9,21 @@ from islands.evolution.progress import ProgressCallback
 
 
 @contextmanager
-def serial_engine(_address: str | None = None, _progress: ProgressCallback = print) -> Iterator[Engine]:
+def serial_engine(
+    _address: str | None = None, _progress: ProgressCallback = print, _cpus: int | None = None
+) -> Iterator[Engine]:
     """Run islands one after the other in this process."""
     yield SerialEngine()
 
 
 @contextmanager
-def ray_engine(address: str | None = None, progress: ProgressCallback = print) -> Iterator[Engine]:
-    """Run islands in parallel with Ray, for ``islands.identify(..., engine=engine)``.
+def ray_engine(
+    address: str | None = None, progress: ProgressCallback = print, cpus: int | None = None
+) -> Iterator[Engine]:
+    """Run islands in parallel with Ray.
+
+    ``islands.identify(..., engine="ray")`` opens this engine for one search; several searches may share an
+    engine, ``with ray_engine() as engine: islands.identify(..., engine=engine)``.
 
     Parameters
     ----------
@@ -25,6 +32,8 @@ def ray_engine(address: str | None = None, progress: ProgressCallback = print) -
         ends with the block.
     progress : ProgressCallback
         Receives a message if an actor is lost or must wait for a CPU.
+    cpus : int, optional
+        Number of cores of this machine that a Ray started here uses; all by default.
 
     Raises
     ------
@@ -35,7 +44,7 @@ def ray_engine(address: str | None = None, progress: ProgressCallback = print) -
     from islands_service.runtime.cluster import cluster  # noqa: PLC0415
     from islands_service.runtime.ray_engine import RayEngine  # noqa: PLC0415
 
-    with cluster(address):
+    with cluster(address, cpus):
         yield RayEngine(progress)
 
 

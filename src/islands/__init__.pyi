@@ -19,12 +19,14 @@ from islands.evolution.presets import PRESETS as PRESETS
 from islands.evolution.settings import Settings as Settings
 from islands.facade.diagnose import diagnose as diagnose
 from islands.facade.diagnose import function_simulator as function_simulator
+from islands.facade.engine_choice import Ray as Ray
 from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
 from islands.facade.result import FittedModel as FittedModel
 from islands.facade.result import Result as Result
 from islands.facade.result import simulate as simulate
+from islands.io.data_frames import as_record as as_record
 from islands.io.models import read_model as read_model
 from islands.io.models import write_model as write_model
 from islands.io.records import read_record as read_record

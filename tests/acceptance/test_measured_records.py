@@ -70,7 +70,7 @@ def piezo():
 
 
 def test_constrained_model_of_the_measured_piezo_does_not_drift(piezo):
-    best = islands.fit(*piezo, constraints="hysteresis").best
+    best = islands.fit(piezo[0], validation=piezo[1], constraints="hysteresis").best
     assert best.metrics["validation"]["free_run"].mape < 0.2
     assert best.physics.property_1 is True
     assert best.physics.hold_drift_percent < 1e-6
@@ -81,7 +81,7 @@ def test_constrained_model_of_the_measured_piezo_does_not_drift(piezo):
 
 
 def test_unconstrained_model_of_the_measured_piezo_drifts_in_a_hold(piezo):
-    best = islands.fit(*piezo, constraints="none").best
+    best = islands.fit(piezo[0], validation=piezo[1], constraints="none").best
     assert best.metrics["validation"]["free_run"].mape < 0.2
     assert best.physics.property_1 is False
     assert best.physics.hold_drift_percent > 20.0

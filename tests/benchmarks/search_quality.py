@@ -49,7 +49,7 @@ def simulated_figures(variant: str, seed: int) -> Iterator[tuple[str, float]]:
     """Identify a simulated record and yield the named figures."""
     parts = [make_record("bouc-wen-piezo", variant, part) for part in ("estimation", "validation")]
     started = perf_counter()
-    result = islands.identify(parts[0], parts[1][:20_000], preset="hysteresis", seed=seed)
+    result = islands.identify(parts[0], validation=parts[1][:20_000], preset="hysteresis", seed=seed)
     seconds = perf_counter() - started
     for terms in (6, 9):
         yield (
@@ -71,7 +71,7 @@ def measured_figures(seed: int) -> Iterator[tuple[str, float]]:
     record = read_record(path, ["u_V"], "y_um")
     first, second = round(0.6 * record.samples), round(0.8 * record.samples)
     started = perf_counter()
-    result = islands.identify(record[:first], record[first:second], preset="hysteresis", seed=seed)
+    result = islands.identify(record[:first], validation=record[first:second], preset="hysteresis", seed=seed)
     seconds = perf_counter() - started
     yield "validation, best", result.models[0].metrics["validation"]["free_run"].mape
     yield "test, best", mape(result.models[0], record[second:])

@@ -114,7 +114,7 @@ def run(
         try:
             result = islands.identify(
                 data,
-                held_out,
+                validation=held_out,
                 start=state,
                 progress=checkpoints,
                 stage=show,

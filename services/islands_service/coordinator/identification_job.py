@@ -71,7 +71,7 @@ def run_identification_job(
 
     result = identify(
         record,
-        validation,
+        validation=validation,
         preset=spec.preset,
         seed=spec.seed,
         progress=reporter,

@@ -55,13 +55,15 @@ LOSS_ERRORS = (
 
 
 @contextmanager
-def cluster(address: str | None = None) -> Iterator[None]:
+def cluster(address: str | None = None, cpus: int | None = None) -> Iterator[None]:
     """Connect to a cluster, or start a local Ray that ends with the block and removes its files.
 
     Parameters
     ----------
     address : str, optional
         ``HOST:PORT`` of the head of a cluster; by default a local Ray is started.
+    cpus : int, optional
+        Number of cores that a local Ray uses; by default all that this process may use.
 
     Raises
     ------
@@ -73,7 +75,7 @@ def cluster(address: str | None = None) -> Iterator[None]:
             "this process is already connected to Ray: disconnect first, or give the address of that cluster"
         )
     logging.getLogger("ray").setLevel(logging.CRITICAL)
-    with _local_ray() if address is None else _remote_cluster(address):
+    with _local_ray(cpus or _count_cpus()) if address is None else _remote_cluster(address):
         yield
 
 
@@ -118,7 +120,7 @@ def _count_cpus() -> int:
 
 
 @contextmanager
-def _local_ray() -> Iterator[None]:
+def _local_ray(cpus: int) -> Iterator[None]:
     # Ray's processes listen on all interfaces: the token keeps other users out.
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(16))
     parent = Path(tempfile.gettempdir())
@@ -133,7 +135,7 @@ def _local_ray() -> Iterator[None]:
             ray.init(
                 address="local",
                 namespace=NAMESPACE,
-                num_cpus=_count_cpus(),
+                num_cpus=cpus,
                 object_store_memory=OBJECT_STORE_BYTES,
                 include_dashboard=False,
                 log_to_driver=False,

@@ -1,9 +1,8 @@
 """`diagnose`: compare a simulation with a record and name what the simulation gets wrong."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis
 from islands.discrepancy.diagnosis import diagnose as diagnose_simulator
 from islands.discrepancy.effects import EFFECTS
@@ -12,15 +11,22 @@ from islands.discrepancy.interfaces.parallel import ParallelMap
 from islands.discrepancy.interfaces.simulator import Simulator
 from islands.discrepancy.simulators.python_function import PythonFunctionSimulator
 from islands.evolution.progress import ProgressCallback, ignore_progress
+from islands.io.data_frames import as_record
 from islands.io.simulator_spec.factory import make_model_simulator, make_simulator
 from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
 from islands.model.model import Model
 
+if TYPE_CHECKING:
+    from islands.io.data_frames import RecordLike
+
 
 def diagnose(
-    record: Dataset,
+    record: "RecordLike",
     simulation: str | Model | SimulationSpec | LocalSpec | Simulator,
     *,
+    inputs: str | Sequence[str] = (),
+    output: str | None = None,
+    dt: float | None = None,
     tolerance: Mapping[str, float] | None = None,
     columns: Mapping[str, Signal] | None = None,
     effects: Sequence[Effect] = EFFECTS,
@@ -32,11 +38,16 @@ def diagnose(
 
     Parameters
     ----------
-    record : Dataset
+    record : Dataset or data frame
         The first input drives the simulation; further inputs are channels that may affect the output.
+        Make a record of arrays with `as_record`.
     simulation : str, Model, spec or Simulator
         Text as on the command line (``second-order``, ``linear:2``, ``model:FILE.json``,
         ``python:FILE.py:FUNCTION``, ...), a model, a specification, or a simulator.
+    inputs, output
+        Names of the columns of a data frame.
+    dt : float, optional
+        Sampling time of a data frame without a time, in seconds.
     tolerance : mapping, optional
         Relative standard deviations of parameters about their nominal values. Other parameters are
         calibrated without a prior.
@@ -61,6 +72,7 @@ def diagnose(
         There is no such simulation, a tolerance belongs to no parameter, two effects have the same name, or
         an effect is invalid.
     """
+    record = as_record(record, dt=dt, inputs=inputs, output=output)
     simulator: Any = simulation
     if isinstance(simulation, Model):
         simulator = make_model_simulator(simulation, "the model", record)

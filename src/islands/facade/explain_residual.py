@@ -10,6 +10,7 @@ from islands.data.dataset import Dataset
 from islands.discrepancy.diagnosis import Diagnosis, ResidualFormula
 from islands.discrepancy.inference.verdict import Verdict
 from islands.evolution.engine import Engine
+from islands.facade.engine_choice import Ray
 from islands.facade.identify import identify
 from islands.model.equations import named_equation
 from islands.simulation.predictors import free_run
@@ -44,7 +45,9 @@ RESIDUAL = "residual"
 SIMULATED = "simulated"
 
 
-def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = None) -> ResidualFormula | None:
+def explain_residual(
+    found: Diagnosis, seed: int = 0, engine: Engine | Ray | str | None = None
+) -> ResidualFormula | None:
     """Search for a formula of the residual of the best simulation of a diagnosis.
 
     The search uses the estimation part of the record; the hold-out part decides which formula is returned.
@@ -70,9 +73,7 @@ def explain_residual(found: Diagnosis, seed: int = 0, engine: Engine | None = No
         output_name=RESIDUAL,
         output_unit=record.output_unit,
     )
-    result = identify(
-        dataset[: found.estimation_samples], 0.25, preset="narx", seed=seed, engine=engine, **SEARCH
-    )
+    result = identify(dataset[: found.estimation_samples], preset="narx", seed=seed, engine=engine, **SEARCH)
     best, explained = None, MIN_EXPLAINED_FRACTION
     for each in result.models:
         run = free_run(each.model, dataset)

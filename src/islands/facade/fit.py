@@ -2,6 +2,9 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
 
 from islands.data.averaging import AUTO, count_means
 from islands.data.dataset import Dataset
@@ -43,12 +46,18 @@ from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import screen
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
+from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set, get_library
 from islands.model.regressor import Regressor
 from islands.simulation.outcome import EvaluationOutcome
 from islands.validation.assessment import assess
 from islands.validation.ensemble import ValidatedModel
+
+if TYPE_CHECKING:
+    from narwhals.typing import IntoSeries
+
+    from islands.io.data_frames import RecordLike
 
 #: Samples of a shooting interval (case 1 of the paper); at most a tenth of a short record.
 SHOOTING = 500
@@ -58,9 +67,13 @@ _SCREENED = 150
 
 
 def fit(
-    record: Dataset,
-    validation: Dataset | float = 0.25,
+    record: "RecordLike",
+    y: "ArrayLike | IntoSeries | None" = None,
+    dt: float | None = None,
     *,
+    inputs: str | Sequence[str] = (),
+    output: str | None = None,
+    validation: "RecordLike | float" = 0.25,
     library: str = "phi-polynomial",
     degree: int | None = None,
     lags: int | None = None,
@@ -78,9 +91,17 @@ def fit(
 
     Parameters
     ----------
-    record : Dataset
-        Record without missing values.
-    validation : Dataset or float
+    record : Dataset, data frame or array
+        Data without missing values, as `as_record` takes them: a `Dataset`; a frame of pandas or polars or an
+        xarray Dataset, with ``inputs`` and ``output``; or the inputs as an array, followed by ``y`` and
+        ``dt``.
+    y : array, optional
+        The output, of shape (samples,), if ``record`` is an array.
+    dt : float, optional
+        Sampling time in seconds. A frame with a time, as its index or as a column, does not need it.
+    inputs, output
+        Names of the columns of a frame.
+    validation : Dataset, data frame or float
         Data that rank the models: a separate record, or the fraction at the end of ``record``.
     library : str
         An entry of ``LIBRARIES``: ``phi-polynomial`` for hysteresis, ``polynomial`` for smooth systems.
@@ -122,6 +143,7 @@ def fit(
     RecordError
         The record is too short or incomplete, or the validation data has other columns or sampling time.
     """
+    record, validation = read_data(record, y, dt, inputs, output, validation)
     entry = get_library(library)
     degree = entry.degree if degree is None else degree
     lags = entry.lags if lags is None else lags

@@ -1,9 +1,11 @@
 """Identification by evolution (MGGP/FROE), refinement and validation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Unpack
+
+from numpy.typing import ArrayLike
 
 from islands.data.averaging import count_means
 from islands.data.dataset import Dataset
@@ -19,7 +21,7 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.evolution.archipelago import empty_archipelago
-from islands.evolution.engine import Engine, SerialEngine, Stop
+from islands.evolution.engine import Engine, Stop
 from islands.evolution.hall_of_fame import HallOfFame
 from islands.evolution.presets import resolve_settings
 from islands.evolution.problem import Problem, make_problem
@@ -27,16 +29,24 @@ from islands.evolution.progress import ProgressCallback, ignore_progress
 from islands.evolution.search_result import SearchResult, SearchStatistics, with_average, with_bands
 from islands.evolution.search_state import SearchState, advance, stop_reason
 from islands.evolution.settings import Settings
+from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.rate_selection import TrialLibrary, select_rate
 from islands.facade.result import Result
+from islands.facade.setting_changes import SettingChanges
+from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set, get_library
 from islands.model.expression import Primitive
 from islands.model.primitives import PRIMITIVES
 from islands.model.user_primitive import get_source
 from islands.program.primitive_functions import row_address
+
+if TYPE_CHECKING:
+    from narwhals.typing import IntoSeries
+
+    from islands.io.data_frames import RecordLike
 
 #: Outcomes of individuals with estimated parameters.
 FEASIBLE_OUTCOMES = ("ok", "abandoned")
@@ -49,25 +59,37 @@ SearchCallback = Callable[[SearchState, Settings], None]
 
 
 def identify(
-    record: Dataset,
-    validation: Dataset | float = 0.25,
+    record: "RecordLike",
+    y: "ArrayLike | IntoSeries | None" = None,
+    dt: float | None = None,
     *,
+    inputs: str | Sequence[str] = (),
+    output: str | None = None,
+    validation: "RecordLike | float" = 0.25,
     preset: str = "hysteresis",
     seed: int = 0,
     progress: SearchCallback | None = None,
     stage: ProgressCallback = ignore_progress,
     stop: Stop | None = None,
     start: SearchState | None = None,
-    engine: Engine | None = None,
-    **changes: Any,
+    engine: Engine | Ray | str | None = None,
+    **changes: Unpack[SettingChanges],
 ) -> Result:
     """Identify a model of a record by evolution.
 
     Parameters
     ----------
-    record : Dataset
-        Record without missing values.
-    validation : Dataset or float
+    record : Dataset, data frame or array
+        Data without missing values, as `as_record` takes them: a `Dataset`; a frame of pandas or polars or an
+        xarray Dataset, with ``inputs`` and ``output``; or the inputs as an array, followed by ``y`` and
+        ``dt``.
+    y : array, optional
+        The output, of shape (samples,), if ``record`` is an array.
+    dt : float, optional
+        Sampling time in seconds. A frame with a time, as its index or as a column, does not need it.
+    inputs, output
+        Names of the columns of a frame.
+    validation : Dataset, data frame or float
         Data that select among the hall of fame: a separate record, or the fraction at the end of ``record``.
     preset : str
         An entry of ``PRESETS``.
@@ -81,8 +103,9 @@ def identify(
         Called frequently. Once it returns true, the search ends with the best models so far.
     start : SearchState, optional
         State to continue from; the result equals that of an uninterrupted run.
-    engine : Engine, optional
-        Engine that runs the epochs; `SerialEngine` by default.
+    engine : str, Ray or Engine, optional
+        What runs the islands: ``serial`` (the default), ``ray`` on all cores of this machine,
+        ``islands.Ray(address=..., cpus=...)``, or an engine. The result is the same, bit for bit.
     **changes
         Settings that differ from the preset: ``generations=100, islands=4``. ``primitives`` contains names of
         built-in primitives and primitives of your own, ``("mul", islands.primitive("soften", soften))``.
@@ -101,6 +124,7 @@ def identify(
     ModelError
         The function of a primitive of your own does not compile.
     """
+    record, validation = read_data(record, y, dt, inputs, output, validation)
     settings = resolve_settings(
         preset, {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
     )
@@ -124,7 +148,10 @@ def identify(
         raise SettingsError(
             "the start state has other islands or another seed: pass the settings and the seed of its run"
         )
-    with closing((engine or SerialEngine()).run(search_problem, state.archipelago, stop)) as epochs:
+    with (
+        open_engine(engine, stage) as opened,
+        closing(opened.run(search_problem, state.archipelago, stop)) as epochs,
+    ):
         # Epochs after the last one are never requested, so work that an engine does in advance has no effect.
         while not (stop() or stop_reason(state, settings)) and (epoch := next(epochs, None)):
             state = advance(state, epoch)

@@ -56,7 +56,8 @@ def demo(
         for preset in PRESETS:
             began = perf_counter()
             found = islands.identify(
-                *(estimation, validation),
+                estimation,
+                validation=validation,
                 preset=preset,
                 islands=ISLANDS,
                 progress=search_progress(show),

@@ -77,7 +77,7 @@ def fit(
         began = perf_counter()
         result = islands.fit(
             data,
-            held_out,
+            validation=held_out,
             library=library,
             degree=degree,
             lags=lags,

@@ -155,7 +155,7 @@ def test_the_setting_decides_without_a_test():
 def test_models_that_validate_worse_are_not_used():
     record = lag(white(0), 0)
     worse = Dataset(white(7, 400), -lag(white(7, 400), 0).y, 1.0, ("u_V",), "y_um")
-    assert islands.fit(record, worse, **LIBRARY).search_result.direct_inputs == ()
+    assert islands.fit(record, validation=worse, **LIBRARY).search_result.direct_inputs == ()
 
 
 def test_identify_finds_it_likewise():

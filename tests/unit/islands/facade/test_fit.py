@@ -188,7 +188,8 @@ def test_result_has_the_values_of_default_settings():
 
 
 def test_settings_may_be_numpy_numbers(tmp_path):
-    made = islands.fit(tank(), np.float64(0.5), library="polynomial", max_terms=np.int64(2), seed=np.int64(3))
+    numbers = {"validation": np.float64(0.5), "max_terms": np.int64(2), "seed": np.int64(3)}
+    made = islands.fit(tank(), library="polynomial", **numbers)
     with undrawn_figures():
         made.save(tmp_path)
     saved = json.loads((tmp_path / "result.json").read_text())
@@ -199,14 +200,14 @@ def test_settings_may_be_numpy_numbers(tmp_path):
 
 
 def test_fraction_at_the_end_of_the_record_validates():
-    split = islands.fit(tank(), 0.1, library="polynomial", max_terms=2).search_result.split
+    split = islands.fit(tank(), validation=0.1, library="polynomial", max_terms=2).search_result.split
     assert (split.estimation.samples, split.validation.samples) == (360, 40)
     assert np.array_equal(split.validation.y, tank().y[360:])
 
 
 def test_validation_record_does_not_affect_the_parameters_of_a_structure():
-    whole = islands.fit(tank(), tank(150, seed=5), library="polynomial", max_terms=3)
-    other = islands.fit(tank(), tank(150, seed=6), library="polynomial", max_terms=3)
+    whole = islands.fit(tank(), validation=tank(150, seed=5), library="polynomial", max_terms=3)
+    other = islands.fit(tank(), validation=tank(150, seed=6), library="polynomial", max_terms=3)
     described = whole.search_result.settings["validation"]
     assert (described["samples"], described["sha256"]) == (150, record_document(tank(150, seed=5))["sha256"])
     assert whole.search_result.split.estimation.samples == 400
@@ -222,13 +223,13 @@ def test_validation_record_does_not_affect_the_parameters_of_a_structure():
 
 def test_validation_data_need_the_same_inputs_and_sampling_time():
     record, renamed = piezo(), piezo(200, seed=1, input_names=("u_val_V",), output_name="y_val_um")
-    made = islands.fit(record, renamed, max_terms=2)
+    made = islands.fit(record, validation=renamed, max_terms=2)
     assert made.best.model.input_names == ("u_V",)
     two = Dataset(walk(200, 0, inputs=2), piezo(200).y, 0.01)
     with pytest.raises(RecordError, match=r"has 1 inputs \(u_V\), the validation data 2 \(u1, u2\)"):
-        islands.fit(record, two)
+        islands.fit(record, validation=two)
     with pytest.raises(RecordError, match=r"of 0\.01 s, the validation data of 0\.02 s: resample"):
-        islands.fit(record, piezo(200, dt=0.02))
+        islands.fit(record, validation=piezo(200, dt=0.02))
 
 
 # Records of every kind.
@@ -292,7 +293,7 @@ def test_constant_output_gives_a_model_of_one_term(tmp_path, drawing):
 def test_models_that_diverge_one_step_ahead_are_ranked_last(tmp_path, drawing):
     calm, u = tank(), tank().u.copy()
     u[200] = 1e5
-    made = islands.fit(calm, Dataset(u, calm.y, 1.0), library="polynomial", max_terms=6)
+    made = islands.fit(calm, validation=Dataset(u, calm.y, 1.0), library="polynomial", max_terms=6)
     lost = [m for m in made.models if not m.ranked_model.assessment.outcomes["validation"]["one_step_ahead"]]
     assert 0 < len(lost) < len(made.models)
     assert [m.rank for m in lost] == list(range(len(made.models) - len(lost) + 1, len(made.models) + 1))
@@ -305,7 +306,8 @@ def test_models_that_diverge_one_step_ahead_are_ranked_last(tmp_path, drawing):
 @pytest.mark.ci
 def test_structures_without_estimates_are_counted_by_outcome():
     # Nine samples give six rows after the warm-up, which suffice for five parameters.
-    made = islands.fit(tank(9), tank(100, seed=1), library="polynomial", max_terms=10, certificate=0)
+    held_out = tank(100, seed=1)
+    made = islands.fit(tank(9), validation=held_out, library="polynomial", max_terms=10, certificate=0)
     outcomes = made.search_result.search.outcomes
     assert set(outcomes) == {"ok", "too_few_rows"}
     assert outcomes["ok"] >= len(made.models) == 5
@@ -319,9 +321,8 @@ def test_structures_without_estimates_are_counted_by_outcome():
 @pytest.mark.parametrize("samples", [9, 400])
 def test_progress_fractions_are_monotonic(samples):
     reports = []
-    islands.fit(
-        tank(samples), tank(100, seed=1), library="polynomial", progress=lambda *news: reports.append(news)
-    )
+    parts = {"record": tank(samples), "validation": tank(100, seed=1)}
+    islands.fit(**parts, library="polynomial", progress=lambda *news: reports.append(news))
     texts, shares = zip(*reports, strict=True)
     stages = ("sampling rate", "inner products", "best subsets", "swap search", "model of 1")
     assert list(dict.fromkeys(stage for text in texts for stage in stages if stage in text)) == list(stages)

@@ -150,13 +150,13 @@ def with_or_without_means(search, **changes):
 
 
 def fit_with_shooting(record, validation=0.25, **changes):
-    return islands.fit(record, validation, estimator="shooting", **LIBRARY, **changes)
+    return islands.fit(record, validation=validation, estimator="shooting", **LIBRARY, **changes)
 
 
 def identify_in_two_epochs(record, validation=0.25, **changes):
     budget = {"generations": 2, "migrate_every": 1, "population": 10, "max_terms": 3, "library_degree": 1}
     small = {"max_height": 1, "shifts": (1,), "from_library": 0.0, "feedthrough": "no"}
-    return islands.identify(record, validation, preset="narx", **budget, **small, **changes)
+    return islands.identify(record, validation=validation, preset="narx", **budget, **small, **changes)
 
 
 def measurements(result):

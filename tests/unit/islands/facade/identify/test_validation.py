@@ -22,10 +22,10 @@ from support.searches import distinct_genes
 @pytest.mark.ci
 def test_validation_data_may_be_a_separate_record(data, result):
     parts = split(data, 0.25)
-    separate = identify(parts.estimation, parts.validation, **BUDGET, seed=5)
+    separate = identify(parts.estimation, validation=parts.validation, **BUDGET, seed=5)
     assert parameters(separate) == parameters(result)
     assert separate.search_result.split.validation is parts.validation
-    elsewhere = identify(parts.estimation, record(seed=9), **BUDGET, seed=5)
+    elsewhere = identify(parts.estimation, validation=record(seed=9), **BUDGET, seed=5)
     assert separate.search_result.settings["validation"] != elsewhere.search_result.settings["validation"]
     assert elsewhere.search_result.search.history == result.search_result.search.history
 
@@ -35,7 +35,7 @@ def test_validation_data_do_not_affect_the_search(data, result):
     """Only the selection and order of models may depend on them."""
     parts = split(data, 0.25)
     spoilt = replace(parts.validation, y=parts.validation.y[::-1].copy())
-    other = identify(parts.estimation, spoilt, **BUDGET, seed=5)
+    other = identify(parts.estimation, validation=spoilt, **BUDGET, seed=5)
     assert other.search_result.search.history == result.search_result.search.history
     assert other.search_result.search.outcomes == result.search_result.search.outcomes
     assert parameters(other) != parameters(result)
@@ -91,7 +91,7 @@ def test_record_with_two_inputs_and_segments_is_identified():
     data = Dataset(
         np.column_stack([np.concatenate([one.u, other.u])[:, 0], u2]), y, 1e-2, segments=(1200, 1200)
     )
-    found = identify(data, two_inputs(seed=4), **{**BUDGET, "generations": 2})
+    found = identify(data, validation=two_inputs(seed=4), **{**BUDGET, "generations": 2})
     assert found.best.model.inputs == 2
     assert found.search_result.record.segments == (1200, 1200)
     assert found.best.metrics["validation"]["free_run"].mape < 2.0
@@ -140,18 +140,18 @@ def test_invalid_setting_raises_settings_error_with_its_name(data, changes, mess
 
 def test_too_short_records_raise_an_error_before_the_search(data):
     with pytest.raises(RecordError, match="the validation data has 20 samples: lags up to"):
-        identify(data, record(seed=9)[:20], progress=pytest.fail, **BUDGET)
+        identify(data, validation=record(seed=9)[:20], progress=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="the validation data has 25 samples"):
         identify(data[:100], progress=pytest.fail, **BUDGET)
     with pytest.raises(RecordError, match="take a longer recording"):
-        identify(data[:20], record(seed=9), progress=pytest.fail, **BUDGET)
+        identify(data[:20], validation=record(seed=9), progress=pytest.fail, **BUDGET)
 
 
 def test_validation_data_of_another_system_raise_an_error(data):
     with pytest.raises(RecordError, match="the validation data 2"):
-        identify(data, two_inputs(seed=1), progress=pytest.fail)
+        identify(data, validation=two_inputs(seed=1), progress=pytest.fail)
     with pytest.raises(RecordError, match="resample the validation data"):
-        identify(data, replace(data, dt=0.5), progress=pytest.fail)
+        identify(data, validation=replace(data, dt=0.5), progress=pytest.fail)
 
 
 def test_error_without_models_lists_the_outcomes():
@@ -161,7 +161,7 @@ def test_error_without_models_lists_the_outcomes():
     with pytest.raises(SettingsError, match=r"no model was found: \{'ok': 1\}; take another preset, more"):
         identify(
             growing,
-            Dataset(u, np.sin(np.arange(1000.0)), 0.1),
+            validation=Dataset(u, np.sin(np.arange(1000.0)), 0.1),
             preset="narx",
             population=1,
             generations=0,

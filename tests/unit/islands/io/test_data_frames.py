@@ -1,0 +1,152 @@
+"""Records from data frames and arrays."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+import xarray as xr
+
+import islands
+from islands.io.records import write_record
+from islands.io.result_folder import content_sha256
+from support.searches import record
+
+TIME = 0.04 * np.arange(400)
+RECORD = islands.Dataset(record(400).u, record(400).y, 0.04, ("u_V",), "y")
+COLUMNS = {"u_V": RECORD.u[:, 0], "y": RECORD.y}
+CHOICE = {"inputs": ["u_V"], "output": "y"}
+MOMENTS = pd.Timestamp("2026-03-29 00:59:55", tz="Europe/Berlin") + pd.to_timedelta(TIME, unit="s")
+FRAME = pd.DataFrame(COLUMNS)
+
+SAME = {
+    "a column t_s": FRAME.assign(t_s=TIME),
+    "an index of moments": FRAME.set_index(MOMENTS),
+    "an index of durations": FRAME.set_index(pd.to_timedelta(TIME, unit="s")),
+    "an index of seconds": FRAME.set_index(TIME),
+    "an index of milliseconds": FRAME.set_index(pd.Index(1000 * TIME, name="time_ms")),
+    "a column of moments": FRAME.assign(Datum=MOMENTS),
+    "nullable numbers": FRAME.convert_dtypes().assign(t=TIME),
+    "polars": pl.DataFrame(COLUMNS | {"t": TIME}),
+    "polars with durations": pl.DataFrame(
+        COLUMNS | {"at": pl.Series((1e6 * TIME).round().astype(int)).cast(pl.Duration("us"))}
+    ),
+    "a mapping": COLUMNS | {"t": TIME.tolist()},
+    "a structured array": FRAME.assign(t=TIME).to_records(index=False),
+    "xarray": xr.Dataset({name: ("t", values) for name, values in COLUMNS.items()}, coords={"t": TIME}),
+    "xarray with moments": xr.Dataset(
+        {name: ("at", values) for name, values in COLUMNS.items()}, coords={"at": MOMENTS.tz_convert(None)}
+    ),
+    "xarray with milliseconds": xr.Dataset(
+        {name: ("t", values) for name, values in COLUMNS.items()},
+        coords={"t": ("t", 1000 * TIME, {"units": "ms"})},
+    ),
+}
+
+
+@pytest.mark.parametrize("data", SAME.values(), ids=SAME)
+def test_the_same_columns_give_the_same_record_in_every_container(data):
+    made = islands.as_record(data, **CHOICE)
+    assert (made.input_names, made.input_units, made.output_name) == (("u_V",), ("V",), "y")
+    assert made.dt == pytest.approx(0.04, rel=1e-12)
+    assert np.array_equal(made.u, RECORD.u)
+    assert np.array_equal(made.y, RECORD.y)
+
+
+def test_a_frame_and_its_file_give_the_same_record(tmp_path):
+    write_record(RECORD, tmp_path / "record.csv")
+    read = islands.read_record(tmp_path / "record.csv", **CHOICE)
+    made = islands.as_record(pd.read_csv(tmp_path / "record.csv"), **CHOICE)
+    assert content_sha256(made) == content_sha256(read)
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "names"),
+    [
+        (RECORD.u, RECORD.y, ("u1",)),
+        (RECORD.u[:, 0], RECORD.y[:, None], ("u",)),
+        (RECORD.u[:, 0].tolist(), RECORD.y.tolist(), ("u",)),
+        (FRAME["u_V"], FRAME["y"], ("u_V",)),
+        (FRAME[["u_V"]], FRAME["y"], ("u_V",)),
+        (pl.Series("u_V", RECORD.u[:, 0]), pl.Series("y", RECORD.y), ("u_V",)),
+    ],
+)
+def test_two_arrays_and_a_sampling_time_are_a_record(u, y, names):
+    made = islands.as_record(u, y, 0.04)
+    assert made.input_names == names
+    assert np.array_equal(made.u, RECORD.u)
+    assert np.array_equal(made.y, RECORD.y)
+
+
+def test_units_of_an_xarray_data_set_are_those_of_the_record():
+    data = SAME["xarray"].assign(y=("t", RECORD.y, {"units": "um"}))
+    made = islands.as_record(data, **CHOICE)
+    assert (made.input_units, made.output_unit) == (("V",), "um")
+
+
+def test_an_input_of_a_frame_may_act_at_once():
+    made = islands.as_record(FRAME, dt=0.04, inputs="u_V+1", output="y")
+    assert made.input_names == ("u_V+1",)
+    assert made.u[0, 0] == RECORD.u[1, 0]
+
+
+GAP = np.where(TIME < 8.0, TIME, TIME + 1.0)
+
+#: Data, arguments, and what the message says.
+UNUSABLE = [
+    (FRAME, {"dt": 0.04, "inputs": "volt", "output": "y"}, "no column volt; it has u_V, y"),
+    (FRAME, {"dt": 0.04, "output": "y"}, "no input is given: name one or more of the columns u_V, y"),
+    (FRAME, {"dt": 0.04, "inputs": "u_V"}, "no output is given: take one of the columns u_V, y"),
+    (FRAME, CHOICE, "no time column"),
+    (FRAME.set_index(MOMENTS), {**CHOICE, "dt": 0.1}, "0.04 s by column time and 0.1 s"),
+    (FRAME.set_index(GAP), CHOICE, "the record, sample 200, column time follows a gap"),
+    (FRAME.assign(u_V=FRAME["u_V"].astype(str)), {**CHOICE, "dt": 1.0}, "u_V holds .* where real numbers"),
+    (FRAME.assign(u_V=1.0), {**CHOICE, "dt": 1.0}, "column u_V is constant"),
+    (
+        FRAME.assign(u_V=FRAME["u_V"].where(FRAME.index != 7)),
+        {**CHOICE, "dt": 1.0},
+        "sample 7, column u_V is empty or NaN",
+    ),
+    (FRAME.set_axis(["y", "y"], axis=1), {**CHOICE, "dt": 1.0}, "two columns have the same name"),
+    (pl.LazyFrame(COLUMNS), CHOICE, "collect it first"),
+    (RECORD.u, {}, r"\(u, y, dt\)"),
+    (RECORD.u, {"y": RECORD.y[1:], "dt": 0.04}, "column u1 has 400 samples, column y 399"),
+    (RECORD.u, {"y": RECORD.y, "output": "y"}, "leave them out"),
+    (RECORD.u, {"y": FRAME, "dt": 0.04}, "the output is one column"),
+    (RECORD, {"dt": 0.04}, "give nothing else"),
+    (RECORD, {"y": RECORD}, "validation="),
+    (FRAME, {**CHOICE, "y": 0.25}, "validation="),
+]
+
+
+@pytest.mark.parametrize(("data", "arguments", "message"), UNUSABLE, ids=[each[2] for each in UNUSABLE])
+def test_unusable_data_are_refused_with_the_remedy(data, arguments, message):
+    with pytest.raises(islands.IslandsError, match=message):
+        islands.as_record(data, **arguments)
+
+
+def test_fit_of_a_frame_equals_fit_of_the_record():
+    settings = {"library": "polynomial", "degree": 1, "max_terms": 3}
+    ends = FRAME.iloc[:300], FRAME.iloc[300:]
+    made = islands.fit(ends[0], **CHOICE, dt=0.04, validation=ends[1], **settings)
+    same = islands.fit(RECORD[:300], validation=RECORD[300:], **settings)
+    arrays = islands.fit(
+        FRAME["u_V"].iloc[:300], FRAME["y"].iloc[:300], 0.04, validation=RECORD[300:], **settings
+    )
+    assert made.best.model == same.best.model == arrays.best.model
+
+
+def test_diagnosis_of_a_frame_reads_its_columns():
+    with pytest.raises(islands.RecordError, match="no column volt"):
+        islands.diagnose(FRAME, "linear:1", inputs="volt", output="y", dt=0.04)
+
+
+def test_arrays_import_no_library_of_frames():
+    code = (
+        "import sys, islands; islands.as_record([0.0, 1.0] * 20, [1.0, 2.0] * 20, 0.1);"
+        "print({'pandas', 'polars', 'xarray'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
