@@ -50,7 +50,17 @@ def _is_visible(u: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
     if len(u) < _MIN_SAMPLES or not np.isfinite(height) or height == 0.0:
         return False
     path = float(np.add.reduce(np.abs(np.diff(u))))
+    return bool(path <= _MAX_PATH * 2.0 * width) and measure_area(u, y) >= _MIN_AREA
+
+
+def measure_area(u: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Return the area that output over input encloses, as a fraction of the rectangle around it.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (samples,)
+        One loop of signals that vary; the last sample is connected with the first.
+    """
     # Half the sum of cross products around the closed polygon.
-    x, z = (u - u[0]) / width, (y - y[0]) / height
-    area = 0.5 * abs(float(np.add.reduce(x * np.roll(z, -1) - np.roll(x, -1) * z)))
-    return bool(path <= _MAX_PATH * 2.0 * width) and area >= _MIN_AREA
+    x, z = (u - u[0]) / np.ptp(u), (y - y[0]) / np.ptp(y)
+    return 0.5 * abs(float(np.add.reduce(x * np.roll(z, -1) - np.roll(x, -1) * z)))

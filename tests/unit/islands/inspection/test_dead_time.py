@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset, join
+from islands.inspection.dead_time import estimate_dead_time
+from support.known_records import delay, lag, measure, steps, white
+
+
+def make_record(make_input, dead_time, noise=0.05, seed=0, samples=1500):
+    u = make_input(samples, seed)
+    return measure(u, delay(lag(u, 8.0), dead_time), noise, seed, dt=0.1)
+
+
+@pytest.mark.parametrize("make_input", [white, steps])
+@pytest.mark.parametrize("dead_time", [0, 4, 15, 80])
+def test_dead_time_is_found_within_one_sample(make_input, dead_time):
+    for seed in range(3):
+        fact = estimate_dead_time(make_record(make_input, dead_time, seed=seed), 0)
+        assert abs(fact.value - (dead_time + 1)) <= 1
+        assert fact.interval[0] <= dead_time + 1 <= fact.interval[1]
+
+
+def test_dead_time_of_a_clean_record_is_exact():
+    for dead_time in (0, 3, 11):
+        fact = estimate_dead_time(make_record(white, dead_time, noise=0.0), 0)
+        assert fact.value == dead_time + 1
+        assert fact.confidence > 0.9
+
+
+@pytest.mark.ci
+def test_stated_confidence_is_the_frequency_of_right_values():
+    # Systems of third order begin so slowly that noise hides the first samples.
+    right, confidences = [], []
+    for seed in range(30):
+        u = steps(1200, seed, 10)
+        response = lag(lag(lag(u, 4.0), 5.0), 6.0)
+        fact = estimate_dead_time(measure(u, delay(response, 5), 0.05, seed), 0)
+        right.append(abs(fact.value - 8) <= 1)
+        confidences.append(fact.confidence)
+    assert np.mean(right) >= np.mean(confidences) - 0.15
+    assert np.mean(confidences) < 0.9
+
+
+def test_direct_response_has_no_dead_time():
+    u = white(1000, 0)
+    fact = estimate_dead_time(measure(u, u + lag(u, 5.0), 0.02), 0)
+    assert fact.value == 0
+    assert "within the sample" in fact.sentence
+
+
+def test_predictable_input_does_not_tell_the_dead_time():
+    u = np.sin(0.05 * np.arange(2000))
+    fact = estimate_dead_time(measure(u, delay(lag(u, 8.0), 5), 0.02), 0)
+    assert fact.value is None
+    assert "predictable" in fact.sentence
+
+
+def test_input_without_effect_has_no_visible_response():
+    record = Dataset(white(1500, 0), white(1500, 1), 1.0)
+    assert "visible" in estimate_dead_time(record, 0).sentence
+
+
+def test_every_input_has_its_own_dead_time():
+    u, v = white(2000, 1), white(2000, 2)
+    y = delay(lag(u, 5.0), 3) + delay(lag(v, 5.0), 9)
+    record = Dataset(np.column_stack([u, v]), y + 0.05 * white(2000, 3), 1.0)
+    assert [estimate_dead_time(record, place).value for place in (0, 1)] == [4, 10]
+
+
+def test_short_record_does_not_tell_the_dead_time():
+    fact = estimate_dead_time(make_record(white, 2, samples=40), 0)
+    assert fact.value is None
+    assert "too short" in fact.sentence
+
+
+def test_missing_outputs_are_left_out():
+    whole = make_record(white, 4)
+    y = whole.y.copy()
+    y[300:320] = np.nan
+    assert estimate_dead_time(Dataset(whole.u, y, whole.dt), 0).value == 5
+
+
+def test_recordings_are_not_joined():
+    parts = tuple(make_record(white, 4, seed=seed, samples=500) for seed in range(3))
+    assert estimate_dead_time(join(parts), 0).value == 5
+
+
+def test_sentence_states_samples_and_seconds():
+    assert "after 5 samples (0.5 s)" in estimate_dead_time(make_record(white, 4), 0).sentence
