@@ -20,7 +20,8 @@ def show(
 ) -> None:
     """Show or write a model as an equation, a program, a block for a simulator, or JSON.
 
-    Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of FMI 3.0 and 2.0.
+    Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of
+    FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica.
     """
     extended = options.extended(model)
     if extended is None and out is not None:

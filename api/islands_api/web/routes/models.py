@@ -25,7 +25,17 @@ Rank = Annotated[int, Path(ge=1, le=10_000, description="1 has the least error o
 _MEDIA_TYPES = {"json": "application/json", "mathml": "application/mathml+xml"}
 
 #: File name suffixes of the export formats; others have .txt.
-_SUFFIXES = {"python": "py", "c": "c", "matlab": "m", "latex": "tex", "json": "json", "mathml": "xml"}
+_SUFFIXES = {
+    "python": "py",
+    "c": "c",
+    "s-function": "c",
+    "matlab": "m",
+    "matlab-system": "m",
+    "modelica": "mo",
+    "latex": "tex",
+    "json": "json",
+    "mathml": "xml",
+}
 
 _TEXT_SCHEMA: dict[str, Any] = {"schema": {"type": "string"}}
 _EXPORT_RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -69,7 +79,7 @@ async def exported(
         Query(alias="format", description="Format of the export.", json_schema_extra={"enum": list(EXPORTS)}),
     ] = "python",
 ) -> Response:
-    """Export a model as Python, C, MATLAB, an equation, or a model file."""
+    """Export a model as a program, a block for a simulator, an equation, or a model file."""
     found = await get_model(state, caller, job, rank)
     text = await state.run_blocking(export, model_from_json(found.file, f"model {rank}"), form)
     name = f"model-{rank:02d}.{_SUFFIXES.get(form, 'txt')}"

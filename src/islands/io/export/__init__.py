@@ -12,7 +12,10 @@ from islands.errors import SettingsError, lookup
 from islands.io.export.c import c_source
 from islands.io.export.fmu.archive import fmu2, fmu3
 from islands.io.export.matlab import matlab_source
+from islands.io.export.matlab_system import matlab_system_source
+from islands.io.export.modelica import modelica_source
 from islands.io.export.python import python_source
+from islands.io.export.s_function import s_function_source
 from islands.io.models import model_json
 from islands.model.equations import equation, latex_equation, mathml_equation
 from islands.model.model import Model
@@ -25,6 +28,9 @@ EXPORTS: Mapping[str, Callable[[Model], str]] = MappingProxyType(
         "python": python_source,
         "c": c_source,
         "matlab": matlab_source,
+        "matlab-system": matlab_system_source,
+        "s-function": s_function_source,
+        "modelica": modelica_source,
         "json": model_json,
     }
 )
@@ -44,7 +50,8 @@ def export(model: Model, kind: str) -> str:
     """
     if kind in FILE_EXPORTS:
         raise SettingsError(f"the format {kind} is not text: write a file with --out or write_export")
-    return lookup(EXPORTS, kind, "format")(model)
+    lookup({**EXPORTS, **FILE_EXPORTS}, kind, "format")
+    return EXPORTS[kind](model)
 
 
 def write_export(model: Model, kind: str, path: str | Path) -> None:

@@ -41,7 +41,7 @@ def matlab_source(model: Model) -> str:
         The model has no finite parameters, or a user-defined primitive has no MATLAB body.
     """
     inputs = signals(model)[1:]
-    definitions = [_definition(primitive) for primitive in functions(model)]
+    definitions = [matlab_definition(primitive) for primitive in functions(model)]
     term_texts = terms(model, lambda name, lag: f"{name}(k-{lag})" if lag else f"{name}(k)", _name)
     return _FILE.format(
         heading=heading(model, "%"),
@@ -55,7 +55,14 @@ def matlab_source(model: Model) -> str:
     )
 
 
-def _definition(primitive: Primitive) -> str:
+def matlab_definition(primitive: Primitive) -> str:
+    """Return the definition of a primitive as a MATLAB function.
+
+    Raises
+    ------
+    ModelError
+        The primitive has no MATLAB body.
+    """
     arguments = ", ".join("ab"[: primitive.arity])
     text = textwrap.indent(body(primitive, "matlab"), "  ")
     return f"function r = {_name(primitive)}({arguments})\n{text}\nend\n"

@@ -4,7 +4,7 @@ Simulators call a block once per sample, so that the block keeps the past: FMU, 
 and MATLAB functions read it from the caller's arrays.
 """
 
-from collections.abc import Callable
+import textwrap
 from dataclasses import dataclass
 
 from islands.errors import ModelError
@@ -53,6 +53,11 @@ class SampledState:
         """Return the position of a past sample; ``position("u", 1)`` is that of u(k-1)."""
         return sum(self.depths[: self.signals.index(signal)]) + lag - 1
 
+    def describe(self, mark: str) -> str:
+        """Return a comment that lists the past samples in their order; every line begins with ``mark``."""
+        listed = ", ".join(f"{self.signals[channel]}(k-{lag})" for channel, lag in self.samples)
+        return textwrap.fill(listed, 100, initial_indent=mark, subsequent_indent=mark, break_on_hyphens=False)
+
 
 def make_sampled_state(model: Model) -> SampledState:
     """Return the layout of the state of a model.
@@ -80,25 +85,6 @@ def make_sampled_state(model: Model) -> SampledState:
         tuple((channel, 0) in lags for channel in range(model.inputs + 1)),
         float(model.dt),
     )
-
-
-def state_terms(model: Model, state: SampledState, sample: Callable[[int], str], present: str) -> list[str]:
-    """Return the terms of a model as text in C.
-
-    Parameters
-    ----------
-    sample : callable
-        ``sample(position)`` returns the text of an entry of the state.
-    present : str
-        Format string of the present sample of an input; ``{0}`` is its number, from 0.
-    """
-
-    def read(signal: str, lag: int) -> str:
-        if lag:
-            return sample(state.position(signal, lag))
-        return present.format(state.signals.index(signal) - 1)
-
-    return terms(model, read, c_name)
 
 
 _C_BLOCK = """\
@@ -141,7 +127,13 @@ def c_block(model: Model, state: SampledState) -> str:
 
     Sums and products are evaluated in the same order as in this package's kernels.
     """
-    lines = state_terms(model, state, "state[{}]".format, "input[{}]")
+    lines = terms(
+        model,
+        lambda signal, lag: (
+            f"state[{state.position(signal, lag)}]" if lag else f"input[{state.signals.index(signal) - 1}]"
+        ),
+        c_name,
+    )
     return _C_BLOCK.format(
         inputs=model.inputs,
         states=state.size,

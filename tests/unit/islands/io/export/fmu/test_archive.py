@@ -14,62 +14,13 @@ from islands.errors import ModelError
 from islands.io.export import write_export
 from islands.io.export.fmu.compiler import compile_library, find_compiler
 from islands.io.export.sampled_state import make_sampled_state
-from islands.simulation.predictors import free_run
 from islands.systems.published_models import PUBLISHED
-from support.programs import CASES, HOSTILE_NAMES, model, record, record_of
+from support.block_cases import OF_STATES, block_case
+from support.programs import HOSTILE_NAMES, model
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler is called cc")
 
 FORMATS = ("fmu", "fmu2")
-
-#: Chosen for their states: past inputs and outputs, several inputs, no past, an input that acts at once.
-OF_STATES = {
-    **{
-        name: replace(CASES[name], dt=CASES[name].dt or 0.1)
-        for name in (
-            "published 12",
-            "many parts",
-            "several inputs",
-            "a constant, that needs no past",
-            "no output",
-            "tanh",
-        )
-    },
-    "at once": replace(model({"y(k-1)": 0.5, "u1(k-1)*u2(k-2)": 0.25}, ("a_V+1", "b_A")), dt=0.1),
-}
-
-
-def start_values(exported, data, first):
-    """Return the start values with which sample ``first`` of a record is the first one."""
-    state = make_sampled_state(exported)
-    signals = [data.y, *data.u.T]
-    return {
-        f"start.{state.columns[channel]}[{lag}]": signals[channel][first - lag]
-        for channel, lag in state.samples
-    }
-
-
-def simulated(exported, data, kind, path):
-    """Run an FMU with fmpy from the first sample that needs no measured output."""
-    write_export(exported, kind, path)
-    assert validate_fmu(str(path)) == []
-    first = max(exported.maximum_lag, 1)
-    names, times = exported.column_names, np.arange(data.samples - first) * data.dt
-    signals = np.empty(times.size, [(name, float) for name in ("time", *names)])
-    signals["time"] = times
-    for name, column in zip(names, data.u.T, strict=True):
-        signals[name] = column[first:]
-    found = fmpy.simulate_fmu(
-        str(path),
-        stop_time=times[-1],
-        step_size=data.dt,
-        output_interval=data.dt,
-        start_values=start_values(exported, data, first),
-        input=signals,
-        output=[exported.output_name],
-        fmi_type="CoSimulation",
-    )
-    return first, found[exported.output_name]
 
 
 @pytest.mark.ci
@@ -77,15 +28,27 @@ def simulated(exported, data, kind, path):
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.parametrize("name", OF_STATES)
 def test_fmpy_simulates_like_the_free_run(name, kind, tmp_path):
-    exported = OF_STATES[name]
-    data = record(exported.inputs, dt=0.1) if name == "at once" else record_of(name)
-    first, theirs = simulated(exported, data, kind, tmp_path / "model.fmu")
-    ours = free_run(exported, data)
-    assert ours.outcome
+    exported, data, past, inputs, outputs = block_case(name)
+    path, state = tmp_path / "model.fmu", make_sampled_state(exported)
+    write_export(exported, kind, path)
+    assert validate_fmu(str(path)) == []
+    signals = np.empty(len(outputs), [(column, float) for column in ("time", *exported.column_names)])
+    signals["time"] = np.arange(len(outputs)) * data.dt
+    for column, values in zip(exported.column_names, inputs.T, strict=True):
+        signals[column] = values
+    names = [f"start.{state.columns[channel]}[{lag}]" for channel, lag in state.samples]
+    found = fmpy.simulate_fmu(
+        str(path),
+        stop_time=signals["time"][-1],
+        step_size=data.dt,
+        output_interval=data.dt,
+        start_values=dict(zip(names, past, strict=True)),
+        input=signals,
+        output=[exported.output_name],
+    )
     # With an input that acts at once, the output is late by one sampling time.
-    late = int(any(exported.leads))
-    expected = np.append(data.y[first - late : first], ours.y[first : data.samples - late])
-    np.testing.assert_allclose(theirs, expected, rtol=1e-12, atol=0)
+    expected = [past[0], *outputs[:-1]] if any(exported.leads) else outputs
+    np.testing.assert_allclose(found[exported.output_name], expected, rtol=1e-12, atol=0)
 
 
 class Session:

@@ -1,0 +1,112 @@
+"""Export of a model as a Modelica block."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from islands.data.channel_names import parse_unit
+from islands.errors import ModelError
+from islands.io.export.parts import functions, heading, terms
+from islands.io.export.sampled_state import SampledState, make_sampled_state
+from islands.model.expression import Primitive
+from islands.model.model import Model
+from islands.model.primitives import LARGEST_EXPONENT
+
+_FILE = """\
+block NarxModel "NARX model of {title}"
+{heading}
+  // The first sample is at time 0. The parameters are the samples before it, newest first.
+{parameters}
+{connectors}
+protected
+{states}{functions}equation
+  when sample(0, {dt!r}) then
+    y = {terms};
+    {shifts}
+  end when;
+end NarxModel;
+"""
+
+#: Expressions of the primitives that are functions, in Modelica.
+_BODIES: Mapping[str, str] = MappingProxyType(
+    {
+        "sign": "if a > 0 then 1.0 elseif a < 0 then -1.0 else 0.0",
+        "div": "if b == 0 then 0.0 else a/b",
+        "abs": "abs(a)",
+        "sqrt": "sqrt(abs(a))",
+        "exp": f"exp(min(a, {LARGEST_EXPONENT}))",
+        "log": "if a == 0 then 0.0 else log(abs(a))",
+        "sin": "sin(a)",
+        "cos": "cos(a)",
+        "tanh": "tanh(a)",
+        "max": "if a > b then a else b",
+        "min": "if a < b then a else b",
+    }
+)
+
+
+def modelica_source(model: Model) -> str:
+    """Return a model as a Modelica block with connectors of the Modelica Standard Library.
+
+    The block samples its inputs with the sampling time of the model. Sums and products are evaluated in the
+    same order as in this package's kernels.
+
+    Raises
+    ------
+    ModelError
+        The model has no finite parameters or no sampling time, or it has a user-defined primitive.
+    """
+    state = make_sampled_state(model)
+    stored = [(name, depth) for name, depth in zip(state.signals, state.depths, strict=True) if depth]
+    lines = terms(
+        model,
+        lambda signal, lag: f"pre(past_{signal}[{lag}])" if lag else signal,
+        lambda primitive: f"f_{primitive.name}",
+    )
+    return _FILE.format(
+        title=_escape(model.output_name),
+        heading=heading(model, "  //"),
+        parameters="\n".join(_parameter(name, depth) for name, depth in stored),
+        connectors="\n".join(_connector(state, channel) for channel in range(len(state.signals))),
+        states="".join(
+            f"  discrete Real past_{name}[{depth}](start = start_{name}, each fixed = true);\n"
+            for name, depth in stored
+        ),
+        functions="".join(_function(each) for each in functions(model)),
+        dt=state.dt,
+        # Modelica has no sign after an operator.
+        terms="\n      + ".join(lines).replace("+ -", "- "),
+        shifts="\n    ".join(
+            f"past_{name}[{lag}] = {f'pre(past_{name}[{lag - 1}])' if lag > 1 else name};"
+            for name, depth in stored
+            for lag in range(1, depth + 1)
+        ),
+    )
+
+
+def _parameter(name: str, depth: int) -> str:
+    lags = ", ".join(f"{name}(k-{lag})" for lag in range(1, depth + 1))
+    return f'  parameter Real start_{name}[{depth}] = fill(0.0, {depth}) "{lags}";'
+
+
+def _connector(state: SampledState, channel: int) -> str:
+    column, kind = state.columns[channel], "RealInput" if channel else "RealOutput"
+    unit = parse_unit(column)
+    declared = f'(unit = "{_escape(unit)}")' if unit else ""
+    return f'  Modelica.Blocks.Interfaces.{kind} {state.signals[channel]}{declared} "{_escape(column)}";'
+
+
+def _function(primitive: Primitive) -> str:
+    if primitive.name not in _BODIES:
+        raise ModelError(
+            f"primitive {primitive.name!r} has no text in Modelica: only built-in primitives can be exported"
+        )
+    inputs = "".join(f"    input Real {name};\n" for name in "ab"[: primitive.arity])
+    return (
+        f"  function f_{primitive.name}\n{inputs}    output Real r;\n  algorithm\n"
+        f"    r := {_BODIES[primitive.name]};\n  end f_{primitive.name};\n"
+    )
+
+
+def _escape(text: str) -> str:
+    """Return a text for a string literal."""
+    return text.replace("\\", "\\\\").replace('"', '\\"')
