@@ -18,6 +18,12 @@ from islands.systems.published_models import get_published_model
 Record = Annotated[
     Path, typer.Argument(help="The record: CSV (any separator, decimal comma or point), NPZ, MAT or Parquet.")
 ]
+Records = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RECORD...", help="One or several recordings of a system: CSV, NPZ, MAT or Parquet."
+    ),
+]
 Inputs = Annotated[
     list[str], typer.Option("--input", help="Input column; repeat it, or separate by commas, for several.")
 ]

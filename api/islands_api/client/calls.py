@@ -91,6 +91,7 @@ def submit(
     seed: int = 0,
     dt: float | None = None,
     rows: str | None = None,
+    recordings: Sequence[DatasetRef | Mapping[str, Any]] = (),
     validation: float | DatasetRef | Mapping[str, Any] | None = None,
     name: str = "",
     priority: int = 0,
@@ -111,8 +112,10 @@ def submit(
         Sampling time in seconds, if the record has no time column.
     rows : str, optional
         ``START:STOP``, the samples used for estimation.
+    recordings : sequence of data set or mapping
+        Further recordings of the same system: data sets, or ``{"dataset": ID, "rows": "START:STOP"}``.
     validation : float or data set or mapping, optional
-        Fraction of the record's end, a data set, or ``{"dataset": ID, "rows": "START:STOP"}``.
+        Fraction of the end of every recording, a data set, or a mapping as for ``recordings``.
     settings
         Settings that differ from those of the preset: `islands.evolution.settings.Settings`.
 
@@ -121,8 +124,6 @@ def submit(
     SettingsError
         A number is NaN or infinite, or the idempotency key is not printable ASCII.
     """
-    if isinstance(validation, str | DatasetView):
-        validation = {"dataset": get_id(validation)}
     given: dict[str, Any] = {
         "dataset": get_id(dataset),
         "inputs": as_list(inputs),
@@ -131,12 +132,19 @@ def submit(
         "seed": seed,
         "dt": dt,
         "rows": rows,
-        "validation": validation,
+        "recordings": [_make_part(each) for each in recordings] or None,
+        "validation": validation
+        if isinstance(validation, float | int) or validation is None
+        else _make_part(validation),
         "name": name or None,
         "priority": priority or None,
         "settings": settings or None,
     }
     return make_submission("/v1/jobs", given, idempotency_key)
+
+
+def _make_part(given: DatasetRef | Mapping[str, Any]) -> Mapping[str, Any]:
+    return {"dataset": get_id(given)} if isinstance(given, str | DatasetView) else given
 
 
 def job(which: JobRef) -> RequestSpec[JobView]:

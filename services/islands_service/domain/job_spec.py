@@ -64,6 +64,9 @@ LIMITS = {
 #: Largest number of entries of a list.
 _MAX_ENTRIES = 64
 
+#: Largest number of recordings of a job.
+MAX_RECORDINGS = 64
+
 #: Largest back-shift, in samples.
 MAX_SHIFT = 1000
 
@@ -130,9 +133,13 @@ class Identification(BaseModel):
     output: Name = Field(description="Column that is the output.", examples=["y_um"])
     dt: Seconds | None = Field(default=None, description=_DT)
     rows: Rows | None = Field(default=None, description="Samples that estimate; all by default.")
+    recordings: Annotated[tuple[Part, ...], Field(max_length=MAX_RECORDINGS - 1)] = Field(
+        default=(),
+        description="Further recordings of the same system with the same columns.",
+    )
     validation: Annotated[FiniteFloat, Field(gt=0.0, lt=1.0)] | Part = Field(
         default=0.25,
-        description="The fraction at the end of the record that selects the models, or a data set.",
+        description="The fraction at the end of every recording that selects the models, or a data set.",
     )
     preset: str = Field(default="hysteresis", json_schema_extra={"enum": list(PRESETS)})
     seed: Seed = 0
@@ -147,7 +154,17 @@ class Identification(BaseModel):
     @property
     def datasets(self) -> tuple[str, ...]:
         """Data sets that the job reads."""
-        return (self.dataset, *([self.validation.dataset] if isinstance(self.validation, Part) else []))
+        return tuple(part.dataset for part in self.parts)
+
+    @property
+    def estimation(self) -> tuple[Part, ...]:
+        """Recordings that estimate."""
+        return (Part(dataset=self.dataset, rows=self.rows), *self.recordings)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Recordings that estimate, and the validation data unless it is a fraction of them."""
+        return (*self.estimation, *([self.validation] if isinstance(self.validation, Part) else []))
 
 
 def _check_single(given: Any) -> Any:

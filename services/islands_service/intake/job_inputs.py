@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from islands.data.dataset import Dataset
+from islands.data.dataset import Dataset, join
 from islands.io.records import read_record
 from islands.io.records.row_range import parse_rows
 from islands_service.domain.job_spec import Discrepancy, Identification, Part
@@ -33,7 +33,7 @@ def link_blob(blob: Path, name: str) -> Iterator[Path]:
 def read_record_and_validation(
     spec: Identification, datasets: dict[str, StoredDataset], blobs: Blobs
 ) -> tuple[Dataset, Dataset | float]:
-    """Read the estimation record of a job, and its validation record or fraction.
+    """Read the recordings of a job that estimate, and its validation record or fraction.
 
     Raises
     ------
@@ -43,15 +43,13 @@ def read_record_and_validation(
         The data folder has lost a file.
     """
 
-    def read(dataset: str, rows: str | None) -> Dataset:
-        stored = datasets[dataset]
+    def read(part: Part) -> Dataset:
+        stored = datasets[part.dataset]
         with link_blob(blobs.path(stored.blob), stored.name) as path:
-            return read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(rows))
+            return read_record(path, spec.inputs, spec.output, spec.dt, parse_rows(part.rows))
 
-    record = read(spec.dataset, spec.rows)
-    if isinstance(spec.validation, Part):
-        return record, read(spec.validation.dataset, spec.validation.rows)
-    return record, spec.validation
+    record = join(tuple(read(part) for part in spec.estimation))
+    return record, read(spec.validation) if isinstance(spec.validation, Part) else spec.validation
 
 
 def read_record_and_columns(

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from math import prod
 from typing import Any
 
@@ -82,28 +83,28 @@ def _parts(spec: Identification | Discrepancy, settings: ServiceSettings) -> lis
 def _check_identification(spec: Identification, settings: ServiceSettings) -> list[Part]:
     """Check the settings of an identification; return the data that it reads."""
     resolve_job_settings(spec, settings.max_islands, settings.max_evaluations)
-    parts = [Part(dataset=spec.dataset, rows=spec.rows)]
-    if isinstance(spec.validation, Part):
-        parts.append(spec.validation)
-    return parts
+    return list(spec.parts)
 
 
 def _check_disjoint(parts: list[Part], datasets: list[StoredDataset]) -> None:
-    """Reject validation data with samples of the estimation data, also if the file was uploaded twice."""
-    files = {dataset.blob for dataset in datasets}
-    if len(parts) > 1 and len(files) == 1 and overlap(*(parse_rows(part.rows) for part in parts)):
-        raise SettingsError(
-            "the validation shares samples with those that estimate: give rows START:STOP for each, or "
-            "take another data set for the validation"
-        )
+    """Reject recordings and validation data that share samples, also if a file was uploaded twice."""
+    used = [(dataset.blob, parse_rows(part.rows)) for part, dataset in zip(parts, datasets, strict=True)]
+    for (blob, rows), (other, other_rows) in combinations(used, 2):
+        if blob == other and overlap(rows, other_rows):
+            raise SettingsError(
+                "recordings or validation data share samples: give rows START:STOP for each, or take another "
+                "data set for one of them"
+            )
 
 
 def _check_sampling(datasets: list[StoredDataset]) -> None:
     """Reject data sets with different sampling times, as far as their previews contain them."""
-    estimation, *validation = (dataset.preview["dt"] for dataset in datasets)
-    for dt in validation:
-        if dt is not None:
-            check_dt(estimation, dt, "the data set", "the data set of the validation")
+    first, *others = datasets
+    for other in others:
+        if other.preview["dt"] is not None:
+            check_dt(
+                first.preview["dt"], other.preview["dt"], "the first data set", f"the data set {other.name}"
+            )
 
 
 def _check_discrepancy(spec: Discrepancy) -> list[Part]:

@@ -32,8 +32,8 @@ class Dataset:
         Lengths of the consecutive segments in samples; they sum to ``samples``. No regressor reaches across
         a boundary.
     recordings : tuple of str
-        Name of the recording of every segment, empty if it has none. A recording that was cut at a gap has
-        several consecutive segments.
+        Name of the recording of every segment, or one name for all of them; empty if it has none. A recording
+        that was cut at a gap has several consecutive segments.
     start : float
         Time of the first sample in seconds.
     sha256 : str
@@ -82,7 +82,8 @@ class Dataset:
             raise RecordError(
                 f"the segments' lengths {segments} must be positive and sum to the {len(y)} samples"
             )
-        recordings = tuple(self.recordings) or ("",) * len(segments)
+        recordings = tuple(self.recordings) or ("",)
+        recordings *= len(segments) if len(recordings) == 1 else 1
         if len(recordings) != len(segments):
             raise RecordError(f"{len(segments)} segments need {len(segments)} names, got {recordings}")
         _check_finite(u, y, names, self.output_name)
@@ -199,7 +200,7 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
     """Join several recordings of one system; no regressor reaches from one into another.
 
     Recordings without a name get the number of their place as a name. If a name occurs before, the number is
-    added to it.
+    added to it. A single recording is returned itself.
 
     Raises
     ------
@@ -209,6 +210,8 @@ def join(recordings: tuple[Dataset, ...]) -> Dataset:
     if not recordings:
         raise RecordError("there is no recording to join: give at least one")
     first = recordings[0]
+    if len(recordings) == 1:
+        return first
     for other in recordings[1:]:
         same = (other.input_names, other.output_name, other.input_units, other.output_unit)
         if same != (first.input_names, first.output_name, first.input_units, first.output_unit):

@@ -61,7 +61,7 @@ def split(record: Dataset, fraction: float = 0.25) -> Split:
     ]
     if not all(parts):
         raise SettingsError(f"a fraction of {fraction} of {record.samples} samples leaves a part empty")
-    return Split(*(part[0] if len(part) == 1 else join(part) for part in parts))
+    return Split(*map(join, parts))
 
 
 def split_data(record: Dataset, validation: Dataset | float) -> Split:

@@ -1,5 +1,6 @@
 """``islands jobs``: submission and monitoring of jobs, over REST only."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,7 +52,7 @@ _MAX_NAME_LENGTH = 200
 @jobs.command()
 @with_search_options
 def submit(
-    record: Annotated[Path, typer.Argument(help="The record: CSV, NPZ, MAT or Parquet.")],
+    records: options.Records,
     inputs: options.Inputs,
     output_column: options.Output,
     dt: options.SamplingTime = None,
@@ -69,11 +70,14 @@ def submit(
     watch: Watch = False,
     as_json: Json = False,
 ) -> None:
-    """Upload a record and submit a job that identifies it."""
+    """Upload recordings and submit a job that identifies one model of them."""
     names = options.columns(inputs)
     held_out = _parse_validation(validation)
+    if isinstance(held_out, str) and len(records) > 1:
+        raise SettingsError(f"--validation {held_out}: with several recordings, give a file or a fraction")
     with _client(url, key) as client:
-        dataset = client.upload(record, names, output_column if rows is None else None, dt)
+        whole = output_column if rows is None else None
+        dataset, *others = (client.upload(record, names, whole, dt) for record in records)
         validation_data: float | dict[str, Any] | None
         match held_out:
             case Path():
@@ -90,8 +94,11 @@ def submit(
             seed=search.seed,
             dt=dt,
             rows=rows,
+            recordings=[
+                {"dataset": other.id, **({} if rows is None else {"rows": rows})} for other in others
+            ],
             validation=validation_data,
-            name=_make_name(name, record),
+            name=_make_name(name, records),
             priority=priority,
             idempotency_key=idempotency_key,
             **search.changes,
@@ -138,7 +145,7 @@ def diagnose(
             seed=seed,
             dt=dt,
             rows=rows,
-            name=_make_name(name, record),
+            name=_make_name(name, [record]),
             priority=priority,
             idempotency_key=idempotency_key,
         )
@@ -224,9 +231,10 @@ def result(
                 output.print(f"{out}/: {kind.contents}", markup=False)
 
 
-def _make_name(name: str, record: Path) -> str:
-    """Return the name of a job; if it is empty, the file name of the record."""
-    return name or "".join(each for each in record.name if each.isprintable())[:_MAX_NAME_LENGTH]
+def _make_name(name: str, records: Sequence[Path]) -> str:
+    """Return the name of a job; if it is empty, the file names of the recordings."""
+    files = ", ".join(record.name for record in records)
+    return name or "".join(each for each in files if each.isprintable())[:_MAX_NAME_LENGTH]
 
 
 def _parse_validation(text: str | None) -> Path | str | float | None:

@@ -130,6 +130,7 @@ def read_table(
         output_name=output,
         input_units=tuple(parse_unit(source.removeprefix(structures[source])) for source in sources),
         output_unit=parse_unit(output.removeprefix(structures[output])),
+        recordings=(file,),
         start=step * columns.first if start is None else start,
     )
     return advance_inputs(record, [place for place, name in enumerate(inputs) if name != sources[place]])

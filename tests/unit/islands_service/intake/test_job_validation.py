@@ -81,15 +81,27 @@ def test_record_with_an_insufficient_preview_is_inspected(record, changes):
 
 @pytest.mark.parametrize("other", [ONE, ONE.replace("csv", "txt")])
 def test_data_set_with_the_same_file_is_refused_for_validation(other):
-    with pytest.raises(SettingsError, match="the validation shares samples with those that estimate"):
+    with pytest.raises(SettingsError, match="recordings or validation data share samples"):
         pending_inspections(dataset(), dataset(other), validation={"dataset": other})
     rows = {"rows": "0:60", "validation": {"dataset": other, "rows": "60:"}}
     assert len(pending_inspections(dataset(), dataset(other), **rows)) == 2
 
 
+def test_recordings_are_checked_and_must_not_share_samples():
+    recordings = {"recordings": [{"dataset": OTHER}]}
+    assert pending_inspections(dataset(), dataset(OTHER), **recordings) == ()
+    (pending,) = pending_inspections(dataset(), dataset(OTHER, y_um="NaN in line 7"), **recordings)
+    assert pending.dataset.id == OTHER
+    shared = {"recordings": [{"dataset": OTHER}, {"dataset": OTHER, "rows": "50:"}]}
+    with pytest.raises(SettingsError, match="recordings or validation data share samples"):
+        pending_inspections(dataset(), dataset(OTHER), **shared)
+    with pytest.raises(RecordError, match=r"0\.01 s, the data set a\.csv of 0\.02 s: resample"):
+        pending_inspections(dataset(), dataset(OTHER, dt=0.02), **recordings)
+
+
 def test_data_sets_with_different_sampling_times_are_refused():
     validation = {"validation": {"dataset": OTHER}}
-    with pytest.raises(RecordError, match=r"0\.01 s, the data set of the validation of 0\.02 s: resample"):
+    with pytest.raises(RecordError, match=r"0\.01 s, the data set a\.csv of 0\.02 s: resample"):
         pending_inspections(dataset(), dataset(OTHER, dt=0.02), **validation)
     for other in (dataset(OTHER, dt=0.010001), dataset(OTHER, dt=None)):
         assert len(pending_inspections(dataset(), other, **validation)) == (other.preview["dt"] is None)

@@ -133,6 +133,18 @@ def test_validation_is_rows_or_a_file(
     assert found == expected
 
 
+def test_several_recordings_are_one_job(run: Run, service: Service, owner: str, tmp_path: Path) -> None:
+    (tmp_path / "v.csv").write_bytes(csv(120))
+    code, out, err = run("submit", "r.csv", "v.csv", *COLUMNS, "--json")
+    assert code == 0, err
+    job = json.loads(out)
+    datasets = [job["spec"]["dataset"], *(each["dataset"] for each in job["spec"]["recordings"])]
+    assert job["name"] == "r.csv, v.csv"
+    assert [service.store.datasets.get(owner, each).name for each in datasets] == ["r.csv", "v.csv"]
+    code, _, err = run("submit", "r.csv", "v.csv", *COLUMNS, "--validation", "100:")
+    assert (code, "with several recordings, give a file or a fraction" in err) == (2, True)
+
+
 # Discrepancy jobs.
 
 

@@ -1,0 +1,27 @@
+"""Records of a job: every recording is read with the columns of the job and keeps its name."""
+
+from pathlib import Path
+
+from islands_service.domain.job_spec import Identification
+from islands_service.intake.job_inputs import read_record_and_validation
+from islands_service.store.blobs import Blobs
+from islands_service.store.datasets import StoredDataset
+from support.service import csv, spec
+
+
+def test_recordings_of_a_job_are_joined(tmp_path: Path) -> None:
+    blobs = Blobs(tmp_path)
+    datasets = {
+        name: StoredDataset("me", name, f"{name}.csv", ".csv", blobs.write(csv(samples)), 7, {}, 0.0)
+        for name, samples in (("a", 120), ("b", 90))
+    }
+    recordings = [{"dataset": "b"}, {"dataset": "b", "rows": "10:70"}]
+    order = Identification.model_validate(spec("a", rows="0:100", recordings=recordings, validation=0.5))
+    record, validation = read_record_and_validation(order, datasets, blobs)
+    assert record.rows_by_recording == {
+        "a.csv": slice(0, 100),
+        "b.csv": slice(100, 190),
+        "b.csv (3)": slice(190, 250),
+    }
+    assert validation == 0.5
+    assert order.datasets == ("a", "b", "b")
