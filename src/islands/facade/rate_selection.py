@@ -6,7 +6,7 @@ one-step-ahead error describes the noise. Means of consecutive samples change mo
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import comb, inf, isfinite, lcm
+from math import inf, isfinite, lcm
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,32 +26,16 @@ from islands.estimation.structure_selection.deviations import (
     subtract_offsets,
 )
 from islands.estimation.structure_selection.input_ranking import screen_candidates
+from islands.inspection.oversampling import COUNTS, is_noisy, keeps_bandwidth
 from islands.model.model import Model
 from islands.simulation.outcome import EvaluationOutcome
 from islands.simulation.predictors import Simulation, free_run
-
-#: Samples of a mean that are compared.
-COUNTS = (1, 2, 5, 10, 20, 50)
 
 #: Samples are averaged if the error is at most this fraction of the error without averaging.
 CLEAR_GAIN = 0.8
 
 #: The same for a search that refines: at the rate of the record, it improves more on the trial models.
 CLEAR_GAIN_REFINED = 0.5
-
-#: Smallest noise worth a comparison, relative to the root mean square of the increments of a signal.
-_NOISE = 0.2
-
-#: Order of the differences that separate the noise from the signal.
-_ORDER = 4
-
-#: Largest variance of the noise, relative to that of the signal. Without oversampling, all of a signal looks
-#: like noise.
-_LARGEST_NOISE = 0.1
-
-#: Largest variance within the means, without noise, relative to that of the signal: a sine has 18 means in a
-#: period.
-_VARIANCE_WITHIN = 0.01
 
 #: Fewest means of the estimation data, and of the validation data when two rates are compared.
 _LEAST_ESTIMATION, _LEAST_VALIDATION = 500, 100
@@ -121,7 +105,7 @@ def _choose_count(split: Split, library: TrialLibrary, least: int) -> int:
     with np.errstate(over="ignore", invalid="ignore"):
         counts = [count for count in COUNTS if _permits(split, count, least)]
         interval = _limit_interval(split.validation, counts)
-        if len(counts) == 1 or not _is_noisy(split.estimation):
+        if len(counts) == 1 or not is_noisy(split.estimation):
             return 1
     squares = np.array(
         [
@@ -148,47 +132,12 @@ def _permits(split: Split, count: int, least: int) -> bool:
     for part, fewest in ((estimation, _LEAST_ESTIMATION), (validation, _LEAST_VALIDATION)):
         if _count_in_segments(part, least * count) < max(fewest * count, _LEAST_SHARE * part.samples):
             return False
-    means = average_samples(estimation, count)
-    pairs = [(estimation.y, means.y), *zip(estimation.u.T, means.u.T, strict=True)]
-    return all(_keeps_variance(fine, coarse, count, estimation) for fine, coarse in pairs)
+    return keeps_bandwidth(estimation, count)
 
 
 def _count_in_segments(record: Dataset, least: int) -> int:
     """Return the number of samples in segments of at least ``least`` samples."""
     return sum(length for length in record.segments if length >= least)
-
-
-def _keeps_variance(
-    fine: NDArray[np.float64], coarse: NDArray[np.float64], count: int, record: Dataset
-) -> bool:
-    """Return whether means of a signal have its variance, except for that of the noise."""
-    variance = float(np.var(fine))
-    noise = min(_estimate_noise(fine, record) ** 2, _LARGEST_NOISE * variance)
-    lost = variance - float(np.var(coarse))
-    return lost <= _VARIANCE_WITHIN * variance + noise * (1.0 - 1.0 / count)
-
-
-def _is_noisy(record: Dataset) -> bool:
-    return any(
-        _estimate_noise(signal, record) > _NOISE * _measure_increments(signal, record)
-        for signal in (record.y, *record.u.T)
-    )
-
-
-def _measure_increments(signal: NDArray[np.float64], record: Dataset) -> float:
-    """Return the root mean square of the increments of a signal."""
-    increments = np.concatenate([np.diff(signal[first:last]) for first, last in record.bounds])
-    return float(np.sqrt(np.mean(increments**2)))
-
-
-def _estimate_noise(signal: NDArray[np.float64], record: Dataset) -> float:
-    """Return the standard deviation of the white noise of a signal.
-
-    High-order differences of an oversampled signal vanish, and those of its noise do not. The median ignores
-    the steps of an input.
-    """
-    differences = np.concatenate([np.diff(signal[first:last], _ORDER) for first, last in record.bounds])
-    return float(np.median(np.abs(differences)) / (0.6745 * comb(2 * _ORDER, _ORDER) ** 0.5))
 
 
 def _limit_interval(validation: Dataset, counts: list[int]) -> int:

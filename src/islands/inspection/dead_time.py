@@ -69,7 +69,7 @@ def _find_onset(record: Dataset, place: int) -> Onset | str:
     if not isinstance(found, str) and found.lag < 0.5 * LARGEST:
         return found
     for count in _COARSE:
-        if min(record.segments) < count:
+        if max(record.segments) < count:
             break
         coarse = compare_lags(average_samples(record, count), place, 0)
         if isinstance(coarse, str) or coarse.lag >= LARGEST:

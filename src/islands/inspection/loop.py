@@ -40,6 +40,9 @@ _LEAST_GAIN = 0.4
 #: Squared error, relative to the variance of the output, below which delays and time constants explain it.
 _EXPLAINED = 5e-3
 
+#: Squared error, relative to the variance of the output, above which neither regression describes the record.
+_FAR = 0.1
+
 #: Delay of the turning points, relative to the phase shift of the loop's width: largest one of a hysteresis,
 #: smallest one of a delay.
 _TOGETHER, _LATE = 0.3, 0.6
@@ -81,7 +84,7 @@ def check_loop(record: Dataset, place: int) -> Fact:
     loop, share = _judge(slow)
     if loop is None:
         text = (
-            f"{output} over {name} is a loop, of a hysteresis or of a delay: {name} is too regular to tell."
+            f"{output} over {name} is a loop, of a hysteresis or of a delay: the record does not show which."
         )
     elif loop:
         text = f"{output} over {name} is a loop that remains at low frequency, as that of a hysteresis."
@@ -95,8 +98,10 @@ def _judge(record: Dataset) -> tuple[bool | None, float | None]:
     without, with_plays = _predict(record)
     gains = 1.0 - resample(with_plays) / np.maximum(resample(without), np.finfo(np.float64).tiny)
     better = float(np.mean(gains >= _LEAST_GAIN))
-    if not _is_regular(record) and (better > 0.5 or without.sum() > _EXPLAINED * record.samples):
-        return better >= 0.5, max(better, 1.0 - better)
+    if not _is_regular(record):
+        explained = _EXPLAINED * record.samples < without.sum() and with_plays.sum() < _FAR * record.samples
+        if better > 0.5 or explained:
+            return better >= 0.5, max(better, 1.0 - better)
     late = _compare_tips(record)
     if not late.size:
         return None, None

@@ -52,42 +52,49 @@ def check_rest(record: Dataset) -> Fact:
     if np.count_nonzero(resting & recently) < _LEAST_SAMPLES and usual > 0.0:
         most = float(np.quantile(moved[usable], _CALMEST))
         if most > _TURNING * usual:
-            return _answer(record, None, None, "never rest in this record")
+            return _answer(record, None, None)
         resting, recently = usable & (moved <= most), np.ones(len(moved), dtype=bool)
     resting &= recently
     moving = usable & (moved > max(most, usual))
     if min(np.count_nonzero(resting), np.count_nonzero(moving)) < _LEAST_SAMPLES:
-        return _answer(record, None, None, "never rest in this record")
-    noise = 2.0 * estimate_noise(record.y, record) ** 2
+        return _answer(record, None, None)
+    level = estimate_noise(record.y, record)
+    noise = 2.0 * level * level
     output = _compare_means(motion - noise, resting, moving)
     inputs = _compare_means(moved**2, resting, moving)
     excess = output - inputs
     rests = bool(np.median(excess) <= _RESTS)
     share = float(np.mean((excess <= _RESTS) == rests))
-    percent = 100.0 * float(np.median(output))
-    return _answer(record, rests, share, f"rest, with {percent:.0f} % of its usual motion")
+    return _answer(record, rests, share, tuple(100.0 * float(np.median(part)) for part in (output, inputs)))
 
 
-def _answer(record: Dataset, rests: bool | None, confidence: float | None, ending: str) -> Fact:
+def _answer(
+    record: Dataset, rests: bool | None, confidence: float | None, percent: tuple[float, ...] = ()
+) -> Fact:
+    output = record.output_name
     inputs = "the inputs" if record.inputs > 1 else record.input_names[0]
+    plural = record.inputs > 1
     if rests is None:
-        ending = ending if record.inputs > 1 else ending.replace("rest", "rests", 1)
-        sentence = f"The record does not show whether {record.output_name} rests: {inputs} {ending}."
+        never = "never rest" if plural else "never rests"
+        sentence = f"The record does not show whether {output} rests: {inputs} {never}."
     else:
-        verb = "rests" if rests else "moves"
-        ending = ending if record.inputs > 1 else ending.replace("rest", "rests", 1)
-        sentence = f"{record.output_name} {verb} while {inputs} {ending}."
-    return Fact("rest", record.output_name, rests, "", None, confidence, sentence)
+        verb = f"rests with {inputs}" if rests else f"moves on while {inputs} {'rest' if plural else 'rests'}"
+        have = "have" if plural else "has"
+        sentence = (
+            f"{output} {verb}: it has {percent[0]:.0f} % of its usual motion where {inputs} {have} "
+            f"{percent[1]:.0f} %."
+        )
+    return Fact("rest", output, rests, "", None, confidence, sentence)
 
 
 def _choose_interval(record: Dataset) -> int:
     """Return the samples in which the output moves clearly more than its noise."""
-    noise = estimate_noise(record.y, record)
+    level = _NOISE_LEVELS * estimate_noise(record.y, record)
     for interval in _INTERVALS:
         steps = record.y[interval:] - record.y[:-interval]
         if interval >= record.samples // 20:
             break
-        if np.nanmean(steps**2) >= 2.0 * (_NOISE_LEVELS * noise) ** 2:
+        if np.nanmean(steps**2) >= 2.0 * level * level:
             return interval
     return _INTERVALS[0]
 

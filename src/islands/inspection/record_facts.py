@@ -1,0 +1,107 @@
+"""All facts about a record, with a bound on the samples that they are measured on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from islands.data.dataset import Dataset
+from islands.data.missing_outputs import skip_missing_outputs
+from islands.inspection.channel import Channel, channels
+from islands.inspection.dead_time import estimate_dead_time
+from islands.inspection.drift import measure_drift
+from islands.inspection.excitation import measure_excitation
+from islands.inspection.fact import Fact
+from islands.inspection.loop import check_loop
+from islands.inspection.noise import measure_noise
+from islands.inspection.oversampling import recommend_rate
+from islands.inspection.quantisation import find_quantisation
+from islands.inspection.rest import check_rest
+from islands.inspection.saturation import find_saturation
+
+#: Most samples, and most inputs, that the facts are measured on.
+MOST_SAMPLES, MOST_INPUTS = 100_000, 16
+
+#: Names of the facts, in their order.
+FACTS = (
+    *("samples", "quantisation", "saturation", "noise", "band", "levels", "coverage", "excitation-order"),
+    *("dead-time", "rest", "loop", "drift", "sampling-time"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordFacts:
+    """Facts about a record.
+
+    Attributes
+    ----------
+    facts : tuple of Fact
+        In the order of `FACTS`; facts about several signals in the order of the record.
+    """
+
+    facts: tuple[Fact, ...]
+
+    def find(self, name: str, signal: str | None = None) -> Fact:
+        """Return the fact of a name, about a signal if several have it.
+
+        Raises
+        ------
+        KeyError
+            There is no such fact.
+        """
+        for fact in self.facts:
+            if fact.name == name and signal in (None, fact.signal):
+                return fact
+        raise KeyError(name if signal is None else (name, signal))
+
+
+def measure_facts(record: Dataset) -> RecordFacts:
+    """Measure all facts about a record.
+
+    Missing outputs are skipped. Of a record with more than `MOST_SAMPLES` samples, the middle is taken; the
+    fact ``samples`` says so. The drift is always that of the whole record.
+
+    Parameters
+    ----------
+    record : Dataset
+
+    Raises
+    ------
+    RecordError
+        Every output is missing.
+    """
+    complete = skip_missing_outputs(record)
+    first = max(0, complete.samples - MOST_SAMPLES) // 2
+    part = complete[first : first + MOST_SAMPLES] if complete.samples > MOST_SAMPLES else complete
+    # Statistics of very large numbers overflow: their facts are then unknown.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        found = [_count_samples(record, complete, part, first)]
+        for channel in channels(part):
+            found += _describe_channel(channel, part)
+        varying = [place for place in range(min(part.inputs, MOST_INPUTS)) if np.ptp(part.u[:, place]) > 0.0]
+        found += [estimate_dead_time(part, place) for place in varying]
+        found += [check_rest(part), *(check_loop(part, place) for place in varying)]
+        found += [measure_drift(complete), recommend_rate(part)]
+    return RecordFacts(tuple(sorted(found, key=lambda fact: FACTS.index(fact.name))))
+
+
+def _count_samples(record: Dataset, complete: Dataset, part: Dataset, first: int) -> Fact:
+    seconds = complete.samples * complete.dt
+    text = f"{record.samples} samples of {record.dt:.4g} s: {seconds:.4g} s."
+    if complete is not record:
+        text += f" {record.output_name} is missing in {record.samples - complete.samples} of them."
+    if part is not complete:
+        last = first + part.samples - 1
+        text += f" The facts are those of the samples {first} to {last}, except the drift."
+    return Fact("samples", "", float(record.samples), "", None, None, text)
+
+
+def _describe_channel(channel: Channel, record: Dataset) -> list[Fact]:
+    quantisation = find_quantisation(channel)
+    found = [quantisation, find_saturation(channel, quantisation)]
+    if np.ptp(channel.values) == 0.0:
+        return found
+    excitation = () if channel.is_output else measure_excitation(channel, record)
+    # An input with a few levels has no noise: it is a set point.
+    if not any(fact.name == "levels" and fact.value is not None for fact in excitation):
+        found.append(measure_noise(channel, record, quantisation))
+    return [*found, *excitation]

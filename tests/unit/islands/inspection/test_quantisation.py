@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from islands.inspection.channel import Channel
+from islands.inspection.quantisation import find_quantisation
+from support.known_records import slow, white
+
+
+def find(values):
+    return find_quantisation(Channel("y_V", "V", values, is_output=True))
+
+
+@pytest.mark.parametrize("step", [0.01, 5.0 / 4096.0, 0.3])
+@pytest.mark.parametrize("offset", [0.0, 0.123])
+def test_step_is_exact(step, offset):
+    for seed in range(3):
+        y = slow(2000, seed)
+        y = offset + step * np.round(y / y.std() / step)
+        assert find(y).value == pytest.approx(step, rel=1e-9)
+
+
+def test_step_is_the_divisor_of_all_differences():
+    assert find(np.tile([0.0, 0.4, 1.0], 20)).value == pytest.approx(0.2, rel=1e-9)
+
+
+def test_step_of_printed_values_is_found_despite_their_rounding():
+    exact = np.round(slow(2000, 0) / 5e-3) * 5e-3
+    printed = np.array([float(f"{value:.7g}") for value in exact])
+    assert find(printed).value == pytest.approx(5e-3, rel=1e-6)
+
+
+def test_continuous_signal_is_not_quantised():
+    for seed in range(3):
+        assert find(white(2000, seed)).value is None
+
+
+def test_more_levels_than_a_converter_has_are_no_quantisation():
+    assert find(np.round(white(2000, 0), 6)).value is None
+
+
+def test_two_levels_are_no_lattice():
+    assert find(np.tile([0.0, 1.0], 50)).value is None
+
+
+def test_missing_values_are_left_out():
+    y = np.round(white(1000, 0), 2)
+    y[::7] = np.nan
+    assert find(y).value == pytest.approx(0.01, rel=1e-9)

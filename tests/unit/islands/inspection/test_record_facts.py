@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from islands.data.dataset import Dataset
+from islands.inspection.record_facts import FACTS, MOST_SAMPLES, measure_facts
+from support.known_records import lag, measure, slow, steps, white
+
+
+def test_every_fact_is_measured_once_for_each_signal():
+    u = np.column_stack([steps(2000, 0), slow(2000, 1)])
+    found = measure_facts(Dataset(u, lag(u[:, 0], 5.0) + u[:, 1], 0.1)).facts
+    assert {fact.name for fact in found} == set(FACTS)
+    keys = [(fact.name, fact.signal) for fact in found]
+    assert len(keys) == len(set(keys))
+    assert [keys.count(("dead-time", name)) for name in ("u1", "u2", "y")] == [1, 1, 0]
+
+
+def test_every_fact_is_one_sentence():
+    for fact in measure_facts(measure(steps(2000, 0), lag(steps(2000, 0), 5.0), 0.05)).facts[1:]:
+        assert fact.sentence[0] == fact.sentence[0].strip()
+        assert fact.sentence.endswith(".")
+        assert ". " not in fact.sentence
+
+
+def test_equal_records_have_equal_facts():
+    record = measure(slow(2000, 0), lag(slow(2000, 0), 5.0), 0.05)
+    assert measure_facts(record) == measure_facts(record)
+
+
+def test_facts_do_not_depend_on_the_units():
+    u, y = slow(2000, 0), lag(slow(2000, 0), 5.0)
+    one, other = (measure_facts(measure(u * scale, 7.0 + y * scale, 0.05)) for scale in (1.0, 1000.0))
+    for name in ("dead-time", "rest", "loop", "saturation", "coverage"):
+        assert one.find(name).value == other.find(name).value
+    assert other.find("noise", "y").value == pytest.approx(1000.0 * one.find("noise", "y").value)
+
+
+def test_a_part_of_a_long_record_is_stated():
+    u = white(MOST_SAMPLES + 1000, 0)
+    fact = measure_facts(measure(u, u)).find("samples")
+    assert fact.value == MOST_SAMPLES + 1000
+    assert f"samples 500 to {MOST_SAMPLES + 499}" in fact.sentence
+
+
+def test_missing_outputs_are_counted():
+    u = slow(2000, 0)
+    y = lag(u, 5.0)
+    y[100:150] = np.nan
+    assert "missing in 50" in measure_facts(Dataset(u, y, 1.0)).find("samples").sentence
+
+
+@pytest.mark.parametrize("samples", [1, 2, 5, 30])
+def test_short_records_have_facts(samples):
+    rng = np.random.default_rng(0)
+    assert measure_facts(Dataset(rng.random(samples), rng.random(samples), 1.0)).facts
+
+
+@pytest.mark.parametrize("scale", [0.0, 1e-300, 1e300])
+def test_extreme_values_have_facts(scale):
+    record = Dataset(scale * slow(500, 0), scale * slow(500, 1), 1.0)
+    assert measure_facts(record).facts
+
+
+def test_unknown_fact_is_an_error():
+    with pytest.raises(KeyError, match="colour"):
+        measure_facts(Dataset(white(50, 0), white(50, 1), 1.0)).find("colour")
