@@ -23,9 +23,12 @@ from islands.facade.engine_choice import Ray as Ray
 from islands.facade.explain_residual import explain_residual as explain_residual
 from islands.facade.fit import fit as fit
 from islands.facade.identify import identify as identify
-from islands.facade.result import FittedModel as FittedModel
-from islands.facade.result import Result as Result
-from islands.facade.result import simulate as simulate
+from islands.facade.results.fitted_model import FittedModel as FittedModel
+from islands.facade.results.model_simulation import simulate as simulate
+from islands.facade.results.result import Result as Result
+from islands.facade.results.saved_result import SavedModel as SavedModel
+from islands.facade.results.saved_result import SavedResult as SavedResult
+from islands.facade.results.saved_result import read_result as read_result
 from islands.io.data_frames import as_record as as_record
 from islands.io.models import read_model as read_model
 from islands.io.models import write_model as write_model

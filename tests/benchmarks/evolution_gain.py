@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import islands
 from islands.data.dataset import Dataset
-from islands.facade.result import FittedModel
+from islands.facade.results.fitted_model import FittedModel
 from support.laws import Law
 
 _UNIT = ((-2.0, 2.0),)

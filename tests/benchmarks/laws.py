@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import islands
 from islands.data.dataset import Dataset
 from islands.evolution.search_result import RankedModel, SearchResult
-from islands.facade.result import FittedModel
+from islands.facade.results.fitted_model import FittedModel
 from islands.simulation.predictors import free_run
 from islands.validation.metrics import metrics
 from islands.validation.recommendation import ROUNDING, is_sound

@@ -19,7 +19,8 @@ from time import perf_counter
 import islands
 from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
-from islands.facade.result import FittedModel, Result
+from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.result import Result
 from islands.io.records import read_record
 from islands.systems.catalogue import make_record
 from islands.validation.metrics import metrics

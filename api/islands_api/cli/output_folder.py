@@ -8,7 +8,7 @@ from islands.errors import SettingsError
 from islands_api.cli.console import output
 
 if TYPE_CHECKING:
-    from islands.facade.result import Result
+    from islands.facade.results.result import Result
 
 
 def check_folder(folder: Path, force: bool, result: str = "result.json") -> None:

@@ -45,7 +45,7 @@ from islands.evolution.settings import Settings
 from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import screen
 from islands.facade.rate_selection import TrialLibrary, select_rate
-from islands.facade.result import Result
+from islands.facade.results.result import Result
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document
 from islands.model.candidate_library import full_set, get_library

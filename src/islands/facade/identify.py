@@ -33,7 +33,7 @@ from islands.facade.engine_choice import Ray, open_engine
 from islands.facade.feedthrough_selection import select_feedthrough
 from islands.facade.final_models import estimate_candidates, select_final_models
 from islands.facade.rate_selection import TrialLibrary, select_rate
-from islands.facade.result import Result
+from islands.facade.results.result import Result
 from islands.facade.setting_changes import SettingChanges
 from islands.io.data_frames import read_data
 from islands.io.result_folder import record_document

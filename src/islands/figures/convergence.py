@@ -1,6 +1,8 @@
 """Convergence of a search: error against generations, and error against the number of terms."""
 
+from collections.abc import Mapping, Sequence
 from math import ceil
+from typing import cast
 
 import numpy as np
 from matplotlib import colormaps
@@ -77,6 +79,42 @@ def draw_front(result: SearchResult) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.legend(frameon=False)
     return finish(figure)
+
+
+@house_style()
+def draw_fronts(
+    fronts: Mapping[str, Sequence[tuple[int, float]]],
+    marked: Mapping[str, tuple[int, float]],
+    data: str,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw the errors of the models of several results against their numbers of terms.
+
+    Parameters
+    ----------
+    fronts : mapping
+        Numbers of terms and RMSE of the models of each result, by its name; NaN is left out.
+    marked : mapping
+        The recommended model of each result.
+    data : str
+        What the errors were measured on, for the title.
+    ax : Axes, optional
+        Axes to draw into; by default those of a new figure.
+    """
+    figure = blank(3.2) if ax is None else cast("Figure", ax.get_figure(root=True))
+    axes = figure.subplots() if ax is None else ax
+    for (name, points), colour, marker in zip(fronts.items(), (MEASURED, SIMULATED), "os", strict=True):
+        sizes, errors = zip(*sorted(points), strict=True)
+        axes.plot(sizes, errors, marker=marker, color=colour, label=name)
+        axes.plot(*marked[name], "o", ms=13, mfc="none", color=RESIDUAL)
+    axes.plot([], [], "o", ms=9, mfc="none", color=RESIDUAL, label="recommended")
+    _set_log_scale(axes)
+    axes.set_xlabel("terms")
+    axes.set_ylabel("free-run RMSE")
+    axes.set_title(data, fontsize=8.0)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.legend(frameon=False)
+    return finish(figure) if ax is None else figure
 
 
 def _set_generation_axes(axes: Axes) -> None:

@@ -98,6 +98,27 @@ def draw_free_run(
     return finish(figure)
 
 
+def draw_free_run_panel(axes: Axes, record: Dataset, simulated: NDArray[np.float64]) -> None:
+    """Draw the measured output and the free run into axes, without the residual.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of the user; their style is kept.
+    record, simulated
+        As in `draw_free_run`.
+
+    Raises
+    ------
+    SettingsError
+        The simulation does not have one value per sample.
+    """
+    yhat = finite_part(record, simulated)
+    _draw_outputs(axes, record, yhat, 1.0)
+    axes.set_xlabel("time (s)")
+    axes.legend()
+
+
 def _draw_pair(
     above: Axes,
     below: Axes,
@@ -107,12 +128,10 @@ def _draw_pair(
     weight: float,
 ) -> None:
     time = break_line(record, record.time)
-    measured, simulated = break_line(record, record.y), break_line(record, yhat)
-    residual = measured - simulated
+    measured = break_line(record, record.y)
+    residual = measured - break_line(record, yhat)
     followed = break_line(record, _clip_diverged(record, yhat))
-    above.plot(*downsample(time, measured), color=MEASURED, lw=weight * MEASURED_WIDTH, label="measured")
-    above.plot(*downsample(time, simulated), color=SIMULATED, lw=weight * SIMULATED_WIDTH, label="simulated")
-    above.set_ylim(limits(measured, followed))
+    _draw_outputs(above, record, yhat, weight)
     below.axhline(0.0, color=FRAME, lw=0.6, zorder=1)
     below.plot(*downsample(time, residual), color=RESIDUAL, lw=weight * SIMULATED_WIDTH, label="residual")
     below.set_ylim(limits(measured - followed, np.zeros(1)))
@@ -125,9 +144,17 @@ def _draw_pair(
         for _, end in record.bounds[:-1]:
             axes.axvline(record.time[end] - record.dt / 2, color=FRAME, lw=0.6)
     above.tick_params(labelbottom=False)
-    above.set_ylabel(label(record.output_name, record.output_unit))
     below.set(xlabel="time (s)", ylabel=label("residual", record.output_unit))
     _annotate_divergences(above, record, yhat)
+
+
+def _draw_outputs(axes: Axes, record: Dataset, yhat: NDArray[np.float64], weight: float) -> None:
+    time = break_line(record, record.time)
+    measured, simulated = break_line(record, record.y), break_line(record, yhat)
+    axes.plot(*downsample(time, measured), color=MEASURED, lw=weight * MEASURED_WIDTH, label="measured")
+    axes.plot(*downsample(time, simulated), color=SIMULATED, lw=weight * SIMULATED_WIDTH, label="simulated")
+    axes.set_ylim(limits(measured, break_line(record, _clip_diverged(record, yhat))))
+    axes.set_ylabel(label(record.output_name, record.output_unit))
 
 
 def _draw_band(axes: Axes, record: Dataset, centre: NDArray[np.float64], half: NDArray[np.float64]) -> None:

@@ -70,6 +70,26 @@ def draw_loop(record: Dataset, simulated: NDArray[np.float64], title: str = "") 
     return finish(figure)
 
 
+def draw_loop_panel(axes: Axes, record: Dataset, simulated: NDArray[np.float64]) -> None:
+    """Draw the measured and the simulated output against the first input into axes.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of the user; their style is kept.
+    record, simulated
+        As in `draw_loop`.
+
+    Raises
+    ------
+    SettingsError
+        The simulation does not have one value per sample.
+    """
+    rows = last_loops(record)
+    _draw_loop(axes, record[rows], finite_part(record, simulated)[rows], 0)
+    axes.legend()
+
+
 def _draw_loop(axes: Axes, record: Dataset, yhat: NDArray[np.float64], channel: int) -> None:
     u = break_line(record, record.u[:, channel])
     for values, colour, width, name in (

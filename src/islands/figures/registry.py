@@ -3,40 +3,114 @@
 from collections.abc import Callable, Mapping
 from math import isfinite
 from types import MappingProxyType
+from typing import cast
 
-import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from islands.data.dataset import Dataset
 from islands.data.split import Split
+from islands.errors import SettingsError, lookup
 from islands.evolution.search_result import RankedModel, SearchResult
 from islands.figures.convergence import draw_convergence, draw_front, draw_islands
-from islands.figures.free_run import draw_free_run
+from islands.figures.free_run import draw_free_run, draw_free_run_panel
 from islands.figures.hold import draw_holds
-from islands.figures.hysteresis_loop import draw_loop
+from islands.figures.hysteresis_loop import draw_loop, draw_loop_panel
 from islands.figures.record import draw_record
 from islands.figures.residuals import draw_residual_correlations
+from islands.model.model import Model
 from islands.simulation.predictors import free_run
+from islands.validation.assessment import assess_residual
+from islands.validation.predictable_residual import ResidualStructure
+from islands.validation.prediction_bands import PredictionBands
+from islands.validation.residual_tests import ResidualTests
 
 ModelFigure = Callable[[RankedModel, Split], Figure]
 
 
+#: Draws a model on a record, with a number of samples before the first prediction and prediction bands.
+RecordFigure = Callable[[Model, Dataset, int, PredictionBands | None], Figure]
+
+
+def _free_run_on(model: Model, record: Dataset, warm_up: int, bands: PredictionBands | None) -> Figure:
+    band = None if bands is None else bands.predict(model, record, warm_up=warm_up)
+    return draw_free_run(record, free_run(model, record, warm_up).y, band=band)
+
+
+def _loop_on(model: Model, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
+    return draw_loop(record, free_run(model, record, warm_up).y)
+
+
+def _hold_on(model: Model, record: Dataset, _warm_up: int, _bands: PredictionBands | None) -> Figure:
+    return draw_holds(model, record)
+
+
+def _residuals_on(model: Model, record: Dataset, warm_up: int, _bands: PredictionBands | None) -> Figure:
+    return _draw_residuals(*assess_residual(model, record, warm_up))
+
+
+#: Figures of a model on any record, by the names of `FIGURES`.
+RECORD_FIGURES: Mapping[str, RecordFigure] = MappingProxyType(
+    {"free-run": _free_run_on, "loop": _loop_on, "hold": _hold_on, "residuals": _residuals_on}
+)
+
+#: Figures that one axes can hold, without their secondary panels.
+PANELS = MappingProxyType({"free-run": draw_free_run_panel, "loop": draw_loop_panel})
+
+
+def draw_record_figure(
+    kind: str,
+    model: Model,
+    record: Dataset,
+    warm_up: int,
+    bands: PredictionBands | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw a figure of a model on a record.
+
+    Parameters
+    ----------
+    kind : str
+        A key of `RECORD_FIGURES`.
+    model : Model
+    record : Dataset
+        Record with the inputs and the sampling time of the model.
+    warm_up : int
+        Number of samples before the first prediction.
+    bands : PredictionBands, optional
+        Prediction bands of the model.
+    ax : Axes, optional
+        Axes to draw the first panel into, in their own style.
+
+    Returns
+    -------
+    Figure
+        A new figure, or that of the axes.
+
+    Raises
+    ------
+    SettingsError
+        There is no such figure, or it does not fit into one axes.
+    """
+    draw = lookup(RECORD_FIGURES, kind, "figure")
+    if ax is None:
+        return draw(model, record, warm_up, bands)
+    if kind not in PANELS:
+        raise SettingsError(
+            f"the figure {kind} has several panels: leave ax out, or take {', '.join(PANELS)}"
+        )
+    PANELS[kind](ax, record, free_run(model, record, warm_up).y)
+    return cast("Figure", ax.get_figure(root=True))
+
+
 def _free_run(entry: RankedModel, split: Split) -> Figure:
     """Draw the measured output, the free run with its prediction band, and the residual over time."""
-    band = None
-    if entry.bands is not None:
-        band = entry.bands.predict(entry.model, split.validation, warm_up=entry.assessment.warm_up)
-    return draw_free_run(split.validation, _simulate(entry, split), band=band)
+    return _free_run_on(entry.model, split.validation, entry.assessment.warm_up, entry.bands)
 
 
 def _loop(entry: RankedModel, split: Split) -> Figure:
     """Draw the measured output and the free run against every input."""
-    return draw_loop(split.validation, _simulate(entry, split))
-
-
-def _simulate(entry: RankedModel, split: Split) -> NDArray[np.float64]:
-    """Return the free run on the validation data, with the warm-up of the metrics."""
-    return free_run(entry.model, split.validation, entry.assessment.warm_up).y
+    return _loop_on(entry.model, split.validation, entry.assessment.warm_up, None)
 
 
 def _hold(entry: RankedModel, split: Split) -> Figure:
@@ -46,11 +120,14 @@ def _hold(entry: RankedModel, split: Split) -> Figure:
 
 def _residuals(entry: RankedModel, _split: Split) -> Figure:
     """Draw the correlation functions of the residual with their 95 % band, and its verdict."""
-    structure = entry.assessment.residual_structure
+    return _draw_residuals(entry.assessment.residual_tests, entry.assessment.residual_structure)
+
+
+def _draw_residuals(tests: ResidualTests, structure: ResidualStructure) -> Figure:
     shares = ((structure.one_step_share, "one step ahead"), (structure.free_run_share, "in free run"))
     parts = ", ".join(f"{100 * share:.0f} % {mode}" for share, mode in shares if isfinite(share))
     title = f"residual {structure.verdict}" + (f": predictable part {parts}" if parts else "")
-    return draw_residual_correlations(entry.assessment.residual_tests, title)
+    return draw_residual_correlations(tests, title)
 
 
 FIGURES: Mapping[str, ModelFigure] = MappingProxyType(

@@ -125,6 +125,12 @@ def as_record(
     return replace(record, input_units=tuple(units[:-1]), output_unit=units[-1])
 
 
+def states_time(data: "RecordLike", taken: Sequence[str] = ()) -> bool:
+    """Return whether data with named columns have a time besides the columns that are taken."""
+    columns = _read_columns(data)
+    return columns is not None and bool(columns.time or _time_columns(columns, taken))
+
+
 def read_data(
     data: "RecordLike",
     y: "ArrayLike | IntoSeries | None",
@@ -264,10 +270,17 @@ def _join_output(data: Any, columns: _Columns | None, y: Any) -> tuple[tuple[str
     return tuple(loads), output, _Columns(loads | {output: load}, columns.time or other.time)
 
 
+def _time_columns(columns: _Columns, taken: Sequence[str | None]) -> list[str]:
+    return [
+        name
+        for name in columns.load
+        if name not in taken and looks_like_time(name) and seconds_per_unit(name) is not None
+    ]
+
+
 def _make_table(columns: _Columns, taken: Sequence[str | None]) -> ColumnarFile:
     loads = dict(columns.load)
-    named = [name for name in loads if name not in taken and looks_like_time(name)]
-    if columns.time is not None and not any(seconds_per_unit(name) is not None for name in named):
+    if columns.time is not None and not _time_columns(columns, taken):
         name, times = columns.time
         loads[name] = lambda: times
     return ColumnarFile(_TITLE, tuple(loads), lambda name: loads[name]())

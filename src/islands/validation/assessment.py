@@ -121,7 +121,7 @@ def assess(
         errors,
         outcomes,
         _compute_information(model, split.estimation, warm_up, constraints),
-        *_assess_residual(model, split.validation, warm_up),
+        *assess_residual(model, split.validation, warm_up),
         check_physics(model, split.estimation),
         model.maximum_lag if warm_up is None else warm_up,
         # The loop ends with the validation data.
@@ -160,9 +160,23 @@ def _compute_information(
     return information_criteria(float(np.add.reduce(residual**2)), len(residual), free)
 
 
-def _assess_residual(
+def assess_residual(
     model: Model, record: Dataset, warm_up: int | None
 ) -> tuple[ResidualTests, ResidualStructure]:
+    """Test the residuals of a model on the longest recording of a record.
+
+    Parameters
+    ----------
+    model : Model
+    record : Dataset
+    warm_up : int or None
+        Number of samples before the first prediction. None is the model's largest lag.
+
+    Raises
+    ------
+    ModelError, RecordError, SettingsError
+        As in `assess`.
+    """
     begin, end = max(record.bounds, key=lambda bounds: bounds[1] - bounds[0])
     recording = record[begin:end]
     first = model.maximum_lag if warm_up is None else warm_up

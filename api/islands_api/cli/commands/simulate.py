@@ -12,7 +12,7 @@ from islands.data.compatibility import match_rate
 from islands.data.dataset import Dataset
 from islands.errors import SettingsError
 from islands.facade.fit import SHOOTING
-from islands.facade.result import simulate as run
+from islands.facade.results.model_simulation import simulate as run
 from islands.io.ensembles import read_bands
 from islands.io.records import read_record, write_simulation
 from islands.io.records.row_range import parse_rows

@@ -1,0 +1,133 @@
+"""`simulate`: simulation of a record, and `predict`: free run of a model on any data, one value per row."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from islands.data.compatibility import match_rate
+from islands.data.dataset import Dataset
+from islands.errors import SettingsError, lookup
+from islands.io.data_frames import as_record, states_time
+from islands.model.model import Model
+from islands.simulation.outcome import EvaluationOutcome
+from islands.simulation.predictors import Simulation, free_run, multiple_shooting
+
+if TYPE_CHECKING:
+    from narwhals.typing import IntoSeries
+
+    from islands.io.data_frames import RecordLike
+    from islands.io.simulator_spec.specification import LocalSpec, SimulationSpec
+
+#: Simulation modes, by the names of the command line.
+SIMULATION_MODES = ("one-step", "shooting", "free-run")
+
+
+def simulate(
+    model: "Model | str | Mapping[str, object] | SimulationSpec | LocalSpec",
+    record: Dataset,
+    mode: str = "free-run",
+    shooting: int = 500,
+    columns: Mapping[str, NDArray[np.float64]] | None = None,
+    warm_up: int | None = None,
+) -> Simulation:
+    """Simulate a record.
+
+    Parameters
+    ----------
+    model : Model, str, mapping or spec
+        A model; or a simulator, as its name on the command line (``second-order``), its specification, or
+        the document of an extended simulation.
+    record : Dataset
+        Inputs, and the output from which initial states are taken. Its samples are averaged if the model
+        describes means of samples and the record has the sampling time before averaging (see `match_rate`).
+    mode : str
+        ``one-step``, ``shooting`` (intervals of ``shooting`` samples) or ``free-run``; a simulator has
+        ``free-run`` only.
+    shooting : int
+        Steps of the model in each interval; a step of a model of means is a mean.
+    columns : mapping, optional
+        Recorded simulations by name for the simulator ``column:NAME``, each of shape (samples,).
+    warm_up : int, optional
+        Number of samples before the first prediction of a model; by default the model's largest lag.
+
+    Raises
+    ------
+    RecordError
+        The record does not match the model, or is too short.
+    SettingsError
+        The mode or the simulator is unknown, or the warm-up is shorter than the model's largest lag.
+    """
+    intervals = dict(zip(SIMULATION_MODES, (1, shooting, None), strict=True))
+    interval = lookup(intervals, mode, "mode")
+    if isinstance(model, Model):
+        return multiple_shooting(model, match_rate(model, record), interval, warm_up)
+    if interval is not None:
+        raise SettingsError(f"a simulator has no mode {mode!r}: take free-run")
+    # Import the simulators of the discrepancy analysis only if they are used.
+    from islands.io.simulator_spec.factory import simulate_spec  # noqa: PLC0415
+
+    y = simulate_spec(model, record, columns)
+    return Simulation(y, float(np.mean((record.y - y) ** 2)), EvaluationOutcome())
+
+
+def record_of_model(
+    model: Model,
+    data: "RecordLike",
+    y: "ArrayLike | IntoSeries | None" = None,
+    dt: float | None = None,
+    inputs: str | Sequence[str] = (),
+    output: str | None = None,
+) -> Dataset:
+    """Return the record of a simulation of a model, as `as_record` makes it, with missing outputs.
+
+    The columns of a frame are those of the model, and a frame without a time has the sampling time of the
+    model, unless others are given.
+
+    Raises
+    ------
+    RecordError, SettingsError
+        As in `as_record`.
+    """
+    if isinstance(data, Dataset):
+        return as_record(data, y, dt, inputs=inputs, output=output)
+    if y is None:
+        inputs, output = inputs or model.column_names, output or model.output_name
+    if dt is None and model.dt is not None and not states_time(data, (*inputs, output or "")):
+        dt = model.dt / model.average
+    return as_record(data, y, dt, inputs=inputs, output=output, missing_output=True)
+
+
+def predict(model: Model, record: Dataset, warm_up: int | None = None) -> NDArray[np.float64]:
+    """Return the free run of a model with one value for every sample of a record.
+
+    Each sample of a model of means has the prediction of its mean.
+
+    Parameters
+    ----------
+    model : Model
+    record : Dataset
+        Inputs, and the first samples of the output.
+    warm_up : int, optional
+        Number of steps of the model before the first prediction; by default the model's largest lag.
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        NaN during the warm-up of every segment and after a divergence.
+
+    Raises
+    ------
+    RecordError
+        The record does not match the model, is too short, or its output is missing in the warm-up.
+    """
+    data = match_rate(model, record)
+    simulated = free_run(model, data, warm_up).y
+    if data is record:
+        return simulated
+    predicted = np.full(record.samples, np.nan)
+    for (begin, _), (first, last) in zip(record.bounds, data.bounds, strict=True):
+        means = simulated[first:last]
+        predicted[begin : begin + len(means) * model.average] = np.repeat(means, model.average)
+    return predicted

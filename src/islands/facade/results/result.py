@@ -1,0 +1,70 @@
+"""Result of `fit` and `identify`."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from islands.evolution.search_result import SearchResult
+from islands.facade.results.fitted_model import FittedModel
+from islands.facade.results.notebook_html import render_html
+from islands.facade.results.ranked_models import RankedModels, write_validation_key
+from islands.io.model_description import describe
+from islands.io.result_folder import content_sha256, write_result
+from islands.io.summary_text import summary
+from islands.validation.recommendation import Recommendation
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Result(RankedModels[FittedModel]):
+    """Result of a search."""
+
+    search_result: SearchResult
+
+    @property
+    def models(self) -> tuple[FittedModel, ...]:
+        """All models, in the order of their free-run error on the validation data."""
+        return tuple(
+            FittedModel(rank, entry, self.search_result)
+            for rank, entry in enumerate(self.search_result.models, start=1)
+        )
+
+    @property
+    def recommendation(self) -> Recommendation:
+        """Rank of the recommended model, and the reasons for the choice."""
+        return self.search_result.recommendation
+
+    def with_wall_time(self, seconds: float) -> "Result":
+        """Return a copy of the result with the duration of the search in seconds."""
+        return Result(replace(self.search_result, search=replace(self.search_result.search, wall_s=seconds)))
+
+    def save(self, folder: str | Path) -> Path:
+        """Write ``result.json``, ``models/``, ``figures/`` (of the recommended model) and ``summary.txt``."""
+        from islands.figures.registry import SEARCH_FIGURES, model_figures, search_figures  # noqa: PLC0415
+        from islands.figures.style import save  # noqa: PLC0415
+
+        folder = Path(folder)
+        figures = folder / "figures"
+        figures.mkdir(parents=True, exist_ok=True)
+        # An earlier result in the folder may have had a loop.
+        (figures / "loop.svg").unlink(missing_ok=True)
+        for kind in model_figures(self.search_result):
+            save(self.best.plot(kind), figures / f"{kind}.svg")
+        for name in search_figures(self.search_result):
+            save(SEARCH_FIGURES[name](self.search_result), figures / f"{name}.svg")
+        write_result(self.search_result, folder)
+        return folder
+
+    def __str__(self) -> str:
+        return summary(self.search_result)
+
+    @property
+    def validation_key(self) -> str:
+        """Text that identifies the validation data."""
+        found = self.search_result
+        return write_validation_key(
+            found.record.sha256 or content_sha256(found.record), found.settings, found.average
+        )
+
+    def _repr_html_(self) -> str:
+        # The equation, which is indented, is shown in MathML.
+        sentences = [line for line in describe(self.search_result) if not line.startswith(" ")]
+        return render_html(self.best.model, sentences, self.best.plot())

@@ -1,0 +1,163 @@
+"""Comparison of two results: a table of the recommended models, and the errors of all models."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from html import escape
+from math import isfinite, nan
+from typing import TYPE_CHECKING
+
+from islands.data.compatibility import match_rate
+from islands.errors import SettingsError
+from islands.facade.results.assessed_model import AssessedModel
+from islands.facade.results.model_simulation import record_of_model
+from islands.facade.results.notebook_html import image_html
+from islands.validation.metrics import Metrics, metrics
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from islands.io.data_frames import RecordLike
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedModel:
+    """One row of a comparison.
+
+    Attributes
+    ----------
+    result : str
+        Name of the result.
+    rank, terms : int
+    rmse, mape, r2 : float
+        Errors in free run: in the unit of the output, in per cent of the output range, and R2. NaN after a
+        divergence.
+    equation : str
+    """
+
+    result: str
+    rank: int
+    terms: int
+    rmse: float
+    mape: float
+    r2: float
+    equation: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ResultComparison:
+    """Recommended models of two results, and the errors of all their models.
+
+    Attributes
+    ----------
+    recommended : tuple of ComparedModel
+        Recommended model of each result.
+    models : tuple of ComparedModel
+        All models of both results.
+    data : str
+        What the errors were measured on.
+    """
+
+    recommended: tuple[ComparedModel, ...]
+    models: tuple[ComparedModel, ...]
+    data: str
+
+    def plot(self, *, ax: "Axes | None" = None) -> "Figure":
+        """Draw the RMSE of the free run of all models over their number of terms, by result.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes to draw into.
+        """
+        from islands.figures.convergence import draw_fronts  # noqa: PLC0415
+
+        names = dict.fromkeys(each.result for each in self.models)
+        fronts = {
+            name: [(each.terms, each.rmse) for each in self.models if each.result == name] for name in names
+        }
+        marked = {each.result: (each.terms, each.rmse) for each in self.recommended}
+        return draw_fronts(fronts, marked, self.data, ax)
+
+    def __str__(self) -> str:
+        lines = [*self._cells()]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        rows = ("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
+        return "\n".join([f"Errors in free run on {self.data}", *rows])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        head, *rows = (
+            "".join(f'<t{kind} style="text-align: left">{escape(cell)}</t{kind}>' for cell in line)
+            for kind, line in zip("h" + "d" * len(self.recommended), self._cells(), strict=True)
+        )
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        sentence = f"<p>Errors in free run on {escape(self.data)}</p>"
+        return f"<div>{sentence}{table}{image_html(self.plot(), 'error over the number of terms')}</div>"
+
+    def _cells(self) -> list[list[str]]:
+        head = [each.name for each in fields(ComparedModel)]
+        return [head, *([_write(getattr(row, name)) for name in head] for row in self.recommended)]
+
+
+def _write(value: object) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.4g}" if isfinite(value) else "diverged"
+
+
+def compare_models(
+    results: Sequence[Sequence[AssessedModel]],
+    chosen: Sequence[int],
+    names: Sequence[str],
+    same_data: bool,
+    record: "RecordLike | None",
+) -> ResultComparison:
+    """Compare the models of two results.
+
+    Parameters
+    ----------
+    results : sequence of sequence of AssessedModel
+        Models by rank, of each result.
+    chosen : sequence of int
+        Rank of the recommended model of each result.
+    names : sequence of str
+        Names of the results.
+    same_data : bool
+        Whether both results have the same validation data.
+    record : Dataset or data frame, optional
+        Record that all models simulate, in place of the validation data.
+
+    Raises
+    ------
+    SettingsError
+        The names are not two different ones.
+    RecordError
+        The record does not match a model.
+    """
+    if len(set(names)) != len(results):
+        raise SettingsError(f"two results need two different names, got {', '.join(names)}")
+    rows = [
+        [_row(name, each, record) for each in models] for name, models in zip(names, results, strict=True)
+    ]
+    data = "the given record"
+    if record is None:
+        data = "the validation data"
+        if not same_data:
+            data += " of each result, which differ: give a record to compare on"
+    recommended = tuple(models[rank - 1] for rank, models in zip(chosen, rows, strict=True))
+    return ResultComparison(recommended, tuple(row for models in rows for row in models), data)
+
+
+def _row(name: str, entry: AssessedModel, record: "RecordLike | None") -> ComparedModel:
+    if record is None:
+        errors = entry.metrics["validation"]["free_run"]
+    else:
+        data = match_rate(entry.model, record_of_model(entry.model, record))
+        run = entry.simulate(data)
+        errors = metrics(data.y, run.y) if run.outcome else Metrics(nan, nan, nan, nan)
+    return ComparedModel(
+        name, entry.rank, entry.model.size, errors.rmse, errors.mape, errors.r2, entry.equation
+    )

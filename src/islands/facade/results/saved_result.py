@@ -1,0 +1,179 @@
+"""`read_result`: the result of a folder, from its JSON files alone."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from islands.data.dataset import Dataset
+from islands.errors import ModelError
+from islands.facade.results.assessed_model import AssessedModel
+from islands.facade.results.notebook_html import render_html
+from islands.facade.results.ranked_models import RankedModels, write_validation_key
+from islands.io.ensembles import bands_from_document, ensemble_from_document
+from islands.io.models import read_model
+from islands.io.result_models import read_shooting_interval
+from islands.model.expression import Primitive
+from islands.model.model import Model
+from islands.model.primitives import PRIMITIVES
+from islands.validation.metrics import Metrics
+from islands.validation.prediction_bands import PredictionBands
+from islands.validation.recommendation import Recommendation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SavedModel(AssessedModel):
+    """One model of a result folder.
+
+    Attributes
+    ----------
+    rank : int
+        Rank of the model; 1 has the least validation error.
+    model : Model
+        Regressors, parameters, standard errors.
+    document : mapping
+        Entry of the model in ``result.json``: also physics checks, residual tests and constraints.
+    metrics : mapping
+        Errors by part and prediction, for example ``metrics["validation"]["free_run"].mape``.
+    warm_up, shooting_interval : int
+        Samples before the first prediction, and steps in an interval of multiple shooting, of these errors.
+    prediction_bands : PredictionBands or None
+        Prediction bands of every level; None if the free run of the model diverged.
+    output_unit : str
+        Unit of the output; empty if unknown.
+    """
+
+    rank: int
+    model: Model
+    document: Mapping[str, Any]
+    metrics: Mapping[str, Mapping[str, Metrics]]
+    warm_up: int
+    shooting_interval: int
+    prediction_bands: PredictionBands | None
+    output_unit: str
+
+    @property
+    def validation(self) -> Dataset:
+        """A folder has no data.
+
+        Raises
+        ------
+        ModelError
+            Always.
+        """
+        raise ModelError("a result folder has no data: give a record, plot(record=...)")
+
+    def _draw(self, kind: str) -> "Figure":
+        raise ModelError(f"a result folder has no data: give a record, plot({kind!r}, record=...)")
+
+    def _repr_html_(self) -> str:
+        return render_html(self.model, [self.describe_error()])
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SavedResult(RankedModels[SavedModel]):
+    """Result of a folder.
+
+    Attributes
+    ----------
+    folder : Path
+    document : mapping
+        Content of ``result.json``: record, settings, statistics of the search, models.
+    models : tuple of SavedModel
+        All models, in the order of their free-run error on the validation data.
+    recommendation : Recommendation
+        Rank of the recommended model, and the reasons for the choice.
+    """
+
+    folder: Path
+    document: Mapping[str, Any]
+    models: tuple[SavedModel, ...]
+    recommendation: Recommendation
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Settings that determine the result, together with the record and the seed."""
+        settings: Mapping[str, Any] = self.document["settings"]
+        return settings
+
+    @property
+    def validation_key(self) -> str:
+        """Text that identifies the validation data."""
+        average = self.document["preprocessing"]["average"]
+        return write_validation_key(self.document["record"]["sha256"], self.settings, average)
+
+    def __str__(self) -> str:
+        return (self.folder / "summary.txt").read_text(encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        reasons = [f"Recommended: model {self.best.rank}: {'; '.join(self.recommendation.reasons)}"]
+        return render_html(self.best.model, [*reasons, self.best.describe_error()])
+
+
+def read_result(folder: str | Path, primitives: Mapping[str, Primitive] = PRIMITIVES) -> SavedResult:
+    """Read the result of a folder that `islands identify`, `islands fit` or `Result.save` wrote.
+
+    Models, errors, settings and prediction bands are those of the search, bit for bit. A folder has no data:
+    give a record to the figures.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder with ``result.json`` and ``models/``.
+    primitives : mapping
+        Primitives that expressions may contain; add your own with ``PRIMITIVES | {mine.name: mine}``.
+
+    Raises
+    ------
+    ModelError
+        There is no result in the folder, it is damaged, or it was written by a version without these files.
+    """
+    folder = Path(folder)
+    file = folder / "result.json"
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ModelError(f"{folder} has no result.json: give the folder of a result") from error
+    except (OSError, ValueError) as error:
+        raise ModelError(f"{file} cannot be read ({error})") from error
+    try:
+        entries = document["models"]
+        models = [
+            read_model(folder / "models" / f"{entry['rank']:02d}.json", primitives) for entry in entries
+        ]
+        ensemble = ensemble_from_document(document["ensemble"], models[0], primitives)
+        shooting = read_shooting_interval(document)
+        stored = tuple(
+            SavedModel(
+                entry["rank"],
+                model,
+                MappingProxyType(entry),
+                _read_metrics(entry["metrics"]),
+                entry["warm_up"],
+                shooting,
+                bands_from_document(entry["bands"], ensemble),
+                document["record"]["units"]["output"],
+            )
+            for entry, model in zip(entries, models, strict=True)
+        )
+        chosen = document["recommended"]
+        recommendation = Recommendation(stored[chosen["rank"] - 1].rank, tuple(chosen["reasons"]))
+    except (KeyError, TypeError, IndexError, ValueError) as error:
+        raise ModelError(f"{file} is damaged or of another version: {error!r} is missing or wrong") from error
+    return SavedResult(folder, MappingProxyType(document), stored, recommendation)
+
+
+def _read_metrics(document: Mapping[str, Any]) -> dict[str, dict[str, Metrics]]:
+    return {
+        part: {
+            mode: Metrics(**{name: nan if number is None else number for name, number in errors.items()})
+            for mode, errors in by_mode.items()
+        }
+        for part, by_mode in document.items()
+    }

@@ -1,0 +1,118 @@
+"""Result of a search: the recommended model and the folder."""
+
+import json
+import re
+from base64 import b64decode
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import islands
+from islands.model.equations import mathml_equation
+from support.searches import record
+from support.undrawn import undrawn_figures
+
+
+def test_the_best_model_is_the_recommended_one(result):
+    assert result.best.rank == result.recommendation.rank
+    assert result.best.model == result.search_result.recommended.model
+    least = result.models[0].metrics["validation"]["free_run"].rmse
+    assert all(model.metrics["validation"]["free_run"].rmse >= least for model in result.models)
+
+
+def test_a_result_without_a_loop_replaces_the_loop_figure_of_an_earlier_one(result, tmp_path):
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    (figures / "loop.svg").touch()
+    with undrawn_figures():
+        result.save(tmp_path)
+    assert "loop.svg" not in {path.name for path in figures.iterdir()}
+    assert json.loads((tmp_path / "result.json").read_text())["loop"] is False
+
+
+def test_results_models_and_records_are_represented_in_one_line(result):
+    text = repr(result)
+    assert text == f"<Result of {len(result.models)} models, recommended: {result.best.equation}>"
+    assert repr(result.models[1]) == f"<FittedModel of rank 2: {result.models[1].equation}>"
+    assert repr(record(400)) == "<Dataset of 400 samples of 0.04 s: u to y>"
+
+
+def test_a_notebook_shows_the_equation_the_sentences_and_a_figure(result):
+    shown = result._repr_html_()
+    assert mathml_equation(result.best.model) in shown
+    assert "<p>Recommended: model " in shown
+    assert "<p>Next: " in shown
+    image = re.search(r'src="data:image/svg\+xml;base64,([^"]+)"', shown)
+    assert b"</svg>" in b64decode(image[1])
+    rmse = result.models[1].metrics["validation"]["free_run"].rmse
+    assert f"<p>Rank 2: free-run RMSE on the validation data {rmse:.4g}</p>" in result.models[1]._repr_html_()
+
+
+def test_predictions_of_a_frame_have_one_value_per_row(result):
+    data = record(400)
+    frame = pd.DataFrame({"u": data.u[:, 0], "y": data.y})
+    predicted = result.predict(frame)
+    assert predicted.shape == (400,)
+    assert np.array_equal(predicted, result.best.simulate(data).y, equal_nan=True)
+    # The free run reads only the first samples of the output.
+    frame.loc[result.best.warm_up :, "y"] = np.nan
+    assert np.array_equal(result.predict(frame), predicted, equal_nan=True)
+    assert np.array_equal(result.predict(data.u, data.y, data.dt), predicted, equal_nan=True)
+    with pytest.raises(islands.RecordError, match="no column u; it has v, y"):
+        result.predict(frame.rename(columns={"u": "v"}))
+
+
+def test_rows_of_a_model_of_means_have_the_prediction_of_their_mean():
+    data = islands.join((record(400), record(205, seed=3)))
+    result = islands.fit(data, library="polynomial", degree=1, max_terms=2, average=4)
+    predicted, means = result.predict(data), result.best.simulate(data).y
+    assert predicted.shape == (605,)
+    assert np.array_equal(predicted[:400:4], means[:100], equal_nan=True)
+    assert np.array_equal(
+        predicted[400:600].reshape(-1, 4), np.repeat(means[100:150, None], 4, 1), equal_nan=True
+    )
+    assert np.isnan(predicted[604])
+
+
+def test_the_table_of_models_has_their_errors_by_rank(result):
+    table = result.to_pandas()
+    assert [*table.index] == [model.rank for model in result.models]
+    assert table.loc[table["recommended"]].index == [result.best.rank]
+    assert [*table["rmse_val"]] == [model.metrics["validation"]["free_run"].rmse for model in result.models]
+    assert [*table["terms"]] == [model.model.size for model in result.models]
+    assert table.loc[1, "equation"] == result.models[0].equation
+
+
+def test_a_figure_of_another_record_is_that_of_its_simulation(result):
+    other = record(200, seed=5)
+    drawn = result.best.plot(record=other).axes[0].get_lines()[1].get_ydata()
+    assert np.array_equal(drawn, result.best.simulate(other).y, equal_nan=True)
+    for kind in ("loop", "hold", "residuals"):
+        assert result.best.plot(kind, record=other).axes
+
+
+@pytest.mark.parametrize("kind", ["free-run", "loop"])
+def test_a_figure_is_drawn_into_the_axes_of_the_user(result, kind):
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    assert result.best.plot(kind, ax=right) is figure
+    assert not left.has_data()
+    assert {text.get_text() for text in right.get_legend().get_texts()} == {"measured", "simulated"}
+
+
+def test_a_figure_of_several_panels_does_not_fit_into_one_axes(result):
+    from matplotlib.figure import Figure
+
+    with pytest.raises(islands.SettingsError, match="several panels"):
+        result.best.plot("residuals", ax=Figure().subplots())
+
+
+def test_a_model_is_exported_as_text_or_to_a_file(result, tmp_path):
+    assert "double" in result.best.export("c")
+    assert result.best.export("json", tmp_path / "model.json") is None
+    assert islands.read_model(tmp_path / "model.json") == result.best.model
+    with pytest.raises(islands.SettingsError, match="not text"):
+        result.best.export("fmu")
