@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from islands.io.export import EXPORTS, FILE_EXPORTS, export, write_export
-from islands.io.export.extension import export_extended
+from islands.io.export.closed_form import closed_form
+from islands.io.export.extension import EXTENDED_EXPORTS
 from islands_api.cli import options
 
 
@@ -21,13 +22,18 @@ def show(
     """Show or write a model as an equation, a program, a block for a simulator, or JSON.
 
     Equations: plain text, LaTeX, MathML. Programs: Python, C, MATLAB. Blocks: FMU of
-    FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica.
+    FMI 3.0 and 2.0, Simulink S-function, MATLAB System, Modelica. An extended
+    simulation with a closed form is exported like a model.
     """
     extended = options.extended(model)
-    if extended is None and out is not None:
-        write_export(options.model(model), kind, out)
-        return
-    text = export(options.model(model), kind) if extended is None else export_extended(extended, kind)
+    if extended is not None and kind in EXTENDED_EXPORTS:
+        text = EXTENDED_EXPORTS[kind](extended)
+    else:
+        chosen = options.model(model) if extended is None else closed_form(extended)
+        if out is not None:
+            write_export(chosen, kind, out)
+            return
+        text = export(chosen, kind)
     if out is None:
         typer.echo(text.rstrip("\n"))
     else:

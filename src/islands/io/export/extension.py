@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from islands.discrepancy.effects import get_summary
-from islands.errors import lookup
 from islands.io.simulator_spec.specification import LocalExtendedSpec
 
 
@@ -56,14 +55,3 @@ if __name__ == "__main__":
 EXTENDED_EXPORTS: Mapping[str, Callable[[LocalExtendedSpec], str]] = MappingProxyType(
     {"plain": as_text, "python": as_program, "json": as_json}
 )
-
-
-def export_extended(spec: LocalExtendedSpec, kind: str) -> str:
-    """Return an extended simulation in a format of ``EXTENDED_EXPORTS``.
-
-    Raises
-    ------
-    SettingsError
-        There is no such format.
-    """
-    return lookup(EXTENDED_EXPORTS, kind, "format of an extended simulation")(spec)
